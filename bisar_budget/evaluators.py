@@ -100,56 +100,6 @@ def published_ground_inverse(
     )
 
 
-def full_motion(
-    x: float,
-    y: float,
-    z: float,
-    slant_range: float,
-    tau: float,
-) -> tuple[tuple[float, ...], ...]:
-    """Range error of one unit of each motion error of one platform at one slow time. [m/unit]
-
-    −u·r̃(τ): the line of sight is that of the position then, nothing is held constant. Position and
-    slant range are those at the slow time. Derived here.
-    """
-    along_x = -x/slant_range
-    along_y = -y/slant_range
-    along_z = -z/slant_range
-    shared_0 = 0.5*tau**2
-    return (
-        (along_x, along_y, along_z),  # position x, y, z
-        (along_x*tau, along_y*tau, along_z*tau),  # velocity x, y, z
-        (along_x*shared_0, along_y*shared_0, along_z*shared_0),  # acceleration x, y, z
-    )
-
-
-def direct_motion(
-    x: float,
-    y: float,
-    z: float,
-    slant_range: float,
-    b_x: float,
-    b_y: float,
-    b_z: float,
-    tau: float,
-) -> tuple[tuple[float, ...], ...]:
-    """As full_motion, where the receiver hears the transmitter and takes it as its clock. [m/unit]
-
-    −(u − b)·r̃(τ), b the unit vector from the other platform to this one. Position, slant range and b
-    are those at the slow time. Derived here.
-    """
-    shared_0 = 1/slant_range
-    shared_1 = shared_0*x
-    shared_2 = shared_0*y
-    shared_3 = shared_0*z
-    shared_4 = 0.5*tau**2
-    return (
-        (b_x - shared_1, b_y - shared_2, b_z - shared_3),  # position x, y, z
-        (b_x*tau - shared_1*tau, b_y*tau - shared_2*tau, b_z*tau - shared_3*tau),  # velocity x, y, z
-        (b_x*shared_4 - shared_1*shared_4, b_y*shared_4 - shared_2*shared_4, b_z*shared_4 - shared_3*shared_4),  # acceleration x, y, z
-    )
-
-
 def full_ground_inverse(
     s_x: float,
     s_y: float,
@@ -165,17 +115,6 @@ def full_ground_inverse(
         (rate_x, -s_x),  # adjugate, second row
         (-rate_x*s_y + rate_y*s_x,),  # determinant
     )
-
-
-def allowable_error(
-    budget: float,
-    per_unit: float,
-) -> float:
-    """Size of an error at which an effect of so much per unit, without sign, reaches a budget. [unit]
-
-    The step from a quadratic phase error to its limit. Source: Rigling & Moses, Table II.
-    """
-    return budget/per_unit
 
 
 def autofocus_gain(

@@ -40,7 +40,7 @@ _GEOMETRY = "bisar_budget/geometry.py"
 _POINT = "bisar_budget/simulate/point.py"
 _PIECES = "bisar_budget/effects/pieces.py"
 _PHASES = "bisar_budget/verify/phase_cases.py"
-_NOISE = "bisar_budget/verify/noise_image.py"
+_NOISE = "bisar_budget/verify/spread_cases.py"
 
 _PLOT = "bisar_budget/report/drawing/point_plot.py"
 _FIGURES = "bisar_budget/report/drawing/point_figures.py"
@@ -156,8 +156,8 @@ MUTANTS = (
     Mutant(
         "simulate: the clock without coverage factor",
         _POINT,
-        "np.asarray(mission.allocation.coverage_factor * polynomial + noise, dtype=float)",
-        "np.asarray(polynomial + noise, dtype=float)",
+        "clock=tuple(factor * term for term in terms)",
+        "clock=tuple(term for term in terms)",
         (f"{_IMAGES}test_the_clock_of_a_simulated_image_has_the_coverage_factor",),
     ),
     Mutant(
@@ -254,8 +254,8 @@ MUTANTS = (
     Mutant(
         "verify: ratio of the cubic phase inverted",
         _PHASES,
-        "measured_cubic_rad=measured, verdict=compare(measured / requirement - 1, TOLERANCE)",
-        "measured_cubic_rad=measured, verdict=compare(requirement / measured - 1, TOLERANCE)",
+        "verdict = compare(measured / requirement - 1, TOLERANCE)",
+        "verdict = compare(requirement / measured - 1, TOLERANCE)",
         (f"{_BORDERS}TestCubic",),
     ),
     Mutant(

@@ -410,7 +410,7 @@ def _with_images(
     for (place, found), images in zip(usable.items(), verified, strict=True):
         judged = with_verdicts(found, images, today)
         if illustrated:
-            from bisar_budget.verify.evidence import form_image_evidence
+            from bisar_budget.verify.limits import form_image_evidence
 
             shown = form_image_evidence(judged.analysed().mission, judged)
             result[place] = judged._replace(image_evidence=shown)

@@ -27,10 +27,9 @@ from bisar_budget.geometry import Axes, PlatformState, Vector
 from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.paths.earth import Geodetic, SceneAxes, axes_at, geodetic
 from bisar_budget.paths.instant import Instant, parse_instant
-from bisar_budget.ranges.exact_ranges import aperture_nodes
-from bisar_budget.simulate.exact import exact_effect
-from bisar_budget.simulate.phase_history import phase_history
-from bisar_budget.simulate.point import Flight, SimulationError, flight, pulses_for
+from bisar_budget.simulate.collection import PointCollection
+from bisar_budget.simulate.phase_history import Errors, Flight, phase_history
+from bisar_budget.simulate.point import SimulationError, declared_errors, pulses_for
 from bisar_budget.simulate.targets import Targets
 
 Floats = NDArray[np.float64]
@@ -109,7 +108,8 @@ def export_phase_history(mission: Mission, targets: Targets) -> Exported:
     except ImportError:
         raise MissingExtraError from None
     settings = mission.simulation or Simulation()
-    plan = _plan(mission, targets)
+    collection, errors = PointCollection(mission, mission.geometry), declared_errors(mission)
+    plan = _plan(mission, targets, collection, errors)
     needed = plan.pulses * plan.samples * _BYTES_PER_SAMPLE
     if needed > settings.memory_limit:
         raise SimulationError(
@@ -120,7 +120,7 @@ def export_phase_history(mission: Mission, targets: Targets) -> Exported:
     T, radar = mission.collection.aperture_time, mission.radar
     slow_time: Floats = np.linspace(-T / 2, T / 2, plan.pulses)
     frequency: Floats = radar.center_frequency + np.linspace(-0.5, 0.5, plan.samples) * radar.bandwidth
-    flown = flight(mission, slow_time, vibrating=True)
+    flown = collection.flight(errors, slow_time, np.random.default_rng(settings.seed))
     scatterers, amplitudes = _scene(mission, targets, plan.half)
     rng = np.random.default_rng(settings.seed)
     history = phase_history(
@@ -147,19 +147,17 @@ def export_phase_history(mission: Mission, targets: Targets) -> Exported:
         middle = parse_instant(UNDATED)
         assert middle is not None
     axes = axes_at(place)
-    vectors, offset = _vectors(mission, slow_time, flown, axes, plan)
+    vectors, offset = _vectors(mission, slow_time, flown, collection.flight(errors.smooth(), slow_time), axes, plan)
     tree = _document(mission, targets, plan, axes, vectors, middle.after(-offset), offset, remarks)
     data = _file(tree, vectors, history.samples.astype(np.complex64))
     return Exported(data, plan.pulses, plan.samples, plan.half, place, len(amplitudes), tuple(remarks))
 
 
-def _plan(mission: Mission, targets: Targets) -> _Plan:
+def _plan(mission: Mission, targets: Targets, collection: PointCollection, errors: Errors) -> _Plan:
     """Choose the image area, and the samples that keep it from repeating in range and in Doppler."""
     T, radar, geometry = mission.collection.aperture_time, mission.radar, mission.geometry
-    nodes = aperture_nodes(T)
-    slow = flight(mission, nodes, vibrating=False)
     try:
-        effect = exact_effect(nodes, slow.transmitter, slow.receiver, slow.clock, radar.wavelength, T)
+        effect = collection.effect(errors.still())
     except ValueError as fault:
         raise SimulationError(f"the declared errors leave no image of a point: {fault}") from None
     moved = max(abs(part) for part in effect.displacement)
@@ -170,13 +168,13 @@ def _plan(mission: Mission, targets: Targets) -> _Plan:
     reach = max(max(abs(one.east), abs(one.north)) for one in targets.points)
     half = float(math.ceil(reach + moved + _MARGIN_CELLS * cell))
     fine: Floats = np.linspace(-T / 2, T / 2, _FINE)
-    flown = flight(mission, fine, vibrating=False)
-    paths = (flown.transmitter, flown.receiver)
-    measured = sum(np.linalg.norm(path.measured, axis=1) for path in paths)
-    error = sum(np.linalg.norm(path.actual, axis=1) for path in paths) - measured + SPEED_OF_LIGHT * flown.clock
+    flown = collection.flight(errors.smooth(), fine)
+    measured = sum(np.linalg.norm(path.measured, axis=1) for path in flown.paths)
+    actual = sum(np.linalg.norm(path.actual, axis=1) for path in flown.paths)
+    error = actual - measured + SPEED_OF_LIGHT * flown.clock
     delays, turns = [], []
     for corner in ((half, half), (half, -half), (-half, half), (-half, -half)):
-        away = sum(np.linalg.norm(path.measured - (*corner, 0.0), axis=1) for path in paths) - measured
+        away = sum(np.linalg.norm(path.measured - (*corner, 0.0), axis=1) for path in flown.paths) - measured
         delays.append(float(np.abs(away).max()))
         turns.append(float(np.abs(np.gradient(away, fine)).max()))
     delay = (max(delays) + float(np.abs(error).max())) / SPEED_OF_LIGHT
@@ -211,7 +209,7 @@ def _scene(mission: Mission, targets: Targets, half: float) -> tuple[Floats, NDA
 
 
 def _vectors(
-    mission: Mission, slow_time: Floats, flown: Flight, axes: SceneAxes, plan: _Plan
+    mission: Mission, slow_time: Floats, flown: Flight, smooth: Flight, axes: SceneAxes, plan: _Plan
 ) -> tuple[NDArray[Any], float]:
     """Parameters of each vector, and the time of the file at the middle of the aperture. [s]
 
@@ -223,7 +221,6 @@ def _vectors(
         [(name, "i8" if name == "SIGNAL" else "f8", (size,) if size > 1 else ()) for name, size in _VECTOR]
     )
     vectors: NDArray[Any] = np.zeros(slow_time.size, dtype)
-    smooth = flight(mission, slow_time, vibrating=False)
     ranges = []
     doppler = np.zeros(slow_time.size)
     sides = (

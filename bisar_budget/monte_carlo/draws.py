@@ -10,19 +10,20 @@ the draws.
 """
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.constants import SPEED_OF_LIGHT, UTILIZATION_TOLERANCE
+from bisar_budget.effects.effect import CLOCK_UNITS, PLATFORMS, ErrorSource
 from bisar_budget.faults import printable
 from bisar_budget.memory import is_spacious
-from bisar_budget.monte_carlo.sums import Sums
-from bisar_budget.monte_carlo.variables import Floats, HeldSum, Variable
-from bisar_budget.ranges.exact_ranges import ExactRanges
+from bisar_budget.ranges.exact_ranges import STILL, ExactRanges, Floats, Found, Truths, followed
 
 if TYPE_CHECKING:
     from bisar_budget.workers import MapBlocks
@@ -32,10 +33,43 @@ if TYPE_CHECKING:
 BLOCK = 1 << 15
 CHUNK = 1 << 22  # draws of one stream; a second or so
 EXACT_PIECE = 1 << 18  # of a chunk, which it divides, where each draw goes through exact ranges: as long
+_ORDER = {"m": 0, "m/s": 1, "m/s^2": 2}
+_CLOCK = {unit: power for power, unit in enumerate(CLOCK_UNITS.values())}
 _SAMPLE = 512  # draws that decide whether exact ranges are needed
 _DIFFERENT = 0.01  # of a limit
 _AFTER_BYTES = 256
 _WORTH_COMPILING = 1 << 30  # normal numbers; then Numba saves more seconds than it takes
+
+
+class Variable(NamedTuple):
+    """One standard variable, mean 0 and variance 1, and what it does.
+
+    `of` is the error, or the covariance, that it belongs to. `parts` are the errors it makes, and how much of each
+    [unit]; none where it is noise, which is phases alone. Effects: quadratic and cubic phase at the aperture edge
+    [rad], displacement east and north [m].
+    """
+
+    id: str
+    of: str
+    owner: str
+    distribution: str
+    parts: tuple[tuple[ErrorSource, float], ...]
+    effects: tuple[float, float, float, float]
+
+
+class HeldSum(NamedTuple):
+    """A requirement before the draws: the sum of whose errors, in which effects, is held to which limit."""
+
+    id: str
+    unit: str
+    limit: float
+    owners: tuple[str, ...]
+    columns: tuple[int, ...]  # of the effects: one phase, or east and north
+
+    def holds(self, square: Floats) -> Truths:
+        """Whether sums whose squares are given are within the limit."""
+        held: Truths = square <= (self.limit * (1 + UTILIZATION_TOLERANCE)) ** 2
+        return held
 
 
 class DrawsPiece(NamedTuple):
@@ -80,7 +114,8 @@ class Tally(NamedTuple):
     all_hold: int
 
 
-class Counted(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Counted:
     """Counts and mean squares of all draws.
 
     For each requirement the draws in which it held and the mean square, over draws that have an image; the draws in
@@ -145,6 +180,123 @@ def tally_of(drawing: Drawing, piece: DrawsPiece) -> Tally:
     return Drawer(drawing).tally(piece)
 
 
+class Sums:
+    """Effects of one block of draws, added up: the quadratic phase by owner, all else for the mission.
+
+    By owner, if kept: `motion` is position, velocity and acceleration error of both platforms, (2, 3, 3, draws),
+    `clock` its coefficients (4, draws), `phase_alone` what is stated as a phase, quadratic and cubic (2, draws).
+
+    Parameters
+    ----------
+    drawing : Drawing
+        Says what will be added, and what will be asked for.
+    size : int
+        Draws.
+    adds, keeps_motion : bool
+        Whether `square`, and whether `exact_square` will be asked for.
+    """
+
+    def __init__(self, drawing: Drawing, size: int, *, adds: bool, keeps_motion: bool) -> None:
+        self.exact, self.size, self.keeps_motion = drawing.exact, size, keeps_motion
+        wanted = {column for one in drawing.judged for column in one.columns}
+        self.phases = {variable.owner: np.zeros(size) for variable in drawing.variables} if adds else {}
+        self.totals = {column: np.zeros(size) for column in sorted(wanted - {0})} if adds else {}
+        self.motion: dict[str, Floats] = {}
+        self.clock: dict[str, Floats] = {}
+        self.phase_alone: dict[str, Floats] = {}
+        self._exact: dict[tuple[str, ...], Found] = {}
+        self._scaled = np.empty(size)
+        self._square = np.empty(size)
+
+    def clear(self) -> None:
+        """Begin another block."""
+        every: list[Mapping[Any, Floats]] = [self.phases, self.totals, self.motion, self.clock, self.phase_alone]
+        for one in (one for kept in every for one in kept.values()):
+            one.fill(0.0)
+        self._exact.clear()
+
+    def add(self, variable: Variable, drawn: Floats) -> None:
+        """Add one variable's draws, (draws,)."""
+        if self.phases:
+            for target, column in ((self.phases[variable.owner], 0), *((t, c) for c, t in self.totals.items())):
+                if variable.effects[column]:
+                    np.multiply(drawn, variable.effects[column], out=self._scaled)
+                    target += self._scaled
+        if self.keeps_motion:
+            for source, size in variable.parts:
+                self._add_motion(variable.owner, source, size, drawn)
+            if not variable.parts:
+                self._add_phases(variable.owner, variable.effects[:2], drawn)
+
+    def _add_motion(self, owner: str, source: ErrorSource, size: float, drawn: Floats) -> None:
+        if source.is_position:
+            motion = self._kept(self.motion, owner, (2, 3, 3))
+            for platform, name in enumerate(PLATFORMS):
+                if source.moves(name):
+                    for axis, component in enumerate(source.direction):
+                        if component:
+                            motion[platform, _ORDER[source.unit], axis] += size * component * drawn
+        elif source.owner == "clock":
+            self._kept(self.clock, owner, (4,))[_CLOCK[source.unit]] += size * drawn
+        else:
+            self._add_phases(owner, (size, 0.0), drawn)
+
+    def _add_phases(self, owner: str, phases: tuple[float, ...], drawn: Floats) -> None:
+        self._kept(self.phase_alone, owner, (2,))[:] += np.multiply.outer(phases, drawn)
+
+    def _kept(self, where: dict[str, Floats], owner: str, shape: tuple[int, ...]) -> Floats:
+        if owner not in where:
+            where[owner] = np.zeros((*shape, self.size))
+        return where[owner]
+
+    def square(self, judged: HeldSum) -> Floats:
+        """Square of what a requirement is about, (draws,); it stands until the next is asked for."""
+        square = self._square
+        if judged.columns == (0,):
+            square.fill(0.0)
+            for owner, phase in self.phases.items():
+                if owner in judged.owners:
+                    square += phase
+            square *= square
+            return square
+        first, *others = judged.columns
+        np.multiply(self.totals[first], self.totals[first], out=square)
+        for column in others:
+            np.multiply(self.totals[column], self.totals[column], out=self._scaled)
+            square += self._scaled
+        return square
+
+    def exact_square(self, judged: HeldSum) -> Floats:
+        """The same by exact ranges; not a number for a draw without an image."""
+        owners = judged.owners
+        if owners not in self._exact:
+            self._exact[owners] = self._by_exact_ranges(owners)
+        found = self._exact[owners]
+        quadratic, cubic = _sum(self.phase_alone, owners, np.zeros((2, 1)))
+        if judged.columns == (0,):
+            square: Floats = (found.quadratic + quadratic) ** 2
+        elif judged.columns == (1,):
+            square = (found.cubic + cubic) ** 2
+        else:
+            square = found.east**2 + found.north**2
+        return square
+
+    def _by_exact_ranges(self, owners: tuple[str, ...]) -> Found:
+        times = self.exact.times[:, 0]
+        powers = np.stack((np.ones_like(times), times, times**2 / 2), axis=-1)  # of (22)
+        clock_powers = SPEED_OF_LIGHT * times[:, None] ** np.arange(4)
+        motion = _sum(self.motion, owners, np.broadcast_to(0.0, (2, 3, 3, self.size)))
+        clock = _sum({} if self.exact.has_direct_path else self.clock, owners, np.broadcast_to(0.0, (4, self.size)))
+        shifts = [powers @ one.swapaxes(0, 1) if one.any() else STILL for one in motion]
+        return followed(self.exact, clock_powers @ clock, shifts, np.zeros(self.size, dtype=int))
+
+
+def _sum(parts: Mapping[str, Floats], owners: Sequence[str], nothing: Floats) -> Floats:
+    """Sum of the parts of several owners; `nothing` where none has any."""
+    found = [parts[owner] for owner in owners if owner in parts]
+    return sum(found[1:], found[0]) if found else nothing
+
+
 class Drawer:
     """Makes pieces of draws; one that follows the last one of its chunk goes on where that ended."""
 
@@ -167,7 +319,7 @@ class Drawer:
             size = min(BLOCK, piece.stop - start)
             if sums is None or sums.size != size:
                 sums = None  # the room of the others
-                sums = _sums(drawing, size, adds=not drawing.is_exact, keeps_motion=drawing.is_exact)
+                sums = Sums(drawing, size, adds=not drawing.is_exact, keeps_motion=drawing.is_exact)
             self._draw(sums)
             together = np.ones(size, dtype=bool)
             for index, one in enumerate(drawing.judged):
@@ -204,13 +356,9 @@ class Drawer:
         self._at += sums.size
 
 
-def _sums(drawing: Drawing, size: int, *, adds: bool, keeps_motion: bool) -> Sums:
-    return Sums(drawing.exact, drawing.variables, drawing.judged, size, adds=adds, keeps_motion=keeps_motion)
-
-
 def _needs_exact_ranges(drawing: Drawing) -> bool:
     """Whether exact ranges differ from the linear model in a sample of draws, by more than a part of a limit."""
-    sums = _sums(drawing, _SAMPLE, adds=True, keeps_motion=True)
+    sums = Sums(drawing, _SAMPLE, adds=True, keeps_motion=True)
     drawn = np.empty(_SAMPLE)
     for variable in drawing.variables:
         _Stream(variable, drawing.seed).fill(drawn)
@@ -232,11 +380,18 @@ def _compiled() -> Callable[[np.random.Generator, Floats], None]:
     if not is_spacious():
         return _fill_normal
     try:
-        from bisar_budget.monte_carlo.compiled import fill_normal
-    except (ImportError, RuntimeError):
+        from numba import njit
+
+        found: Callable[[np.random.Generator, Floats], None] = njit(cache=True, nogil=True)(_fill_each)
+    except (ImportError, RuntimeError):  # not installed, or nowhere to keep what it compiles
         return _fill_normal
-    found: Callable[[np.random.Generator, Floats], None] = fill_normal
     return found
+
+
+def _fill_each(generator: np.random.Generator, out: Floats) -> None:
+    """What Numba compiles: normal draws, those of NumPy to the last bit, in two thirds of the time."""
+    for index in range(out.size):
+        out[index] = generator.standard_normal()
 
 
 class _Stream:
@@ -277,3 +432,43 @@ class _Stream:
             return
         for start in range(0, count, buffer.size):
             self.fill(buffer[: count - start])
+
+
+# ---------------------------------------------------------------------- eigenvectors
+_SWEEPS = 30  # of a Jacobi method: convergence is quadratic, a 6 x 6 takes about five
+
+
+def eigensystem(matrix: Sequence[Sequence[float]]) -> tuple[list[float], list[list[float]]]:
+    """Eigenvalues of a symmetric matrix (n, n) and, as columns, its unit eigenvectors, in no order.
+
+    By Jacobi's rotations. Of equal eigenvalues LAPACK takes other vectors than these, and a seed would draw others.
+    """
+    n = len(matrix)
+    a = [list(row) for row in matrix]
+    v = [[float(i == j) for j in range(n)] for i in range(n)]
+    # Below this an element moves no eigenvalue by more than rounding does.
+    negligible = 1e-17 * max((abs(x) for row in a for x in row), default=0.0)
+    for _ in range(_SWEEPS):
+        is_done = True
+        for p in range(n - 1):
+            for q in range(p + 1, n):
+                if abs(a[p][q]) <= negligible:
+                    continue
+                is_done = False
+                theta = (a[q][q] - a[p][p]) / (2 * a[p][q])
+                t = math.copysign(1.0, theta) / (abs(theta) + math.hypot(theta, 1.0))
+                cosine = 1 / math.hypot(t, 1.0)
+                _rotate(a, v, p, q, cosine, t * cosine)
+        if is_done:
+            break
+    return [a[i][i] for i in range(n)], v
+
+
+def _rotate(a: list[list[float]], v: list[list[float]], p: int, q: int, c: float, s: float) -> None:
+    """Turn the plane of p and q so that a[p][q] vanishes; `v` collects the turns."""
+    for row in (*a, *v):
+        row[p], row[q] = c * row[p] - s * row[q], s * row[p] + c * row[q]
+    upper, lower = a[p], a[q]
+    a[p] = [c * x - s * y for x, y in zip(upper, lower, strict=True)]
+    a[q] = [s * x + c * y for x, y in zip(upper, lower, strict=True)]
+    a[p][q] = a[q][p] = 0.0

@@ -4,12 +4,10 @@
 __all__ = [
     "autofocus",
     "collection",
-    "exact",
     "image_formation",
     "impulse_response",
     "phase_history",
     "point",
     "realisations",
-    "resampling",
     "targets",
 ]

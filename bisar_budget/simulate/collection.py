@@ -1,7 +1,8 @@
 """The collection of a mission and images of one point in it, with any errors, where exact ranges put it."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -10,21 +11,20 @@ from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.geometry import BistaticGeometry, GroundVector
 from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.ranges.exact_ranges import aperture_nodes
-from bisar_budget.simulate.exact import ExactEffect, exact_effect
 from bisar_budget.simulate.image_formation import backprojection, bytes_held, kernel_within, taylor_window
 from bisar_budget.simulate.phase_history import (
     Complexes,
-    Course,
+    Errors,
+    ExactEffect,
+    Flight,
     Floats,
-    Path,
-    PathError,
     cell_centres,
     direct_path_error,
     direct_path_ways,
+    exact_effect,
     path,
     phase_history,
 )
-from bisar_budget.simulate.range_lines import Flown
 
 OVERSAMPLING = 2.5  # samples of an image per resolution cell
 CELLS = 48  # resolution cells of a cross-range cut; fewer blur the aperture by over 1 % of a phase under a taper
@@ -35,6 +35,11 @@ _BYTES_PER_PIXEL = 16 * 16  # two images, their grid, and what forming or refocu
 _BYTES_PER_SAMPLE = 16 * 5  # of the phase history; it is a product of terms of its own size
 CONTRIBUTIONS = 1 << 21  # of pulses to pixels, which the reading of an image holds at once
 _BYTES_PER_CONTRIBUTION = 8 + 2 * 16  # in single and in double precision
+_STRIDE = 4  # pixels from one step along a line to the next; between them a cubic is drawn
+_STRETCH = 4.0  # of a pixel, at most: where Doppler hardly changes along a line
+_SLANT = 60.0  # of the way from line to line, at most: where equal Doppler runs along equal range
+_CORRECTIONS = 3  # of each pixel's range sum
+_BLOCK = 1 << 14  # pixels corrected at once
 _PULSES_PER_CELL, _LARGE_CELLS = 4, 128  # a response repeats after as many cells as there are pulses
 
 
@@ -42,66 +47,116 @@ class MemoryLimitError(ValueError):
     """An image beyond `simulation.memory_limit`."""
 
 
-class Errors(NamedTuple):
-    """Errors in one image: of both platforms, the clock's t̃₀ … t̃₃ of (1), and any other history of the clock.
+@dataclass(frozen=True, slots=True, eq=False)
+class RangeLines:
+    """Ground pixels along lines of equal range and of equal Doppler, in which a response is a product.
 
-    [s], [1], [1/s], [1/s²]; `clock_course` [s].
+    A straight grid leaves a response where a platform is near: its ridge follows an ellipse, and its sidelobes in
+    range follow lines of equal Doppler. Here the pixels of a line have one range sum at the aperture midpoint, those
+    of a column one change of the range sum over the aperture. Lines are followed from the middle outwards, so a patch
+    may bend around a platform.
+
+    Both platforms are where they were measured at the beginning, the middle and the end of the aperture, (3, 3). [m]
     """
 
-    transmitter: PathError = PathError()
-    receiver: PathError = PathError()
-    clock: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
-    clock_course: Course | None = None
+    transmitter: Floats
+    receiver: Floats
 
-    def of(self, platform: str, error: PathError) -> "Errors":
-        """Give one platform an error."""
-        return self._replace(transmitter=error) if platform == "transmitter" else self._replace(receiver=error)
+    def gradients(self, points: Floats) -> tuple[Floats, Floats]:
+        """Gradients of the midpoint's range sum and of its change over the aperture, at points (..., 2): (..., 2)."""
+        platforms = np.concatenate((self.transmitter, self.receiver))
+        ground = points[..., None, :] - platforms[:, :2]
+        square = ground[..., 0] ** 2 + ground[..., 1] ** 2 + platforms[:, 2] ** 2
+        directions = ground / np.sqrt(square)[..., None]
+        sums = directions[..., :3, :] + directions[..., 3:, :]
+        return sums[..., 1, :], sums[..., 2, :] - sums[..., 0, :]
 
-    def smooth(self) -> "Errors":
-        """The same errors without vibration, and with what is smooth of other histories."""
-        slow = self.slow()
-        return slow._replace(transmitter=_still(slow.transmitter), receiver=_still(slow.receiver))
+    def range_sum(self, points: Floats) -> Floats:
+        """At the midpoint, of ground points (..., 2 or 3), (...). [m]"""
+        total: Floats = np.zeros(points.shape[:-1])
+        for one in (self.transmitter, self.receiver):
+            east, north = points[..., 0] - one[1, 0], points[..., 1] - one[1, 1]
+            total += np.sqrt(east**2 + north**2 + one[1, 2] ** 2)
+        return total
 
-    def slow(self) -> "Errors":
-        """The same with what is smooth of other histories: noise between a few nodes would pass for a phase."""
-        return self._replace(
-            transmitter=_slow(self.transmitter),
-            receiver=_slow(self.receiver),
-            clock_course=self.clock_course and self.clock_course.smooth(),
-        )
+    def turns_left(self, centre: GroundVector) -> bool:
+        """Whether the range sum grows over the aperture for points counter-clockwise of a ground point."""
+        by_range, by_doppler = self.gradients(np.asarray(centre, dtype=float))
+        return float(by_doppler @ _left(by_range)) < 0
 
+    def cells(self, centre: GroundVector, bandwidth_hz: float, wavelength_m: float) -> tuple[float, float]:
+        """Resolution at a ground point: peak to first null across the lines of equal range, and along them. [m]"""
+        by_range, by_doppler = self.gradients(np.asarray(centre, dtype=float))
+        steepness = float(np.hypot(*by_range))
+        along = abs(float(by_doppler @ _left(by_range))) / steepness
+        if not steepness or not along:
+            raise ValueError("range or Doppler does not change over the ground there: no image plane")
+        return SPEED_OF_LIGHT / (bandwidth_hz * steepness), wavelength_m / along
 
-def _slow(error: PathError) -> PathError:
-    return error if error.course is None else error._replace(course=error.course.smooth())
+    def baseband(self, points: Floats, wavelength_m: float) -> Complexes:
+        """Phase that takes the range history at the midpoint out of an image of points (..., 3).
 
+        What stays is the aperture's own spectrum. A backprojected image carries the phase of the range to each
+        pixel, which close to a platform is a chirp across the patch and hides the aperture from autofocus.
+        """
+        reference = float(np.linalg.norm(self.transmitter[1]) + np.linalg.norm(self.receiver[1]))
+        phase: Complexes = np.exp(-2j * math.pi / wavelength_m * (self.range_sum(points) - reference))
+        return phase
 
-def _still(error: PathError) -> PathError:
-    return error._replace(sinusoids=(), wideband_rms=0.0)
+    def grid(self, centre: GroundVector, spacing: tuple[float, float], shape: tuple[int, int]) -> Floats:
+        """Pixels around a ground point.
 
+        Parameters
+        ----------
+        centre : (2,) float
+            East, north; the pixel (nx // 2, ny // 2). [m]
+        spacing : (2,) float
+            At the centre, across the lines and along them. [m]
+        shape : (2,) int
+            Lines, towards the platforms, and pixels of a line, counter-clockwise.
 
-def superposed(parts: Iterable[Errors]) -> Errors:
-    """All of several polynomial errors at once; vibration is not added."""
-    total = Errors()
-    for part in parts:
-        total = Errors(
-            transmitter=superposed_motion(total.transmitter, part.transmitter),
-            receiver=superposed_motion(total.receiver, part.receiver),
-            clock=tuple(a + b for a, b in zip(total.clock, part.clock, strict=True)),
-        )
-    return total
+        Returns
+        -------
+        (nx, ny, 3) ndarray
+            East, north, up. [m]
+        """
+        nx, ny = shape
+        middle = np.asarray(centre, dtype=float)
+        by_range, by_doppler = self.gradients(middle)
+        range_step = -spacing[0] * float(np.hypot(*by_range))
+        doppler_step = -spacing[1] * float(by_doppler @ _left(by_range)) / float(np.hypot(*by_range))
 
+        def across(points: Floats) -> Floats:
+            """To the next line, along equal Doppler."""
+            g, d = self.gradients(points)
+            slant = _left(d)
+            square, slope = _dot(g, g), _dot(g, slant)
+            # Along equal range instead where that would lead too far: |slant/slope| against |g|/square.
+            keeps = _dot(slant, slant) * square <= _SLANT**2 * slope**2
+            return range_step * np.where(keeps, slant / np.where(keeps, slope, 1.0), g / square)
 
-def superposed_motion(a: PathError, b: PathError) -> PathError:
-    """Two polynomial errors of one platform at once; vibration is not added."""
+        def along(points: Floats) -> Floats:
+            """To the next pixel of a line, by an equal step of Doppler; as long as may be where there is none."""
+            g, d = self.gradients(points)
+            tangent = -_left(g) / np.sqrt(_dot(g, g))
+            slope, longest = _dot(d, tangent), _STRETCH * spacing[1]
+            keeps = slope * longest / doppler_step > 1
+            return np.where(keeps, doppler_step / np.where(keeps, slope, 1.0), longest) * tangent
 
-    def add(u: tuple[float, float, float], v: tuple[float, float, float]) -> tuple[float, float, float]:
-        return (u[0] + v[0], u[1] + v[1], u[2] + v[2])
-
-    return PathError(
-        position=add(a.position, b.position),
-        velocity=add(a.velocity, b.velocity),
-        acceleration=add(a.acceleration, b.acceleration),
-    )
+        start = _followed(across, middle, nx)
+        followed = np.moveaxis(_followed(along, start, ny), 0, 1)
+        wanted = self.range_sum(middle) + range_step * (np.arange(nx) - nx // 2)
+        grid = np.zeros((nx, ny, 3))
+        lines = max(1, _BLOCK // ny)
+        for top in range(0, nx, lines):
+            part = slice(top, top + lines)
+            points = followed[part]
+            for _ in range(_CORRECTIONS):
+                g = self.gradients(points)[0]
+                off = (wanted[part, None] - self.range_sum(points)) / np.sum(g**2, axis=-1)
+                points = points + off[..., None] * g
+            grid[part, :, :2] = points
+        return grid
 
 
 class Chip(NamedTuple):
@@ -168,41 +223,37 @@ class PointCollection:
         """Weights over the aperture, or the band, at the centres of equal cells."""
         return taylor_window(count) if self.is_tapered else np.ones(count)
 
-    def paths(self, errors: Errors, slow_time: Floats, rng: np.random.Generator | None = None) -> tuple[Path, Path]:
-        """Fly both platforms."""
-        ways = direct_path_ways(self.geometry, slow_time) if self.has_direct_path else (None, None)
-        return (
-            path(self.geometry.transmitter, slow_time, errors.transmitter, rng, ways[0]),
-            path(self.geometry.receiver, slow_time, errors.receiver, rng, ways[1]),
-        )
+    def flight(self, errors: Errors, slow_time: Floats, rng: np.random.Generator | None = None) -> Flight:
+        """Both platforms flown with errors; where the direct path is the clock, measured paths are in its error.
 
-    def effect(self, errors: Errors) -> ExactEffect:
-        """Displacement and phases of a point at the scene centre, by exact ranges.
+        Wideband vibration needs a generator.
+        """
+        ways = direct_path_ways(self.geometry, slow_time) if self.has_direct_path else (None, None)
+        transmitter = path(self.geometry.transmitter, slow_time, errors.transmitter, rng, ways[0])
+        receiver = path(self.geometry.receiver, slow_time, errors.receiver, rng, ways[1])
+        clock: Floats = np.asarray(np.polynomial.polynomial.polyval(slow_time, errors.clock), dtype=float)
+        if errors.clock_course is not None:
+            clock = clock + errors.clock_course.at(slow_time)
+        if self.has_direct_path:
+            clock = clock + direct_path_error((transmitter, receiver))
+        return Flight(transmitter, receiver, clock)
+
+    def effect(self, errors: Errors, seen_from: GroundVector = (0.0, 0.0)) -> ExactEffect:
+        """Displacement and phases of a point of the ground, by exact ranges.
 
         Raises
         ------
         ValueError
             No ground point has the recorded range history.
         """
-        errors = errors.slow()
-        clock = self.clock(errors, self._nodes)
-        flown = self.paths(errors, self._nodes)
-        return exact_effect(self._nodes, *flown, clock, self.wavelength, self.aperture_time)
+        flight = self.flight(errors.slow(), self._nodes)
+        transmitter, receiver = (one.seen_from(seen_from) for one in flight.paths)
+        return exact_effect(self._nodes, transmitter, receiver, flight.clock, self.wavelength, self.aperture_time)
 
-    def flown(self, errors: Errors) -> Flown:
-        """Measured paths, vibration left out: what a processor lays its grid by."""
+    def range_lines(self, errors: Errors) -> RangeLines:
+        """Lines of equal range by the measured paths, vibration left out: what a processor lays its grid by."""
         ends = np.array([-1.0, 0.0, 1.0]) * self.aperture_time / 2
-        transmitter, receiver = self.paths(errors.smooth(), ends)
-        return Flown(transmitter.measured, receiver.measured)
-
-    def clock(self, errors: Errors, slow_time: Floats) -> Floats:
-        """Clock error over slow time, and what measured paths add where the direct path is the clock. [s]"""
-        error: Floats = np.asarray(np.polynomial.polynomial.polyval(slow_time, errors.clock), dtype=float)
-        if errors.clock_course is not None:
-            error = error + errors.clock_course.at(slow_time)
-        if self.has_direct_path:
-            error = error + direct_path_error(self.paths(errors, slow_time))
-        return error
+        return RangeLines(*(one.measured for one in self.flight(errors.smooth(), ends).paths))
 
     def chip(
         self,
@@ -239,25 +290,24 @@ class PointCollection:
         """
         grid, spacing = self._grid(centre, errors, cells, range_cells)
         slow_time = cell_centres(self.aperture_time, pulses_for(cells))
-        transmitter, receiver = self.paths(errors, slow_time)
-        clock = self.clock(errors, slow_time)
+        flight = self.flight(errors, slow_time)
         if is_reference:
-            transmitter, receiver = (Path(actual=p.measured, measured=p.measured) for p in (transmitter, receiver))
-            clock = 0 * clock
-        frequencies = self._frequencies(grid, transmitter, receiver, scatterer, clock)
+            flight = flight.as_measured()
+        frequencies = self._frequencies(grid, flight, scatterer)
         self._require_memory(grid.shape[0] * grid.shape[1], slow_time.size, frequencies)
         history = phase_history(
             np.array([[*scatterer, 0.0]]),
             np.ones(1, dtype=complex),
             slow_time=slow_time,
             frequency=self.radar.center_frequency + cell_centres(self.radar.bandwidth, frequencies),
-            transmitter=transmitter,
-            receiver=receiver,
-            clock_error=clock,
+            transmitter=flight.transmitter,
+            receiver=flight.receiver,
+            clock_error=flight.clock,
         )
         if self.is_tapered:
             history.samples[:] *= np.outer(self.window(slow_time.size), self.window(frequencies))
-        image = backprojection(history, grid, self.kernel) * baseband(self.flown(errors), grid, self.wavelength)
+        image = backprojection(history, grid, self.kernel)
+        image = image * self.range_lines(errors).baseband(grid, self.wavelength)
         return Chip(image, grid, spacing)
 
     def pair(
@@ -276,24 +326,22 @@ class PointCollection:
         key = (centre, errors.smooth(), cells, range_cells)
         if self._kept is None or self._kept[0] != key:
             self._require_room(cells, range_cells)
-            flown = self.flown(errors)
-            cell = flown.cells(centre, self.radar.bandwidth, self.wavelength)
+            lines = self.range_lines(errors)
+            cell = lines.cells(centre, self.radar.bandwidth, self.wavelength)
             spacing = (cell[0] / OVERSAMPLING, cell[1] / OVERSAMPLING)
             shape = (max(1, 2 * round(range_cells * OVERSAMPLING / 2)), 2 * round(cells * OVERSAMPLING / 2))
-            self._kept = (key, flown.grid(centre, spacing, shape), spacing)
+            self._kept = (key, lines.grid(centre, spacing, shape), spacing)
         return self._kept[1:]
 
-    def _frequencies(
-        self, grid: Floats, transmitter: Path, receiver: Path, scatterer: GroundVector, clock: Floats
-    ) -> int:
+    def _frequencies(self, grid: Floats, flight: Flight, scatterer: GroundVector) -> int:
         """How many keep a range profile from repeating within a patch: its range walk sets that."""
         farthest = 0.0
         point = np.array([*scatterer, 0.0])
         for pulse in (0, -1):
             off = np.zeros(grid.shape[:-1])
             if self.has_direct_path:  # takes out most of what a distant platform's error puts in
-                off -= SPEED_OF_LIGHT * clock[pulse]
-            for one in (transmitter, receiver):
+                off -= SPEED_OF_LIGHT * flight.clock[pulse]
+            for one in flight.paths:
                 off += np.linalg.norm(grid - one.measured[pulse], axis=-1)
                 off -= np.linalg.norm(point - one.actual[pulse])
             farthest = max(farthest, float(np.abs(off).max()))
@@ -329,12 +377,38 @@ def pulses_for(cells: int) -> int:
     return max(_PULSES_PER_CELL * min(cells, _LARGE_CELLS), _PULSES_PER_CELL // 2 * cells)
 
 
-def baseband(flown: Flown, points: Floats, wavelength_m: float) -> Complexes:
-    """Phase that takes the range history at the midpoint out of an image of points (..., 3).
+def _followed(step: Callable[[Floats], Floats], start: Floats, count: int) -> Floats:
+    """Follow a field of steps both ways from points (..., 2), (count, ..., 2), the start at count // 2."""
+    back = count // 2
+    way = np.array([-1.0, 1.0]).reshape(2, *[1] * start.ndim)
+    place = np.stack((start, start))
+    velocity = way * step(place)
+    pixels = [place[:1]]
+    within = (np.arange(1, _STRIDE + 1) / _STRIDE).reshape(-1, *[1] * place.ndim)
+    for _ in range(-(-back // _STRIDE)):
+        half = place + _STRIDE / 2 * velocity
+        ahead = place + _STRIDE * way * step(half)
+        slope = way * step(ahead)
+        pixels.append(_between(place, velocity, ahead, slope, within))
+        place, velocity = ahead, slope
+    out = np.concatenate(pixels[1:]) if back else np.empty((0, *place.shape))
+    return np.concatenate((out[:back, 0][::-1], pixels[0], out[: count - 1 - back, 1]))
 
-    What stays is the aperture's own spectrum. A backprojected image carries the phase of the range to each
-    pixel, which close to a platform is a chirp across the patch and hides the aperture from autofocus.
-    """
-    reference = float(np.linalg.norm(flown.transmitter[1]) + np.linalg.norm(flown.receiver[1]))
-    phase: Complexes = np.exp(-2j * math.pi / wavelength_m * (flown.range_sum(points) - reference))
-    return phase
+
+def _between(a: Floats, slope_a: Floats, b: Floats, slope_b: Floats, t: Floats) -> Floats:
+    """Cubic through two points with their slopes per pixel."""
+    slope_a, slope_b = _STRIDE * slope_a, _STRIDE * slope_b
+    s = 1 - t
+    cubic: Floats = s * s * (1 + 2 * t) * a + t * t * (1 + 2 * s) * b + s * t * (s * slope_a - t * slope_b)
+    return cubic
+
+
+def _dot(a: Floats, b: Floats) -> Floats:
+    """Scalar products of plane vectors, (..., 1)."""
+    return a[..., :1] * b[..., :1] + a[..., 1:] * b[..., 1:]
+
+
+def _left(vectors: Floats) -> Floats:
+    """Turned by a quarter, counter-clockwise."""
+    turned: Floats = vectors[..., ::-1] * np.array([-1.0, 1.0])
+    return turned

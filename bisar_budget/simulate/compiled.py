@@ -16,24 +16,22 @@ from numba import njit, prange
 from numpy.polynomial import Chebyshev, Polynomial
 
 from bisar_budget.constants import SPEED_OF_LIGHT
-from bisar_budget.simulate.phase_history import Complexes, Floats, PhaseHistory
-from bisar_budget.simulate.range_profile import (
+from bisar_budget.simulate.image_formation import (
     PROFILE_BYTES,
     carrier_frequency,
     cells_per_metre,
     harmonics,
     kernel,
-    kernel_shape,
     kernel_transform,
     profile_length,
     range_profiles,
 )
+from bisar_budget.simulate.phase_history import Complexes, Floats, PhaseHistory
 
 Spline = Literal["linear", "cubic"]
 
 _LINE = 32  # pixels of one expansion; two or four vectors of a processor
 _RUN = 64  # pixels anywhere whose ranges are bounded together
-_TILE = 512  # pixels anywhere that are taken together: what they need of a pulse stays in that cache too
 _ROWS = 16  # lines of one tile; what it needs of a pulse stays in a processor's first cache
 _OVERSAMPLING = 2  # of profiles from the FFT
 _TAPS = 8  # of the kernel that refines them: -140 dB at this oversampling
@@ -102,11 +100,8 @@ def lattice_of(points: Floats, tolerance: float) -> Lattice | None:
     return Lattice(origin, across, along, (lines, count))
 
 
-def backproject(history: PhaseHistory, points: Floats, spline: Spline) -> Complexes:
+def backproject(history: PhaseHistory, points: Floats, spline: Spline) -> Complexes | None:
     """Image by backprojection, see `image_formation.backprojection`; all inputs finite.
-
-    Pixels may be so few and so far apart in range that to refine what lies between them would take longer than to
-    read them one by one, or more memory than a block has: they are read from profiles that are not refined.
 
     Parameters
     ----------
@@ -119,8 +114,9 @@ def backproject(history: PhaseHistory, points: Floats, spline: Spline) -> Comple
 
     Returns
     -------
-    (...) ndarray
-        Complex image.
+    (...) ndarray or None
+        Complex image. None where pixels are so few and so far apart in range that to refine what lies between them
+        takes longer than to read them one by one, or more memory than a block has.
     """
     shape = points.shape[:-1]
     image = np.zeros(shape, dtype=complex)
@@ -150,11 +146,9 @@ def backproject(history: PhaseHistory, points: Floats, spline: Spline) -> Comple
         nearest, farthest = _reach(history.transmitter, history.receiver, *_boxes(by_line))
         within = _needed(history, nearest, farthest, image.size)
         if within is None:
-            for unrefined in _unrefined_blocks(history):
-                _add_points_apart(*unrefined, axes, kernel_shape(_TAPS, _OVERSAMPLING), image.reshape(-1))
-        else:
-            for block in _profile_blocks(history, within, spline):
-                _add_points(*block, axes, spline == "cubic", image.reshape(-1))
+            return None
+        for block in _profile_blocks(history, within, spline):
+            _add_points(*block, axes, spline == "cubic", image.reshape(-1))
     image /= history.samples.size
     return image
 
@@ -251,35 +245,6 @@ def _profile_blocks(history: PhaseHistory, needed: _Needed, spline: Spline) -> I
         )
 
 
-class _Unrefined(NamedTuple):
-    """Profiles of some pulses as the FFT gives them, and what it takes to read them."""
-
-    profiles: Complexes
-    transmitter: Floats
-    receiver: Floats
-    reference: Floats
-    cells_per_metre: float
-    cycles_per_metre: float
-
-
-def _unrefined_blocks(history: PhaseHistory) -> Iterator[_Unrefined]:
-    """Whole profiles, of as many pulses as fit in a cache, for a kernel of `_TAPS`."""
-    length = profile_length(history, _OVERSAMPLING)
-    transform = kernel_transform(2 * math.pi * harmonics(history) / length, _TAPS, _OVERSAMPLING)
-    reference = _reference(history)
-    pulses = max(1, int(_BLOCK_BYTES / (PROFILE_BYTES * length)))
-    for start in range(0, history.slow_time.size, pulses):
-        part = slice(start, start + pulses)
-        yield _Unrefined(
-            range_profiles(history, length, transform, part),
-            history.transmitter[part],
-            history.receiver[part],
-            reference[part],
-            cells_per_metre(history, length),
-            carrier_frequency(history) / SPEED_OF_LIGHT,
-        )
-
-
 @_parallel
 def _refine(profiles, first, weights, refined):
     """Samples between the samples, as real and imaginary parts; profiles repeat."""
@@ -358,80 +323,25 @@ def _split(ranges, per_metre, first, cycles, whole, fraction, turn, order):
 
 
 @_compiled
-def _places(whole, fraction, order, cells_per_cycle, index, between):
-    """Sample before each pixel, and how far beyond it the pixel is."""
-    for i in range(index.shape[0]):
+def _places(whole, fraction, turn, order, cells_per_cycle, index, between, cycles):
+    """Sample before each pixel, how far beyond it the pixel is, and the carrier's cycles there.
+
+    Cycles are in integers up to second order, in fractions of a cycle beyond.
+    """
+    for i in range(between.shape[0]):
         base, step, place, slope = whole[0, i], whole[1, i], fraction[0, i], fraction[1, i]
+        c0, c1, c2 = turn[0, i], turn[1, i], turn[2, i]
         p2, p3, p4 = order[0, i], order[1, i], order[2, i]
         for j in range(_LINE):
-            x = _F(j - _LINE // 2)
+            k = _I(j - _LINE // 2)
+            x = _F(k)
             bend = x * x * (p2 + x * (p3 + x * p4))
             t = place + x * slope + cells_per_cycle * bend
             floor = np.floor(t)
             between[i, j] = t - floor
-            index[i, j] = _I(base + _I(j - _LINE // 2) * step + _I(floor))
-
-
-# Loops of their own: next to arithmetic, loads from anywhere would keep that from being vectorised. Neighbours are
-# read before any is written, so that they are read at once.
-
-
-@_compiled
-def _fetch2(profile, index, fetched):
-    for i in range(index.shape[0]):
-        for j in range(_LINE):
-            n = np.uint64(np.uint32(index[i, j]))
-            s0, s1 = profile[n], profile[n + np.uint64(1)]
-            fetched[i, 2 * j], fetched[i, 2 * j + 1] = s0, s1
-
-
-@_compiled
-def _fetch4(profile, index, fetched):
-    for i in range(index.shape[0]):
-        for j in range(_LINE):
-            n = np.uint64(np.uint32(index[i, j] - _I(1)))
-            s0, s1 = profile[n], profile[n + np.uint64(1)]
-            s2, s3 = profile[n + np.uint64(2)], profile[n + np.uint64(3)]
-            fetched[i, 4 * j], fetched[i, 4 * j + 1], fetched[i, 4 * j + 2], fetched[i, 4 * j + 3] = s0, s1, s2, s3
-
-
-@_compiled
-def _add2(taps, between, turn, order, real, imag):
-    """Linear B-spline times the carrier."""
-    for i in range(real.shape[0]):
-        c0, c1, c2 = turn[0, i], turn[1, i], turn[2, i]
-        p3, p4 = order[1, i], order[2, i]
-        for j in range(_LINE):
-            cosine, sine = _carrier(j, c0, c1, c2, p3, p4)
-            v = between[i, j]
-            re = taps[i, 4 * j] + v * (taps[i, 4 * j + 2] - taps[i, 4 * j])
-            im = taps[i, 4 * j + 1] + v * (taps[i, 4 * j + 3] - taps[i, 4 * j + 1])
-            real[i, j] += re * cosine - im * sine
-            imag[i, j] += re * sine + im * cosine
-
-
-@_compiled
-def _add4(taps, between, turn, order, real, imag):
-    """Cubic B-spline times the carrier."""
-    for i in range(real.shape[0]):
-        c0, c1, c2 = turn[0, i], turn[1, i], turn[2, i]
-        p3, p4 = order[1, i], order[2, i]
-        for j in range(_LINE):
-            cosine, sine = _carrier(j, c0, c1, c2, p3, p4)
-            w0, w1, w2, w3 = _cubic(between[i, j])
-            re = w0 * taps[i, 8 * j] + w1 * taps[i, 8 * j + 2] + w2 * taps[i, 8 * j + 4] + w3 * taps[i, 8 * j + 6]
-            im = w0 * taps[i, 8 * j + 1] + w1 * taps[i, 8 * j + 3] + w2 * taps[i, 8 * j + 5] + w3 * taps[i, 8 * j + 7]
-            real[i, j] += re * cosine - im * sine
-            imag[i, j] += re * sine + im * cosine
-
-
-@_compiled
-def _carrier(j, c0, c1, c2, p3, p4):
-    """Phasor of pixel j of a segment: up to second order in integers, beyond in fractions of a cycle."""
-    k = _I(j - _LINE // 2)
-    x = _F(k)
-    turned = _I(c0 + k * _I(c1 + k * c2))
-    return _phasor(_F(turned) * _F(1 / _TURN) + x * x * x * (p3 + x * p4))
+            index[i, j] = _I(base + k * step + _I(floor))
+            turned = _I(c0 + k * _I(c1 + k * c2))
+            cycles[i, j] = _F(turned) * _F(1 / _TURN) + x * x * x * (p3 + x * p4)
 
 
 @_compiled
@@ -441,6 +351,55 @@ def _cubic(v):
     w0, w3 = u * u * u * _F(1 / 6), v * v * v * _F(1 / 6)
     w1 = _F(2 / 3) - v * v * (_F(1) - _F(0.5) * v)
     return w0, w1, _F(1) - w0 - w1 - w3, w3
+
+
+# A loop of its own: next to arithmetic, loads from anywhere would keep that from being vectorised. Neighbours are
+# read before any is written, so that they are read at once.
+
+
+@_compiled
+def _fetch(profile, index, cubic, fetched):
+    """Taps of each pixel, two or four."""
+    for i in range(index.shape[0]):
+        if cubic:
+            for j in range(_LINE):
+                n = np.uint64(np.uint32(index[i, j] - _I(1)))
+                s0, s1 = profile[n], profile[n + np.uint64(1)]
+                s2, s3 = profile[n + np.uint64(2)], profile[n + np.uint64(3)]
+                fetched[i, 4 * j], fetched[i, 4 * j + 1], fetched[i, 4 * j + 2], fetched[i, 4 * j + 3] = (
+                    s0,
+                    s1,
+                    s2,
+                    s3,
+                )
+        else:
+            for j in range(_LINE):
+                n = np.uint64(np.uint32(index[i, j]))
+                s0, s1 = profile[n], profile[n + np.uint64(1)]
+                fetched[i, 2 * j], fetched[i, 2 * j + 1] = s0, s1
+
+
+@_compiled
+def _add_taps(taps, between, cycles, cubic, real, imag):
+    """B-spline times the carrier."""
+    for i in range(real.shape[0]):
+        if cubic:
+            for j in range(_LINE):
+                cosine, sine = _phasor(cycles[i, j])
+                w0, w1, w2, w3 = _cubic(between[i, j])
+                t = 8 * j
+                re = w0 * taps[i, t] + w1 * taps[i, t + 2] + w2 * taps[i, t + 4] + w3 * taps[i, t + 6]
+                im = w0 * taps[i, t + 1] + w1 * taps[i, t + 3] + w2 * taps[i, t + 5] + w3 * taps[i, t + 7]
+                real[i, j] += re * cosine - im * sine
+                imag[i, j] += re * sine + im * cosine
+        else:
+            for j in range(_LINE):
+                cosine, sine = _phasor(cycles[i, j])
+                v = between[i, j]
+                re = taps[i, 4 * j] + v * (taps[i, 4 * j + 2] - taps[i, 4 * j])
+                im = taps[i, 4 * j + 1] + v * (taps[i, 4 * j + 3] - taps[i, 4 * j + 1])
+                real[i, j] += re * cosine - im * sine
+                imag[i, j] += re * sine + im * cosine
 
 
 @_parallel
@@ -456,6 +415,7 @@ def _add_lattice(
         rows = min(_ROWS, image.shape[0] - top)
         real, imag = np.zeros((rows, _LINE), np.float32), np.zeros((rows, _LINE), np.float32)
         index, between = np.empty((rows, _LINE), np.int32), np.empty((rows, _LINE), np.float32)
+        carrier = np.empty((rows, _LINE), np.float32)
         fetched = np.empty((rows, (4 if cubic else 2) * _LINE), np.int64)
         taps = fetched.view(np.float32)
         whole, fraction = np.empty((2, rows), np.int32), np.empty((2, rows), np.float32)
@@ -470,13 +430,9 @@ def _add_lattice(
             _expand(middle, transmitter[pulse], along, ranges)
             _expand(middle, receiver[pulse], along, ranges)
             _split(ranges, per_metre, first[pulse], cycles, whole, fraction, turn, order)
-            _places(whole, fraction, order, cells_per_cycle, index, between)
-            if cubic:
-                _fetch4(profiles[pulse], index, fetched)
-                _add4(taps, between, turn, order, real, imag)
-            else:
-                _fetch2(profiles[pulse], index, fetched)
-                _add2(taps, between, turn, order, real, imag)
+            _places(whole, fraction, turn, order, cells_per_cycle, index, between, carrier)
+            _fetch(profiles[pulse], index, cubic, fetched)
+            _add_taps(taps, between, carrier, cubic, real, imag)
         for i in range(rows):
             for j in range(_LINE):
                 image[top + i, left + j] += complex(real[i, j], imag[i, j])
@@ -563,95 +519,35 @@ def _reach(transmitter, receiver, centres, halves):
 @_compiled
 def _split_points(sums, per_metre, first, cycles, index, between, turn):
     """Sample before each pixel, how far beyond it the pixel is, and what is left of its cycles."""
-    for i in range(sums.shape[0]):
-        cell = sums[i] * per_metre - first
-        before = np.floor(cell)
-        index[i], between[i] = _I(before), _F(cell - before)
-        cycle = sums[i] * cycles
-        turn[i] = _F(cycle - np.rint(cycle))
-
-
-@_compiled
-def _fetch_points(profile, index, cubic, fetched):
-    """Taps of each pixel, two or four."""
-    if cubic:
-        for i in range(index.shape[0]):
-            n = np.uint64(np.uint32(index[i] - _I(1)))
-            s0, s1 = profile[n], profile[n + np.uint64(1)]
-            s2, s3 = profile[n + np.uint64(2)], profile[n + np.uint64(3)]
-            fetched[4 * i], fetched[4 * i + 1], fetched[4 * i + 2], fetched[4 * i + 3] = s0, s1, s2, s3
-    else:
-        for i in range(index.shape[0]):
-            n = np.uint64(np.uint32(index[i]))
-            s0, s1 = profile[n], profile[n + np.uint64(1)]
-            fetched[2 * i], fetched[2 * i + 1] = s0, s1
-
-
-@_compiled
-def _add_taps(taps, between, turn, cubic, real, imag):
-    """B-spline times the carrier."""
-    if cubic:
-        for i in range(real.shape[0]):
-            cosine, sine = _phasor(turn[i])
-            w0, w1, w2, w3 = _cubic(between[i])
-            re = w0 * taps[8 * i] + w1 * taps[8 * i + 2] + w2 * taps[8 * i + 4] + w3 * taps[8 * i + 6]
-            im = w0 * taps[8 * i + 1] + w1 * taps[8 * i + 3] + w2 * taps[8 * i + 5] + w3 * taps[8 * i + 7]
-            real[i] += re * cosine - im * sine
-            imag[i] += re * sine + im * cosine
-    else:
-        for i in range(real.shape[0]):
-            cosine, sine = _phasor(turn[i])
-            v = between[i]
-            re = taps[4 * i] + v * (taps[4 * i + 2] - taps[4 * i])
-            im = taps[4 * i + 1] + v * (taps[4 * i + 3] - taps[4 * i + 1])
-            real[i] += re * cosine - im * sine
-            imag[i] += re * sine + im * cosine
+    for i in range(index.shape[0]):
+        for j in range(_LINE):
+            cell = sums[i * _LINE + j] * per_metre - first
+            before = np.floor(cell)
+            index[i, j], between[i, j] = _I(before), _F(cell - before)
+            cycle = sums[i * _LINE + j] * cycles
+            turn[i, j] = _F(cycle - np.rint(cycle))
 
 
 @_parallel
 def _add_points(profiles, first, transmitter, receiver, reference, per_metre, cycles, points, cubic, image):
     """Add some pulses to pixels anywhere, (3, n), each at its own exact range."""
-    for tile in prange((image.shape[0] + _TILE - 1) // _TILE):
-        start = tile * _TILE
-        count = min(_TILE, image.shape[0] - start)
-        some = points[:, start : start + count].copy()
-        sums, index = np.empty(count), np.empty(count, np.int32)
-        between, turn = np.empty(count, np.float32), np.empty(count, np.float32)
-        fetched = np.empty((4 if cubic else 2) * count, np.int64)
+    for tile in prange((image.shape[0] + _ROWS * _LINE - 1) // (_ROWS * _LINE)):
+        start = tile * _ROWS * _LINE
+        count = min(_ROWS * _LINE, image.shape[0] - start)
+        rows = (count + _LINE - 1) // _LINE
+        some = np.empty((3, rows * _LINE))
+        for axis in range(3):
+            some[axis, :count] = points[axis, start : start + count]
+            some[axis, count:] = points[axis, start + count - 1]
+        sums, index = np.empty(rows * _LINE), np.empty((rows, _LINE), np.int32)
+        between, turn = np.empty((rows, _LINE), np.float32), np.empty((rows, _LINE), np.float32)
+        fetched = np.empty((rows, (4 if cubic else 2) * _LINE), np.int64)
         taps = fetched.view(np.float32)
-        real, imag = np.zeros(count, np.float32), np.zeros(count, np.float32)
+        real, imag = np.zeros((rows, _LINE), np.float32), np.zeros((rows, _LINE), np.float32)
         for pulse in range(profiles.shape[0]):
             _sums(some, transmitter[pulse], receiver[pulse], reference[pulse], sums)
             _split_points(sums, per_metre, first[pulse], cycles, index, between, turn)
-            _fetch_points(profiles[pulse], index, cubic, fetched)
+            _fetch(profiles[pulse], index, cubic, fetched)
             _add_taps(taps, between, turn, cubic, real, imag)
         for i in range(count):
-            image[start + i] += complex(real[i], imag[i])
-
-
-@_parallel
-def _add_points_apart(profiles, transmitter, receiver, reference, per_metre, cycles, points, shape, image):
-    """Add some pulses to pixels anywhere, (3, n), each read by the kernel itself, in double precision."""
-    length = profiles.shape[1]
-    for i in prange(image.shape[0]):
-        total = 0j
-        for pulse in range(profiles.shape[0]):
-            distance = -reference[pulse]
-            for positions in (transmitter, receiver):
-                x, y, z = (
-                    points[0, i] - positions[pulse, 0],
-                    points[1, i] - positions[pulse, 1],
-                    points[2, i] - positions[pulse, 2],
-                )
-                distance += math.sqrt(x * x + y * y + z * z)
-            cell = distance * per_metre
-            before = math.floor(cell)
-            first = (int(before) - _TAPS // 2 + 1) % length
-            read = 0j
-            for tap in range(_TAPS):
-                offset = 2 / _TAPS * (cell - before + _TAPS // 2 - 1 - tap)
-                weight = math.exp(shape * (math.sqrt(max(0.0, 1 - offset * offset)) - 1))
-                read += weight * profiles[pulse, (first + tap) % length]
-            angle = 2 * math.pi * (distance * cycles - np.rint(distance * cycles))
-            total += read * complex(math.cos(angle), math.sin(angle))
-        image[i] += total
+            image[start + i] += complex(real[i // _LINE, i % _LINE], imag[i // _LINE, i % _LINE])

@@ -8,17 +8,17 @@ lines along the axes (x′, y′) of (10).
 import math
 import time
 from collections.abc import Callable
-from typing import NamedTuple, Protocol
+from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.geometry import GroundVector
-from bisar_budget.simulate.collection import baseband
+from bisar_budget.simulate.collection import RangeLines
 from bisar_budget.simulate.far_field import far_field_filter, is_nonuniform, polar_format
 from bisar_budget.simulate.image_formation import Kernel, backprojection, bytes_held, ground_grid, matched_filter
 from bisar_budget.simulate.phase_history import Complexes, Floats, PhaseHistory
-from bisar_budget.simulate.range_lines import Flown
 
 IMAGE_FORMERS = ("backprojection", "polar_format", "matched_filter", "far_field")
 
@@ -63,10 +63,11 @@ class Former(Protocol):
         """About how long an image of so many pulses takes, measured with some of them. [s]"""
 
 
-class ExactRangeFormer(NamedTuple):
+@dataclass(frozen=True, slots=True, eq=False)
+class ExactRangeFormer:
     """Matched filter (4) or backprojection, which equals it."""
 
-    flown: Flown
+    lines: RangeLines
     bandwidth: float
     wavelength: float
     is_direct: bool
@@ -87,33 +88,33 @@ class ExactRangeFormer(NamedTuple):
 
     def cells(self, centre: GroundVector) -> tuple[float, float]:
         """Resolution."""
-        return self.flown.cells(centre, self.bandwidth, self.wavelength)
+        return self.lines.cells(centre, self.bandwidth, self.wavelength)
 
     def look(self, centre: GroundVector) -> Floats:
         """Direction of x′."""
-        by_range = self.flown.gradients(np.asarray(centre))[0]
+        by_range = self.lines.gradients(np.asarray(centre))[0]
         towards: Floats = -by_range / float(np.hypot(*by_range))
         return towards
 
     def offsets(self, places: Floats, centre: GroundVector) -> Floats:
         """Cells from the centre, by range sum and by its change over the aperture."""
         middle = np.asarray([centre])
-        nearer = self.flown.range_sum(middle) - self.flown.range_sum(places)
-        way = 1 if self.flown.turns_left(centre) else -1
+        nearer = self.lines.range_sum(middle) - self.lines.range_sum(places)
+        way = 1 if self.lines.turns_left(centre) else -1
         turned = way * (self._change(places) - self._change(middle))
         return np.stack((nearer * self.bandwidth / SPEED_OF_LIGHT, turned / self.wavelength), axis=1)
 
     def _change(self, places: Floats) -> Floats:
         """Change of the range sum over the aperture. [m]"""
         total: Floats = np.zeros(len(places))
-        for one in (self.flown.transmitter, self.flown.receiver):
+        for one in (self.lines.transmitter, self.lines.receiver):
             for when, sign in ((0, -1), (2, 1)):
                 total += sign * np.linalg.norm(np.c_[places, np.zeros(len(places))] - one[when], axis=1)
         return total
 
     def grid(self, centre: GroundVector, spacing: tuple[float, float], shape: tuple[int, int]) -> Floats:
         """Pixels along lines of equal range and of equal Doppler."""
-        return self.flown.grid(centre, spacing, shape)
+        return self.lines.grid(centre, spacing, shape)
 
     def image(self, history: PhaseHistory, grid: Floats, told: Told) -> Complexes:
         """Form the image."""
@@ -127,11 +128,12 @@ class ExactRangeFormer(NamedTuple):
 
     def _formed(self, history: PhaseHistory, part: Floats) -> Complexes:
         formed = matched_filter(history, part) if self.is_direct else backprojection(history, part, self.kernel)
-        formed *= baseband(self.flown, part, self.wavelength)
+        formed *= self.lines.baseband(part, self.wavelength)
         return formed
 
 
-class PlaneWaves(NamedTuple):
+@dataclass(frozen=True, slots=True, eq=False)
+class PlaneWaves:
     """Far-field filter (12), or polar format (13) and (14).
 
     `sight` are the look vectors of both measured platforms, added, over slow time, (times, 2), an odd number of them
@@ -213,7 +215,7 @@ class PlaneWaves(NamedTuple):
         return _SECONDS_PER_SAMPLE * float(blocks * pulses * some.frequency.size + pixels)
 
     def _carrier(self, points: Floats) -> Complexes:
-        """Phase of the range at the midpoint, as `baseband` has it, for plane waves."""
+        """Phase of the range at the midpoint, as `RangeLines.baseband` has it, for plane waves."""
         wavenumber = 2 * math.pi * self.center_frequency / SPEED_OF_LIGHT
         carrier: Complexes = np.exp(1j * wavenumber * (points[..., :2] @ self.middle))
         return carrier

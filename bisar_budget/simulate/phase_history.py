@@ -5,6 +5,7 @@ Frame: scene centre at the origin, x east, y north, z up. SI units.
 """
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -12,12 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget.constants import SPEED_OF_LIGHT
-from bisar_budget.geometry import BistaticGeometry, PlatformState
+from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState, Vectors
+from bisar_budget.ranges.exact_ranges import ExactRanges, Sampling, followed
 
-_FEW = 8  # scatterers are added one by one
-_HELD = 1 << 18  # complex numbers held at once, of many
+_HELD = 1 << 18  # complex numbers held at once
 _NO_SIGHT = 1e-20  # square of what a metre of a platform changes; less is rounding
 SMOOTH = 12  # order of what is smooth of a history
+_ORDER = 12  # of the fit to samples anywhere over the aperture
 _ROUNDING = 1e-14  # of a frequency: what numpy.linspace leaves
 
 Floats = NDArray[np.float64]
@@ -69,6 +71,65 @@ class PathError(NamedTuple):
     wideband_band: tuple[float, float] | None = None
     course: Course | None = None
 
+    def slow(self) -> "PathError":
+        """The same with what is smooth of its other history."""
+        return self if self.course is None else self._replace(course=self.course.smooth())
+
+    def still(self) -> "PathError":
+        """The same without vibration."""
+        return self._replace(sinusoids=(), wideband_rms=0.0)
+
+    def plus(self, other: "PathError") -> "PathError":
+        """Both polynomial errors at once; vibration is not added."""
+        position, velocity, acceleration = (
+            (u[0] + v[0], u[1] + v[1], u[2] + v[2]) for u, v in zip(self[:3], other[:3], strict=True)
+        )
+        return PathError(position, velocity, acceleration)
+
+
+class Errors(NamedTuple):
+    """Errors in one image: of both platforms, the clock's t̃₀ … t̃₃ of (1), and any other history of the clock.
+
+    [s], [1], [1/s], [1/s²]; `clock_course` [s].
+    """
+
+    transmitter: PathError = PathError()
+    receiver: PathError = PathError()
+    clock: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
+    clock_course: Course | None = None
+
+    def of(self, platform: str, error: PathError) -> "Errors":
+        """Give one platform an error."""
+        return self._replace(transmitter=error) if platform == "transmitter" else self._replace(receiver=error)
+
+    def smooth(self) -> "Errors":
+        """The same errors without vibration, and with what is smooth of other histories."""
+        return self.slow().still()
+
+    def still(self) -> "Errors":
+        """The same without vibration."""
+        return self._replace(transmitter=self.transmitter.still(), receiver=self.receiver.still())
+
+    def slow(self) -> "Errors":
+        """The same with what is smooth of other histories: noise between a few nodes would pass for a phase."""
+        return self._replace(
+            transmitter=self.transmitter.slow(),
+            receiver=self.receiver.slow(),
+            clock_course=self.clock_course and self.clock_course.smooth(),
+        )
+
+
+def superposed(parts: Iterable[Errors]) -> Errors:
+    """All of several polynomial errors at once; vibration is not added."""
+    total = Errors()
+    for part in parts:
+        total = Errors(
+            transmitter=total.transmitter.plus(part.transmitter),
+            receiver=total.receiver.plus(part.receiver),
+            clock=tuple(a + b for a, b in zip(total.clock, part.clock, strict=True)),
+        )
+    return total
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Path:
@@ -76,6 +137,30 @@ class Path:
 
     actual: Floats
     measured: Floats
+
+    def seen_from(self, place: GroundVector) -> "Path":
+        """The same with a ground point for its origin."""
+        away = np.array([*place, 0.0])
+        return Path(actual=self.actual - away, measured=self.measured - away)
+
+
+@dataclass(frozen=True, eq=False)
+class Flight:
+    """Both platforms at some slow times, and the error of the clock there, (times,). [s]"""
+
+    transmitter: Path
+    receiver: Path
+    clock: Floats
+
+    @property
+    def paths(self) -> tuple[Path, Path]:
+        """Those of transmitter and receiver."""
+        return self.transmitter, self.receiver
+
+    def as_measured(self) -> "Flight":
+        """The flight that the processor believes in: where the paths were measured, by a perfect clock."""
+        transmitter, receiver = (Path(actual=one.measured, measured=one.measured) for one in self.paths)
+        return Flight(transmitter, receiver, np.zeros_like(self.clock))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -266,16 +351,23 @@ def phase_history(
     scatterers, amplitudes = np.atleast_2d(scatterers), np.atleast_1d(amplitudes)
     if len(scatterers) != len(amplitudes):
         raise ValueError(f"{len(scatterers)} scatterers have {len(amplitudes)} amplitudes")
-    if len(scatterers) > _FEW and is_even(frequency):
-        _add_many(
-            samples, scatterers, amplitudes, (transmitter.actual, receiver.actual), clock - reference, wavenumber
-        )
-    else:
-        for position, amplitude in zip(scatterers, amplitudes, strict=True):
-            actual = np.linalg.norm(transmitter.actual - position, axis=1)
-            actual += np.linalg.norm(receiver.actual - position, axis=1)
-            differential_range = actual - reference + clock  # (1)
-            samples += amplitude * np.exp(-1j * np.outer(differential_range, wavenumber))  # (2), (3)
+    # (3) with the frequency split into coarse and fine steps: e^{-j(k + q)R} is a product, and the sum over
+    # scatterers one of matrices, so that 2√n exponentials do for n frequencies.
+    coarse, fine = split(wavenumber) if is_even(frequency) else (wavenumber, np.zeros(1))
+    many = max(1, _HELD // (coarse.size + fine.size))
+    together = max(1, min(many, len(scatterers)))
+    pulses = max(1, min(many // together, _HELD // (coarse.size * fine.size)))
+    for begin in range(0, slow_time.size, pulses):
+        some = slice(begin, begin + pulses)
+        total: Complexes = np.zeros((slow_time[some].size, coarse.size, fine.size), dtype=complex)
+        for start in range(0, len(scatterers), together):
+            part = slice(start, start + together)
+            ranges = np.linalg.norm(transmitter.actual[some, None] - scatterers[part], axis=-1)
+            ranges += np.linalg.norm(receiver.actual[some, None] - scatterers[part], axis=-1)
+            ranges = ranges - reference[some, None] + clock[some, None]  # (1)
+            by_coarse = np.exp(-1j * coarse[:, None] * ranges[:, None]) * amplitudes[part]  # (2), (3)
+            total += by_coarse @ np.exp(-1j * ranges[..., None] * fine)
+        samples[some] = total.reshape(len(total), -1)[:, : wavenumber.size]
     if noise_power:
         if rng is None:
             raise ValueError("noise needs a random generator")
@@ -290,27 +382,60 @@ def phase_history(
     )
 
 
-def _add_many(
-    samples: Complexes,
-    scatterers: Floats,
-    amplitudes: Complexes,
-    actual: tuple[Floats, Floats],
-    offset: Floats,
-    wavenumber: Floats,
-) -> None:
-    """Add the echoes of many scatterers: (3) with the frequency split into coarse and fine steps, two products less.
+# ---------------------------------------------------------------------- by exact ranges
+class NoGroundPointError(ValueError):
+    """No ground point has the recorded range history: the point has no image."""
 
-    e^{-j(k + q)R} is a product, so the sum over scatterers is one of matrices. Frequencies are evenly spaced.
+
+@dataclass(frozen=True, kw_only=True)
+class ExactEffect:
+    """Displacement (east, north) [m]; phases at the aperture edge, signed like the range error [rad]."""
+
+    displacement: tuple[float, float]
+    quadratic: float
+    cubic: float
+
+
+def exact_effect(
+    slow_time: Floats,
+    transmitter: Path,
+    receiver: Path,
+    clock_error: Floats | float,
+    wavelength_m: float,
+    aperture_time_s: float,
+) -> ExactEffect:
+    """Effect of one error, its paths sampled anywhere over the aperture: see `ranges.exact_ranges`.
+
+    Raises
+    ------
+    NoGroundPointError
+        No ground point has the recorded range history.
     """
-    coarse, fine = split(wavenumber)
-    shape = (coarse.size, fine.size)
-    many = max(1, _HELD // sum(shape))
-    for pulse in range(samples.shape[0]):
-        total = np.zeros(shape, dtype=complex)
-        for start in range(0, len(scatterers), many):
-            part = slice(start, start + many)
-            ranges = sum(np.linalg.norm(one[pulse] - scatterers[part], axis=1) for one in actual) + offset[pulse]
-            by_coarse = np.exp(-1j * np.outer(coarse, ranges))
-            by_fine = np.exp(-1j * np.outer(ranges, fine))
-            total += (by_coarse * amplitudes[part]) @ by_fine
-        samples[pulse] += total.ravel()[: wavenumber.size]
+    half, paths = aperture_time_s / 2, (transmitter, receiver)
+    exact = ExactRanges(
+        np.array([half]),
+        np.array([2 * math.pi / wavelength_m]),
+        _sampling(slow_time / half),
+        [_columns(one.actual) for one in paths],
+        [_columns(one.actual[slow_time.size // 2]) for one in paths],
+    )
+    clock = np.broadcast_to(SPEED_OF_LIGHT * np.asarray(clock_error, dtype=float), slow_time.shape)[:, None]
+    shifts = [_columns(one.measured - one.actual) for one in paths]
+    found = followed(exact, clock, shifts, np.zeros(1, dtype=int))
+    if not found.is_found[0]:
+        raise NoGroundPointError("no ground point has the recorded range history")
+    east, north, quadratic, cubic = (float(one[0]) for one in found[1:5])
+    return ExactEffect(displacement=(east, north), quadratic=quadratic, cubic=cubic)
+
+
+def _columns(positions: Floats) -> Vectors:
+    """Positions (..., 3) by component, each (..., 1)."""
+    x, y, z = np.moveaxis(positions, -1, 0)[..., None]
+    return x, y, z
+
+
+def _sampling(places: Floats) -> Sampling:
+    """Samples anywhere in −1 … 1, fitted by the polynomial through them."""
+    legendre = np.polynomial.legendre.legvander(places, min(_ORDER, max(3, places.size // 4)))
+    at_edge = np.array([1.0, 1.0, 1.5, 2.5])[:, None]  # of P₂ and P₃, see `LEGENDRE_FITS`
+    return Sampling(places, at_edge * np.linalg.pinv(legendre)[:4])

@@ -3,6 +3,7 @@
 import math
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -13,32 +14,27 @@ from bisar_budget.effects.combined import correlated_errors, likely_error
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.pieces import LinePiece, gradients_of, indicated_point
 from bisar_budget.effects.vibration import counted, lines_of
-from bisar_budget.geometry import BistaticGeometry, GroundVector, Vector
+from bisar_budget.geometry import GroundVector, Vector
 from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.mission.platforms import MotionError as DeclaredError
-from bisar_budget.ranges.exact_ranges import aperture_nodes
 from bisar_budget.simulate.autofocus import ALGORITHMS
-from bisar_budget.simulate.collection import superposed_motion
-from bisar_budget.simulate.exact import ExactEffect, exact_effect
+from bisar_budget.simulate.collection import PointCollection, RangeLines
 from bisar_budget.simulate.former import IMAGE_FORMERS, ExactRangeFormer, Former, PlaneWaves
-from bisar_budget.simulate.image_formation import ground_grid, kernel_within, taylor_window
-from bisar_budget.simulate.impulse_response import ImpulseResponse, impulse_response
+from bisar_budget.simulate.image_formation import ground_grid
+from bisar_budget.simulate.impulse_response import ImpulseResponse, between, impulse_response
 from bisar_budget.simulate.phase_history import (
     Complexes,
+    Errors,
+    ExactEffect,
+    Flight,
     Floats,
-    Path,
     PathError,
     PathSinusoid,
     PhaseHistory,
     cell_centres,
-    direct_path_error,
-    direct_path_ways,
-    path,
     phase_history,
 )
-from bisar_budget.simulate.range_lines import Flown
-from bisar_budget.simulate.realisations import FlownErrors, flown_errors
-from bisar_budget.simulate.resampling import between
+from bisar_budget.simulate.realisations import drawn_errors
 from bisar_budget.simulate.targets import Target, Targets
 from bisar_budget.workers import Progress, unseen
 
@@ -64,7 +60,8 @@ class SimulationError(Exception):
     """An image that cannot be formed as asked; the message says what to change."""
 
 
-class Response(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Response:
     """One target as the images show it.
 
     `effect` is what the errors do to it by exact ranges, its displacement counted from the target; `shown` is where
@@ -124,7 +121,8 @@ class PointImages(NamedTuple):
     outside: str = ""
 
 
-class Patch(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Patch:
     """Ground patch around the displaced point: pixels along both axes, and their spacing there. [m]"""
 
     shape: tuple[int, int]
@@ -141,7 +139,8 @@ class Patch(NamedTuple):
         return (self.shape[0] * self.spacing[0], self.shape[1] * self.spacing[1])
 
 
-class Plan(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Plan:
     """Patches, samples and memory that the images of a mission take, known before any is formed."""
 
     rotated: Patch
@@ -217,34 +216,19 @@ def simulate_point(
     """
     if image_former not in IMAGE_FORMERS:
         raise ValueError(f"image former {image_former!r}; known: {', '.join(IMAGE_FORMERS)}")
-    geometry, settings = mission.geometry, mission.simulation
-    T, wavelength = mission.collection.aperture_time, mission.radar.wavelength
-    nodes, fine = aperture_nodes(T), cell_centres(T, 2049)
-    drawn = flown_errors(Analysis(mission))
-    slow = drawn.smooth()
-    at_nodes = _paths(mission, geometry, nodes, vibrating=False, drawn=slow)
-    smooth = _paths(mission, geometry, fine, vibrating=False, drawn=slow)
-
-    def effect_at(place: GroundVector) -> ExactEffect:
-        transmitter, receiver = (_seen_from(place, one) for one in at_nodes)
-        clock = _clock(mission, nodes, at_nodes, slow)
-        return exact_effect(nodes, transmitter, receiver, clock, wavelength, T)
-
+    geometry, settings = mission.geometry, mission.simulation or Simulation()
+    T = mission.collection.aperture_time
+    fine = cell_centres(T, 2049)
+    collection, declared = PointCollection(mission, geometry), declared_errors(mission)
+    standing = [(one.east, one.north) for one in targets.points]
     try:
-        effect = effect_at((0.0, 0.0))
-        effects = [effect_at((one.east, one.north)) for one in targets.points]
-        begin, middle, end = (
-            _paths(mission, geometry, np.array([tau]), vibrating=False, drawn=slow) for tau in (-T / 2, 0.0, T / 2)
-        )
-        flown = Flown(*(np.concatenate([at[leg].measured for at in (begin, middle, end)]) for leg in (0, 1)))
-        former, scene_former = _formers(mission, image_former, flown, smooth)
-        displaced = [
-            (one.east + moved.displacement[0], one.north + moved.displacement[1])
-            for one, moved in zip(targets.points, effects, strict=True)
-        ]
-        by_clock = SPEED_OF_LIGHT * _clock(mission, fine, smooth, slow)
-        left = _left_over(smooth, effect) + by_clock
-        recorded = [_recorded(smooth, (one.east, one.north)) + by_clock for one in targets.points]
+        effect, *effects = (collection.effect(declared.still(), place) for place in ((0.0, 0.0), *standing))
+        slow = declared.smooth()
+        smooth = collection.flight(slow, fine)
+        former, scene_former = _formers(collection, image_former, collection.range_lines(declared), smooth)
+        displaced = [_sum(place, moved.displacement) for place, moved in zip(standing, effects, strict=True)]
+        left = _range_error(smooth, (0.0, 0.0), effect.displacement)
+        recorded = [_range_error(smooth, place, (0.0, 0.0)) for place in standing]
         shown = [former.place(*one) for one in zip(displaced, recorded, strict=True)]
         in_scene_shown = [scene_former.place(*one) for one in zip(displaced, recorded, strict=True)]
         smear = former.left(shown[0], left, recorded[0])
@@ -252,29 +236,29 @@ def simulate_point(
         plan = _plan(mission, former, scene_former, np.array(shown), np.array(in_scene_shown), smear, slope)
     except ValueError as error:
         raise SimulationError(f"the declared errors leave no image of a point: {error}") from None
-    plan.require_memory((settings or Simulation()).memory_limit, mission.collection.pulses)
+    plan.require_memory(settings.memory_limit, mission.collection.pulses)
     slow_time = cell_centres(T, plan.pulses)
     frequency = mission.radar.center_frequency + cell_centres(mission.radar.bandwidth, plan.frequencies)
-    rng = np.random.default_rng(settings.seed if settings else 1)
+    rng = np.random.default_rng(settings.seed)
     lines = former.grid(_middle(shown), plan.rotated.spacing, plan.rotated.shape)
     scene = ground_grid(_middle(in_scene_shown), 0.0, plan.in_scene.size, plan.in_scene.shape)
-    clutter, clutter_amplitudes = _clutter(targets.clutter_db, lines, settings.seed if settings else 1)
+    clutter, clutter_amplitudes = _clutter(targets.clutter_db, lines, settings.seed)
     amplitudes = np.concatenate(([10 ** (one.level_db / 20) for one in targets.points], clutter_amplitudes))
 
-    def history(paths: tuple[Path, Path], clock: Floats, places: Floats) -> PhaseHistory:
+    def history(flight: Flight, places: Floats) -> PhaseHistory:
         formed = phase_history(
             np.c_[places, np.zeros(len(places))],
             amplitudes.astype(complex),
             slow_time=slow_time,
             frequency=frequency,
-            transmitter=paths[0],
-            receiver=paths[1],
-            clock_error=clock,
-            noise_power=10 ** (settings.noise / 10) if settings and settings.noise is not None else 0.0,
+            transmitter=flight.transmitter,
+            receiver=flight.receiver,
+            clock_error=flight.clock,
+            noise_power=10 ** (settings.noise / 10) if settings.noise is not None else 0.0,
             rng=rng,
         )
-        if settings and settings.window == "taylor":
-            formed.samples[:] *= np.outer(taylor_window(plan.pulses), taylor_window(plan.frequencies))
+        if collection.is_tapered:
+            formed.samples[:] *= np.outer(collection.window(plan.pulses), collection.window(plan.frequencies))
         return formed
 
     done = 0
@@ -287,33 +271,27 @@ def simulate_point(
 
         return by.image(data, grid, told)
 
-    standing = [(one.east, one.north) for one in targets.points]
     begun, few = time.perf_counter(), cell_centres(T, _FEW_PULSES)
-    still = _paths(mission, geometry, few, vibrating=False, drawn=slow)
+    still = collection.flight(slow, few)
     places = np.pad(np.concatenate((standing, clutter)), ((0, 0), (0, 1)))
     some = phase_history(
         places,
         amplitudes.astype(complex),
         slow_time=few,
         frequency=frequency,
-        transmitter=still[0],
-        receiver=still[1],
+        transmitter=still.transmitter,
+        receiver=still.receiver,
     )
     recording = 2 * (time.perf_counter() - begun) * plan.pulses / few.size
     rotating = 2 * former.seconds(some, plan.pulses, lines)
     foreseen(recording + rotating + scene_former.seconds(some, plan.pulses, scene))
-    flown_as_declared = _paths(mission, geometry, slow_time, vibrating=True, rng=rng, drawn=drawn)
-    data = history(
-        flown_as_declared,
-        _clock(mission, slow_time, flown_as_declared, drawn),
-        np.concatenate((standing, clutter - np.asarray(effect.displacement))),
-    )
+    as_declared = collection.flight(declared, slow_time, rng)
+    data = history(as_declared, np.concatenate((standing, clutter - np.asarray(effect.displacement))))
     try:
         rotated, in_scene = image(former, data, lines), image(scene_former, data, scene)
         del data
-        measured = [one.measured for one in _paths(mission, geometry, slow_time, vibrating=False, drawn=slow)]
-        as_measured = (Path(actual=measured[0], measured=measured[0]), Path(actual=measured[1], measured=measured[1]))
-        error_free = image(former, history(as_measured, 0 * slow_time, np.concatenate((displaced, clutter))), lines)
+        as_measured = collection.flight(slow, slow_time).as_measured()
+        error_free = image(former, history(as_measured, np.concatenate((displaced, clutter))), lines)
     except ValueError as error:
         raise SimulationError(f"{image_former.replace('_', ' ')} cannot form this image: {error}") from None
     focused = ALGORITHMS[mission.autofocus.algorithm](rotated).image
@@ -361,47 +339,75 @@ def simulate_point(
     )
 
 
-class Flight(NamedTuple):
-    """Both platforms at some slow times, as flown and as measured, and the clock error. [s]"""
+def declared_errors(mission: Mission) -> Errors:
+    """The declared errors of a mission as they are flown once: by its signs, its seed and its coverage factor.
 
-    transmitter: Path
-    receiver: Path
-    clock: Floats
-
-
-def flight(mission: Mission, slow_time: Floats, *, vibrating: bool) -> Flight:
-    """Fly a mission once with its declared errors, as `simulate_point` does: what a receiver records.
-
-    Without vibration it is what is smooth of that, by which a response is displaced.
-
-    Parameters
-    ----------
-    mission : Mission
-        As loaded.
-    slow_time : (pulses,) ndarray
-        [s]
-    vibrating : bool
-        With vibration and what else is fast.
+    A covariance has no sign to fly with: flown is its most probable error of one sigma of quadratic phase.
     """
-    drawn = flown_errors(Analysis(mission))
-    drawn = drawn if vibrating else drawn.smooth()
-    rng = np.random.default_rng(mission.simulation.seed if mission.simulation else 1)
-    paths = _paths(mission, mission.geometry, slow_time, vibrating=vibrating, rng=rng, drawn=drawn)
-    return Flight(*paths, _clock(mission, slow_time, paths, drawn))
+    analysis, factor, common = Analysis(mission), mission.allocation.coverage_factor, mission.common_motion_error
+    errors = drawn_errors(analysis)
+    sources = {source.id: source for source in analysis.sources}
+    likely = {
+        group.platform: likely_error(group, [sources[row_id] for row_id in group.ids])
+        for group in correlated_errors(mission)
+    }
+    for name in PLATFORMS:
+        declared: DeclaredError = getattr(mission.platforms, name).motion_error
+        state = getattr(mission.geometry, name)
+        axes = state.frame(declared.frame)
+        error = _turned((declared.position, declared.velocity, declared.acceleration), axes, factor)
+        if name in likely:
+            flown = _turned((likely[name][:3], likely[name][3:]), axes, 1.0)
+            error = flown._replace(acceleration=error.acceleration)
+        if common is not None:
+            shared = (common.position, common.velocity, common.acceleration)
+            error = error.plus(_turned(shared, state.frame("scene"), factor))
+        wideband = declared.vibration.wideband
+        error = error._replace(
+            sinusoids=tuple(PathSinusoid(*line) for line in lines_of(mission, name)),
+            wideband_rms=counted(mission, name, wideband.rms, "islr") if wideband else 0.0,
+            course=getattr(errors, name).course,
+        )
+        errors = errors.of(name, error)
+    if mission.has_direct_path:  # whose own clock errors are nothing
+        return errors
+    clock = mission.timing_error
+    terms = (clock.constant or 0.0, clock.linear or 0.0, clock.quadratic or 0.0, clock.cubic or 0.0)
+    return errors._replace(clock=tuple(factor * term for term in terms))
 
 
-def _formers(mission: Mission, image_former: str, flown: Flown, smooth: tuple[Path, Path]) -> tuple[Former, Former]:
+def _turned(
+    stated: Sequence[Sequence[float] | None], axes: tuple[Vector, Vector, Vector], factor: float
+) -> PathError:
+    """Position, velocity, acceleration error stated along a frame's axes, along the scene's, with their signs."""
+    found = []
+    for vector in stated:
+        parts = (0.0, 0.0, 0.0) if vector is None else vector
+        x, y, z = (factor * sum(d * axis[i] for d, axis in zip(parts, axes, strict=True)) for i in range(3))
+        found.append((x, y, z))
+    position, velocity, acceleration = (*found, (0.0, 0.0, 0.0))[:3]
+    return PathError(position, velocity, acceleration)
+
+
+def _formers(
+    collection: PointCollection, image_former: str, lines: RangeLines, flight: Flight
+) -> tuple[Former, Former]:
     """Image formers of the rotated images, and of the one along (x, y)."""
-    radar = mission.radar
-    kernel = kernel_within((mission.simulation or Simulation()).memory_limit)
-    exact = ExactRangeFormer(flown, radar.bandwidth, radar.wavelength, image_former == "matched_filter", kernel)
+    radar = collection.radar
+    exact = ExactRangeFormer(
+        lines, radar.bandwidth, radar.wavelength, image_former == "matched_filter", collection.kernel
+    )
     if image_former in ("backprojection", "matched_filter"):
         return exact, exact
-    sight = sum(one.measured / np.linalg.norm(one.measured, axis=1, keepdims=True) for one in smooth)
+    sight = sum(one.measured / np.linalg.norm(one.measured, axis=1, keepdims=True) for one in flight.paths)
     plane = PlaneWaves(
         np.asarray(sight)[:, :2], radar.center_frequency, radar.bandwidth, image_former == "polar_format"
     )
     return plane, exact if plane.is_polar else plane
+
+
+def _sum(place: GroundVector, by: GroundVector) -> GroundVector:
+    return place[0] + by[0], place[1] + by[1]
 
 
 def _middle(places: Sequence[GroundVector] | Floats) -> GroundVector:
@@ -493,106 +499,13 @@ def pulses_for(mission: Mission, cells: int) -> int:
     return given
 
 
-def _vector(declared: Vector | None, axes: tuple[Vector, Vector, Vector], factor: float) -> Vector:
-    """Turn an error stated along a frame's axes into the scene's, with its signs."""
-    if declared is None:
-        return (0.0, 0.0, 0.0)
-    x, y, z = (factor * sum(d * axis[i] for d, axis in zip(declared, axes, strict=True)) for i in range(3))
-    return (x, y, z)
-
-
-def _paths(
-    mission: Mission,
-    geometry: BistaticGeometry,
-    slow_time: Floats,
-    *,
-    vibrating: bool,
-    rng: np.random.Generator | None = None,
-    drawn: FlownErrors,
-) -> tuple[Path, Path]:
-    factor = mission.allocation.coverage_factor
-    common = mission.common_motion_error
-    likely = _likely_errors(mission)
-    flown = []
-    ways = direct_path_ways(geometry, slow_time) if mission.has_direct_path else (None, None)
-    for name, way in zip(("transmitter", "receiver"), ways, strict=True):
-        declared: DeclaredError = getattr(mission.platforms, name).motion_error
-        state = getattr(geometry, name)
-        axes = state.frame(declared.frame)
-        error = PathError(
-            position=_vector(declared.position, axes, factor),
-            velocity=_vector(declared.velocity, axes, factor),
-            acceleration=_vector(declared.acceleration, axes, factor),
-        )
-        if name in likely:
-            position, velocity = (_vector(values, axes, 1.0) for values in likely[name])
-            error = error._replace(position=position, velocity=velocity)
-        if common is not None:
-            scene = state.frame("scene")
-            shared = PathError(
-                position=_vector(common.position, scene, factor),
-                velocity=_vector(common.velocity, scene, factor),
-                acceleration=_vector(common.acceleration, scene, factor),
-            )
-            error = superposed_motion(error, shared)
-        if vibrating:
-            wideband = declared.vibration.wideband
-            error = error._replace(
-                sinusoids=tuple(PathSinusoid(*line) for line in lines_of(mission, name)),
-                wideband_rms=counted(mission, name, wideband.rms, "islr") if wideband else 0.0,
-            )
-        error = error._replace(course=getattr(drawn, name))
-        flown.append(path(state, slow_time, error, rng, way))
-    return flown[0], flown[1]
-
-
-def _likely_errors(mission: Mission) -> dict[str, tuple[Vector, Vector]]:
-    """Position and velocity error along the frame's axes of each platform with a covariance: one of its errors.
-
-    A covariance has no sign to fly with. Shown is its most probable error of one sigma of quadratic phase.
-    """
-    groups = correlated_errors(mission)
-    sources = {source.id: source for source in Analysis(mission).sources} if groups else {}
-    errors = {}
-    for group in groups:
-        a, b, c, d, e, f = likely_error(group, [sources[row_id] for row_id in group.ids])
-        errors[group.platform] = ((a, b, c), (d, e, f))
-    return errors
-
-
-def _clock(mission: Mission, slow_time: Floats, paths: tuple[Path, Path], drawn: FlownErrors) -> Floats:
-    """Clock error over slow time, that of the direct path where it is the clock. [s]"""
-    noise = 0.0 if drawn.clock is None else drawn.clock.at(slow_time)
-    if mission.has_direct_path:
-        return direct_path_error(paths) + noise
-    error = mission.timing_error
-    terms = (error.constant or 0.0, error.linear or 0.0, error.quadratic or 0.0, error.cubic or 0.0)
-    polynomial = np.polynomial.polynomial.polyval(slow_time, terms)
-    clock: Floats = np.asarray(mission.allocation.coverage_factor * polynomial + noise, dtype=float)
-    return clock
-
-
-def _seen_from(place: GroundVector, one: Path) -> Path:
-    """Path with a ground point for its origin."""
-    away = np.array([*place, 0.0])
-    return Path(actual=one.actual - away, measured=one.measured - away)
-
-
-def _recorded(paths: tuple[Path, Path], place: GroundVector) -> Floats:
-    """Differential range (1) of a ground point, clock excluded. [m]"""
-    at = np.array([*place, 0.0])
-    total: Floats = np.sum(
-        [np.linalg.norm(p.actual - at, axis=1) - np.linalg.norm(p.measured, axis=1) for p in paths], axis=0
-    )
-    return total
-
-
-def _left_over(paths: tuple[Path, Path], effect: ExactEffect) -> Floats:
-    """Range error left at the displaced point, clock excluded. [m]"""
-    point = np.array([*effect.displacement, 0.0])
-    legs = [np.linalg.norm(p.actual, axis=1) - np.linalg.norm(p.measured - point, axis=1) for p in paths]
-    total: Floats = np.sum(legs, axis=0)
-    return total
+def _range_error(flight: Flight, scatterer: GroundVector, seen_at: GroundVector) -> Floats:
+    """Range sum of a ground point as recorded, less that of another by the measured paths. [m]"""
+    there, here = np.array([*scatterer, 0.0]), np.array([*seen_at, 0.0])
+    total: Floats = np.zeros(flight.clock.shape)
+    for one in flight.paths:
+        total += np.linalg.norm(one.actual - there, axis=1) - np.linalg.norm(one.measured - here, axis=1)
+    return total + SPEED_OF_LIGHT * flight.clock
 
 
 def _measured(image: Complexes, spacing: float, mask_m: float | None) -> ImpulseResponse:

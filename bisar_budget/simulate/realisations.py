@@ -18,10 +18,9 @@ from bisar_budget.effects.random_errors import RandomError, process_of
 from bisar_budget.effects.spectra import PowerLawPiece
 from bisar_budget.mission.instruments import GaussMarkov
 from bisar_budget.mission.model import Mission, Simulation
-from bisar_budget.simulate.phase_history import Course, Floats
+from bisar_budget.simulate.phase_history import Course, Errors, Floats, PathError
 
 _STEPS = 512  # from mid-aperture to the end of it, in which a walk is summed up
-_PER_TIME = 50  # steps in a correlation time
 _SLOW_TONES = 80  # over logarithms, below a tone per two apertures
 _SLOWEST = 1e-4  # of a tone per aperture; its quadratic phase is nothing
 _PERIODS = 4  # apertures in which phase noise repeats
@@ -67,20 +66,8 @@ def position_courses(
     return total
 
 
-class FlownErrors(NamedTuple):
-    """One time series of every declared error of sensors and clocks together; None where there is none."""
-
-    transmitter: Course | None
-    receiver: Course | None
-    clock: Course | None  # [s]
-
-    def smooth(self) -> "FlownErrors":
-        """The parts of the errors that move and defocus a response."""
-        return FlownErrors(*(one and one.smooth() for one in self))
-
-
-def flown_errors(analysis: Analysis) -> FlownErrors:
-    """Draw each declared error once, by the seed of the file's simulation, with the coverage factor. [m], [s]"""
+def drawn_errors(analysis: Analysis) -> Errors:
+    """One time series of each declared error of sensors and clocks, with the coverage factor, by the file's seed."""
     mission = analysis.mission
     seed, factor = (mission.simulation or Simulation()).seed, mission.allocation.coverage_factor
     half = mission.collection.aperture_time / 2
@@ -96,9 +83,11 @@ def flown_errors(analysis: Analysis) -> FlownErrors:
             moved[error.owner] = moved.get(error.owner, 0.0) + drawn
         elif error.published.spread:
             phase = phase + factor * phase_courses(mission, error, times, 1, rng)[0]
-    transmitter, receiver = (Course(times, moved[name]) if name in moved else None for name in PLATFORMS)
+    transmitter, receiver = (
+        PathError(course=Course(times, moved[name]) if name in moved else None) for name in PLATFORMS
+    )
     clock = Course(times, clock_seconds(phase, mission.radar.wavelength)) if phase.any() else None
-    return FlownErrors(transmitter, receiver, clock)
+    return Errors(transmitter, receiver, clock_course=clock)
 
 
 def _bias(order: int) -> Callable[[Floats, int, np.random.Generator], Floats]:

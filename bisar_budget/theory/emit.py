@@ -27,7 +27,6 @@ from bisar_budget.theory.symbols import (
     positive,
     pslr,
     share,
-    tau,
     total_qpe,
     wavelength,
 )
@@ -117,7 +116,6 @@ def evaluators() -> tuple[Evaluator, ...]:
     )
     adjugate, determinant = dr.ground_inverse()
     power, other, phase = positive("power"), positive("other"), positive("phase")
-    per_unit, budget = positive("perunit"), positive("budget")
     (vibration_row, _) = published.vibration().rows
     gradients, full_adjugate, full_determinant = full.gradient_inverse()
     phase_arguments = ((wavelength, "wavelength"), (T, "aperture_time"))
@@ -162,60 +160,12 @@ def evaluators() -> tuple[Evaluator, ...]:
             row_names=("adjugate, first row", "adjugate, second row", "determinant"),
         ),
         Evaluator(
-            name="full_motion",
-            summary="Range error of one unit of each motion error of one platform at one slow time. [m/unit]",
-            details=(
-                "−u·r̃(τ): the line of sight is that of the position then, nothing is held constant. Position and "
-                "slant range are those at the slow time. Derived here."
-            ),
-            arguments=(*platform_arguments(TRANSMITTER)[:3], (TRANSMITTER.slant_range, "slant_range"), (tau, "tau")),
-            rows=tuple(
-                tuple(published.sensitivity(full.range_error_at(TRANSMITTER), error) for error in motion[k : k + 3])
-                for k in (0, 3, 6)
-            ),
-            row_names=tuple(f"{kind} x, y, z" for kind in published.KINDS),
-            quotients=tuple(
-                (f"along_{axis}", component, TRANSMITTER.slant_range)
-                for axis, component in zip("xyz", TRANSMITTER.position, strict=True)
-            ),
-        ),
-        Evaluator(
-            name="direct_motion",
-            summary="As full_motion, where the receiver hears the transmitter and takes it as its clock. [m/unit]",
-            details=(
-                "−(u − b)·r̃(τ), b the unit vector from the other platform to this one. Position, slant range and b "
-                "are those at the slow time. Derived here."
-            ),
-            arguments=(
-                *platform_arguments(TRANSMITTER)[:3],
-                (TRANSMITTER.slant_range, "slant_range"),
-                *zip(full.DIRECT_PATH, ("b_x", "b_y", "b_z"), strict=True),
-                (tau, "tau"),
-            ),
-            rows=tuple(
-                tuple(
-                    published.sensitivity(full.direct_range_error_at(TRANSMITTER), error)
-                    for error in motion[k : k + 3]
-                )
-                for k in (0, 3, 6)
-            ),
-            row_names=tuple(f"{kind} x, y, z" for kind in published.KINDS),
-        ),
-        Evaluator(
             name="full_ground_inverse",
             summary="Adjugate and determinant of Q = −[s; ṡ], by the true gradients of range and Doppler.",
             details="As published_ground_inverse has them with the range held constant. Derived here.",
             arguments=tuple(zip(gradients, ("s_x", "s_y", "rate_x", "rate_y"), strict=True)),
             rows=(tuple(full_adjugate[0, :]), tuple(full_adjugate[1, :]), (full_determinant,)),
             row_names=("adjugate, first row", "adjugate, second row", "determinant"),
-        ),
-        Evaluator(
-            name="allowable_error",
-            summary="Size of an error at which an effect of so much per unit, without sign, reaches a budget. [unit]",
-            details="The step from a quadratic phase error to its limit. Source: Rigling & Moses, Table II.",
-            arguments=((budget, "budget"), (per_unit, "per_unit")),
-            rows=((published.allowable(budget, per_unit),),),
-            row_names=("",),
         ),
         Evaluator(
             name="autofocus_gain",

@@ -5,8 +5,8 @@ does: with u(τ) the unit vector to a platform, a position error r̃(τ) changes
 order. Constant and linear terms move the response to x̂, where a point has a history of its own; what defocuses is
 the rest. Derived here; nothing of it is in the paper.
 
-Numbers come from `range_error_at` at the nodes of `legendre_fit`, whatever the length of the aperture. The series
-about its middle is what a reader compares with Table I: over a short aperture both are the same.
+Numbers come from `range_error_at` at the nodes of `legendre_fit`, as `ranges` has it, whatever the length of the
+aperture. The series about its middle is what a reader compares with Table I: over a short aperture both are the same.
 """
 
 from collections.abc import Sequence
@@ -16,7 +16,6 @@ from sympy import (
     Add,
     Eq,
     Expr,
-    Function,
     ImmutableMatrix,
     Matrix,
     Poly,
@@ -113,12 +112,6 @@ def direct_range_error(platform: PlatformSymbols) -> Expr:
     return expand(total.subs(dict(zip(other.position, platform.position - baseline * b, strict=True))))
 
 
-def direct_range_error_at(platform: PlatformSymbols) -> Expr:
-    """The same with r̃ of (22). [m]"""
-    of_errors = dict(zip(dr.error_track(platform), dr.error_polynomial(platform), strict=True))
-    return direct_range_error(platform).subs(of_errors)
-
-
 def direct_sight(platform: PlatformSymbols) -> Matrix:
     """Decrease of the range per metre of each error where the direct path is the clock: u_t − b or u_r + b."""
     own = dict(zip(platform.position, platform.slant_range * platform.look[0], strict=True))
@@ -210,29 +203,11 @@ def effective_coefficients() -> tuple[Expr, Expr, Expr]:
 @cache
 def table() -> Table:
     """Coefficients of the range error with every first-order term, before what the displacement adds."""
-    beta = range_error()
-    motion_free = {e: 0 for platform in PLATFORMS for e in published.motion_errors(platform)}
-    rows = [
-        TableRow(
-            number=None,
-            error=real("ttilde"),
-            label=Eq(Function("ttilde")(tau), dr.clock_polynomial(), evaluate=False),
-            cells=tuple(cell.subs(motion_free) for cell in beta),
-        )
-    ]
-    for platform in PLATFORMS:
-        polynomial = dr.error_polynomial(platform)
-        for index, error in enumerate(published.motion_errors(platform)):
-            axis = index // 3
-            track = Function(f"{AXES[axis]}tilde_{platform.subscript}")(tau)
-            label = Eq(track, published.single_error(polynomial[axis], error), evaluate=False)
-            cells = tuple(published.single_error(cell, error) for cell in beta)
-            rows.append(TableRow(number=None, error=error, label=label, cells=cells))
     return Table(
         number="Full model",
         title="Differential range errors with the line of sight turning as it does",
         columns=("Constant β̃₀", "Linear β̃₁", "Quadratic β̃₂", "Cubic β̃₃", "Quartic β̃₄"),
-        rows=tuple(rows),
+        rows=published.coefficient_rows(range_error(), PLATFORMS, is_numbered=False),
         notes=(
             "Derived here. u and its derivatives are those of the unit vector to the platform at τ = 0.",
             "With synchronization.method direct_path w_t, w_r stand for u_t, u_r, and there is no clock.",

@@ -1,5 +1,6 @@
 """The limits of Rigling & Moses: Table I, Table II, vibration, pull-in, derived row by row in print order."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -76,45 +77,35 @@ def single_error(expression: Expr, error: Symbol, platforms: tuple[PlatformSymbo
     return expression.xreplace({other: Integer(0) for other in every if other != error})
 
 
-@cache
-def table_1(platforms: tuple[PlatformSymbols, ...] = PLATFORMS) -> Table:
-    """Table I: coefficients β̃₀ … β̃₃ of the range error, for the clock and each motion error alone."""
-    beta = dr.coefficients(dr.range_error(platforms))
+def coefficient_rows(
+    beta: Sequence[Expr], platforms: tuple[PlatformSymbols, ...], *, is_numbered: bool
+) -> tuple[TableRow, ...]:
+    """Rows of a table of coefficients of the range error: the clock alone, then each motion error alone."""
     motion_free = {e: 0 for platform in platforms for e in motion_errors(platform)}
-    rows = [
-        TableRow(
-            number=1,
-            error=real("ttilde"),
-            label=Eq(Function("ttilde")(tau), dr.clock_polynomial(), evaluate=False),
-            cells=tuple(cell.subs(motion_free) for cell in beta),
-        )
-    ]
+    clock = Eq(Function("ttilde")(tau), dr.clock_polynomial(), evaluate=False)
+    number = 1 if is_numbered else None
+    rows = [TableRow(number, real("ttilde"), clock, tuple(cell.subs(motion_free) for cell in beta))]
     for platform in platforms:
         polynomial = dr.error_polynomial(platform)
         for index, error in enumerate(motion_errors(platform)):
             axis = index // 3
             track = Function(f"{AXES[axis]}tilde_{platform.subscript}")(tau)
-            rows.append(
-                TableRow(
-                    number=2 + index,
-                    error=error,
-                    label=Eq(track, single_error(polynomial[axis], error, platforms), evaluate=False),
-                    cells=tuple(single_error(cell, error, platforms) for cell in beta),
-                )
-            )
+            label = Eq(track, single_error(polynomial[axis], error, platforms), evaluate=False)
+            cells = tuple(single_error(cell, error, platforms) for cell in beta)
+            rows.append(TableRow(2 + index if is_numbered else None, error, label, cells))
+    return tuple(rows)
+
+
+@cache
+def table_1(platforms: tuple[PlatformSymbols, ...] = PLATFORMS) -> Table:
+    """Table I: coefficients β̃₀ … β̃₃ of the range error, for the clock and each motion error alone."""
     return Table(
         number="Table I",
         title="Differential range errors induced by motion measurement errors",
         columns=("Constant β̃₀", "Linear β̃₁", "Quadratic β̃₂", "Cubic β̃₃"),
-        rows=tuple(rows),
+        rows=coefficient_rows(dr.coefficients(dr.range_error(platforms)), platforms, is_numbered=True),
         notes=("Rows are numbered as printed; the paper prints the transmitter's and has the receiver's by t to r.",),
     )
-
-
-def allowable(budget: Expr, per_unit: Expr) -> Expr:
-    """Size of an error at which a phase of so much per unit, without sign, reaches a budget: the step of Table II."""
-    error = Symbol("error", real=True)
-    return limit(per_unit * error, error, budget)
 
 
 def edge_phase(beta: Expr, order: int) -> Expr:

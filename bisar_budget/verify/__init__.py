@@ -1,4 +1,6 @@
 """Images with errors exactly at their limits, and verdicts on the limits. Needs NumPy."""
 
 # What other rooms may use.
-__all__ = ["evidence", "limits"]
+__all__ = [
+    "limits",
+]

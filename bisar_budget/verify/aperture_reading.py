@@ -9,7 +9,8 @@ response, formed and read by the same paths, takes out what is common to both.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -17,18 +18,17 @@ from numpy.typing import NDArray
 
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.geometry import GroundVector
+from bisar_budget.simulate.autofocus import Focused
 from bisar_budget.simulate.collection import (
     CELLS,
     CONTRIBUTIONS,
     OVERSAMPLING,
     Chip,
-    Errors,
     PointCollection,
     pulses_for,
 )
-from bisar_budget.simulate.exact import ExactEffect
 from bisar_budget.simulate.image_formation import taylor_window
-from bisar_budget.simulate.phase_history import Complexes, Floats, cell_centres
+from bisar_budget.simulate.phase_history import Complexes, Errors, ExactEffect, Floats, cell_centres
 
 READ_CELLS = 1  # of range that a chip needs around the middle line, beside what a response walks
 _STRIDE = 2  # lines from one that is read to the next
@@ -43,6 +43,8 @@ _REFINEMENTS, _HALVINGS, _SETTLED_RAD = 20, 6, 1e-5
 # quarter of the 0.02 rad that a measured phase may be off.
 _REPRODUCED, _EXACT = 0.05, 5e-3
 _BLOCK = 1 << 18  # contributions formed at once
+_SUPPORT = 0.4  # of the largest error-free spectral magnitude; the band's edges ring in a finite image
+_TIMES = 64  # read from the lines' spectra at once
 _KERNEL = np.linspace(0, 64, 4097)  # range cells, of a tapered range response
 
 
@@ -117,7 +119,7 @@ def read_aperture(
             raise ValueError("the response is not in the image")
     fit = best.fit
     # A pixel along y′ changes the range sum over the aperture by λ / OVERSAMPLING, twice its P₁ part.
-    turn = 1 if collection.flown(errors).turns_left(centre) else -1
+    turn = 1 if collection.range_lines(errors).turns_left(centre) else -1
     across = -turn * OVERSAMPLING / math.pi * float(fit[1])
     place = 2 * slow_time / collection.aperture_time
     slope = np.polynomial.legendre.legder([0.0, 0.0, *fit[2:]])
@@ -133,8 +135,8 @@ class _Pixels:
     def __init__(self, collection: PointCollection, errors: Errors, centre: GroundVector, pixels: Floats) -> None:
         self.collection, self.errors, self.places = collection, errors.smooth(), pixels
         self.point = np.array([[*centre, 0.0]])
-        flown = collection.flown(errors)
-        self.at_middle = flown.range_sum(pixels) - flown.range_sum(self.point[0, :2])
+        lines = collection.range_lines(errors)
+        self.at_middle = lines.range_sum(pixels) - lines.range_sum(self.point[0, :2])
         self.squares = _squares(pixels)
         if collection.is_tapered:
             weights, frequency = taylor_window(257), cell_centres(1.0, 257)
@@ -146,7 +148,7 @@ class _Pixels:
         `left` (m,) is a range error that displaces the range responses, and has no part in the phase. [m]
         """
         collection = self.collection
-        paths = collection.paths(self.errors, slow_time)
+        paths = collection.flight(self.errors, slow_time).paths
         if collection.is_tapered:
             by_time = _weights(collection, slow_time)[:, None]
         contribution = np.empty((slow_time.size, self.places.shape[0]), dtype=np.complex64)
@@ -240,7 +242,8 @@ def _taper(columns: int) -> Floats:
     return taper
 
 
-class _Refined(NamedTuple):
+@dataclass(frozen=True, slots=True, eq=False)
+class _Refined:
     """Polynomial of the phase, and what of the image it leaves over, of its norm."""
 
     fit: Floats
@@ -313,3 +316,144 @@ def _refined(fit: Floats, place: Floats, contribution: Complexes, seen: Complexe
         if np.abs(step[1:]).max() < _SETTLED_RAD:
             break
     return _Refined(found, float(np.linalg.norm(left)) / norm)
+
+
+# ---------------------------------------------------------------------- displacement
+@dataclass(frozen=True, slots=True)
+class Shift:
+    """Displacement on the ground (east, north) [m], azimuth of the line of smear, 0 to π [rad].
+
+    `pixels` is the displacement along x′ and y′ of the image.
+    """
+
+    displacement: GroundVector
+    smear_azimuth: float
+    pixels: tuple[float, float]
+
+
+def measured_shift(chip: Chip, reference: Chip, reading: ApertureReading | None = None) -> Shift:
+    """Displacement of a response against an error-free one on the same grid, and the line of its smear.
+
+    Each part of the aperture sees the point at a place of its own, as (26) to (28) of Rigling & Moses have it for
+    three parts. In the spectrum of the image that place is the gradient of the phase against an error-free response:
+    its mean is the displacement of the centre of gravity, its spread the smear. That holds for a smear far smaller
+    than a resolution cell, where the outline of the response shows nothing yet.
+
+    A `reading` of the aperture says better where the response is: a cubic phase moves the centre of gravity along y′,
+    a quadratic one along x′, neither what is displaced.
+
+    Raises
+    ------
+    ValueError
+        The spectra share no support: one of the two is not in the image.
+    """
+    spectra = [np.fft.fftshift(np.fft.fft2(one.image)) for one in (chip, reference)]
+    product = spectra[0] * np.conj(spectra[1])
+    strength = np.abs(spectra[1])
+    inside = strength > _SUPPORT * strength.max()
+    inside[:-1, :-1] &= inside[1:, :-1] & inside[:-1, 1:]
+    inside[-1], inside[:, -1] = False, False
+    if not inside.any():
+        raise ValueError("the response is not in the image")
+    steps = [_step(product, axis)[inside] for axis in (0, 1)]
+    weights = np.abs(product[inside])
+    # A shift by d turns the spectrum by −2π·d/extent from one frequency to the next.
+    pixels = np.stack([-step * count / (2 * math.pi) for step, count in zip(steps, product.shape, strict=True)])
+    ground = _pixel_vectors(reference.grid) @ pixels
+    middle = np.average(pixels, axis=1, weights=weights)
+    if reading is not None:
+        middle = np.array([middle[0] - reading.walked_pixels, reading.across_pixels])
+    mean = _pixel_vectors(reference.grid) @ middle
+    spread = np.cov(ground, aweights=weights)
+    east, north = np.linalg.eigh(spread)[1][:, -1]
+    return Shift(
+        (float(mean[0]), float(mean[1])), math.atan2(north, east) % math.pi, (float(middle[0]), float(middle[1]))
+    )
+
+
+def _step(product: Complexes, axis: int) -> Floats:
+    steps: Floats = np.angle(np.roll(product, -1, axis) * np.conj(product))
+    return steps
+
+
+def _pixel_vectors(grid: Floats) -> Floats:
+    """One pixel along each axis at the middle of the grid, as columns (east, north), (2, 2). [m]"""
+    i, j = grid.shape[0] // 2, grid.shape[1] // 2
+    columns = (grid[i + 1, j] - grid[i - 1, j], grid[i, j + 1] - grid[i, j - 1])
+    vectors: Floats = np.stack([column[:2] / 2 for column in columns], axis=1)
+    return vectors
+
+
+# ---------------------------------------------------------------------- autofocus
+def refocused(
+    collection: PointCollection,
+    errors: Errors,
+    centre: GroundVector,
+    chip: Chip,
+    algorithm: Callable[[Complexes], Focused],
+    half: int,
+) -> Chip:
+    """Estimate one phase over the aperture on some lines of a chip and take it out of all.
+
+    Along a line of equal range a pulse has the frequency that the measured paths give it. Over a long aperture, or
+    where range and Doppler gradients are nearly parallel, equal times take up unequal parts of that band: a quadratic
+    phase in time is none in frequency, and what a few per cent of the band hold of the aperture is lost to an
+    estimate. The lines' spectra are therefore read at equal times, focused there, and the phase is taken back to
+    their frequencies.
+
+    Parameters
+    ----------
+    collection : PointCollection
+        That formed the chip.
+    errors : Errors
+        Of the measured paths.
+    centre : (2,) float
+        Middle of the chip. [m]
+    chip : Chip
+        Image with the error.
+    algorithm : callable
+        `phase_gradient_autofocus` or `map_drift`.
+    half : int
+        Lines on either side of the middle one that are used.
+    """
+    lines, columns = chip.image.shape
+    slow_time = cell_centres(collection.aperture_time, max(64, round(columns / OVERSAMPLING)))
+    frequency = _frequency(collection, errors, centre, chip, slow_time)
+    step = np.gradient(frequency)
+    if not (step > 0).all() and not (step < 0).all():
+        raise ValueError("Doppler along the line does not change one way over the aperture: autofocus has no band")
+    middle = lines // 2
+    used = chip.image[middle - half : middle + half + 1]
+    place = np.arange(columns) - columns // 2
+    aperture = np.empty((used.shape[0], slow_time.size), dtype=complex)
+    for start in range(0, slow_time.size, _TIMES):
+        part = slice(start, start + _TIMES)
+        aperture[:, part] = used @ np.exp(-2j * math.pi * np.outer(place, frequency[part]))
+    aperture *= np.abs(step)
+    # As an image of its own, sampled like the chip: the aperture in the middle of a band.
+    count = slow_time.size
+    samples = math.ceil(OVERSAMPLING * count)
+    spectrum = np.zeros((used.shape[0], samples), dtype=complex)
+    bins = (np.arange(count) - count // 2) % samples
+    spectrum[:, bins] = aperture
+    phase = algorithm(np.fft.fftshift(np.fft.ifft(spectrum, axis=1), axes=1)).phase[bins]
+    order = np.argsort(frequency)
+    at_bins = np.interp(np.fft.fftfreq(columns), frequency[order], phase[order])
+    image = np.fft.ifft(np.fft.fft(chip.image, axis=1) * np.exp(-1j * at_bins), axis=1)
+    return chip._replace(image=image)
+
+
+def _frequency(
+    collection: PointCollection, errors: Errors, centre: GroundVector, chip: Chip, slow_time: Floats
+) -> Floats:
+    """Frequency of each pulse along the middle of a line, the midpoint's taken out, (times,). [cycles/pixel]"""
+    line = chip.grid[chip.grid.shape[0] // 2]
+    middle = line.shape[0] // 2
+    slope = np.zeros(slow_time.size)
+    for one in collection.flight(errors.smooth(), slow_time).paths:
+        for pixel, sign in ((line[middle + 1], 1), (line[middle - 1], -1)):
+            slope += sign * np.linalg.norm(pixel - one.measured, axis=1) / 2
+    lines = collection.range_lines(errors)
+    at_middle = (lines.range_sum(line[middle + 1]) - lines.range_sum(line[middle - 1])) / 2
+    frequency: Floats = (slope - at_middle) / collection.wavelength
+    return frequency

@@ -1,8 +1,9 @@
 """Form images with each error set exactly at its limit, and measure whether the limit is true."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import nullcontext
+import time
+from collections.abc import Iterable, Iterator
+from contextlib import nullcontext, suppress
 from fnmatch import fnmatchcase
 from functools import partial
 
@@ -11,23 +12,47 @@ import numpy as np
 from bisar_budget.analysis.vibration_limits import tone_limits
 from bisar_budget.budget.aggregates import Aggregates
 from bisar_budget.budget.judged_rows import Judging
+from bisar_budget.budget.pull_in import ROOM
+from bisar_budget.budget.random_rows import RandomRows
+from bisar_budget.budget.verdicts import rows_worth_showing
+from bisar_budget.effects.clocks import spurs_of
 from bisar_budget.effects.declared import QUADRATIC
 from bisar_budget.effects.echoes import SLOWEST
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.effects.vibration import lines_of
 from bisar_budget.faults import printable
-from bisar_budget.findings.images import Verdict, VerifiedMission
+from bisar_budget.findings.images import FLOOR_DB, ImageEvidence, PointImage, Verdict, VerifiedMission
+from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.mission.model import Mission, Simulation
-from bisar_budget.verify import duration, phase_cases
-from bisar_budget.verify import vibration_cases as vibration
-from bisar_budget.verify.location_case import location
-from bisar_budget.verify.study import Study
+from bisar_budget.simulate.collection import CELLS, OVERSAMPLING, RANGE_CELLS, Chip, PointCollection, pulses_for
+from bisar_budget.simulate.impulse_response import upsampled
+from bisar_budget.simulate.phase_history import Errors, Floats
+from bisar_budget.verify import phase_cases
+from bisar_budget.verify.spread_cases import (
+    UNDECLARED_CYCLES,
+    Case,
+    limits_of,
+    verify_islr,
+    verify_pslr,
+    verify_random,
+    verify_spread_tone,
+    verify_spur,
+    vibration_cases,
+)
+from bisar_budget.verify.study import Responses, Study
 from bisar_budget.workers import MapBlocks, Progress, unseen, worker_pool
 
-__all__ = ["Study", "rows_to_verify", "seconds_to_verify", "verify_mission"]
+__all__ = ["Study", "form_image_evidence", "rows_to_verify", "seconds_to_verify", "verify_mission"]
 
-Case = Callable[[], Verdict]
+_FINE = 4  # interpolation of a cut, so that its nulls look like nulls
+_AROUND = 10  # resolution cells of a cut each way, beyond the smear
+_MAX_PIXELS = 96  # of a chip, each way
+_CUT_FLOOR_DB = -80.0  # a null is as deep as rounding leaves it; nobody sees more
+_LONG = 60.0  # s; far below it nothing is measured
+_SLOWEST = 1.0  # s that the smallest image takes on a slow and busy machine
+_LARGER = 8  # times the cells of the smallest image: 32 times its pixels and pulses
+_BESIDE = 1.25  # images at a limit and on both sides of it, over those at it
 
 
 def verify_mission(
@@ -87,13 +112,6 @@ def rows_to_verify(mission: Mission, only: str = "*") -> list[str]:
     return [row_id for row_id in cases(Study(mission)) if fnmatchcase(row_id, only)]
 
 
-def seconds_to_verify(mission: Mission, only: str = "*", jobs: int = 1) -> float:
-    """About how long `verify_mission` will take; 0 where it is far below a minute. [s]"""
-    mission = mission._replace(places={})
-    wanted = rows_to_verify(mission, only)
-    return duration.seconds_to_verify(mission, cases, wanted) / max(1, min(jobs, len(wanted)))
-
-
 def cases(study: Study) -> dict[str, Case]:
     """Row ids in the order of `check`, with the call that verifies each."""
     return dict(_cases(study))
@@ -127,32 +145,19 @@ def _order(one: Subject) -> tuple[int, int]:
 
 def _of_tones_by_islr(study: Study) -> Iterator[tuple[Subject, Case]]:
     """Lines of vibration where ISLR holds their power."""
-    from bisar_budget.verify.random_cases import verify_spread_tone
-
     metric, limits = tone_limits(study.mission, study.allocation)
     for name, limit in limits.items() if metric == "islr" else ():
         T, size = study.collection.aperture_time, limit.by(study.model)
-        cycles = [line.frequency * T for line in lines_of(study.mission, name)] or [vibration.UNDECLARED_CYCLES]
+        cycles = [line.frequency * T for line in lines_of(study.mission, name)] or [UNDECLARED_CYCLES]
         for index, turns in enumerate(cycles):
             if turns >= SLOWEST:
                 one = subject(name, "vibration", "sinusoidal", entry=index)
-                blank = Verdict(id=one.id, model=study.model, boundary_error=size, unit="m")
+                blank = study.blank(one.id, size, "m")
                 yield one, partial(verify_spread_tone, study, blank, name, size, turns)
 
 
 def _of_instruments(study: Study) -> Iterator[tuple[str, Case]]:
     """Sensors and clocks that have a limit, and what all noise spreads together."""
-    from bisar_budget.budget.random_rows import RandomRows
-    from bisar_budget.effects.clocks import spurs_of
-    from bisar_budget.verify.random_cases import (
-        limits_of,
-        verify_islr,
-        verify_pslr,
-        verify_random,
-        verify_spread_tone,
-        verify_spur,
-    )
-
     for error in study.analysis.random:
         if limits_of(study, error):
             yield error.id, partial(verify_random, study, error)
@@ -166,7 +171,7 @@ def _of_instruments(study: Study) -> Iterator[tuple[str, Case]]:
             yield row_id, partial(verify_spur, study, spur, row_id, size)
         else:
             level = 20 * math.log10(math.pi * size / study.collection.wavelength)
-            blank = Verdict(id=row_id, model=study.model, boundary_error=level, unit="dB")
+            blank = study.blank(row_id, level, "dB")
             cycles = spur.frequency * study.collection.aperture_time
             yield row_id, partial(verify_spread_tone, study, blank, spur.name, size, cycles)
     if study.mission.requirements.pslr is not None:
@@ -192,7 +197,7 @@ def _cases(study: Study) -> Iterator[tuple[str, Case]]:
             if line.frequency * study.collection.aperture_time < SLOWEST:
                 one = subject(name, "vibration", "sinusoidal", entry=index)
                 slow[one] = partial(phase_cases.slow_vibration, study, one.id, name, line)
-    swaying = slow | dict(_of_tones_by_islr(study)) | dict(vibration.cases(mission, allocation, study.collection))
+    swaying = slow | dict(_of_tones_by_islr(study)) | dict(vibration_cases(study))
     for owner in (*PLATFORMS, "mission"):
         for one in sorted((one for one in swaying if one.owner == owner), key=_order):
             yield one.id, swaying[one]
@@ -212,8 +217,160 @@ def _cases(study: Study) -> Iterator[tuple[str, Case]]:
     if requirements.cubic_phase_error is not None:
         yield "mission.cubic_phase_error", partial(phase_cases.cubic, study, requirements.cubic_phase_error)
     if requirements.location_error is not None:
-        yield "mission.location_error", partial(location, study, requirements.location_error)
+        yield "mission.location_error", partial(phase_cases.location, study, requirements.location_error)
     if allocation.n_pull is not None:
         yield "mission.autofocus_pull_in", partial(phase_cases.pull_in, study, allocation.n_pull)
     if mission.scene.radius is not None and study.model != "published":
         yield "mission.spatial_variance", partial(phase_cases.edge, study)
+
+
+# ---------------------------------------------------------------------- how long it will take
+class _NotFormedError(ValueError):
+    """An image whose size is known, which is all that was asked."""
+
+
+class _Sizes(PointCollection):
+    """A collection that notes the size of every image it is asked for, and forms none."""
+
+    def __init__(self, mission: Mission, study: Study) -> None:
+        super().__init__(mission, study.geometry)
+        self.asked: list[float] = []  # sizes, see `_size`
+
+    def pair(
+        self, errors: Errors, place: tuple[float, float], cells: int = CELLS, range_cells: int = RANGE_CELLS
+    ) -> tuple[Chip, Chip]:
+        """Note two images."""
+        self._require_room(cells, range_cells)
+        self.asked.append(_size(cells, range_cells))
+        raise _NotFormedError("its size is known")
+
+    def window(self, count: int) -> Floats:
+        """Draw no noise: that takes seconds, however large the images."""
+        raise _NotFormedError(f"{count} weights are not needed")
+
+    def chip(self, centre: tuple[float, float], errors: Errors, *, cells: int = CELLS, **_: object) -> Chip:
+        """Note one of two images of a single line."""
+        self._require_room(cells, 0)
+        self.asked.append(_size(cells, 1))
+        raise _NotFormedError("its size is known")
+
+
+def seconds_to_verify(mission: Mission, only: str = "*", jobs: int = 1) -> float:
+    """About how long `verify_mission` will take; 0 where it is far below a minute. [s]
+
+    What one pixel and pulse take depends on the machine, on what else runs on it, and on whether kernels are
+    compiled. So it is measured, on a small and a larger image of the mission itself, where the size leaves any doubt.
+    """
+    mission = mission._replace(places={})
+    study = Study(mission)
+    study.collection = sizes = _Sizes(mission, study)
+    known = cases(study)
+    wanted = [row_id for row_id in known if fnmatchcase(row_id, only)]
+    for row_id in wanted:
+        with suppress(_NotFormedError):
+            known[row_id]()
+    asked = [max(1.0, size) for size in sizes.asked]
+    if _BESIDE * sum(asked) * _SLOWEST <= _LONG:
+        return 0.0
+    study = Study(mission)
+    try:
+        study.collection.chip((0.0, 0.0), Errors(), cells=2)  # compiled, imported
+        smallest = _seconds(study, CELLS)
+    except ValueError:
+        return 0.0  # where there is none of these, there is hardly any image
+    try:
+        grows = max(0.0, _seconds(study, _LARGER * CELLS) - smallest) / (_size(_LARGER * CELLS, RANGE_CELLS) - 1)
+    except ValueError:
+        grows = smallest  # no room for a larger one
+    seconds = _BESIDE * sum(smallest + grows * (size - 1) for size in asked)
+    return seconds / max(1, min(jobs, len(wanted)))
+
+
+def _size(cells: int, range_cells: int) -> float:
+    """Pixels times pulses of an image, over those of the smallest."""
+    return cells * range_cells * pulses_for(cells) / (CELLS * RANGE_CELLS * pulses_for(CELLS))
+
+
+def _seconds(study: Study, cells: int) -> float:
+    """Time that two images of no error and their reading take. [s]"""
+    errors, begun = Errors(), time.perf_counter()
+    effect = study.collection.effect(errors)
+    chips = study.collection.pair(errors, effect.displacement, cells)
+    study.read(Responses(errors, effect, study.spread(errors, effect), *chips))
+    return time.perf_counter() - begun
+
+
+# ---------------------------------------------------------------------- images that a report shows
+def form_image_evidence(mission: Mission, findings: MissionFindings) -> tuple[ImageEvidence, ...]:
+    """Form the images of the rows that decide most about a verified mission.
+
+    Parameters
+    ----------
+    mission : Mission
+        As loaded.
+    findings : MissionFindings
+        About it, with the verdicts of its images.
+
+    Returns
+    -------
+    tuple of ImageEvidence
+        The worst row first; empty where no row has an image.
+    """
+    verdicts = rows_worth_showing(findings)
+    if not verdicts:
+        return ()
+    study = Study(mission, findings.analysis)
+    subjects = {row.id: row.subject for row in findings.rows}
+    return tuple(_evidence(study, findings.file, subjects[verdict.id], verdict) for verdict in verdicts)
+
+
+def _evidence(study: Study, file: str, subject: Subject, verdict: Verdict) -> ImageEvidence:
+    found = ImageEvidence(
+        file=file,
+        verdict=verdict,
+        look_azimuth_rad=study.geometry.look_azimuth,
+        at_limit=_shown(study.at_limit(subject, verdict.boundary_error)),
+    )
+    if verdict.boundary_autofocus is None or verdict.measured_residual_qpe_rad is None:
+        return found
+    images = study.at_limit(subject, verdict.boundary_autofocus, ROOM[study.mission.autofocus.algorithm])
+    return found._replace(before_autofocus=_shown(images), after_autofocus=_shown(study.focused(images)))
+
+
+def _shown(images: Responses) -> PointImage:
+    return _point_image(images.chip, images.reference, images.spread.smear)
+
+
+def _point_image(chip: Chip, reference: Chip, smear_cells: float) -> PointImage:
+    """Reduce a chip to what is shown: as far as the response is smeared, and sidelobes."""
+    spacing, middle = chip.spacing, chip.cut.size // 2
+    reach = _AROUND + smear_cells / 2
+    half = min(math.ceil(reach * OVERSAMPLING), middle - 1)
+    stride = math.ceil(2 * half / _MAX_PIXELS)
+    half -= half % stride
+    cut, clean = (np.abs(upsampled(one.cut, _FINE)) for one in (chip, reference))
+    peak = float(clean.max())
+    fine = slice(_FINE * (middle - half), _FINE * (middle + half) + 1)
+    # A long smear fits into a chip by the brightest of each few samples.
+    shown = np.abs(chip.image[:, middle - half : middle + half]).reshape(chip.image.shape[0], -1, stride).max(axis=2)
+    grey = np.rint(255 * np.clip(1 - _decibel(shown, peak) / FLOOR_DB, 0, 1)).astype(np.uint8)
+    upright = grey.T[::-1]
+    return PointImage(
+        columns=upright.shape[1],
+        rows=upright.shape[0],
+        chip=upright.tobytes(),
+        pixel_m=(spacing[0], spacing[1] * stride),
+        thinned=stride,
+        step_m=spacing[1] / _FINE,
+        cut_db=_levels(cut[fine], peak),
+        error_free_db=_levels(clean[fine], peak),
+    )
+
+
+def _decibel(magnitude: Floats, peak: float) -> Floats:
+    level: Floats = 20 * np.log10(np.maximum(magnitude / peak, 10 ** (_CUT_FLOOR_DB / 20)))
+    return level
+
+
+def _levels(magnitude: Floats, peak: float) -> tuple[float, ...]:
+    return tuple(round(float(level), 2) for level in _decibel(magnitude, peak))

@@ -1,9 +1,7 @@
-"""Verdicts on the limits of quadratic and cubic phase, and on what autofocus makes of them."""
+"""Verdicts on the limits of quadratic and cubic phase, on what autofocus makes of them, and on the location."""
 
 import math
 from typing import Any
-
-import numpy as np
 
 from bisar_budget.analysis.allocation import range_walk_cap
 from bisar_budget.analysis.vibration_limits import slow_limits
@@ -15,19 +13,19 @@ from bisar_budget.effects.vibration import Line
 from bisar_budget.findings.images import Verdict
 from bisar_budget.geometry import GroundVector
 from bisar_budget.phrases import Note
-from bisar_budget.simulate.collection import CELLS, MAX_CELLS, OVERSAMPLING, RANGE_CELLS, Chip, Errors
-from bisar_budget.simulate.exact import ExactEffect, NoGroundPointError
+from bisar_budget.simulate.collection import CELLS, MAX_CELLS, OVERSAMPLING, RANGE_CELLS
 from bisar_budget.simulate.impulse_response import highest, impulse_response
-from bisar_budget.simulate.phase_history import PathError, PathSinusoid
+from bisar_budget.simulate.phase_history import Errors, ExactEffect, NoGroundPointError, PathError, PathSinusoid
 from bisar_budget.verify import reasons
-from bisar_budget.verify.aperture_reading import READ_CELLS, ApertureReading
-from bisar_budget.verify.shift import measured_shift
-from bisar_budget.verify.study import Sizes, Study
+from bisar_budget.verify.aperture_reading import READ_CELLS, ApertureReading, measured_shift
+from bisar_budget.verify.study import Responses, Sizes, Study
 
 TOLERANCE = 0.05  # of the budget: nearer than this a limit is confirmed
 INSIDE, BEYOND = 0.9, 1.1  # of the limit: through it the phase must grow with the error
 FOCUSED_CELLS, FOCUSED_RAD = 2 * CELLS, 12.0  # a phase up to which a response is read in so many cells
 _PEAK_CELLS = 3  # of range around the lines that autofocus reads: the peak is between two lines
+HALF_PIXEL = 0.5  # a displacement nearer than this is the predicted one
+_SETTLED = 1e-6  # of the requirement of the location
 _BESIDE_CELLS = 64  # of smear; beyond, no images are formed on both sides of a limit
 
 
@@ -37,7 +35,7 @@ def quadratic(study: Study, source: ErrorSource) -> Verdict:
     boundary = study.boundary(source, budget)
     if boundary is None:
         return _bound_elsewhere(study, source)
-    blank = Verdict(id=source.id, model=study.model, boundary_error=boundary, unit=source.unit, budget_rad=budget)
+    blank = study.blank(source.id, boundary, source.unit, budget_rad=budget)
     verdict = _judged(study, blank, [(source, boundary)])
     farther = study.boundary(source, gain * budget) if gain > 1 else None
     if farther is None:
@@ -50,22 +48,20 @@ def slow_vibration(study: Study, row_id: str, name: str, line: Line) -> Verdict:
     allocation, budget = study.allocation, study.allocation.qpe_limit(name)
     limits = slow_limits(study.mission, allocation, name, line.frequency * study.collection.aperture_time)
     size = limits.quadratic / allocation.autofocus_gain
-    blank = Verdict(id=row_id, model=study.model, boundary_error=size, unit="m", budget_rad=budget)
+    blank = study.blank(row_id, size, "m", budget_rad=budget)
     try:
         both = [
             Errors().of(name, PathError(sinusoids=(PathSinusoid(size, line.frequency, phase),)))
             for phase in (math.pi / 2, -math.pi / 2)
         ]
-        effects = [study.collection.effect(errors) for errors in both]
-        errors, effect = max(zip(both, effects, strict=True), key=lambda one: abs(one[1].quadratic))
-        chip, reference = study.chips(errors, effect)
-        reading = study.read(errors, effect, chip, reference)
-    except (ValueError, np.linalg.LinAlgError) as error:
+        images = study.images(max(both, key=lambda errors: abs(study.collection.effect(errors).quadratic)))
+        reading = study.read(images)
+    except ValueError as error:
         return _without_image(study, blank, error)
     measured = abs(reading.quadratic)
     return blank._replace(
-        **predicted(effect),
-        **_of_response(chip, reference, effect, reading),
+        **predicted(images.effect),
+        **_of_response(images, reading),
         measured_qpe_rad=measured,
         verdict=compare(measured / budget - 1, TOLERANCE),
         reason=reasons.in_its_worst_phase(),
@@ -76,16 +72,14 @@ def _bound_elsewhere(study: Study, source: ErrorSource) -> Verdict:
     """Limit of an error that no quadratic phase bounds: by the cubic phase, or by the location."""
     allowed, binding = study.allowed(source)
     size = allowed or 0.0
-    blank = Verdict(id=source.id, model=study.model, boundary_error=size, unit=source.unit)
+    blank = study.blank(source.id, size, source.unit)
     requirements = study.mission.requirements
     try:
-        errors = study.together([(source, study.worse_sign([(source, size)], 1.0) * size)])
-        effect = study.collection.effect(errors)
-        chips = study.chips(errors, effect)
-        reading = study.read(errors, effect, *chips)
-    except (ValueError, np.linalg.LinAlgError) as error:
+        images = study.images(study.together([(source, study.worse_sign([(source, size)], 1.0) * size)]))
+        reading = study.read(images)
+    except ValueError as error:
         return _without_image(study, blank, error)
-    blank = blank._replace(**predicted(effect), measured_qpe_rad=abs(reading.quadratic))
+    blank = blank._replace(**predicted(images.effect), measured_qpe_rad=abs(reading.quadratic))
     if binding == CUBIC and requirements.cubic_phase_error is not None:
         return blank._replace(
             budget_rad=requirements.cubic_phase_error,
@@ -93,10 +87,10 @@ def _bound_elsewhere(study: Study, source: ErrorSource) -> Verdict:
             verdict=compare(abs(reading.cubic) / requirements.cubic_phase_error - 1, TOLERANCE),
             reason=reasons.bound_by_the_cubic_phase(),
         )
-    shift = measured_shift(*chips, reading)
-    measured = moved(effect.displacement, shift.displacement)
+    shift = measured_shift(images.chip, images.reference, reading)
+    measured = moved(images.effect.displacement, shift.displacement)
     required = requirements.location_error or 0.0
-    pixel = min(chips[0].spacing)
+    pixel = min(images.chip.spacing)
     excess = math.hypot(*measured) - required
     verdict = "confirmed" if abs(excess) <= pixel / 2 else compare(excess, 0.0)
     return blank._replace(
@@ -109,7 +103,7 @@ def _bound_elsewhere(study: Study, source: ErrorSource) -> Verdict:
 def total(study: Study, row_id: str, owner: str) -> Verdict:
     """All declared errors of an owner at once, each with the sign that makes their phases add."""
     budget = study.allocation.qpe_limit(owner)
-    blank = Verdict(id=row_id, model=study.model, boundary_error=budget, unit="rad", budget_rad=budget)
+    blank = study.blank(row_id, budget, "rad", budget_rad=budget)
     if study.mission.allocation.combine != "sum":
         return blank._replace(reason=reasons.root_sum_square_is_of_many_flights())
     sizes = study.summed(study.members(owner), budget)
@@ -121,34 +115,19 @@ def total(study: Study, row_id: str, owner: str) -> Verdict:
 def other(study: Study, source: ErrorSource) -> Verdict:
     """Phase stated as such."""
     budget = study.allocation.qpe_limit(source.owner)
-    return Verdict(
-        id=source.id,
-        model=study.model,
-        boundary_error=budget,
-        unit=source.unit,
-        budget_rad=budget,
-        reason=reasons.phase_without_motion(),
-    )
+    return study.blank(source.id, budget, source.unit, budget_rad=budget, reason=reasons.phase_without_motion())
 
 
 def edge(study: Study) -> Verdict:
     """Difference between two places of the scene; what images and exact ranges say of it is in the tests."""
     budget = study.allocation.qpe_total
-    blank = Verdict(
-        id="mission.spatial_variance", model=study.model, boundary_error=budget, unit="rad", budget_rad=budget
-    )
+    blank = study.blank("mission.spatial_variance", budget, "rad", budget_rad=budget)
     return blank._replace(reason=reasons.images_are_of_the_centre())
 
 
 def cubic(study: Study, requirement: float) -> Verdict:
     """All declared errors scaled together until the gating model's cubic phase reaches the requirement."""
-    blank = Verdict(
-        id="mission.cubic_phase_error",
-        model=study.model,
-        boundary_error=requirement,
-        unit="rad",
-        budget_rad=requirement,
-    )
+    blank = study.blank("mission.cubic_phase_error", requirement, "rad", budget_rad=requirement)
     sizes = [(s, s.declared or 0.0) for s in study.declared]
     if not sizes:
         return blank._replace(reason=reasons.no_motion_declared())
@@ -159,24 +138,20 @@ def cubic(study: Study, requirement: float) -> Verdict:
         scale = requirement / by_model
         if study.is_full:
             scale = _scale_of_cubic(study, sizes, scale, requirement)
-        errors = study.together(sizes, scale)
-        effect = study.collection.effect(errors)
-        reading = study.read(errors, effect, *study.chips(errors, effect, READ_CELLS))
-    except (ValueError, np.linalg.LinAlgError) as error:
+        images = study.images(study.together(sizes, scale), READ_CELLS)
+        reading = study.read(images)
+    except ValueError as error:
         return _without_image(study, blank, error)
     measured = abs(reading.cubic)
-    return blank._replace(
-        **predicted(effect), measured_cubic_rad=measured, verdict=compare(measured / requirement - 1, TOLERANCE)
-    )
+    verdict = compare(measured / requirement - 1, TOLERANCE)
+    return blank._replace(**predicted(images.effect), measured_cubic_rad=measured, verdict=verdict)
 
 
 def pull_in(study: Study, n_pull: float) -> Verdict:
     """A clock error of π·N_pull, which bends no geometry, refocused; no N_pull goes beyond the cap of range walk."""
     phase, budget, radar = math.pi * n_pull, study.allocation.qpe_total, study.mission.radar
     walk = n_pull * radar.bandwidth / radar.center_frequency / 2  # λN/2 over c/B
-    blank = Verdict(
-        id="mission.autofocus_pull_in", model=study.model, boundary_error=phase, unit="rad", budget_rad=budget
-    )
+    blank = study.blank("mission.autofocus_pull_in", phase, "rad", budget_rad=budget)
     clock = next(s for s in study.sources if s.id == "timing.quadratic")
     found = refocused(study, [(clock, phase / abs(clock.effect.qpe))], budget)
     reason = reasons.range_walk(walk, range_walk_cap(study.mission))
@@ -187,19 +162,17 @@ def refocused(study: Study, sizes: Sizes, budget: float) -> dict[str, Any]:
     """Form the image at the limit with autofocus and refocus it; hold what is left to the plain budget."""
     try:
         errors = study.together(sizes, study.worse_sign(sizes, 1.0))
-        effect = study.collection.effect(errors)
         room = ROOM[study.mission.autofocus.algorithm]
-        smear = study.spread(errors, effect).smear
-        if room * smear > MAX_CELLS:
-            reason = reasons.patch_too_large(room * smear, MAX_CELLS)
+        spread = study.spread(errors, study.collection.effect(errors))
+        if room * spread.smear > MAX_CELLS:
+            reason = reasons.patch_too_large(room * spread.smear, MAX_CELLS)
             return {"verdict_autofocus": "not_evaluated", "reason_autofocus": reason}
-        across = math.ceil(2 * study.shared_lines(errors, effect) / OVERSAMPLING) + _PEAK_CELLS
-        chip, reference = study.chips(errors, effect, min(RANGE_CELLS, across), room)
-        focused = study.focused(errors, effect, chip)
-        residual = abs(_read_focused(study, errors, effect, focused, reference).quadratic)
-        peaks = [highest(one.image) for one in (reference, focused)]
+        across = math.ceil(2 * study.shared_lines(spread) / OVERSAMPLING) + _PEAK_CELLS
+        focused = study.focused(study.images(errors, min(RANGE_CELLS, across), room))
+        residual = abs(_read_focused(study, focused).quadratic)
+        peaks = [highest(one.image) for one in (focused.reference, focused.chip)]
         loss = 20 * math.log10(peaks[0] / peaks[1])
-    except (ValueError, np.linalg.LinAlgError) as error:
+    except ValueError as error:
         return {"verdict_autofocus": "not_evaluated", "reason_autofocus": reasons.no_image_formed(str(error))}
     is_met = residual <= budget * (1 + TOLERANCE)
     return {
@@ -210,18 +183,19 @@ def refocused(study: Study, sizes: Sizes, budget: float) -> dict[str, Any]:
     }
 
 
-def _read_focused(
-    study: Study, errors: Errors, effect: ExactEffect, focused: Chip, reference: Chip
-) -> ApertureReading:
+def _read_focused(study: Study, focused: Responses) -> ApertureReading:
     """Phase that autofocus left: where little, it is read from the middle of a large patch, else from all of it."""
-    small, large = ([chip.within(cells) for chip in (focused, reference)] for cells in (FOCUSED_CELLS, MAX_CELLS))
+    small, large = (
+        focused._replace(chip=focused.chip.within(cells), reference=focused.reference.within(cells))
+        for cells in (FOCUSED_CELLS, MAX_CELLS)
+    )
     try:
-        reading = study.read(errors, effect, small[0], small[1], is_focused=True)
+        reading = study.read(small, is_focused=True)
         if abs(reading.quadratic) < FOCUSED_RAD:
             return reading
-    except (ValueError, np.linalg.LinAlgError):
+    except ValueError:
         pass
-    return study.read(errors, effect, large[0], large[1], is_focused=True)
+    return study.read(large, is_focused=True)
 
 
 def predicted(effect: ExactEffect) -> dict[str, Any]:
@@ -233,7 +207,7 @@ def predicted(effect: ExactEffect) -> dict[str, Any]:
     }
 
 
-def _without_image(study: Study, blank: Verdict, error: ValueError | np.linalg.LinAlgError) -> Verdict:
+def _without_image(study: Study, blank: Verdict, error: ValueError) -> Verdict:
     """Say why a limit has no image; one of the published model that leaves no point of the ground is no limit."""
     if isinstance(error, NoGroundPointError) and not study.is_full:
         return blank._replace(
@@ -270,26 +244,24 @@ def _judged(study: Study, blank: Verdict, sizes: Sizes) -> Verdict:
     blank = blank._replace(published_qpe_rad=by_table)
     try:
         scale = study.worse_sign(sizes, 1.0)
-        errors = study.together(sizes, scale)
-        effect = study.collection.effect(errors)
-        chip, reference = study.chips(errors, effect)
-        reading = study.read(errors, effect, chip, reference)
-    except (ValueError, np.linalg.LinAlgError) as error:
+        images = study.images(study.together(sizes, scale))
+        reading = study.read(images)
+    except ValueError as error:
         return _without_image(study, blank, error)
     measured = abs(reading.quadratic)
-    is_small = study.spread(errors, effect).smear <= _BESIDE_CELLS
+    is_small = images.spread.smear <= _BESIDE_CELLS
     inside, beyond = (_phase(study, sizes, factor * scale) if is_small else None for factor in (INSIDE, BEYOND))
     verdict, remark = _through_the_limit(inside, measured, beyond, budget)
     return blank._replace(
-        **predicted(effect),
-        **_of_response(chip, reference, effect, reading),
-        full_qpe_rad=abs(effect.quadratic),
+        **predicted(images.effect),
+        **_of_response(images, reading),
+        full_qpe_rad=abs(images.effect.quadratic),
         measured_qpe_rad=measured,
         measured_cubic_rad=None,
         measured_inside_rad=inside,
         measured_beyond_rad=beyond,
         displacement_published_m=published_displacement(study, sizes, scale),
-        displacement_full_m=effect.displacement,
+        displacement_full_m=images.effect.displacement,
         smear_azimuth_published_rad=(study.geometry.look_azimuth + math.pi / 2) % math.pi,
         verdict=verdict,
         reason=_both(remark, _remark(study, reading.coverage)),
@@ -318,14 +290,14 @@ def _both(first: Note | None, second: Note | None) -> Note | None:
     return first.then(second or "") if first else second
 
 
-def _of_response(chip: Chip, reference: Chip, effect: ExactEffect, reading: ApertureReading) -> dict[str, Any]:
+def _of_response(images: Responses, reading: ApertureReading) -> dict[str, Any]:
     """Measures of the response; those that a long smear or a bent patch leaves without value are missing."""
-    found: dict[str, Any] = {}
+    chip, reference, found = images.chip, images.reference, dict[str, Any]()
     try:
         shift = measured_shift(chip, reference, reading)
-        found["measured_displacement_m"] = moved(effect.displacement, shift.displacement)
+        found["measured_displacement_m"] = moved(images.effect.displacement, shift.displacement)
         found["measured_smear_azimuth_rad"] = shift.smear_azimuth
-    except (ValueError, np.linalg.LinAlgError):
+    except ValueError:
         pass
     try:
         clean = impulse_response(reference.cut, reference.spacing[1])
@@ -342,12 +314,9 @@ def _of_response(chip: Chip, reference: Chip, effect: ExactEffect, reading: Aper
 
 def _phase(study: Study, sizes: Sizes, scale: float) -> float | None:
     """Quadratic phase that the image of errors shows; None where there is no image."""
-    errors: Errors = study.together(sizes, scale)
     try:
-        effect = study.collection.effect(errors)
-        chips = study.chips(errors, effect, READ_CELLS)
-        return abs(study.read(errors, effect, *chips).quadratic)
-    except (ValueError, np.linalg.LinAlgError):
+        return abs(study.read(study.images(study.together(sizes, scale), READ_CELLS)).quadratic)
+    except ValueError:
         return None
 
 
@@ -381,3 +350,116 @@ def _scale_of_cubic(study: Study, sizes: Sizes, scale: float, requirement: float
         ahead = scale * min(4.0, max(0.25, requirement / found)) if 0 < found < math.inf else low
         scale = ahead if low < ahead < high else (low + high) / 2 if high < math.inf else 2 * scale
     raise ValueError("no scale of the declared errors has this cubic phase")
+
+
+# ---------------------------------------------------------------------- location
+def location(study: Study, requirement: float) -> Verdict:
+    """All declared errors scaled together until the gating model has them move the image by the requirement.
+
+    Confirmed if the image, and by (25) each error alone by exact ranges, is within half a pixel of where the gating
+    model puts it. A displacement that only is shorter is conservative; one that goes elsewhere is not.
+    """
+    blank = study.blank("mission.location_error", requirement, "m")
+    sizes = [(s, s.declared or 0.0) for s in study.declared]
+    if not sizes:
+        return blank._replace(reason=reasons.nothing_moves_the_image())
+    rule = "the full model" if study.is_full else "(25)"
+    try:
+        scale = _scale_of_location(study, sizes, requirement)
+        if scale is None:
+            degeneracy = study.plane.degeneracy
+            why = reasons.displacement_degenerates(degeneracy) if degeneracy else reasons.errors_move_nothing(rule)
+            return blank._replace(reason=why)
+        said = _places(study, sizes, scale)
+        images = study.images(study.together(sizes, scale))
+        effect = images.effect
+        shift = measured_shift(images.chip, images.reference, study.read(images))
+    except ValueError as error:
+        return blank._replace(reason=reasons.no_image_formed(str(error)))
+    assert said is not None
+    measured = moved(effect.displacement, shift.displacement)
+    seen = [("all of them together", said, measured)]
+    if not study.is_full:
+        # Together, errors may hide each other: the sign each is declared with is not the sign it will fly with.
+        for source, size in sizes:
+            alone = published_displacement(study, [(source, size)], scale)
+            if alone is not None:
+                exact = study.effect([(source, size)], scale).displacement
+                seen.append((f"{source.id} alone", alone, exact))
+    verdict, farthest = _of_places(study, seen)
+    along, across = _pixels_apart(study, said, measured)
+    if study.is_full:
+        # What exact ranges predict is the middle of the chip, whose lines and columns are those of range and Doppler.
+        along, across = abs(shift.pixels[0]), abs(shift.pixels[1])
+        verdict = "confirmed" if max(along, across) <= HALF_PIXEL else "optimistic"
+    reason = reasons.places_differ(rule, along, across)
+    if verdict != "confirmed":
+        who, by_rule, is_at = farthest
+        reason = reason.then(reasons.rule_misplaces(who, rule, by_rule, is_at))
+    return blank._replace(
+        **predicted(effect),
+        displacement_published_m=published_displacement(study, sizes, scale),
+        displacement_full_m=effect.displacement,
+        measured_displacement_m=measured,
+        verdict=verdict,
+        reason=reason,
+    )
+
+
+_Seen = tuple[str, GroundVector, GroundVector]
+
+
+def _of_places(study: Study, seen: list[_Seen]) -> tuple[str, _Seen]:
+    """Verdict on what was said and where it is, and the pair that is farthest apart."""
+    verdict = "confirmed"
+    for _, said, is_at in seen:
+        if max(_pixels_apart(study, said, is_at)) > HALF_PIXEL:
+            is_harmless = verdict != "optimistic" and _is_shorter(study, said, is_at)
+            verdict = "conservative" if is_harmless else "optimistic"
+    return verdict, max(seen, key=lambda one: max(_pixels_apart(study, *one[1:])))
+
+
+def _places(study: Study, sizes: Sizes, scale: float) -> GroundVector | None:
+    """Displacement of errors together by the gating model; None where (25) has none."""
+    if not study.is_full:
+        return published_displacement(study, sizes, scale)
+    return study.effect(sizes, scale).displacement
+
+
+def _scale_of_location(study: Study, sizes: Sizes, requirement: float) -> float | None:
+    """Scale at which the gating model moves the image by the requirement; None where it moves nothing."""
+    if not study.is_full:
+        place = published_displacement(study, sizes, 1.0)
+        length = math.hypot(*place) if place else 0.0
+        return requirement / length if length else None
+    plane = study.analysis.full.plane
+    moves = [plane.displacement(source.full, size) or (0.0, 0.0) for source, size in sizes]
+    length = math.hypot(math.fsum(m[0] for m in moves), math.fsum(m[1] for m in moves))
+    if not length:
+        return None
+    scale = requirement / length
+    for _ in range(20):
+        found = math.hypot(*study.effect(sizes, scale).displacement)
+        if not found or abs(found / requirement - 1) < _SETTLED:
+            break
+        scale *= min(2.0, max(0.5, requirement / found))
+    return scale
+
+
+def _pixels_apart(study: Study, a: GroundVector, b: GroundVector) -> GroundVector:
+    """Distance of two displacements along x′ and y′. [pixels]"""
+    look = study.geometry.look_azimuth
+    cosine, sine = math.cos(look), math.sin(look)
+    east, north = b[0] - a[0], b[1] - a[1]
+    spacing = study.collection.spacing
+    return abs(east * cosine + north * sine) / spacing[0], abs(north * cosine - east * sine) / spacing[1]
+
+
+def _is_shorter(study: Study, said: GroundVector, is_at: GroundVector) -> bool:
+    """Whether a displacement is the one said but shorter: then no sum of several, over all signs, is longer."""
+    length = math.hypot(*said)
+    if not length:
+        return False
+    part = (is_at[0] * said[0] + is_at[1] * said[1]) / length**2
+    on_line = (part * said[0], part * said[1])
+    return -1 <= part <= 1 and max(_pixels_apart(study, on_line, is_at)) <= HALF_PIXEL

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -11,23 +11,13 @@ from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.declared import QUADRATIC
 from bisar_budget.effects.effect import PLATFORMS, ErrorSource
 from bisar_budget.effects.subject import Subject
+from bisar_budget.findings.images import Verdict
 from bisar_budget.mission.model import Mission
 from bisar_budget.ranges.exact_ranges import FINE, STILL, ExactRanges, followed
 from bisar_budget.simulate.autofocus import ALGORITHMS
-from bisar_budget.simulate.collection import (
-    CELLS,
-    MAX_CELLS,
-    OVERSAMPLING,
-    RANGE_CELLS,
-    Chip,
-    Errors,
-    PointCollection,
-    superposed,
-)
-from bisar_budget.simulate.exact import ExactEffect
-from bisar_budget.simulate.phase_history import Floats, PathError
-from bisar_budget.verify.aperture_reading import READ_CELLS, ApertureReading, read_aperture
-from bisar_budget.verify.refocus import refocused
+from bisar_budget.simulate.collection import CELLS, MAX_CELLS, OVERSAMPLING, RANGE_CELLS, Chip, PointCollection
+from bisar_budget.simulate.phase_history import Errors, ExactEffect, Floats, PathError, superposed
+from bisar_budget.verify.aperture_reading import READ_CELLS, ApertureReading, read_aperture, refocused
 
 Sizes = Sequence[tuple[ErrorSource, float]]  # errors and how large each is, signed
 _CLOCK_TERMS = ("constant", "linear", "quadratic", "cubic")
@@ -43,6 +33,16 @@ class Spread(NamedTuple):
     walk: int
 
 
+class Responses(NamedTuple):
+    """Images of a point with errors, around the place they move it to, and of one without error at that place."""
+
+    errors: Errors
+    effect: ExactEffect
+    spread: Spread
+    chip: Chip
+    reference: Chip
+
+
 class Study:
     """One mission with what its rows share."""
 
@@ -53,6 +53,10 @@ class Study:
         self.allocation = self.analysis.allocation
         self.plane = self.analysis.published.plane  # (25)
         self.collection = PointCollection(mission, self.geometry)
+
+    def blank(self, row_id: str, limit: float, unit: str, **known: Any) -> Verdict:
+        """Verdict on a limit of the gating model before its image is formed."""
+        return Verdict(id=row_id, model=self.model, boundary_error=limit, unit=unit, **known)
 
     @property
     def is_full(self) -> bool:
@@ -177,34 +181,58 @@ class Study:
         found = model.does(source, size).qpe
         return found if math.isfinite(found) else math.inf
 
-    def at_limit(self, of: Subject, limit: float) -> Errors:
-        """Return the errors that a verdict of quadratic phase was read with."""
+    def at_limit(self, of: Subject, limit: float, room: float = 1.0) -> Responses:
+        """Images at a limit of a row of quadratic phase, as its verdict reads them."""
         source = next((s for s in self.sources if s.subject == of), None)
         sizes = [(source, limit)] if source is not None else self.summed(self.members(of.owner), limit)
-        return self.together(sizes, self.worse_sign(sizes, 1.0))
+        return self.images(self.together(sizes, self.worse_sign(sizes, 1.0)), room=room)
 
-    def images(self, of: Subject, limit: float, room: float = 1.0) -> tuple[Chip, Chip, Errors, ExactEffect]:
-        """Image at a limit of a row of quadratic phase, as its verdict reads it, and of no error at that place."""
-        errors = self.at_limit(of, limit)
+    def images(self, errors: Errors, range_cells: int = RANGE_CELLS, room: float = 1.0) -> Responses:
+        """Images of errors, large enough for the smear.
+
+        `room` is how often the smear must fit: autofocus gives out in less than it needs.
+
+        Raises
+        ------
+        ValueError
+            No ground point has the recorded range history, or the patch cannot be formed.
+        """
         effect = self.collection.effect(errors)
-        return *self.chips(errors, effect, room=room), errors, effect
+        spread = self.spread(errors, effect)
+        cells = min(MAX_CELLS, max(CELLS + spread.smear, math.ceil(room * spread.smear)))
+        chips = self.collection.pair(errors, effect.displacement, cells, range_cells + spread.walk)
+        return Responses(errors, effect, spread, *chips)
 
-    def focused(self, errors: Errors, effect: ExactEffect, chip: Chip) -> Chip:
-        """Refocus a chip by the mission's algorithm, its phase estimated on lines that share it.
+    def read(self, images: Responses, *, is_focused: bool = False) -> ApertureReading:
+        """Quadratic and cubic phase of a response, measured."""
+        walk = images.spread.walk
+        return read_aperture(
+            self.collection,
+            images.errors,
+            images.effect.displacement,
+            images.chip,
+            images.reference,
+            walk and walk + READ_CELLS,
+            None if is_focused else images.effect,
+        )
+
+    def focused(self, images: Responses) -> Responses:
+        """Refocus a response by the mission's algorithm, its phase estimated on lines that share it.
 
         Where range cells are long, lines beside the response show it with a quadratic phase of their own.
         """
         algorithm = ALGORITHMS[self.mission.autofocus.algorithm]
-        lines = chip.image.shape[0]
-        half = min(lines // 2, lines - 1 - lines // 2, self.shared_lines(errors, effect))
-        return refocused(self.collection, errors, effect.displacement, chip, algorithm, half)
+        lines = images.chip.image.shape[0]
+        half = min(lines // 2, lines - 1 - lines // 2, self.shared_lines(images.spread))
+        centre = images.effect.displacement
+        return images._replace(chip=refocused(self.collection, images.errors, centre, images.chip, algorithm, half))
 
-    def shared_lines(self, errors: Errors, effect: ExactEffect) -> int:
+    def shared_lines(self, spread: Spread) -> int:
         """Lines on either side of the middle one that share its quadratic phase, or that the response walks over."""
         (by_constant, _), _ = self.analysis.exact.phases_per_term
         per_line = float(abs(by_constant[0])) * self.collection.range_cell / OVERSAMPLING
         shared = int(min(_SHARED_RAD / per_line if per_line else 1e6, 1e6))
-        return max(shared, round(self.spread(errors, effect).walk * OVERSAMPLING / 2))
+        return max(shared, round(spread.walk * OVERSAMPLING / 2))
 
     def spread(self, errors: Errors, effect: ExactEffect) -> Spread:
         """Where an error puts the parts of a response, by the range error that it leaves over the aperture.
@@ -215,15 +243,16 @@ class Study:
         half = self.collection.aperture_time / 2
         time = np.linspace(-half, half, 257)
         point = np.array([*effect.displacement, 0.0])
-        left: Floats = SPEED_OF_LIGHT * self.collection.clock(errors.smooth(), time)
+        flight = self.collection.flight(errors.smooth(), time)
+        left: Floats = SPEED_OF_LIGHT * flight.clock
         slopes: Floats = np.zeros((time.size, 2))
-        for one in self.collection.paths(errors.smooth(), time):
+        for one in flight.paths:
             sight = one.measured - point
             distance = np.linalg.norm(sight, axis=1)
             left = left + np.linalg.norm(one.actual, axis=1) - distance
             slopes = slopes - sight[:, :2] / distance[:, None]
-        flown = self.collection.flown(errors)
-        cells = flown.cells(effect.displacement, self.mission.radar.bandwidth, self.collection.wavelength)
+        lines = self.collection.range_lines(errors)
+        cells = lines.cells(effect.displacement, self.mission.radar.bandwidth, self.collection.wavelength)
         by_range = slopes[time.size // 2]
         doppler = slopes @ (np.array([by_range[1], -by_range[0]]) / np.hypot(*by_range))
         rate = np.gradient(doppler, time)
@@ -233,30 +262,4 @@ class Study:
         return Spread(
             2 * math.ceil(min(float(np.abs(places).max()) / cells[1], 1e6)),
             2 * math.ceil(min(float(np.abs(walk).max()) / self.collection.range_cell - 0.25, 64)),
-        )
-
-    def chips(
-        self, errors: Errors, effect: ExactEffect, range_cells: int = RANGE_CELLS, room: float = 1.0
-    ) -> tuple[Chip, Chip]:
-        """Image of the errors and of no error at the place they move the point to, large enough for the smear.
-
-        `room` is how often the smear must fit: autofocus gives out in less than it needs.
-        """
-        smear, walk = self.spread(errors, effect)
-        cells = min(MAX_CELLS, max(CELLS + smear, math.ceil(room * smear)))
-        return self.collection.pair(errors, effect.displacement, cells, range_cells + walk)
-
-    def read(
-        self, errors: Errors, effect: ExactEffect, chip: Chip, reference: Chip, *, is_focused: bool = False
-    ) -> ApertureReading:
-        """Quadratic and cubic phase of a response, measured."""
-        walk = self.spread(errors, effect).walk
-        return read_aperture(
-            self.collection,
-            errors,
-            effect.displacement,
-            chip,
-            reference,
-            walk and walk + READ_CELLS,
-            None if is_focused else effect,
         )

@@ -10,8 +10,7 @@ from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.ranges import exact_ranges
 from bisar_budget.ranges.exact_ranges import FINE, STILL, ExactRanges, Lanes, aperture_nodes, followed
-from bisar_budget.simulate.exact import exact_effect
-from bisar_budget.simulate.phase_history import cell_centres
+from bisar_budget.simulate.phase_history import cell_centres, exact_effect
 from bisar_budget.verify.study import Study
 from tests.conftest import mission_text
 from tests.families import DIRECT_PATH, FAMILIES
@@ -23,7 +22,9 @@ def by_courses(study: Study, source, sizes):
     nodes = aperture_nodes(study.collection.aperture_time)
     errors = study.errors(source, 1.0)
     scale = np.asarray(sizes)
-    shifts = [(one.measured - one.actual).T[..., None] * scale for one in study.collection.paths(errors, nodes)]
+    shifts = [
+        (one.measured - one.actual).T[..., None] * scale for one in study.collection.flight(errors, nodes).paths
+    ]
     clock = SPEED_OF_LIGHT * np.polynomial.polynomial.polyval(nodes, errors.clock)[:, None] * scale
     return followed(of_study(study), clock, shifts, np.zeros(len(sizes), dtype=int))
 
@@ -71,7 +72,7 @@ def test_what_remains_has_no_constant_and_no_linear_part() -> None:
     effect = study.collection.effect(errors)
     T, k = study.collection.aperture_time, 2 * math.pi / study.collection.wavelength
     tau = cell_centres(T, 20000)
-    flown, point = study.collection.paths(errors, tau), np.array([*effect.displacement, 0.0])
+    flown, point = study.collection.flight(errors, tau).paths, np.array([*effect.displacement, 0.0])
     left = k * sum(np.linalg.norm(p.actual, axis=1) - np.linalg.norm(p.measured - point, axis=1) for p in flown)
     place = tau / (T / 2)
     parts = [(2 * n + 1) * np.mean(left * np.polynomial.legendre.Legendre.basis(n)(place)) for n in range(4)]
@@ -85,7 +86,7 @@ def test_samples_anywhere_give_the_same() -> None:
     errors = study.errors(next(s for s in study.sources if s.id == "receiver.velocity.y"), 0.5)
     want = study.collection.effect(errors)
     tau = cell_centres(study.collection.aperture_time, 200)
-    got = exact_effect(tau, *study.collection.paths(errors, tau), 0.0, study.collection.wavelength, 6.0)
+    got = exact_effect(tau, *study.collection.flight(errors, tau).paths, 0.0, study.collection.wavelength, 6.0)
     assert got.displacement == pytest.approx(want.displacement, abs=1e-5)
     assert got.quadratic == pytest.approx(want.quadratic, abs=1e-5)
 
@@ -103,7 +104,7 @@ def test_a_start_nearby_changes_nothing() -> None:
     study = Study(parse_mission(mission_text()))
     source = next(s for s in study.sources if s.id == "receiver.velocity.y")
     exact, one = of_study(study), np.zeros(1, dtype=int)
-    flown = study.collection.paths(study.errors(source, 0.5), aperture_nodes(6.0))
+    flown = study.collection.flight(study.errors(source, 0.5), aperture_nodes(6.0)).paths
     given = np.zeros((FINE, 1)), [(path.measured - path.actual).T[..., None] for path in flown]
     first = exact.settled(*given, (0.0, 0.0), math.inf, one)
     again = exact.settled(*given, (first.east + 0.5, first.north + 0.5), math.inf, one)

@@ -13,11 +13,12 @@ from bisar_budget.simulate.autofocus import (
     autofocus_in_scene_axes,
     map_drift,
     phase_gradient_autofocus,
+    rotated,
+    scene_axes,
 )
 from bisar_budget.simulate.image_formation import backprojection, ground_grid, taylor_window
 from bisar_budget.simulate.impulse_response import upsampled
 from bisar_budget.simulate.phase_history import cell_centres
-from bisar_budget.simulate.rotation import rotated, scene_axes
 from tests.simulate.conftest import Collection, collection
 
 

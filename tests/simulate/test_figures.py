@@ -17,8 +17,8 @@ from bisar_budget.simulate import former, image_formation
 from bisar_budget.simulate import point as point_module
 from bisar_budget.simulate.former import IMAGE_FORMERS
 from bisar_budget.simulate.image_formation import ground_grid
+from bisar_budget.simulate.impulse_response import resampled
 from bisar_budget.simulate.point import PointImages, simulate_point
-from bisar_budget.simulate.resampling import resampled
 from bisar_budget.simulate.targets import Target, Targets, parse_targets
 from tests.conftest import ROOT, mission_text
 from tests.simulate.conftest import images_of

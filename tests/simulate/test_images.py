@@ -5,10 +5,16 @@ import math
 import numpy as np
 import pytest
 
-from bisar_budget.simulate.exact import exact_effect
 from bisar_budget.simulate.image_formation import backprojection, ground_grid, matched_filter, taylor_window
 from bisar_budget.simulate.impulse_response import impulse_response, upsampled
-from bisar_budget.simulate.phase_history import PathError, PathSinusoid, cell_centres, path, phase_history
+from bisar_budget.simulate.phase_history import (
+    PathError,
+    PathSinusoid,
+    cell_centres,
+    exact_effect,
+    path,
+    phase_history,
+)
 from tests.simulate.conftest import Collection, collection
 
 pytestmark = pytest.mark.extras

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bisar_budget.simulate.image_formation import taylor_window
-from bisar_budget.simulate.impulse_response import impulse_response, impulse_response_2d, loss_db, upsampled
+from bisar_budget.simulate.impulse_response import impulse_response, impulse_response_2d, upsampled
 from bisar_budget.simulate.phase_history import cell_centres
 
 APERTURE = 256  # samples
@@ -77,7 +77,7 @@ class TestOneCut:
         clean = impulse_response(clean_cut, spacing)
         got = impulse_response(response(quadratic)[0], spacing, mask_m=clean.mask_m)
         assert got.irw_m / clean.irw_m == pytest.approx(width, abs=0.006 if quadratic == math.pi else 0.001)
-        assert loss_db(got, clean) == pytest.approx(loss, abs=0.006)
+        assert 20 * math.log10(got.peak / clean.peak) == pytest.approx(loss, abs=0.006)
         assert got.pslr_db == pytest.approx(pslr, abs=0.01)
         assert got.islr_db == pytest.approx(islr, abs=0.01)
 
@@ -214,7 +214,7 @@ class TestChip:
         assert got.cross_range_cut.pslr_db == pytest.approx(-9.04, abs=0.03)
         assert got.cross_range_cut.islr_db == pytest.approx(-6.27, abs=0.03)
         assert got.pslr_db == pytest.approx(-9.04, abs=0.03)
-        assert loss_db(got, clean) == pytest.approx(-0.97, abs=0.01)
+        assert 20 * math.log10(got.peak / clean.peak) == pytest.approx(-0.97, abs=0.01)
         # Energies of separable responses multiply: total/mainlobe is the product of the cuts'.
         whole = (1 + 10 ** (-0.627)) * (1 + 10 ** (-0.968))
         assert got.islr_db == pytest.approx(10 * math.log10(whole - 1), abs=0.03)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bisar_budget.mission.load import load_mission, parse_mission
-from bisar_budget.simulate import far_field, image_formation, range_profile
+from bisar_budget.simulate import far_field, image_formation
 from bisar_budget.simulate.far_field import far_field_filter
 from bisar_budget.simulate.image_formation import backprojection, is_compiled, kernel_within, matched_filter
 from bisar_budget.simulate.point import SimulationError, simulate_point
@@ -90,7 +90,7 @@ class TestFarApart:
         backprojection(history, points)
         peak = traced(lambda: backprojection(history, points))
         assert peak < 40e6
-        all_at_once = 64 * range_profile.profile_length(history, 2) * range_profile.PROFILE_BYTES
+        all_at_once = 64 * image_formation.profile_length(history, 2) * image_formation.PROFILE_BYTES
         assert all_at_once > 90e6  # what it would have been
 
 
@@ -175,8 +175,8 @@ class TestTime:
 
     def test_a_long_one_grows_with_its_rows(self, monkeypatch) -> None:
         """Measured are images of two sizes; the rest is counted."""
-        monkeypatch.setattr("bisar_budget.verify.duration._SLOWEST", 1e3)
-        monkeypatch.setattr("bisar_budget.verify.duration._seconds", lambda study, cells: 10.0)
+        monkeypatch.setattr("bisar_budget.verify.limits._SLOWEST", 1e3)
+        monkeypatch.setattr("bisar_budget.verify.limits._seconds", lambda study, cells: 10.0)
         mission = load_mission(str(SECTION_V))
         rows = rows_to_verify(mission)
         whole = seconds_to_verify(mission)
@@ -186,22 +186,22 @@ class TestTime:
 
     def test_a_larger_image_takes_what_a_larger_one_took(self, monkeypatch) -> None:
         """A small image takes more for its size than a large one: 97 s were foreseen as 216 s."""
-        monkeypatch.setattr("bisar_budget.verify.duration._SLOWEST", 1e3)
+        monkeypatch.setattr("bisar_budget.verify.limits._SLOWEST", 1e3)
         mission, seconds = load_mission(str(SECTION_V)), {}
         for large in (10.0, 320.0):
             took = {48: 10.0, 8 * 48: large}
-            monkeypatch.setattr("bisar_budget.verify.duration._seconds", lambda study, cells, took=took: took[cells])
+            monkeypatch.setattr("bisar_budget.verify.limits._seconds", lambda study, cells, took=took: took[cells])
             seconds[large] = seconds_to_verify(mission)
         assert seconds[10.0] < seconds[320.0]
 
     def test_the_smallest_pair_is_measured(self, monkeypatch) -> None:
-        monkeypatch.setattr("bisar_budget.verify.duration._SLOWEST", 1e3)
+        monkeypatch.setattr("bisar_budget.verify.limits._SLOWEST", 1e3)
         assert 0 < seconds_to_verify(load_mission(str(SECTION_V)), "timing.quadratic") < 60
 
     @pytest.mark.parametrize("command", ["verify", "simulate"])
     def test_the_command_says_so_and_what_to_change(self, run, monkeypatch, command) -> None:
         monkeypatch.setattr("bisar_budget.cli.waiting.LONG", 1e-9)
-        monkeypatch.setattr("bisar_budget.verify.duration._SLOWEST", 1e3)
+        monkeypatch.setattr("bisar_budget.verify.limits._SLOWEST", 1e3)
         result = run(command, SECTION_V, *(["--only", "timing.quadratic"] if command == "verify" else []))
         (line,) = [line for line in result.stderr.splitlines() if line.startswith("Forming the images of ")]
         assert re.search(r"will take about [\d.]+ (s|minutes); ", line)

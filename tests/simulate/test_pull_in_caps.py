@@ -9,7 +9,7 @@ from bisar_budget.budget.pull_in import ROOM, Caps, caps, needed_sentence
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.report.explain.explanation import explain
 from bisar_budget.simulate.autofocus import ALGORITHMS
-from bisar_budget.simulate.collection import Errors
+from bisar_budget.simulate.phase_history import Errors
 from bisar_budget.verify.limits import Study
 from tests.conftest import findings, mission_text, row
 

@@ -13,8 +13,7 @@ from bisar_budget.faults import MissionError
 from bisar_budget.geometry import PlatformState
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.simulate.collection import RANGE_CELLS
-from bisar_budget.simulate.exact import exact_effect
-from bisar_budget.simulate.phase_history import cell_centres, path
+from bisar_budget.simulate.phase_history import cell_centres, exact_effect, path
 from bisar_budget.verify.aperture_reading import read_aperture
 from bisar_budget.verify.limits import Study
 from tests.conftest import TODAY, findings, mission_text, row

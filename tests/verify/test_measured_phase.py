@@ -10,11 +10,10 @@ from hypothesis import strategies as st
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.evaluators import LEGENDRE_FITS
 from bisar_budget.mission.load import parse_mission
-from bisar_budget.simulate.collection import Errors, PointCollection, superposed
-from bisar_budget.simulate.phase_history import PathError, cell_centres
-from bisar_budget.verify.aperture_reading import _distance, _squares, read_aperture
+from bisar_budget.simulate.collection import PointCollection
+from bisar_budget.simulate.phase_history import Errors, PathError, cell_centres, superposed
+from bisar_budget.verify.aperture_reading import _distance, _squares, measured_shift, read_aperture
 from bisar_budget.verify.limits import verify_mission
-from bisar_budget.verify.shift import measured_shift
 from tests.conftest import mission_text
 from tests.simulate.conftest import collection
 
@@ -119,9 +118,9 @@ def brute_force_phase(c: PointCollection, errors: Errors, order: int) -> float:
     half = c.aperture_time / 2
 
     def left(point, times):
-        flown = c.paths(errors, times)
+        flown = c.flight(errors, times).paths
         legs = [np.linalg.norm(p.actual, axis=1) - np.linalg.norm(p.measured - [*point, 0.0], axis=1) for p in flown]
-        return sum(legs) + SPEED_OF_LIGHT * c.clock(errors, times)
+        return sum(legs) + SPEED_OF_LIGHT * c.flight(errors, times).clock
 
     place = cell_centres(2.0, 4001)
 
@@ -243,9 +242,9 @@ def test_superposed_errors_add_along_the_whole_path() -> None:
     a = Errors(clock=(1e-9, 0.0, 0.0, 0.0)).of("receiver", PathError(position=(1.0, 2.0, 3.0)))
     b = Errors(clock=(0.0, 1e-12, 0.0, 0.0)).of("receiver", PathError(velocity=(0.1, 0.2, 0.3)))
     both = superposed([a, b])
-    errors = [path.measured - path.actual for one in (a, b, both) for path in c.paths(one, tau)]
+    errors = [path.measured - path.actual for one in (a, b, both) for path in c.flight(one, tau).paths]
     assert np.allclose(errors[5], errors[1] + errors[3])
-    assert np.allclose(c.clock(both, tau), 1e-9 + 1e-12 * tau)
+    assert np.allclose(c.flight(both, tau).clock, 1e-9 + 1e-12 * tau)
 
 
 def test_a_taylor_window_is_honoured() -> None:

@@ -12,7 +12,7 @@ from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.simulate.point import simulate_point
 from bisar_budget.simulate.realisations import _Tones
 from bisar_budget.verify.limits import verify_mission
-from bisar_budget.verify.random_cases import verify_islr, verify_random
+from bisar_budget.verify.spread_cases import verify_islr, verify_random
 from bisar_budget.verify.study import Study
 from tests.conftest import ROOT
 from tests.effects.test_random_errors import MISSION, OSCILLATORS

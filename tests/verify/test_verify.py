@@ -12,8 +12,8 @@ from bisar_budget.budget.check import check_mission
 from bisar_budget.findings.images import Verdict
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.simulate import collection as collection_module
-from bisar_budget.simulate.exact import NoGroundPointError
 from bisar_budget.simulate.image_formation import backprojection
+from bisar_budget.simulate.phase_history import NoGroundPointError
 from bisar_budget.verify.limits import rows_to_verify, verify_mission
 from bisar_budget.verify.study import Study
 from tests import families

@@ -9,10 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bisar_budget.simulate.impulse_response import upsampled
+from bisar_budget.simulate.impulse_response import between, resampled, upsampled
 from bisar_budget.simulate.phase_history import Complexes, Floats
 from bisar_budget.simulate.point import PointImages
-from bisar_budget.simulate.resampling import between, resampled
 
 FLOOR_DB = -35.0
 _FINE, _FINE_CUT = 4, 8  # interpolation, at most, so that a mainlobe has a shape

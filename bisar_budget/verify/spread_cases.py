@@ -1,0 +1,537 @@
+"""Verdicts on the limits of what echoes and spreads: vibration, sensors and clocks.
+
+A sigma speaks of many flights. Whole time series go through exact ranges for it, and images of some of them say
+whether a response shows the phase that exact ranges find. What spreads is measured in images of as many draws as it
+takes to say whether a limit is true: lines across range, each the transform of the aperture under its window. Their
+mainlobe is what lies within the first nulls of the error-free response, their sidelobes are all the rest of one
+repeat interval, so that by Parseval only the mainlobe has to be transformed. Energies are means over the draws.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from bisar_budget.analysis.spread import declared_powers, islr_db, mainlobe_energy, shown_islr_db, spread_limit, tones
+from bisar_budget.analysis.vibration_limits import echo_phase, highest_echo, vibration_limits
+from bisar_budget.budget.random_rows import HELD, ISLR, held_effect, limits_for, sizes_at
+from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.effects.clocks import Spur
+from bisar_budget.effects.declared import CUBIC
+from bisar_budget.effects.echoes import SLOWEST, near_lines, worst_phases
+from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.effects.random_errors import RandomError, process_of
+from bisar_budget.effects.subject import Subject, subject
+from bisar_budget.effects.vibration import Line, lines_of, sight_of
+from bisar_budget.findings.images import Verdict
+from bisar_budget.mission.model import Simulation
+from bisar_budget.phrases import Note
+from bisar_budget.ranges.exact_ranges import aperture_nodes
+from bisar_budget.simulate.collection import CELLS, PointCollection
+from bisar_budget.simulate.impulse_response import upsampled
+from bisar_budget.simulate.phase_history import (
+    SMOOTH,
+    Course,
+    Errors,
+    Floats,
+    PathError,
+    PathSinusoid,
+    cell_centres,
+    direct_path_error,
+)
+from bisar_budget.simulate.realisations import clock_seconds, phase_courses, position_courses
+from bisar_budget.verify import reasons
+from bisar_budget.verify.phase_cases import TOLERANCE, compare
+from bisar_budget.verify.study import Study
+
+TOLERANCE_DB = 0.5
+UNDECLARED_CYCLES = 10  # of a vibration per aperture, where the file gives no frequency
+
+_FINE_CUT = 8  # interpolation of a cut before its peak is read
+_SEEN_WALK = 0.3  # range cells, from which a smear is said
+_COMMON_RUNS = 32
+
+_DRAWS, _CLOCK_DRAWS = 4000, 1000  # know a sigma to 1.1 %, and to 2.2 %
+_SYNCHRONIZED_DRAWS = 400  # whose fast tones are drawn too, because they are folded
+_TURNS = 100  # of a tone per aperture, beyond which it has no quadratic phase to speak of
+_SURE_SIGMA = 3.0  # standard errors of a sigma
+_IMAGES = 6
+_FINE = 513  # moments of a time series in an image
+_AT_ONCE = 250  # draws in memory
+_ORDER = 3  # up to which a phase moves and defocuses; the rest spreads
+
+_MOMENTS = 1024  # of an aperture whose spread power is measured; the mask holds two of so many cells of white noise
+_FIRST, _MOST = 64, 8192  # draws
+_AT_MOST = 256  # of them in memory
+_NORMAL_95 = 1.96  # standard errors on either side of a mean
+_SURE = 3.3  # of them within one verdict, 99.9 %: another seed must not draw another verdict
+_KNOWN_DB = 0.25  # half of an interval at most: one that is drawn too early may lie anywhere
+_NODES = 32  # of the mainlobe's integral
+_STEPS = 64  # in a cell, by which the first null is sought: the response is 0 there, and so is what a step holds
+_TINY = 1e-300
+
+Case = Callable[[], Verdict]
+
+
+# ---------------------------------------------------------------------- vibration
+def vibration_cases(study: Study) -> Iterator[tuple[Subject, Case]]:
+    """Give the subject of each vibration limit, one platform alone and both together, and the call that verifies it.
+
+    What comes out for the published limits at equal shares: a sinusoid of one platform makes echoes 9 dB inside the
+    requirement, both in phase 3 dB inside; noise-like vibration of both, independent, exceeds the requirement by
+    0.44 dB with a uniform window. By the full model's limits both in phase fill it, and so does noise.
+    """
+    mission, T = study.mission, study.collection.aperture_time
+    pslr, islr = mission.requirements.pslr, mission.requirements.islr
+    amplitude, rms = (
+        {name: limit.by(study.model) for name, limit in vibration_limits(mission, study.allocation, metric).items()}
+        for metric in ("pslr", "islr")
+    )
+    lines = {name: lines_of(mission, name) for name in PLATFORMS}
+
+    def blank(of: Subject, limits: Mapping[str, float], requirement_db: float) -> Verdict:
+        # Both together: the larger of two limits stands for the row.
+        return study.blank(of.id, max(limits.values()), "m", requirement_db=requirement_db)
+
+    for name in PLATFORMS:
+        if pslr is not None:
+            alone = {name: amplitude[name]}
+            for index, frequency in enumerate([line.frequency for line in lines[name]] or [None]):
+                if frequency is not None and frequency * T < SLOWEST:
+                    continue  # a phase, which `phase_cases` looks at
+                one = subject(name, "vibration", "sinusoidal", entry=index)
+                yield one, partial(_sinusoidal, study, blank(one, alone, pslr), alone, frequency)
+            for index, members in enumerate(near_lines([line.frequency * T for line in lines[name]])):
+                one = subject(name, "vibration", "sinusoidal.sum", entry=index)
+                near = [lines[name][member] for member in members]
+                yield one, partial(_near, study, blank(one, alone, pslr), name, amplitude[name], near)
+        if islr is not None:
+            one, alone = subject(name, "vibration", "wideband"), {name: rms[name]}
+            yield one, partial(_wideband, study, blank(one, alone, islr), alone)
+    if pslr is not None:
+        frequency = next((line.frequency for name in PLATFORMS for line in lines[name]), None)
+        both = subject("mission", "vibration", "sinusoidal")
+        yield both, partial(_sinusoidal, study, blank(both, amplitude, pslr), amplitude, frequency)
+    if islr is not None:
+        both = subject("mission", "vibration", "wideband")
+        yield both, partial(_wideband, study, blank(both, rms, islr), rms)
+
+
+def _sinusoidal(study: Study, blank: Verdict, limits: Mapping[str, float], declared: float | None) -> Verdict:
+    """Measure the paired echo on the difference from the error-free image, which its sidelobes would bury."""
+    frequency = UNDECLARED_CYCLES / study.collection.aperture_time if declared is None else declared
+    sinusoids = {name: (PathSinusoid(amplitude=size, frequency=frequency),) for name, size in limits.items()}
+    who = "one platform alone" if len(limits) == 1 else "both platforms in phase"
+    return echo(study, blank, sinusoids, who, is_assumed=declared is None)
+
+
+def _near(study: Study, blank: Verdict, name: str, limit: float, lines: Sequence[Line]) -> Verdict:
+    """Lines near each other, in their declared ratio and their worst phases, scaled to their limit together."""
+    cycles = [line.frequency * study.collection.aperture_time for line in lines]
+    worst = worst_phases([line.amplitude for line in lines], cycles)
+    if not worst.amplitude:
+        return blank._replace(reason=reasons.lines_without_amplitude())
+    scale = limit / worst.amplitude
+    sinusoids = tuple(
+        PathSinusoid(scale * line.amplitude, line.frequency, 0.0 if np.sinc(worst.cycles - n) >= 0 else math.pi)
+        for line, n in zip(lines, cycles, strict=True)
+    )
+    return echo(study, blank, {name: sinusoids}, "one platform's lines in their worst phases")
+
+
+def echo(
+    study: Study,
+    blank: Verdict,
+    sinusoids: Mapping[str, tuple[PathSinusoid, ...]],
+    who: str,
+    *,
+    is_assumed: bool = False,
+) -> Verdict:
+    """Measure the paired echoes of sinusoids against the requirement of a verdict that is yet blank."""
+    collection = study.collection
+    every = [sinusoid.frequency * collection.aperture_time for those in sinusoids.values() for sinusoid in those]
+    slowest, cycles = min(every), max(every)
+    if slowest < 3:
+        return blank._replace(reason=reasons.echoes_on_the_peak(slowest))
+    cells = 2 * math.ceil(min(cycles, 1e6)) + CELLS
+    errors = Errors()
+    for name, those in sinusoids.items():
+        errors = errors.of(name, PathError(sinusoids=those))
+    try:
+        clean = collection.chip((0.0, 0.0), Errors(), cells=cells).cut
+        echo = collection.chip((0.0, 0.0), errors, cells=cells).cut - clean
+    except ValueError as error:
+        return blank._replace(reason=reasons.no_image_of_a_vibration(cycles, str(error)))
+    # An echo keeps its range while a scatterer at its place would walk by one wavelength per cycle.
+    walk = cycles * collection.radar.bandwidth / collection.radar.center_frequency
+    peaks = [float(np.abs(upsampled(cut, _FINE_CUT)).max()) for cut in (echo, clean)]
+    level = 20 * math.log10(peaks[0] / peaks[1])
+    return blank._replace(
+        measured_db=level,
+        verdict=compare(level - (blank.requirement_db or 0.0), TOLERANCE_DB),
+        reason=reasons.echoes_measured(who, cycles, walk if walk > _SEEN_WALK else None, is_assumed),
+    )
+
+
+def _wideband(study: Study, blank: Verdict, limits: Mapping[str, float]) -> Verdict:
+    """Measure the ISLR that white vibration adds, over all of the repeat interval, on as many draws as it takes."""
+    collection, seed = study.collection, (study.mission.simulation or Simulation()).seed
+    slow_time = cell_centres(collection.aperture_time, _MOMENTS)
+    clean = collection.flight(Errors(), slow_time).paths
+    errors = Errors()
+    for name, rms in limits.items():
+        errors = errors.of(name, PathError(wideband_rms=rms))
+
+    def phases(rng: np.random.Generator, draws: int, *, is_common: bool) -> Floats:
+        found = np.empty((draws, slow_time.size))
+        for one in found:
+            flown = collection.flight(errors, slow_time, rng).paths
+            shifts = [
+                np.linalg.norm(now.measured, axis=1) - np.linalg.norm(before.measured, axis=1)
+                for now, before in zip(flown, clean, strict=True)
+            ]
+            if collection.has_direct_path:  # of each platform alone
+                shifts[0] -= SPEED_OF_LIGHT * direct_path_error((flown[0], clean[1]))
+                shifts[1] -= SPEED_OF_LIGHT * direct_path_error((clean[0], flown[1]))
+            if is_common:  # the second platform makes the first one's motion, at its own limit
+                first, second = limits.values()
+                shifts[1] = shifts[0] * second / first
+            one[:] = 2 * math.pi / collection.wavelength * (shifts[0] + shifts[1])
+        return found
+
+    rest_on = reasons.power_of_one_platform()
+    if len(limits) == 2:
+        mainlobe = Mainlobe(collection.window(_MOMENTS))
+        common = phases(np.random.default_rng([seed, 1]), _COMMON_RUNS, is_common=True)
+        rest_on = reasons.power_of_both_platforms(mainlobe.added_db(float(mainlobe.lost(common).mean())))
+    draw = partial(phases, np.random.default_rng(seed), is_common=False)
+    return measured_power(collection, blank, draw, rest_on)
+
+
+def measured_power(
+    collection: PointCollection, blank: Verdict, draw: Callable[[int], Floats], rest_on: Note
+) -> Verdict:
+    """Verdict on the ISLR that phases add, (draws, _MOMENTS), against the requirement of one that is yet blank."""
+    required = blank.requirement_db or 0.0
+    found = added_islr(collection.window(_MOMENTS), draw, required)
+    verdict, interval = found.verdict(required), (found.low, found.high)
+    drawn = reasons.draws_decide if verdict != "not_evaluated" else reasons.draws_do_not_decide
+    return blank._replace(
+        measured_db=found.level,
+        measured_db_error=found.error,
+        measured_db_interval=interval,
+        verdict=verdict,
+        reason=rest_on.then(drawn(found.draws, *interval)),
+    )
+
+
+# ---------------------------------------------------------------------- sensors and clocks
+def limits_of(study: Study, error: RandomError) -> dict[str, float]:
+    """Size at which each requirement that an error touches is reached, autofocus left out; empty: none limits it."""
+    model = _model(study, error)
+    effect = held_effect(study.mission, error.effect(model))
+    sizes = map(float, sizes_at(effect, limits_for(study.mission, study.allocation, error.owner, model)))
+    return {name: size for name, size in zip(HELD, sizes, strict=True) if math.isfinite(size)}
+
+
+def _model(study: Study, error: RandomError) -> str:
+    """The gating model by which an error does more."""
+    return max((one.name for one in study.models), key=lambda name: max(error.effect(name)[:2]))
+
+
+def verify_spur(study: Study, spur: Spur, row_id: str, amplitude: float) -> Verdict:
+    """A tone at its limit: the motion of the platform that makes the same phase. [m]"""
+    level = 20 * math.log10(math.pi * amplitude / study.collection.wavelength)
+    blank = study.blank(row_id, level, "dB", requirement_db=study.mission.requirements.pslr)
+    sinusoids = {spur.name: (PathSinusoid(amplitude, spur.frequency),)}
+    return echo(study, blank, sinusoids, "the tone alone")
+
+
+def verify_spread_tone(study: Study, blank: Verdict, owner: str, amplitude: float, cycles: float) -> Verdict:
+    """A tone where ISLR holds it, at its limit: a motion [m] of so many cycles per aperture."""
+    phase = 2 * math.pi * amplitude / study.collection.wavelength
+    return _power(study, blank, [], owner, echoes=[(phase / math.sqrt(2), cycles)])
+
+
+def verify_pslr(study: Study) -> Verdict:
+    """The tones that make the highest echo, in their worst phases, scaled together to what is required."""
+    required = study.mission.requirements.pslr or 0.0
+    row_id = subject("mission", "pslr").id
+    blank = study.blank(row_id, required, "dB", requirement_db=required)
+    found = tones(study.mission)
+    highest = highest_echo(found)
+    if highest is None or not highest.phase:
+        return blank._replace(reason=reasons.no_tone_declared())
+    scale = echo_phase(10 ** (required / 20)) / highest.phase * study.collection.wavelength / (2 * math.pi)
+    sinusoids: dict[str, tuple[PathSinusoid, ...]] = {}
+    for one in [one for one, is_in in zip(found, highest.is_of, strict=True) if is_in]:
+        turned = 0.0 if np.sinc(highest.cycles - one.cycles) >= 0 else math.pi
+        tone = PathSinusoid(scale * one.phase, one.cycles / study.collection.aperture_time, turned)
+        sinusoids[one.subject.owner] = (*sinusoids.get(one.subject.owner, ()), tone)
+    return echo(study, blank, sinusoids, "the tones together in their worst phases")
+
+
+def verify_random(study: Study, error: RandomError) -> Verdict:
+    """Limit of one figure: the smallest of what quadratic phase, cubic phase and ISLR allow, autofocus left out."""
+    sizes = limits_of(study, error)
+    binding = min(sizes, key=lambda name: sizes[name])
+    size = sizes[binding]
+    at_limit = error._replace(declared=size)
+    blank = study.blank(error.id, 20 * math.log10(size) if error.unit == "dB" else size, error.unit)
+    if binding == ISLR:
+        is_taken = study.mission.requirements.cubic_phase_error is not None
+        return _power(study, blank, [at_limit], error.owner, order=_ORDER if is_taken else _ORDER - 1)
+    return _phase(study, blank, at_limit, binding, _stream(study, error.id))
+
+
+def _phase(study: Study, blank: Verdict, error: RandomError, binding: str, rng: np.random.Generator) -> Verdict:
+    """Sigma of quadratic or cubic phase at the limit, coverage factor included, against the budget."""
+    is_cubic = binding == CUBIC
+    required = study.mission.requirements.cubic_phase_error
+    budget = (required or 0.0) if is_cubic else study.allocation.qpe_limit(error.owner)
+    factor = study.mission.allocation.coverage_factor
+    sigma, draws = _sigma(study, error, rng, is_cubic)
+    predicted = factor * sigma
+    drawn, seen = [], []
+    try:
+        for errors in _series(study, error, rng):
+            images = study.images(errors)
+            effect, reading = images.effect, study.read(images)
+            drawn.append(effect.cubic if is_cubic else effect.quadratic)
+            seen.append(reading.cubic if is_cubic else reading.quadratic)
+    except ValueError as fault:
+        return blank._replace(budget_rad=budget, reason=reasons.no_image_of_a_time_series(str(fault)))
+    # How much of a phase images show: readings over exact ranges, the large ones counting more.
+    shown = float(np.dot(drawn, seen) / np.dot(drawn, drawn))
+    measured = predicted * shown
+    tolerance = TOLERANCE + _SURE_SIGMA / math.sqrt(2 * draws)
+    verdict = blank._replace(
+        budget_rad=budget,
+        verdict=compare(measured / budget - 1, tolerance),
+        reason=reasons.sigma_of_time_series(draws, factor, _IMAGES, is_cubic),
+    )
+    if is_cubic:
+        return verdict._replace(measured_cubic_rad=measured, predicted_cubic_rad=predicted)
+    return verdict._replace(measured_qpe_rad=measured, predicted_qpe_rad=predicted)
+
+
+def _stream(study: Study, row_id: str) -> np.random.Generator:
+    """Draws of a row, its own whatever else is verified."""
+    return np.random.default_rng([(study.mission.simulation or Simulation()).seed, *row_id.encode()])
+
+
+def _sigma(study: Study, error: RandomError, rng: np.random.Generator, is_cubic: bool) -> tuple[float, int]:
+    """Standard deviation of a phase over many time series, and their number. [rad]"""
+    mission, nodes = study.mission, aperture_nodes(study.collection.aperture_time)
+    if error.subject.kind in ("imu", "random"):
+        is_walk = error.subject.kind == "imu"  # smooth between the nodes; correlated noise may not be
+        courses = (
+            position_courses(mission, error, nodes, _DRAWS, rng) if is_walk else _smooth_noise(study, error, rng)
+        )
+        found = study.exact_phases(error.owner, courses)
+        return float(np.nanstd(found[1] if is_cubic else found[0])), _DRAWS
+    times = _moments(study, 257)
+    draws = _CLOCK_DRAWS if mission.synchronization is None else _SYNCHRONIZED_DRAWS
+    phases = phase_courses(mission, error, times, draws, rng, _TURNS / study.collection.aperture_time)
+    fit = np.polynomial.legendre.legfit(2 * times / study.collection.aperture_time, phases.T, _ORDER)
+    return float(np.std(2.5 * fit[3] if is_cubic else 1.5 * fit[2])), draws
+
+
+def _smooth_noise(study: Study, error: RandomError, rng: np.random.Generator) -> Floats:
+    """Correlated noise at the nodes of exact ranges, (draws, nodes, 3), without what they cannot tell. [m]
+
+    At the nodes alone noise of a short correlation time would pass for a larger phase.
+    """
+    T, time = study.collection.aperture_time, process_of(study.mission, error).correlation_time
+    times = _moments(study, _FINE)
+    legendre = np.polynomial.legendre
+    fit = np.linalg.pinv(legendre.legvander(2 * times / T, SMOOTH))
+    at_nodes = legendre.legvander(2 * aperture_nodes(T) / T, SMOOTH) @ fit
+    drawn = (position_courses(study.mission, error, times, _AT_ONCE, rng) for _ in range(_DRAWS // _AT_ONCE))
+    found = np.concatenate([at_nodes @ one for one in drawn])
+    # Samples a step Δ apart have more power at low frequencies than the noise: Δ·coth(Δ/2τ_c), not 2τ_c.
+    step = float(times[1] - times[0])
+    power = 2 * time / step * math.tanh(step / (2 * time))
+    courses: Floats = found * math.sqrt(power)
+    return courses
+
+
+def _moments(study: Study, count: int) -> Floats:
+    half = study.collection.aperture_time / 2
+    moments: Floats = np.linspace(-half, half, count)
+    return moments
+
+
+def _series(study: Study, error: RandomError, rng: np.random.Generator) -> list[Errors]:
+    """A few time series as errors of an image, up to the cubic phase: what is left spreads, and would hide it."""
+    times = _moments(study, _FINE)
+    if error.subject.kind in ("imu", "random"):
+        courses = position_courses(study.mission, error, times, _IMAGES, rng)
+        return [Errors().of(error.owner, PathError(course=Course(times, one).smooth(_ORDER))) for one in courses]
+    phases = phase_courses(study.mission, error, times, _IMAGES, rng)
+    delays = [clock_seconds(one, study.collection.wavelength) for one in phases]
+    return [Errors(clock_course=Course(times, one).smooth(_ORDER)) for one in delays]
+
+
+# ---------------------------------------------------------------------- what spreads
+def verify_islr(study: Study, of: Subject) -> Verdict:
+    """Everything that spreads, scaled together to the limit of a row's owner."""
+    mission, model = study.mission, study.models[-1].name
+    limit = spread_limit(mission, study.allocation, of.owner, model) or 0.0
+    level = islr_db(limit**2, model, mainlobe_energy(mission))
+    blank = study.blank(of.id, level, "dB")
+    powers = declared_powers(study.analysis, of.owner, model)
+    total = math.fsum(one.variance for one in powers)
+    if not total:
+        return blank._replace(reason=reasons.no_spread_declared())
+    scale = limit / math.sqrt(total)
+    # A direct path cancels some.
+    rms = {one.row_id: scale * math.sqrt(one.variance) for one in powers if one.variance}
+    members = [
+        error._replace(declared=scale * (error.declared or 0.0)) for error in study.analysis.random if error.id in rms
+    ]
+    cubic = rms.pop(subject("mission", CUBIC).id, 0.0)
+    cycles = {one.subject.id: one.cycles for one in tones(mission)}
+    echoes = [(rms[row_id], turns) for row_id, turns in cycles.items() if row_id in rms]
+    known = {error.id for error in members} | cycles.keys()
+    white = math.sqrt(math.fsum(size**2 for row_id, size in rms.items() if row_id not in known))
+    return _power(study, blank, members, of.owner, white, echoes, cubic)
+
+
+def _power(
+    study: Study,
+    blank: Verdict,
+    members: Sequence[RandomError],
+    owner: str,
+    white: float = 0.0,
+    echoes: Sequence[tuple[float, float]] = (),
+    cubic: float = 0.0,
+    order: int = _ORDER,
+) -> Verdict:
+    """ISLR that time series at a limit add to an image, against what an owner may add to it.
+
+    Beside the errors of sensors and clocks there may be white noise, tones, each with its cycles per aperture, and a
+    cubic phase; of each the rms over the aperture [rad]. Phases up to an order are taken out of the time series.
+    """
+    mission, collection = study.mission, study.collection
+    rng = _stream(study, blank.id)
+    # Each moment stands for a step: what is faster is noise from step to step.
+    times = cell_centres(collection.aperture_time, _MOMENTS)
+    place = 2 * times / collection.aperture_time
+    legendre = np.polynomial.legendre.legvander(place, _ORDER)
+    fitted = legendre[:, : order + 1] @ np.linalg.pinv(legendre[:, : order + 1])
+
+    def left(draws: int) -> Floats:
+        """Phases without what moves and defocuses the response."""
+        phases = white * rng.standard_normal((draws, times.size))
+        for error in members:
+            if error.subject.kind in ("imu", "random"):
+                moved = position_courses(mission, error, times, draws, rng)
+                phases += 2 * math.pi / collection.wavelength * moved @ np.array(sight_of(mission, error.owner))
+            else:
+                phases += phase_courses(mission, error, times, draws, rng)
+        phases = phases - phases @ fitted
+        for rms, cycles in echoes:
+            turned = 2 * math.pi * rng.random((draws, 1))
+            phases += math.sqrt(2) * rms * np.cos(math.pi * cycles * place + turned)
+        if cubic:  # of P₃, whose mean square over the aperture is a seventh
+            phases += math.sqrt(7) * cubic * rng.standard_normal((draws, 1)) * legendre[:, 3]
+        return phases
+
+    allowed = spread_limit(mission, study.allocation, owner, "full") or 0.0  # what an image may show
+    required = shown_islr_db(mission, allowed**2) or 0.0
+    return measured_power(collection, blank._replace(requirement_db=required), left, reasons.power_of_time_series())
+
+
+# ---------------------------------------------------------------------- ISLR that noise adds
+@dataclass(frozen=True, slots=True)
+class AddedIslr:
+    """ISLR that noise adds, the ends of its interval at 95 %, and of how many draws it is the mean. [dB]"""
+
+    level: float
+    low: float
+    high: float
+    draws: int
+
+    @property
+    def error(self) -> float:
+        """Standard error. [dB]"""
+        return (self.high - self.low) / (2 * _NORMAL_95)
+
+    def verdict(self, required_db: float) -> str:
+        """Verdict on a limit that was to add an ISLR; `not_evaluated` where the mean may have another one.
+
+        After all draws, on the border of what is confirmed and what is conservative, it is `conservative`: no limit
+        there adds too much.
+        """
+        excess, doubt = self.level - required_db, _SURE * self.error
+        low, high = excess - doubt, excess + doubt
+        if low > TOLERANCE_DB:
+            return "optimistic"
+        if high < -TOLERANCE_DB:
+            return "conservative"
+        if low >= -TOLERANCE_DB and high <= TOLERANCE_DB:
+            return "confirmed"
+        return "conservative" if self.draws >= _MOST and high < 0 else "not_evaluated"
+
+
+class Mainlobe:
+    """The part of an error-free response that lies within its first nulls.
+
+    Parameters
+    ----------
+    weights : (moments,) ndarray
+        Window over the aperture, at the centres of equal cells.
+    """
+
+    def __init__(self, weights: Floats) -> None:
+        place = cell_centres(1.0, weights.size)
+        response = np.abs(np.fft.rfft(weights, weights.size * _STEPS))
+        null = int(np.argmax(np.diff(response) > 0)) / _STEPS
+        nodes, self._steps = np.polynomial.legendre.leggauss(_NODES)
+        waves = np.exp(-2j * math.pi * np.outer(place, null * nodes))
+        self._waves = waves * weights[:, None] / weights.size
+        self._clean = self._waves.sum(axis=0).real
+        self._steps = self._steps * null / np.mean(weights**2)
+        self.energy = float(self._clean**2 @ self._steps)
+
+    def lost(self, phases: Floats) -> Floats:
+        """Energy that phases (draws, moments) take out of it, over all energy of an image, (draws,)."""
+        # exp(jφ) - 1 without rounding: a limit of -100 dB is an energy of 1e-10.
+        change = (-2 * np.sin(phases / 2) ** 2 + 1j * np.sin(phases)) @ self._waves
+        found: Floats = -(2 * self._clean * change.real + np.abs(change) ** 2) @ self._steps
+        return found
+
+    def added_db(self, lost: float) -> float:
+        """ISLR that goes with a mean energy lost. [dB]"""
+        left = max(self.energy - lost, _TINY)
+        return 10 * math.log10(max(lost, _TINY) / (self.energy * left))
+
+
+def added_islr(weights: Floats, draw: Callable[[int], Floats], required_db: float) -> AddedIslr:
+    """Draw phases until their interval has one verdict against what is required, or there are too many.
+
+    Parameters
+    ----------
+    weights : (moments,) ndarray
+        Window over the aperture.
+    draw : callable
+        Gives so many phases, (draws, moments). [rad]
+    required_db : float
+        ISLR that may be added.
+    """
+    mainlobe = Mainlobe(weights)
+    lost: Floats = np.empty(0)
+    while True:
+        count = min(_AT_MOST, max(_FIRST, lost.size))
+        lost = np.concatenate((lost, mainlobe.lost(draw(count))))
+        if lost.size < _FIRST or lost.size & (lost.size - 1):  # each look is at twice as many as the one before
+            continue
+        mean, error = float(lost.mean()), float(lost.std(ddof=1)) / math.sqrt(lost.size)
+        level, low, high = (mainlobe.added_db(mean + sign * _NORMAL_95 * error) for sign in (0, -1, 1))
+        found = AddedIslr(level, low, high, lost.size)
+        is_known = found.high - found.low <= 2 * _KNOWN_DB
+        if lost.size >= _MOST or (is_known and found.verdict(required_db) != "not_evaluated"):
+            return found
