@@ -3,7 +3,9 @@
 import os
 import re
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
 
 from bisar_budget.faults import fault_words, shown
 from bisar_budget.resources import DISK, Files, UnreadableError
@@ -31,7 +33,8 @@ class SettingsError(Exception):
     """A table that cannot be used; the message names file and key."""
 
 
-class Settings(NamedTuple):
+@dataclass(frozen=True)
+class Settings:
     """The keys and values of the table; `file` is where it stands, for messages."""
 
     file: str
@@ -59,8 +62,12 @@ def project_settings(folder: str, files: Files = DISK) -> Settings | None:
 
 def _read(file: str, files: Files) -> Settings | None:
     data = _bytes_of(file, files)
-    if data is None:
-        return None
+    return None if data is None else _parsed(file, data)
+
+
+@lru_cache(maxsize=4)
+def _parsed(file: str, data: bytes) -> Settings | None:
+    """The table of a `pyproject.toml`, None without one; every mission of a fleet that names a part asks for it."""
     try:
         text = data.decode("utf-8")
     except UnicodeDecodeError as error:
