@@ -175,7 +175,7 @@ def harmless(text: str, format_name: str = "") -> str:
     return text
 
 
-def _print(texts: Iterable[str], format_name: str) -> None:
+def deliver_parts(texts: Iterable[str], format_name: str) -> None:
     """Write to standard output as texts come; a reader that went away changes no exit code, and ends it.
 
     A person reads the format `text`, characters that the terminal's encoding lacks escaped. Programs read the others:
@@ -219,7 +219,7 @@ def fail(message: str) -> NoReturn:
 def deliver(text: str, output: str | None = None, format_name: str = "text") -> None:
     """Write to a file, else, or if that is `-`, to standard output."""
     if output is None or output == "-":
-        _print([text], format_name)
+        deliver_parts([text], format_name)
     else:
         write_file(output, harmless(text, format_name))
 
@@ -233,11 +233,6 @@ def deliver_found(form: "ModuleType", found: Sequence[Any], format_name: str, ou
 
         text = form.as_text(found, Style(color=output is None and wants_color()))
     deliver(text, output, format_name)
-
-
-def deliver_parts(texts: Iterable[str], format_name: str) -> None:
-    """Write texts to standard output as they come, until nobody reads on."""
-    _print(texts, format_name)
 
 
 def write_file(path: str, content: str | bytes) -> None:
@@ -305,19 +300,13 @@ def _own_folder(folder: str) -> tuple[str, int | None]:
 
 def remove_left(folder: str) -> None:
     """Remove temporary folders of commands that are no more: nobody has their lock."""
+    import shutil
+
     with os.scandir(folder) as found:
         left = [one.path for one in found if one.name.startswith(_TEMPORARY[0]) and one.name.endswith(_TEMPORARY[1])]
     for path in left:
         with suppress(OSError):  # one that lives, that is gone by now, or that is another's
             lock = locked(path)
             if lock is not None:
-                _remove(path)
+                shutil.rmtree(path, ignore_errors=True)
                 os.close(lock)
-
-
-def _remove(folder: str) -> None:
-    """Remove a temporary folder and the files in it."""
-    with suppress(OSError):
-        for name in os.listdir(folder):
-            os.unlink(os.path.join(folder, name))
-        os.rmdir(folder)

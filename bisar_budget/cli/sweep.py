@@ -4,6 +4,7 @@ import os
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass
 from datetime import date, datetime
 from time import perf_counter
 from typing import TYPE_CHECKING
@@ -182,23 +183,22 @@ def _cases(mission: "Mission", varied: Sequence[str], cases_file: str | None, sa
     return cases.table(tree, text, cases_file)
 
 
+@dataclass
 class _Run:
     """One sweep on its way to a table and a plot; counts what it finds."""
 
-    def __init__(
-        self,
-        mission: "Mission",
-        cases: "Cases",
-        columns: Sequence[str],
-        model: str | None,
-        day: date,
-        jobs: int,
-        kept: Keeping | None = None,
-        overrides: "tuple[Override, ...]" = (),
-    ) -> None:
-        self.mission, self.cases, self.columns, self.model = mission, cases, columns, model
-        self.day, self.jobs, self.kept, self.overrides = day, jobs, kept, overrides
-        self.done = self.complying = self.unevaluated = self.missing = 0
+    mission: "Mission"
+    cases: "Cases"
+    columns: Sequence[str]
+    model: str | None
+    day: date
+    jobs: int
+    kept: Keeping | None
+    overrides: "tuple[Override, ...]"
+    done: int = 0
+    complying: int = 0
+    unevaluated: int = 0
+    missing: int = 0
 
     def swept(self, cases: "Cases", columns: Sequence[str]) -> "Swept":
         """Ask the engine."""
