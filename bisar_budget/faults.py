@@ -190,6 +190,10 @@ def file_fault(problem: str, hint: str = "") -> Fault:
     return Fault(line=None, column=None, key="", problem=problem, hint=hint)
 
 
+class ClusterError(Exception):
+    """Workers, or a folder of parts, that cannot be used; the message says why, and what can be done."""
+
+
 class WorkerLostError(Exception):
     """A worker process ended before its work did."""
 

@@ -4,6 +4,7 @@ import os
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 from bisar_budget.faults import fault_words, shown
@@ -61,8 +62,12 @@ def project_settings(folder: str, files: Files = DISK) -> Settings | None:
 
 def _read(file: str, files: Files) -> Settings | None:
     data = _bytes_of(file, files)
-    if data is None:
-        return None
+    return None if data is None else _parsed(file, data)
+
+
+@lru_cache(maxsize=4)
+def _parsed(file: str, data: bytes) -> Settings | None:
+    """The table of a `pyproject.toml`, None without one; every mission of a fleet that names a part asks for it."""
     try:
         text = data.decode("utf-8")
     except UnicodeDecodeError as error:

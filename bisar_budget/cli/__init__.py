@@ -7,14 +7,13 @@ import sys
 import warnings
 from importlib import import_module
 from io import StringIO
-from keyword import iskeyword
 from typing import Any, NoReturn
 
 import click
 
 from bisar_budget import __version__, memory
 from bisar_budget.cli.streams import EXIT_INTERRUPTED, EXIT_OUR_FAULT, complain, drop_output, fail
-from bisar_budget.faults import WorkerLostError, printable
+from bisar_budget.faults import ClusterError, WorkerLostError, printable
 from bisar_budget.resources import docstring, hold_files, release_files
 
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF)
@@ -23,7 +22,7 @@ _MODULES = {
     "check": "check",
     "derive": "derive",
     "diff": "diff",
-    "import": "import_file",
+    "import": "mission_files",
     "init": "mission_files",
     "schema": "mission_files",
     "sensitivity": "sensitivity",
@@ -37,9 +36,9 @@ _FRUGAL = ("init", "schema")  # without NumPy
 
 
 def _command(name: str) -> click.Command:
-    """A command; where its name is a word of Python, that of its module."""
+    """A command; where its name is a word of Python, its function has another."""
     module = import_module(f"bisar_budget.cli.{_MODULES[name]}")
-    command: click.Command = getattr(module, _MODULES[name] if iskeyword(name) else name)
+    command: click.Command = getattr(module, "import_file" if name == "import" else name)
     return command
 
 
@@ -89,6 +88,8 @@ class _Commands(click.Group):
             if not _has_folder():
                 fail("the current folder is gone; a name that does not start with / leads nowhere")
             _own_fault(error)
+        except ClusterError as error:
+            fail(str(error))
         except WorkerLostError as error:
             fail(f"{error}; fewer processes (--jobs 1) or a smaller simulation.memory_limit need less")
         except Exception as error:

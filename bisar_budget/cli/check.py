@@ -11,19 +11,28 @@ import click
 from click.core import ParameterSource
 
 from bisar_budget import __version__
-from bisar_budget.cli.outside import DAY_OF_RUN, day, day_origin, origin_of, outside
-from bisar_budget.cli.streams import (
-    EXIT_BROKEN,
+from bisar_budget.cli.options import (
+    DAY_OF_RUN,
     FILE,
     GATING_MODEL,
-    PATIENCE,
+    MISSIONS,
     SET,
     ParamType,
+    day,
+    day_origin,
+    origin_of,
+    outside,
+    scheduler_options,
+    settings_here,
+)
+from bisar_budget.cli.streams import (
+    EXIT_BROKEN,
     complain,
     deliver,
     expand,
     is_terminal,
     load_all,
+    say_faults,
     spare,
     wants_color,
     write_file,
@@ -54,7 +63,7 @@ class _Gate(click.Command):
             raise
 
     def _defaults(self) -> dict[str, Any]:
-        from bisar_budget.settings import TABLE, SettingsError, project_settings
+        from bisar_budget.settings import TABLE
 
         options = {p.opts[0].removeprefix("--"): p for p in self.params if isinstance(p, click.Option) and p.envvar}
         known = ["BISAR_BUDGET_DEBUG", *(str(option.envvar) for option in options.values())]
@@ -65,12 +74,7 @@ class _Gate(click.Command):
                 near = did_you_mean(name, tuple(known))
                 problem = fault_words("is not a known variable", "", f"accepted: {', '.join(known)}", near)
                 raise click.UsageError(f"{printable(name)}: {closed(problem)}")
-        try:
-            settings = project_settings(os.getcwd())
-        except SettingsError as error:
-            raise click.UsageError(printable(str(error))) from None
-        except OSError:  # somebody removed the current folder
-            settings = None
+        settings = settings_here()
         defaults = {}
         for key, value in settings.values.items() if settings else ():
             if key == "sensors":  # `parts` reads it
@@ -117,7 +121,7 @@ class _Draws(ParamType[int]):
 
 
 @click.command(cls=_Gate)
-@click.argument("missions", type=FILE, nargs=-1, required=True, metavar="MISSION...")
+@MISSIONS
 @click.option(
     "--format",
     "format_name",
@@ -187,13 +191,7 @@ class _Draws(ParamType[int]):
     metavar="S",
     help="Seed of --monte-carlo (default: simulation.seed of the mission file, else 1).",
 )
-@click.option(
-    "--scheduler",
-    metavar="ADDRESS",
-    help="Draw on the workers of a Dask scheduler, tcp://HOST:PORT, or on local:N processes of its own. The result "
-    "is the same.",
-)
-@PATIENCE
+@scheduler_options("Draw", " The result is the same.")
 @click.option(
     "--sweep",
     "swept",
@@ -266,7 +264,7 @@ def check(
     if seed is not None and draws is None and given("seed") is ParameterSource.COMMANDLINE:
         raise click.UsageError("--seed needs --monte-carlo N.")
     if draws is not None or scheduler is not None:
-        from bisar_budget.cli.draws import check_draws
+        from bisar_budget.cli.shared_work import check_draws
 
         check_draws(draws, scheduler)
     if explain is not None:
@@ -301,7 +299,7 @@ def check(
         deliver(joined(format_name, pieces, __version__, style), output, format_name)
         statuses = {piece.status for piece in pieces}
     else:
-        from bisar_budget.cli.draws import drawn_by
+        from bisar_budget.cli.shared_work import drawn_by
 
         with drawn_by(scheduler, patience, draws, seed, len(files)) as drawn:
             report = check_all(files, judged_on, model, verifying, illustrated, drawn, changes, from_outside)
@@ -494,13 +492,11 @@ def _append_step_summary(path: str, report: "Report", style: "Style") -> None:
 
 
 def _say_faults(missions: "Iterable[MissionFindings | UnusableMission | None]") -> None:
-    from bisar_budget.faults import MissionError
     from bisar_budget.findings.mission import UnusableMission
 
     for mission in missions:
         if isinstance(mission, UnusableMission):
-            for line in MissionError(mission.file, mission.faults).lines():
-                complain(line)
+            say_faults(mission.file, mission.faults)
 
 
 def _write_report(path: str, format_name: str, report: "Report", style: "Style") -> None:

@@ -10,29 +10,25 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from bisar_budget import __version__
-from bisar_budget.cli.outside import day, outside
-from bisar_budget.cli.streams import (
+from bisar_budget.cli.options import (
     DATE,
-    EXIT_BROKEN,
-    EXIT_USAGE,
     FILE,
     GATING_MODEL,
     OUTPUT,
     ParamType,
-    complain,
-    deliver,
-    expand,
-    fail,
+    day,
+    outside,
     set_option,
-    spare,
+    settings_here,
 )
+from bisar_budget.cli.streams import EXIT_BROKEN, deliver, expand, fail, read_all, spare
 from bisar_budget.faults import printable
+from bisar_budget.resources import DISK, Files
 
 if TYPE_CHECKING:
     from bisar_budget.faults import SetValue
     from bisar_budget.mission.model import Mission
     from bisar_budget.report.change.comparison import ChangeSet, MissionChange
-    from bisar_budget.resources import Files
 
 _Read = Callable[[], "Mission"]
 
@@ -200,34 +196,19 @@ def _with_revision(patterns: Sequence[str], base: str, output: str | None, today
 def _compared(before: Sequence[_Read], after: Sequence[_Read], today: datetime | None) -> "tuple[MissionChange, ...]":
     """Compare each mission with the other of its place; where one cannot be used, say every fault of all and exit."""
     from bisar_budget.budget.check import check_mission
-    from bisar_budget.faults import MissionError
     from bisar_budget.report.change.comparison import compare
 
-    missions: list[Mission] = []
-    for read in (pair for both in zip(before, after, strict=True) for pair in both):
-        try:
-            missions.append(read())
-        except MissionError as error:
-            for line in error.lines():
-                complain(line)
-    if len(missions) < len(before) + len(after):
-        sys.exit(EXIT_USAGE)
+    missions = read_all(read for pair in zip(before, after, strict=True) for read in pair)
     judged_on, from_outside = day(today), outside(today)
     found = [check_mission(mission, judged_on, outside=from_outside) for mission in missions]
     return tuple(compare(*pair) for pair in zip(found[::2], found[1::2], strict=True))
 
 
-def _settings(files: "Files | None" = None) -> Mapping[str, Any]:
+def _settings(files: Files = DISK) -> Mapping[str, Any]:
     """Settings of the project for the current folder: those that `check` takes here, now or in a revision."""
-    from bisar_budget.resources import DISK
-    from bisar_budget.settings import TABLE, SettingsError, project_settings
+    from bisar_budget.settings import TABLE
 
-    try:
-        found = project_settings(os.getcwd(), files or DISK)
-    except SettingsError as error:
-        raise click.UsageError(printable(str(error))) from None
-    except OSError:  # somebody removed the current folder
-        found = None
+    found = settings_here(files)
     if found is None:
         return {}
     try:

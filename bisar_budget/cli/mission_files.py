@@ -1,10 +1,14 @@
-"""`bisar-budget init` and `bisar-budget schema`: to start a mission file from, and to write it with."""
+"""`bisar-budget init`, `schema` and `import`: mission files to start from, and what to write them with."""
 
+import json
 import os
 
 import click
 
-from bisar_budget.cli.streams import FILE, OUTPUT, complain, deliver, fail
+from bisar_budget.cli.options import FILE, OUTPUT
+from bisar_budget.cli.streams import complain, deliver, fail
+
+_SEEN = 20  # of a wavelength: what a place is off the path turns the phase by 0.3 rad
 
 
 @click.command()
@@ -16,8 +20,6 @@ def init(file: str, name: str, force: bool) -> None:
 
     FILE is mission.yaml by default, - for standard output.
     """
-    import json
-
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     from bisar_budget.faults import InvalidValueError
@@ -49,10 +51,58 @@ def schema(is_of_part: bool, output: str | None) -> None:
 
     The first line of a file names its schema: # yaml-language-server: $schema=mission.schema.json
     """
-    import json
-
     from bisar_budget.mission.model import mission_schema
     from bisar_budget.mission.parts import part_schema
 
     text = json.dumps(part_schema() if is_of_part else mission_schema(), indent=2) + "\n"
     deliver(text, output, "json")
+
+
+@click.command("import")
+@click.argument("file", type=FILE)
+@OUTPUT
+@click.option("--channel", metavar="ID", help="Channel of CPHD or CRSD; without it the file's reference channel.")
+@click.option("--force", is_flag=True, help="Replace an existing file.")
+def import_file(file: str, output: str | None, channel: str | None, force: bool) -> None:
+    """Write a mission file from CPHD, CRSD or SICD.
+
+    FILE is read as far as its header, its XML and the parameters of its pulses; XML alone is read too. The mission
+    has the scene point, the band, the aperture by the dwell on that point, both platforms' paths, and the errors that
+    the file declares. What a mission has no key for stands in its comments. Needs the extra `formats`.
+    """
+    from bisar_budget.formats.collected import mission_text
+    from bisar_budget.formats.containers import FormatError, MissingExtraError
+    from bisar_budget.formats.importing import import_collection
+
+    if output is not None and output != "-" and os.path.exists(output):
+        if not force:
+            fail(f"{output} exists; --force replaces it")
+        if os.path.exists(file) and os.path.samefile(file, output):
+            fail(f"{output} is the file to read")
+    from bisar_budget.constants import SPEED_OF_LIGHT
+    from bisar_budget.faults import MissionError
+    from bisar_budget.mission.load import parse_mission
+    from bisar_budget.units import format_quantity
+
+    try:
+        found = import_collection(file, channel)
+        text = mission_text(found)
+    except (FormatError, MissingExtraError) as error:
+        fail(str(error))
+    try:
+        parse_mission(text, "the mission")
+    except MissionError as error:
+        fail(f"{file}: no mission can be made of it: {error.faults[0]}")
+    tracks = {"transmitter": found.transmitter, "receiver": found.receiver}
+    away = {name: format_quantity(track.farthest, "m") for name, track in tracks.items()}
+    for name, track in tracks.items():
+        if track.farthest > track.state.slant_range / 100:
+            fail(f"{file}: a place of the {name} is {away[name]} from its path, more than a hundredth of its range")
+    farthest = max(track.farthest for track in tracks.values())
+    if found.unused or farthest > SPEED_OF_LIGHT / found.center_frequency / _SEEN:
+        doubts = [found.unused] if found.unused else []
+        doubts += [f"places of the {name} are up to {length} from its path" for name, length in away.items()]
+        complain(f"warning: {'; '.join(doubts)}; the comments say more")
+    deliver(text, output, "yaml")
+    if output not in (None, "-"):
+        complain(f"Wrote {output}. Next: bisar-budget check {output}")

@@ -7,23 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bisar_budget import __version__
-from bisar_budget.cli.outside import day, outside
-from bisar_budget.cli.streams import (
-    DATE,
-    FILE,
-    MODEL,
-    OUTPUT,
-    SET,
-    TEXT_OR_JSON,
-    deliver,
-    expand,
-    fail,
-    load_all,
-    spare,
-    wants_color,
-    write_file,
-)
+from bisar_budget.cli.options import DATE, FILE, MISSIONS, MODEL, OUTPUT, SET, TEXT_OR_JSON, day, outside
+from bisar_budget.cli.streams import deliver_found, expand, fail, hold_to_suffixes, load_all, spare, write_file
 from bisar_budget.cli.waiting import watched_checks
 
 if TYPE_CHECKING:
@@ -31,7 +16,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("missions", type=FILE, nargs=-1, required=True, metavar="MISSION...")
+@MISSIONS
 @click.option("--row", metavar="ID", help="A row to follow too; numbers are ordered by what they do to it.")
 @MODEL
 @SET
@@ -60,12 +45,9 @@ def sensitivity(
     from bisar_budget.budget.waivers import overrides
     from bisar_budget.design import sensitivity as asking
     from bisar_budget.design.quantities import QuestionError
-    from bisar_budget.report import Style
     from bisar_budget.report.formats import sensitivities
 
-    kind = "" if plot is None else os.path.splitext(plot)[1][1:].lower()
-    if plot is not None and kind not in ("svg", "png", "pdf"):
-        raise click.UsageError(f"{plot}: the suffix must be one of .svg, .png, .pdf")
+    hold_to_suffixes(plot, (".svg", ".png", ".pdf"))
     files = expand(missions)
     if plot is not None and len(files) > 1:
         raise click.UsageError("--plot draws one mission.")
@@ -82,9 +64,5 @@ def sensitivity(
     if plot is not None:
         from bisar_budget.report.drawing.tornado import tornado
 
-        write_file(plot, tornado(found[0], kind))
-    if format_name == "json":
-        text = sensitivities.as_json(__version__, found)
-    else:
-        text = sensitivities.as_text(found, Style(color=output is None and wants_color()))
-    deliver(text, output, format_name)
+        write_file(plot, tornado(found[0], os.path.splitext(plot)[1][1:].lower()))
+    deliver_found(sensitivities, found, format_name, output)

@@ -1,5 +1,6 @@
 """`bisar-budget sensors`: parts whose figures a mission can take."""
 
+import json
 import os
 import sys
 from collections.abc import Mapping, Sequence
@@ -7,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bisar_budget.cli.streams import EXIT_USAGE, FILE, TEXT_OR_JSON, complain, deliver, expand, spare
-from bisar_budget.faults import MissionError, file_fault, printable, sentences
+from bisar_budget.cli.options import FILE, TEXT_OR_JSON
+from bisar_budget.cli.streams import EXIT_USAGE, complain, deliver, expand, say_faults, spare
+from bisar_budget.faults import file_fault, printable, sentences
 
 if TYPE_CHECKING:
     from bisar_budget.mission.parts import Entry, PartError
@@ -103,8 +105,7 @@ def _check(names: Sequence[str], format_name: str) -> None:
     lines = []
     for file, found in checked.items():
         if isinstance(found, PartError):
-            for line in MissionError(file, found.faults).lines():
-                complain(line)
+            say_faults(file, found.faults)
         else:
             lines.append(f"{_fine(file, found)}\n")
     deliver(_checked_as_json(checked) if format_name == "json" else "".join(lines), None, format_name)
@@ -119,8 +120,6 @@ def _fine(file: str, entry: "Entry") -> str:
 
 
 def _checked_as_json(checked: "Mapping[str, Entry | PartError]") -> str:
-    import json
-
     from bisar_budget.mission.parts import PartError
     from bisar_budget.report.formats.json_document import fault_item
 
@@ -160,8 +159,6 @@ def _as_text(chosen: "list[Entry]") -> str:
 
 
 def _as_json(chosen: "list[Entry]") -> str:
-    import json
-
     document = {"format": "bisar-budget/sensors/1", "parts": [_item(one) for one in chosen]}
     return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
 

@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bisar_budget.cli.streams import FILE, SET, complain, deliver, fail, load_all, spare, write_file
+from bisar_budget.cli.options import FILE, SET
+from bisar_budget.cli.streams import complain, deliver, fail, hold_to_suffixes, load_all, spare, write_file
 from bisar_budget.cli.verify import faster
 from bisar_budget.cli.waiting import FORMING, foretell, watched
 from bisar_budget.faults import changes_words, printable
@@ -62,9 +63,8 @@ def simulate(
     FILE.cphd is the phase history for an image former of your own, as CPHD 1.1.0: the signal has the true ranges, its
     vectors have the measured places. No image is formed then. It needs the extra `formats`.
     """
-    for name, suffixes in ((plot, (".png", ".svg", ".pdf")), (output, (".npz", ".cphd"))):
-        if name is not None and os.path.splitext(name)[1].lower() not in suffixes:
-            raise click.UsageError(f"{name}: the suffix must be one of {', '.join(suffixes)}")
+    hold_to_suffixes(plot, (".png", ".svg", ".pdf"))
+    hold_to_suffixes(output, (".npz", ".cphd"))
     is_phase_history = output is not None and output.lower().endswith(".cphd")
     if is_phase_history and plot is not None:
         raise click.UsageError("--plot draws images, and none is formed for a .cphd file.")

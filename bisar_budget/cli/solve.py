@@ -7,23 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bisar_budget import __version__
-from bisar_budget.cli.outside import day, outside
-from bisar_budget.cli.streams import (
-    DATE,
-    EXIT_BROKEN,
-    FILE,
-    MODEL,
-    OUTPUT,
-    SET,
-    TEXT_OR_JSON,
-    deliver,
-    expand,
-    fail,
-    load_all,
-    spare,
-    wants_color,
-)
+from bisar_budget.cli.options import DATE, MISSIONS, MODEL, OUTPUT, SET, TEXT_OR_JSON, day, outside
+from bisar_budget.cli.streams import EXIT_BROKEN, deliver_found, expand, fail, load_all, spare
 from bisar_budget.cli.waiting import FORMING, foretell, watched, watched_checks
 
 if TYPE_CHECKING:
@@ -34,7 +19,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("missions", type=FILE, nargs=-1, required=True, metavar="MISSION...")
+@MISSIONS
 @click.option(
     "--for",
     "key",
@@ -93,7 +78,6 @@ def solve(
     from bisar_budget.design import compare
     from bisar_budget.design import solve as solving
     from bisar_budget.design.quantities import QuestionError
-    from bisar_budget.report import Style
     from bisar_budget.report.formats import solutions
 
     is_of_parts = compare.is_of_parts(key)
@@ -119,11 +103,7 @@ def solve(
             fail(f"{mission.file}: {error}")
         found = found._replace(overrides=overrides(mission, from_outside, judged_on))
         solved.append(_imaged(mission, found, model) if is_imaged else found)
-    if format_name == "json":
-        text = solutions.as_json(__version__, solved)
-    else:
-        text = solutions.as_text(solved, Style(color=output is None and wants_color()))
-    deliver(text, output, format_name)
+    deliver_found(solutions, solved, format_name, output)
     is_broken = any(one.status == "none" or (one.imaged and one.imaged.is_optimistic) for one in solved)
     sys.exit(EXIT_BROKEN if is_broken else 0)
 

@@ -6,114 +6,23 @@ import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from datetime import UTC, date, datetime
+from functools import partial
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
-from bisar_budget.faults import printable
+from bisar_budget import __version__
+from bisar_budget.faults import MissionError, printable
 from bisar_budget.resources import FILES_READ, locked
 
 if TYPE_CHECKING:
-    from click import ParamType as ParamType
-    from click.shell_completion import CompletionItem
+    from types import ModuleType
 
-    from bisar_budget.faults import SetValue
+    from bisar_budget.faults import Fault, SetValue
     from bisar_budget.mission.model import Mission
-else:
-
-    class ParamType(click.ParamType):
-        """Type of a parameter; that of Click before 8.4 takes no type of its values in brackets."""
-
-        def __class_getitem__(cls, values: object) -> type:  # noqa: D105
-            return cls
-
 
 _TEMPORARY = (".bisar-budget.", ".tmp")  # how the name of a temporary folder begins and ends
 EXIT_BROKEN, EXIT_USAGE, EXIT_OUR_FAULT, EXIT_INTERRUPTED = 1, 2, 3, 130
-
-
-class FileName(ParamType[str]):
-    """Name of a file, which a shell completes; what can be read is seen when it is."""
-
-    name = "file"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
-        """Take the text as it is."""
-        return str(value)
-
-    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> "list[CompletionItem]":
-        """Leave it to the shell, which knows the files."""
-        from click.shell_completion import CompletionItem
-
-        return [CompletionItem(incomplete, type="file")]
-
-
-FILE = FileName()
-OUTPUT = click.option("-o", "--output", type=FILE, metavar="FILE", help="Write to FILE instead of standard output.")
-
-
-def _read_changes(ctx: click.Context, param: click.Parameter, texts: tuple[str, ...]) -> "tuple[SetValue, ...]":
-    if not texts:
-        return ()
-    from bisar_budget.faults import InvalidValueError
-    from bisar_budget.mission.changes import read_changes
-
-    try:
-        return read_changes(texts)
-    except InvalidValueError as error:
-        raise click.UsageError(f"--set: {error.problem.words}.") from None
-
-
-def set_option(what: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Give the option `--set`; `what` says what it does with the value.
-
-    It is no setting of a project, nor of the environment: a gate judges the file that is in the repository.
-    """
-    return click.option(
-        "--set",
-        "changes",
-        multiple=True,
-        metavar="KEY=VALUE",
-        callback=_read_changes,
-        help=f"{what}: KEY is its path in the file, such as platforms.receiver.azimuth or other_errors.0.name, VALUE "
-        "as the file would have it. Repeatable; every report says it.",
-    )
-
-
-SET = set_option("Put a value in place of the mission's own, or beside it")
-
-TEXT_OR_JSON = click.option(
-    "--format",
-    "format_name",
-    type=click.Choice(["text", "json"]),
-    default="text",
-    show_default=True,
-    help="Format of the output.",
-)
-
-GATING_MODEL = click.Choice(["published", "full", "strictest"])
-MODEL = click.option(
-    "--model",
-    type=GATING_MODEL,
-    help="Model that decides, instead of the mission file's.",
-)
-DATE = click.option(
-    "--date",
-    "today",
-    type=click.DateTime(["%Y-%m-%d"]),
-    help="Day on which waivers are judged (default: SOURCE_DATE_EPOCH, else today, UTC).",
-)
-
-PATIENCE = click.option(
-    "--scheduler-timeout",
-    "patience",
-    type=click.IntRange(min=1),
-    default=30,
-    show_default=True,
-    metavar="SECONDS",
-    help="How long a scheduler may have no worker before it is given up.",
-)
 
 
 def expand(patterns: Iterable[str]) -> list[str]:
@@ -137,20 +46,35 @@ def expand(patterns: Iterable[str]) -> list[str]:
 
 def load_all(files: Sequence[str], model: str | None = None, changes: "Sequence[SetValue]" = ()) -> "list[Mission]":
     """Load every mission with values in place of its own, or say every fault of every file and exit."""
-    from bisar_budget.faults import MissionError
     from bisar_budget.mission.load import load_mission
 
-    loaded, is_usable = [], True
-    for file in files:
+    return read_all(partial(load_mission, file, model, changes) for file in files)
+
+
+def read_all(reads: "Iterable[Callable[[], Mission]]") -> "list[Mission]":
+    """Missions that are read in turn; where one cannot be used, says every fault of all and exits."""
+    found, is_usable = [], True
+    for read in reads:
         try:
-            loaded.append(load_mission(file, model, changes))
+            found.append(read())
         except MissionError as error:
             is_usable = False
-            for line in error.lines():
-                complain(line)
+            say_faults(error.file, error.faults)
     if not is_usable:
         sys.exit(EXIT_USAGE)
-    return loaded
+    return found
+
+
+def say_faults(file: str, faults: "tuple[Fault, ...]") -> None:
+    """Say what is wrong with a file, a line for each fault."""
+    for line in MissionError(file, faults).lines():
+        complain(line)
+
+
+def hold_to_suffixes(name: str | None, suffixes: Sequence[str]) -> None:
+    """Refuse the name of a file whose suffix names no format."""
+    if name is not None and os.path.splitext(name)[1].lower() not in suffixes:
+        raise click.UsageError(f"{name}: the suffix must be one of {', '.join(suffixes)}")
 
 
 def spare(files: Sequence[str], targets: Iterable[str | None], folders: Iterable[str] = ()) -> None:
@@ -205,19 +129,6 @@ def _was_read(path: str) -> bool:
     return (found.st_dev, found.st_ino) in FILES_READ
 
 
-def day_of_run() -> date:
-    """SOURCE_DATE_EPOCH, else today, UTC."""
-    epoch = os.environ.get("SOURCE_DATE_EPOCH")
-    if not epoch:
-        return datetime.now(UTC).date()
-    try:
-        if not (epoch.isascii() and epoch.isdigit()):
-            raise ValueError
-        return datetime.fromtimestamp(int(epoch), UTC).date()
-    except (ValueError, OverflowError, OSError):
-        raise click.UsageError(f"SOURCE_DATE_EPOCH must be seconds since 1970 (got {printable(epoch)!r})") from None
-
-
 def is_terminal() -> bool:
     """Whether somebody sees both standard streams."""
     return all(stream is not None and stream.isatty() for stream in (sys.stdout, sys.stderr))
@@ -264,7 +175,7 @@ def harmless(text: str, format_name: str = "") -> str:
     return text
 
 
-def _print(texts: Iterable[str], format_name: str) -> None:
+def deliver_parts(texts: Iterable[str], format_name: str) -> None:
     """Write to standard output as texts come; a reader that went away changes no exit code, and ends it.
 
     A person reads the format `text`, characters that the terminal's encoding lacks escaped. Programs read the others:
@@ -308,14 +219,20 @@ def fail(message: str) -> NoReturn:
 def deliver(text: str, output: str | None = None, format_name: str = "text") -> None:
     """Write to a file, else, or if that is `-`, to standard output."""
     if output is None or output == "-":
-        _print([text], format_name)
+        deliver_parts([text], format_name)
     else:
         write_file(output, harmless(text, format_name))
 
 
-def deliver_parts(texts: Iterable[str], format_name: str) -> None:
-    """Write texts to standard output as they come, until nobody reads on."""
-    _print(texts, format_name)
+def deliver_found(form: "ModuleType", found: Sequence[Any], format_name: str, output: str | None) -> None:
+    """Write what was found as JSON, or as text for a person; `form` is the module that makes both of it."""
+    if format_name == "json":
+        text = form.as_json(__version__, found)
+    else:
+        from bisar_budget.report import Style
+
+        text = form.as_text(found, Style(color=output is None and wants_color()))
+    deliver(text, output, format_name)
 
 
 def write_file(path: str, content: str | bytes) -> None:
@@ -383,19 +300,13 @@ def _own_folder(folder: str) -> tuple[str, int | None]:
 
 def remove_left(folder: str) -> None:
     """Remove temporary folders of commands that are no more: nobody has their lock."""
+    import shutil
+
     with os.scandir(folder) as found:
         left = [one.path for one in found if one.name.startswith(_TEMPORARY[0]) and one.name.endswith(_TEMPORARY[1])]
     for path in left:
         with suppress(OSError):  # one that lives, that is gone by now, or that is another's
             lock = locked(path)
             if lock is not None:
-                _remove(path)
+                shutil.rmtree(path, ignore_errors=True)
                 os.close(lock)
-
-
-def _remove(folder: str) -> None:
-    """Remove a temporary folder and the files in it."""
-    with suppress(OSError):
-        for name in os.listdir(folder):
-            os.unlink(os.path.join(folder, name))
-        os.rmdir(folder)

@@ -4,6 +4,7 @@ import os
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass
 from datetime import date, datetime
 from time import perf_counter
 from typing import TYPE_CHECKING
@@ -11,18 +12,14 @@ from typing import TYPE_CHECKING
 import click
 
 from bisar_budget import __version__
-from bisar_budget.cli.keeping import Keeping, keeping
-from bisar_budget.cli.outside import day, outside
+from bisar_budget.cli.options import DATE, FILE, MODEL, SET, day, outside, scheduler_options
+from bisar_budget.cli.shared_work import Keeping, keeping
 from bisar_budget.cli.streams import (
-    DATE,
     EXIT_BROKEN,
-    FILE,
-    MODEL,
-    PATIENCE,
-    SET,
     complain,
     deliver_parts,
     fail,
+    hold_to_suffixes,
     load_all,
     replacing,
     spare,
@@ -34,6 +31,7 @@ from bisar_budget.resources import cores
 
 if TYPE_CHECKING:
     from bisar_budget.design.cases import Cases
+    from bisar_budget.design.sweep import Asked
     from bisar_budget.design.table import Part, Swept
     from bisar_budget.faults import SetValue
     from bisar_budget.findings.requirement import Override
@@ -45,7 +43,6 @@ MAX_CASES = 100_000_000  # that are started without being asked twice: tens of g
 _MANY = 20_000  # cases from which on it is measured how long they will take
 _TRIAL = 0.3  # s; a shorter one is too short to measure
 _LARGER = 3  # times as many cases, the next trial
-_PLOTS, _TABLES = (".svg", ".png", ".pdf"), (".csv", ".parquet", ".nc")
 
 
 @click.command()
@@ -90,13 +87,7 @@ _PLOTS, _TABLES = (".svg", ".png", ".pdf"), (".csv", ".parquet", ".nc")
 @SET
 @DATE
 @click.option("--jobs", type=click.IntRange(min=1), metavar="N", help="Processes to use (default: number of cores).")
-@click.option(
-    "--scheduler",
-    metavar="ADDRESS",
-    help="Check on the workers of a Dask scheduler, tcp://HOST:PORT, or on local:N processes of its own. Parts are "
-    "kept in the folder FILE.parts of -o FILE, and joined to FILE at the end.",
-)
-@PATIENCE
+@scheduler_options("Check", " Parts are kept in the folder FILE.parts of -o FILE, and joined to FILE at the end.")
 @click.option(
     "--resume",
     "is_resumed",
@@ -137,7 +128,6 @@ def sweep(
         raise click.UsageError("--sample draws from the ranges of --vary; --cases has cases of its own.")
     spare([mission, *([cases_file] if cases_file else [])], [output, plot])
     from bisar_budget.budget.waivers import overrides
-    from bisar_budget.cluster.parts_folder import ClusterError
     from bisar_budget.design.cases import TableError
     from bisar_budget.design.quantities import QuestionError
     from bisar_budget.report.drawing.trades import check_plot
@@ -161,17 +151,14 @@ def sweep(
         sys.exit(2)
     except (QuestionError, MissingTablesError) as error:
         fail(f"{mission}: {error}")
-    except ClusterError as error:
-        fail(str(error))
 
 
 def _usable(output: str | None, plot: str | None, plot_column: str | None, is_polar: bool) -> None:
     """Refuse names of files that no format has, and options of a plot without one."""
-    for name, suffixes in ((output, _TABLES), (plot, _PLOTS)):
-        if name not in (None, "-") and os.path.splitext(str(name))[1].lower() not in suffixes:
-            raise click.UsageError(f"{name}: the suffix must be one of {', '.join(suffixes)}")
+    hold_to_suffixes(None if output == "-" else output, (".csv", ".parquet", ".nc"))
     if plot == "-":
         raise click.UsageError("--plot needs the name of a file.")
+    hold_to_suffixes(plot, (".svg", ".png", ".pdf"))
     if plot is None and (plot_column is not None or is_polar):
         raise click.UsageError("--plot-column and --polar say how to draw; --plot says to which file.")
 
@@ -196,23 +183,22 @@ def _cases(mission: "Mission", varied: Sequence[str], cases_file: str | None, sa
     return cases.table(tree, text, cases_file)
 
 
+@dataclass
 class _Run:
     """One sweep on its way to a table and a plot; counts what it finds."""
 
-    def __init__(
-        self,
-        mission: "Mission",
-        cases: "Cases",
-        columns: Sequence[str],
-        model: str | None,
-        day: date,
-        jobs: int,
-        kept: Keeping | None = None,
-        overrides: "tuple[Override, ...]" = (),
-    ) -> None:
-        self.mission, self.cases, self.columns, self.model = mission, cases, columns, model
-        self.day, self.jobs, self.kept, self.overrides = day, jobs, kept, overrides
-        self.done = self.complying = self.unevaluated = self.missing = 0
+    mission: "Mission"
+    cases: "Cases"
+    columns: Sequence[str]
+    model: str | None
+    day: date
+    jobs: int
+    kept: Keeping | None
+    overrides: "tuple[Override, ...]"
+    done: int = 0
+    complying: int = 0
+    unevaluated: int = 0
+    missing: int = 0
 
     def swept(self, cases: "Cases", columns: Sequence[str]) -> "Swept":
         """Ask the engine."""
@@ -236,8 +222,6 @@ class _Run:
 
     def _seconds(self) -> float:
         """Measure how long all cases will take, by some of them."""
-        from bisar_budget.design.sweep import Asked
-
         tried = 100
         self._trial(tried)  # it imports what it needs
         before = self._trial(tried)
@@ -251,9 +235,7 @@ class _Run:
         each = max((seconds - before) / (tried - tried / _LARGER), seconds / tried / 10)
         workers = self.kept.workers if self.kept else None
         threads = workers.threads if workers else min(self.jobs, cores())
-        is_slow = (
-            Asked(self.mission, self.cases, columns=self.columns, model=self.model, today=self.day).chunks().is_slow
-        )
+        is_slow = self._asked(self.columns).chunks().is_slow
         return each * self.cases.count / (threads if is_slow else 1)  # processes: arrays are faster alone
 
     def _trial(self, count: int) -> float:
@@ -301,9 +283,13 @@ class _Run:
         """The sweep, with its parts kept where that is asked for."""
         if self.kept is None:
             return nullcontext(self.swept(self.cases, columns))
+        return self.kept.swept(self._asked(columns))
+
+    def _asked(self, columns: Sequence[str]) -> "Asked":
+        """The question that the parts answer."""
         from bisar_budget.design.sweep import Asked
 
-        return self.kept.swept(Asked(self.mission, self.cases, columns=columns, model=self.model, today=self.day))
+        return Asked(self.mission, self.cases, columns=columns, model=self.model, today=self.day)
 
     def _counted(
         self, parts: "Iterator[Part]", progress: "Progress", gathered: "Gathered | None"

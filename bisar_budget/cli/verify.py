@@ -7,23 +7,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bisar_budget import __version__
-from bisar_budget.cli.keeping import workers_of
-from bisar_budget.cli.streams import (
-    EXIT_BROKEN,
-    EXIT_USAGE,
-    FILE,
-    OUTPUT,
-    PATIENCE,
-    SET,
-    TEXT_OR_JSON,
-    complain,
-    deliver,
-    expand,
-    load_all,
-    spare,
-    wants_color,
-)
+from bisar_budget.cli.options import MISSIONS, OUTPUT, SET, TEXT_OR_JSON, scheduler_options
+from bisar_budget.cli.shared_work import workers_of
+from bisar_budget.cli.streams import EXIT_BROKEN, EXIT_USAGE, complain, deliver_found, expand, load_all, spare
 from bisar_budget.cli.waiting import FORMING, foretell, watched
 from bisar_budget.faults import printable
 from bisar_budget.resources import cores
@@ -36,7 +22,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("missions", type=FILE, nargs=-1, required=True, metavar="MISSION...")
+@MISSIONS
 @click.option("--only", default="*", metavar="GLOB", help="Verify only the rows whose id matches.")
 @TEXT_OR_JSON
 @OUTPUT
@@ -47,12 +33,7 @@ if TYPE_CHECKING:
     metavar="N",
     help="Processes to use; default: the number of cores, or 1 with the extra `fast`, which uses all cores itself.",
 )
-@click.option(
-    "--scheduler",
-    metavar="ADDRESS",
-    help="Form them on the workers of a Dask scheduler, tcp://HOST:PORT, or on local:N processes of its own.",
-)
-@PATIENCE
+@scheduler_options("Form them")
 def verify(
     missions: Sequence[str],
     only: str,
@@ -71,7 +52,6 @@ def verify(
     for wrong usage, an unusable file, or a mission on whose limits no image gave a verdict.
     """
     from bisar_budget.budget.waivers import NOTHING_OUTSIDE, overrides
-    from bisar_budget.report import Style
     from bisar_budget.report.formats import verification
 
     files = expand(missions)
@@ -85,11 +65,7 @@ def verify(
         )  # images waive nothing
         for mission, found in zip(loaded, images, strict=True)
     ]
-    if format_name == "json":
-        text = verification.as_json(__version__, verified)
-    else:
-        text = verification.as_text(verified, Style(color=output is None and wants_color()))
-    deliver(text, output, format_name)
+    deliver_found(verification, verified, format_name, output)
     doubts = [mission for mission in verified if mission.doubt]
     for mission in doubts:
         complain(f"{printable(mission.file)}: {mission.doubt}")

@@ -19,16 +19,12 @@ from bisar_budget import __version__
 from bisar_budget.design.cases import Cases, CaseTable, Grid
 from bisar_budget.design.sweep import Asked, Chunks
 from bisar_budget.design.table import Part
-from bisar_budget.faults import changes_words
+from bisar_budget.faults import ClusterError, changes_words
 from bisar_budget.memory import hold_room
 from bisar_budget.resources import locked
 
 Question = Mapping[str, str]
 _NAME = re.compile(r"part-\d{12}\.parquet", re.ASCII)
-
-
-class ClusterError(Exception):
-    """Workers, or a folder of parts, that cannot be used; the message says why, and what can be done."""
 
 
 def check_libraries(option: str, room: int, extra: str, *modules: str) -> None:

@@ -23,8 +23,8 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from bisar_budget import __version__
-from bisar_budget.cluster.parts_folder import ClusterError, check_libraries
-from bisar_budget.faults import MissionError, printable
+from bisar_budget.cluster.parts_folder import check_libraries
+from bisar_budget.faults import ClusterError, MissionError, printable
 from bisar_budget.memory import OF_CLUSTER
 
 _ADDRESS = re.compile(r"(?:tcp|tls)://\S+:\d{1,5}", re.ASCII)

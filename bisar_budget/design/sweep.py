@@ -5,10 +5,11 @@ Memory does not grow with the number of cases: they are checked in parts, as the
 
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from datetime import date
 from functools import cached_property, lru_cache
 from hashlib import sha256
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -252,7 +253,8 @@ class Asked:
         return start, stop, self.cases.values(start, stop)
 
 
-class Chunks(NamedTuple):
+@dataclass(frozen=True)
+class Chunks:
     """How cases up to `end` are cut; `is_slow` where many are read by themselves."""
 
     end: int

@@ -15,7 +15,7 @@ pytest.importorskip("distributed")
 pytest.importorskip("pyarrow")
 
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.cli import draws as command
+from bisar_budget.cli import shared_work as command
 from bisar_budget.cluster.scheduler import Workers, connected
 from bisar_budget.mission.load import load_mission
 from bisar_budget.monte_carlo import draws as drawing

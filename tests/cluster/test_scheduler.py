@@ -22,11 +22,11 @@ pytest.importorskip("pyarrow")
 from bisar_budget import __version__
 from bisar_budget.cli import cli
 from bisar_budget.cluster import scheduler
-from bisar_budget.cluster.parts_folder import ClusterError
 from bisar_budget.cluster.scheduler import UnlikeWorkerError, Workers
 from bisar_budget.design.cases import grid
 from bisar_budget.design.quantities import tree_of
 from bisar_budget.design.sweep import Asked, Chunks, part_of
+from bisar_budget.faults import ClusterError
 from bisar_budget.mission.load import load_mission
 from bisar_budget.verify.limits import verify_mission
 from tests.cluster.conftest import Cluster, free_port, wait_until

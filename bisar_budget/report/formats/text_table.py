@@ -1,7 +1,7 @@
 """The report for a terminal: verdict, table of requirements, geometry, the rows that matter with the worst first."""
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 
 from bisar_budget.effects.declared import END_OF_IMAGE
@@ -164,20 +164,22 @@ def _table(mission: MissionFindings, style: Style, room: int) -> Iterator[str]:
         rows = [row for row in rows if matters(row)]
     passing = [row for row in rows if STATUS[row.status].is_met or row.status == "info"]
     passing.sort(key=lambda row: -(row.utilization or 0.0))
-    lines = _table_lines(rows, hidden, mission, style)
+    cells = {row.id: _row(row, mission) for row in rows}
+    lines = _table_lines(rows, hidden, cells, style)
     while is_short and not mission.is_empty and len(lines) > room and passing and len(rows) > _FEWEST:
         least = passing.pop()
         hidden, rows = [least, *hidden], [row for row in rows if row is not least]
-        lines = _table_lines(rows, hidden, mission, style)
+        lines = _table_lines(rows, hidden, cells, style)
     yield from lines
 
 
-def _table_lines(rows: Sequence[Row], hidden: Sequence[Row], mission: MissionFindings, style: Style) -> list[str]:
-    return [*_lines(rows, mission, style), *wrapped(_table_key(rows, hidden), "  ")]
+def _table_lines(
+    rows: Sequence[Row], hidden: Sequence[Row], cells: Mapping[str, Sequence[str]], style: Style
+) -> list[str]:
+    return [*_lines(rows, [cells[row.id] for row in rows], style), *wrapped(_table_key(rows, hidden), "  ")]
 
 
-def _lines(rows: Sequence[Row], mission: MissionFindings, style: Style) -> Iterator[str]:
-    cells = [_row(row, mission) for row in rows]
+def _lines(rows: Sequence[Row], cells: Sequence[Sequence[str]], style: Style) -> Iterator[str]:
     widths = [max(len(line[column]) for line in (_HEADER, *cells)) for column in range(len(_HEADER))]
     widths[0] = 8  # the same in every table: the eye and scripts look there
     names = [len(line[1]) for line in (_HEADER, *cells)]

@@ -1,0 +1,195 @@
+"""Options that commands share; where values come from: the command line, the environment, a project's settings."""
+
+import os
+from collections.abc import Callable, Iterator
+from datetime import UTC, date, datetime
+from typing import TYPE_CHECKING, Any
+
+import click
+from click.core import ParameterSource
+
+from bisar_budget.faults import printable
+from bisar_budget.resources import DISK, Files
+
+if TYPE_CHECKING:
+    from click import ParamType as ParamType
+    from click.shell_completion import CompletionItem
+
+    from bisar_budget.budget.waivers import Outside
+    from bisar_budget.faults import SetValue
+    from bisar_budget.findings.requirement import Override
+    from bisar_budget.settings import Settings
+else:
+
+    class ParamType(click.ParamType):
+        """Type of a parameter; that of Click before 8.4 takes no type of its values in brackets."""
+
+        def __class_getitem__(cls, values: object) -> type:  # noqa: D105
+            return cls
+
+
+DAY_OF_RUN = "the day of the run"
+_BEARING = ("model", "strict", "exit_zero")  # on the verdict, besides the day and --set
+
+
+class FileName(ParamType[str]):
+    """Name of a file, which a shell completes; what can be read is seen when it is."""
+
+    name = "file"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """Take the text as it is."""
+        return str(value)
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> "list[CompletionItem]":
+        """Leave it to the shell, which knows the files."""
+        from click.shell_completion import CompletionItem
+
+        return [CompletionItem(incomplete, type="file")]
+
+
+FILE = FileName()
+MISSIONS = click.argument("missions", type=FILE, nargs=-1, required=True, metavar="MISSION...")
+OUTPUT = click.option("-o", "--output", type=FILE, metavar="FILE", help="Write to FILE instead of standard output.")
+
+
+def _read_changes(ctx: click.Context, param: click.Parameter, texts: tuple[str, ...]) -> "tuple[SetValue, ...]":
+    if not texts:
+        return ()
+    from bisar_budget.faults import InvalidValueError
+    from bisar_budget.mission.changes import read_changes
+
+    try:
+        return read_changes(texts)
+    except InvalidValueError as error:
+        raise click.UsageError(f"--set: {error.problem.words}.") from None
+
+
+def set_option(what: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Give the option `--set`; `what` says what it does with the value.
+
+    It is no setting of a project, nor of the environment: a gate judges the file that is in the repository.
+    """
+    return click.option(
+        "--set",
+        "changes",
+        multiple=True,
+        metavar="KEY=VALUE",
+        callback=_read_changes,
+        help=f"{what}: KEY is its path in the file, such as platforms.receiver.azimuth or other_errors.0.name, VALUE "
+        "as the file would have it. Repeatable; every report says it.",
+    )
+
+
+SET = set_option("Put a value in place of the mission's own, or beside it")
+
+TEXT_OR_JSON = click.option(
+    "--format",
+    "format_name",
+    type=click.Choice(["text", "json"]),
+    default="text",
+    show_default=True,
+    help="Format of the output.",
+)
+
+GATING_MODEL = click.Choice(["published", "full", "strictest"])
+MODEL = click.option(
+    "--model",
+    type=GATING_MODEL,
+    help="Model that decides, instead of the mission file's.",
+)
+DATE = click.option(
+    "--date",
+    "today",
+    type=click.DateTime(["%Y-%m-%d"]),
+    help="Day on which waivers are judged (default: SOURCE_DATE_EPOCH, else today, UTC).",
+)
+
+
+def scheduler_options(doing: str, more: str = "") -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Give `--scheduler` and its time-out; `doing` says what workers are for, `more` what else there is to say."""
+    named = click.option(
+        "--scheduler",
+        metavar="ADDRESS",
+        help=f"{doing} on the workers of a Dask scheduler, tcp://HOST:PORT, or on local:N processes of its own."
+        + more,
+    )
+    patience = click.option(
+        "--scheduler-timeout",
+        "patience",
+        type=click.IntRange(min=1),
+        default=30,
+        show_default=True,
+        metavar="SECONDS",
+        help="How long a scheduler may have no worker before it is given up.",
+    )
+    return lambda command: named(patience(command))
+
+
+def origin_of(parameter: click.Parameter) -> str:
+    """Say where the value of a parameter comes from."""
+    source = click.get_current_context().get_parameter_source(str(parameter.name))
+    if source is ParameterSource.COMMANDLINE:
+        return "command line"
+    if source is ParameterSource.ENVIRONMENT:
+        return f"environment, {parameter.envvar}"
+    return _settings_file() if source is ParameterSource.DEFAULT_MAP else "default"
+
+
+def _settings_file() -> str:
+    found = settings_here()
+    return os.path.relpath(found.file) if found else "pyproject.toml"
+
+
+def settings_here(files: Files = DISK) -> "Settings | None":
+    """Settings of the project for the current folder, now or in a revision; None where there are none."""
+    from bisar_budget.settings import SettingsError, project_settings
+
+    try:
+        return project_settings(os.getcwd(), files)
+    except SettingsError as error:
+        raise click.UsageError(printable(str(error))) from None
+    except OSError:  # somebody removed the current folder
+        return None
+
+
+def outside(today: datetime | None) -> "Outside":
+    """Gather the options of the command that bear on verdicts; `today` is the value of --date."""
+    from bisar_budget.budget.waivers import Outside
+
+    return Outside(tuple(_options()), day_origin(today), today is not None)
+
+
+def day_origin(today: datetime | None) -> str:
+    """Say where the day of waivers comes from."""
+    if today is not None:
+        return "command line"
+    return "environment, SOURCE_DATE_EPOCH" if os.environ.get("SOURCE_DATE_EPOCH") else DAY_OF_RUN
+
+
+def day(today: datetime | None) -> date:
+    """Day on which waivers are judged: that of --date, else of SOURCE_DATE_EPOCH, else today, UTC."""
+    if today is not None:
+        return today.date()
+    epoch = os.environ.get("SOURCE_DATE_EPOCH")
+    if not epoch:
+        return datetime.now(UTC).date()
+    try:
+        if not (epoch.isascii() and epoch.isdigit()):
+            raise ValueError
+        return datetime.fromtimestamp(int(epoch), UTC).date()
+    except (ValueError, OverflowError, OSError):
+        raise click.UsageError(f"SOURCE_DATE_EPOCH must be seconds since 1970 (got {printable(epoch)!r})") from None
+
+
+def _options() -> "Iterator[Override]":
+    from bisar_budget.findings.requirement import Override
+
+    context = click.get_current_context()
+    for parameter in context.command.params:
+        name, origin = str(parameter.name), origin_of(parameter)
+        value = context.params.get(name)
+        if name in _BEARING and origin != "default" and value is not None:
+            yield Override(
+                parameter.opts[0], ("yes" if value else "no") if isinstance(value, bool) else value, origin
+            )
