@@ -39,7 +39,6 @@ SHARE = 0.004  # what the second order may add, of a phase, a displacement or a 
 FLOOR_RAD, FLOOR_M = 1e-3, 2e-3  # and whatever the size
 
 _TOGETHER = 1 << 13  # lanes of a block
-_ROWS = np.array([point_paths.QUADRATIC, point_paths.CUBIC, point_paths.WAY])
 _FLOORS = (FLOOR_RAD, FLOOR_RAD, FLOOR_M)
 
 
@@ -301,28 +300,20 @@ class ErrorBlock:
         is_whole : bool
             Search for the size that the quadratic phase alone allows too.
         """
-        held = [place for place, limit in enumerate(limits) if limit is not None]
-        limit = np.array([self._limit(place, limits[place]) for place in held])
-        per_unit = self.per_unit(model)[held]
+        limit = np.array(
+            [np.nan * self.declared if one is None else self._limit(i, one) for i, one in enumerate(limits)]
+        )
+        per_unit = self.per_unit(model)
         with np.errstate(all="ignore"):
             small = np.where((per_unit > 0) & ~np.isnan(limit), limit / per_unit, math.inf)
-        order = np.argsort(small, axis=0, kind="stable")  # the one that binds is likely to be found first
-        smallest, binding = np.full(small.shape[1:], math.inf), np.full(small.shape[1:], -1, dtype=np.int8)
-        for turn in order:
-            requirement = np.array(held)[turn]
-            first, of = (np.take_along_axis(one, turn[None], axis=0)[0] for one in (small, limit))
-            found = self.reaching(model, requirement, of, first, smallest)
-            is_less = found < smallest
-            smallest, binding = np.where(is_less, found, smallest), np.where(is_less, requirement, binding)
-        quadratic = smallest
-        if is_whole and len(held) > 1:  # also where another requirement binds
-            is_other = binding > 0
-            beyond = self.reaching(model, np.zeros_like(order[0]), np.where(is_other, limit[0], math.nan), small[0])
-            quadratic = np.where(is_other, beyond, np.where(binding == 0, smallest, math.inf))
+        held = [place for place, one in enumerate(limits) if one is not None]
+        found = self._searched(limit, small, held, is_whole=is_whole) if model == "full" and self.moves else small
+        smallest = found.min(axis=0)
+        binding = np.where(np.isfinite(smallest), found.argmin(axis=0), -1).astype(np.int8)
         if model == "full":
             binding = np.where(self.ends_image(smallest), len(HELD), binding)
-        smallest, quadratic = (np.where(np.isfinite(one), one, math.nan) for one in (smallest, quadratic))
-        return Allowed(smallest, quadratic, binding)
+        smallest, quadratic = (np.where(np.isfinite(one), one, math.nan) for one in (smallest, found[0]))
+        return Allowed(smallest, quadratic if is_whole else smallest, binding)
 
     def ends_image(self, size: Floats) -> Truths:
         """Whether allowables, as found, are where the image ends: the search stopped there short of its limit."""
@@ -337,27 +328,38 @@ class ErrorBlock:
         whole = np.broadcast_to(limit, self.declared.shape)
         return whole if place == 0 else np.where(self.is_motion, whole, math.nan)
 
-    def reaching(self, model: str, requirement: Places, limit: Floats, small: Floats, upto: Any = math.inf) -> Floats:
-        """Smallest sizes, of either sign, at which errors reach limits; infinite: none does `upto`.
+    def _searched(self, limit: Floats, small: Floats, held: Sequence[int], *, is_whole: bool) -> Floats:
+        """Smallest sizes, of either sign, at which errors reach limits, (3, errors, cases); infinite: none does.
 
-        `requirement` is the place of each limit in `HELD`; `small` is the size were effects those of small errors. By
-        the full model none is looked for that takes its platform farther than a tenth of the slant range, or than the
-        declared one does.
+        `small` are the sizes were effects those of small errors. None is looked for that takes its platform farther
+        than a tenth of the slant range, or than the declared one does; nor, but for what the quadratic phase allows
+        where `is_whole`, beyond what another limit allows: the one that binds is likely to be found first.
         """
-        if model == "published" or not self.moves:
-            return np.where(small <= upto, small, math.inf)
-        most = np.minimum(upto, np.fmax(self.farthest, np.abs(self.declared)))
-        first = np.minimum(small, most)
-        with np.errstate(all="ignore"):
-            adds = np.array(self.table.per_metre)[requirement, np.arange(self.cases)] * self.grows(first)
-            is_searched = self._is_moving & (adds > SHARE * limit)
-        found = np.where(small <= most, small, math.inf)
-        if is_searched.any():
-            of = requirement[is_searched]
-            slopes = np.array([self.effects["full"].qpe, self.effects["full"].cubic, self.per_unit("full")[2]])
-            held = Held(_ROWS[of], limit[is_searched], np.choose(of, slopes[:, is_searched]))
-            numbers = first[is_searched], most[is_searched]
-            found[is_searched] = self.paths.either_reaching(self._lanes_of(is_searched), held, *numbers)
+        most = np.fmax(self.farthest, np.abs(self.declared))
+        found = np.full(small.shape, math.inf)
+        slopes = np.array([self.effects["full"].qpe, self.effects["full"].cubic, self.per_unit("full")[2]])
+        searches: list[Held] = []
+        is_few = 2 * len(held) * self.declared.size < point_paths.FEW  # then all are searched for together
+        for turn in np.array(held)[np.argsort(small[held], axis=0, kind="stable")]:
+            of, first, slope = (np.take_along_axis(one, turn[None], axis=0)[0] for one in (limit, small, slopes))
+            is_alone = (turn == 0) & is_whole
+            upto = np.minimum(most, np.where(is_alone, math.inf, found.min(axis=0)))
+            with np.errstate(all="ignore"):
+                adds = np.array(self.table.per_metre)[turn, np.arange(self.cases)] * self.grows(
+                    np.minimum(first, upto)
+                )
+                some = self._is_moving & (adds > SHARE * of)
+            at_once = np.where((first <= upto) & ~some, first, math.inf)
+            np.put_along_axis(found, turn[None], at_once[None], axis=0)
+            if not some.any():
+                continue
+            numbers = of[some], slope[some], first[some], upto[some], np.flatnonzero(some), is_alone[some]
+            for lane, sign in zip(self._lanes_of(some), (1.0, -1.0), strict=True):
+                searches.append(Held(lane, turn[some], *numbers).turned(sign))
+                if not is_few:
+                    self.paths.first_reaching(searches.pop(), found.reshape(3, -1))
+        if searches:
+            self.paths.first_reaching(Held(*map(np.concatenate, zip(*searches, strict=True))), found.reshape(3, -1))
         return found
 
 
