@@ -300,9 +300,7 @@ class ErrorBlock:
         is_whole : bool
             Search for the size that the quadratic phase alone allows too.
         """
-        limit = np.array(
-            [np.nan * self.declared if one is None else self._limit(i, one) for i, one in enumerate(limits)]
-        )
+        limit = np.array([self._limit(place, one) for place, one in enumerate(limits)])
         per_unit = self.per_unit(model)
         with np.errstate(all="ignore"):
             small = np.where((per_unit > 0) & ~np.isnan(limit), limit / per_unit, math.inf)
@@ -324,7 +322,8 @@ class ErrorBlock:
         return found
 
     def _limit(self, place: int, limit: Any) -> Floats:
-        """A limit of each error; what only is a phase is held to that of the quadratic."""
+        """A limit of each error, not a number: none; what only is a phase is held to that of the quadratic."""
+        limit = math.nan if limit is None else limit
         whole = np.broadcast_to(limit, self.declared.shape)
         return whole if place == 0 else np.where(self.is_motion, whole, math.nan)
 
@@ -338,16 +337,14 @@ class ErrorBlock:
         most = np.fmax(self.farthest, np.abs(self.declared))
         found = np.full(small.shape, math.inf)
         slopes = np.array([self.effects["full"].qpe, self.effects["full"].cubic, self.per_unit("full")[2]])
-        searches: list[Held] = []
+        per_metre, searches = np.array(self.table.per_metre), list[Held]()
         is_few = 2 * len(held) * self.declared.size < point_paths.FEW  # then all are searched for together
         for turn in np.array(held)[np.argsort(small[held], axis=0, kind="stable")]:
             of, first, slope = (np.take_along_axis(one, turn[None], axis=0)[0] for one in (limit, small, slopes))
             is_alone = (turn == 0) & is_whole
             upto = np.minimum(most, np.where(is_alone, math.inf, found.min(axis=0)))
             with np.errstate(all="ignore"):
-                adds = np.array(self.table.per_metre)[turn, np.arange(self.cases)] * self.grows(
-                    np.minimum(first, upto)
-                )
+                adds = per_metre[turn, np.arange(self.cases)] * self.grows(np.minimum(first, upto))
                 some = self._is_moving & (adds > SHARE * of)
             at_once = np.where((first <= upto) & ~some, first, math.inf)
             np.put_along_axis(found, turn[None], at_once[None], axis=0)

@@ -45,8 +45,8 @@ _NO_ERROR = np.array((0.0, 0.0, 0.0, 0.0, 0.0, 1.0))
 class Held(NamedTuple):
     """Searches for the first size at which what is held in lanes reaches a limit, (searches,).
 
-    `row` is QUADRATIC, CUBIC or WAY, `slope` the effect of a small unit on it, signed. Each looks at `first` first, and
-    ends at `most` or where another of its `group` has found a smaller size; where `is_alone`, another of its own row.
+    `row` is QUADRATIC, CUBIC or WAY, `slope` the effect of a small unit on it, signed. Each looks at `first` first,
+    and ends at `most` or where another of its `group` has found a smaller size; where `is_alone`, of its own row.
     """
 
     lane: Places
@@ -183,9 +183,10 @@ class PointPaths:
             more = np.full((6, self.end.size, max(width, needed - width)), math.inf)
             self._known = np.concatenate((self._known, more), axis=2)
         self._known[:, some, np.repeat(before - first, count) + np.arange(some.size)] = point
-        here = self._known[:, lane, :needed]
-        order = here[0].argsort(axis=1, kind="stable")
-        self._known[:, lane, :needed] = np.take_along_axis(here, order[None], axis=2)
+        if (point[0, first] < self._known[0, lane, before - 1]).any():
+            here = self._known[:, lane, :needed]
+            order = here[0].argsort(axis=1, kind="stable")
+            self._known[:, lane, :needed] = np.take_along_axis(here, order[None], axis=2)
 
     def _to_fold(self, index: Places, some: Places, last: Floats) -> Floats:
         before = self._at(np.maximum(index - 1, 0), some)
@@ -223,7 +224,7 @@ class PointPaths:
     # ---------------------------------------------------------------- the first size that reaches a limit
     @np.errstate(all="ignore")
     def first_reaching(self, held: Held, best: Floats) -> None:
-        """Put the first sizes at which values reach their limits into the best so far, by row and group, (3, groups)."""
+        """Find the first sizes at which values reach limits; the best so far, (3, groups), are by row and group."""
         tries = np.zeros(held.lane.shape, dtype=int)
         for _ in range(ROUNDS):
             others = best[:, held.group]
@@ -263,7 +264,7 @@ class _Seen:
         self.size = np.where(is_known, known[0], math.nan)
         self.value = np.where(is_known, held.value(known), math.nan)
         reaches = np.abs(self.value) >= 1 - CLOSE
-        self.is_between = reaches.any(axis=1)
+        self.is_between: Truths = np.asarray(reaches.any(axis=1))
         stop = np.where(self.is_between, reaches.argmax(axis=1), self.count)
         self._slopes(every)
         self.doubtful = self._doubtful(stop)
@@ -278,7 +279,7 @@ class _Seen:
         self.found = np.where((found <= upto) & ~is_past, found, math.inf)
 
     def _slopes(self, every: Places) -> None:
-        """Slopes at known points of the parabola through each and its neighbours; at the last that of the one before."""
+        """Slopes at known points of the parabola through each and its neighbours; at the last of the one before."""
         self.width, rise = np.diff(self.size, axis=1), np.diff(self.value, axis=1)
         chord = rise / self.width
         self.slope = np.empty(self.size.shape)
@@ -380,9 +381,8 @@ def _parallel_between(before: Floats, beyond: Floats) -> Floats:
 def _on_cubic(part: Floats, start: Floats, rise: Floats, begins: Floats, ends: Floats) -> Floats:
     """Value at a part of intervals of the cubic that rises so much, with these slopes at both ends."""
     square, cube = part * part, part * part * part
-    found: Floats = (
-        start + begins * (part - 2 * square + cube) + ends * (cube - square) + rise * (3 * square - 2 * cube)
-    )
+    found: Floats = start + begins * (part - 2 * square + cube) + ends * (cube - square)
+    found += rise * (3 * square - 2 * cube)
     return found
 
 
