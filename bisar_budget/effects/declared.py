@@ -416,8 +416,7 @@ class DeclaredErrors:
 
     def array(self, value: Any) -> Floats:
         """One number for each case."""
-        found: Floats = np.array(np.broadcast_to(np.asarray(value, dtype=float), (self.cases,)))
-        return found
+        return np.full(self.cases, value, dtype=float)
 
     def displaces(self, error: ErrorSource) -> bool:
         """Whether an error moves platforms or a clock that is listened to: what only is a phase displaces nothing."""

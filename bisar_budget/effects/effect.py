@@ -36,7 +36,7 @@ def override_notes(platform: str, overridden: Sequence["Overridden"], *figures: 
 
 def number(column: Any) -> float:
     """The number of the only case."""
-    return float(column) if isinstance(column, float) else float(np.ravel(column)[0])
+    return float(column.item(0) if isinstance(column, np.ndarray) else column)
 
 
 class ErrorSource(NamedTuple):

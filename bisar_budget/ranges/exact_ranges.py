@@ -161,9 +161,9 @@ def joined(parts: Sequence[Lanes]) -> Lanes:
 
 def _beside(values: Sequence[Any], counts: Sequence[int]) -> Any:
     """One value for all lanes where they share it, else one for each."""
-    if all(np.ndim(value) == 0 and value == values[0] for value in values):
-        return values[0]
-    return np.concatenate([np.broadcast_to(value, (count,)) for value, count in zip(values, counts, strict=True)])
+    if all(np.ndim(value) == 0 for value in values):
+        return values[0] if len(set(values)) == 1 else np.repeat(values, counts)
+    return np.concatenate([np.full(count, value) for value, count in zip(values, counts, strict=True)])
 
 
 class SmallErrors(NamedTuple):
