@@ -25,7 +25,7 @@ from bisar_budget.geometry import BistaticGeometry, angle_between_lines
 from bisar_budget.mission.model import Mission
 from bisar_budget.phrases import NOTHING, Note
 from bisar_budget.ranges import point_paths
-from bisar_budget.ranges.exact_ranges import Effect, ExactRanges, Floats, Lanes, Places, Truths, joined
+from bisar_budget.ranges.exact_ranges import Effect, ExactRanges, Floats, Lanes, Places, Truths
 from bisar_budget.ranges.point_paths import Held, PointPaths
 
 QUADRATIC, CUBIC, LOCATION = "quadratic_phase_error", "cubic_phase_error", "location_error"
@@ -248,11 +248,11 @@ class ErrorBlock:
         """The ways of the point by the errors that displace it: of each positive sign first."""
         if self._follows is None:
             table, full = self.table, self.effects["full"]
-            lanes = [table.lanes(self.sources[place], sign) for place in self.moves for sign in (1.0, -1.0)]
+            lanes = table.lanes(*(self.sources[place] for place in self.moves), signs=(1.0, -1.0))
             of_moving = Effect._make(part[self.moves] for part in full)
             moved = np.array(table.planes["full"].displacement(of_moving, 1.0))  # (2, moving, cases)
             per_unit = np.stack((moved, -moved), axis=2).reshape(2, -1)
-            self._follows = PointPaths(self.exact, joined(lanes), per_unit)
+            self._follows = PointPaths(self.exact, lanes, per_unit)
         return self._follows
 
     def forget(self) -> None:
@@ -426,16 +426,33 @@ class DeclaredErrors:
         """Whether an error is one of a clock that the direct path stands in for."""
         return error.owner == "clock" and self.has_direct_path
 
-    def lanes(self, error: ErrorSource, sign: float = 1.0) -> Lanes:
-        """A unit of an error, with a sign, in each case."""
+    def lanes(self, *errors: ErrorSource, signs: Sequence[float] = (1.0,)) -> Lanes:
+        """A unit of errors, of each sign, in each case; by error, sign and case."""
+        moved = [error.platforms for error in errors]
+        orders = [list(self.edge).index(error.unit) if error.platforms else -1 for error in errors]
+        courses = np.array([self._course(error, order) for error, order in zip(errors, orders, strict=True)])
+        at_nodes = np.moveaxis(courses[:, None] * np.array(signs)[:, None, None], 2, 0)
+        moves: list[list[Any]] = [[float(platform in one) for one in moved] for platform in (0, 1)]
+        u, v, order = (self._of_each(values, len(signs)) for values in (*moves, orders))
+        x, y, z = (self._of_each([error.direction[axis] for error in errors], len(signs)) for axis in (0, 1, 2))
+        case = np.tile(self.each, len(errors) * len(signs))
+        return Lanes(case, at_nodes.reshape(len(at_nodes), -1), (u, v), (x, y, z), order)
+
+    def _course(self, error: ErrorSource, order: int) -> Floats:
+        """Position error at the nodes of a unit of an error, or the range error of what moves no platform."""
         exact = self.exact
-        if error.platforms:
-            moves = (float(0 in error.platforms), float(1 in error.platforms))
-            return Lanes(self.each, sign * exact.powers[error.unit], moves, error.direction, error.unit)
+        if order >= 0:
+            return exact.powers[error.unit]
         if error.is_motion:
-            return Lanes(self.each, sign * exact.clock_course(error.unit))
+            return exact.clock_course(error.unit)
         # A phase as such: a quadratic that displaces nothing.
-        return Lanes(self.each, sign * ((exact.times / exact.half) ** 2 - 1 / 3) / exact.k)
+        return np.asarray(((exact.times / exact.half) ** 2 - 1 / 3) / exact.k)
+
+    def _of_each(self, values: Sequence[Any], signs: int) -> Any:
+        """One value of each error for its lanes, or the one that all have."""
+        if any(isinstance(value, np.ndarray) for value in values):
+            return np.repeat([self.array(value) for value in values], signs, axis=0).reshape(-1)
+        return values[0] if len(set(values)) == 1 else np.repeat(values, signs * self.cases)
 
     def block_of(self, error: ErrorSource) -> tuple[ErrorBlock, int]:
         """The block that has an error, and its place there."""

@@ -112,15 +112,15 @@ class Lanes:
         1 where transmitter, receiver moves, else 0.
     direction : Vectors
         Of the motion; floats or (lanes,).
-    unit : str or (lanes,)
-        Of each; velocity errors turn Doppler.
+    order : int or (lanes,)
+        Power of slow time that a position error grows with, those of velocity turn Doppler; -1 of a clock.
     """
 
     case: Places
     at_nodes: Floats
     moves: tuple[Any, Any] = (0.0, 0.0)
     direction: Vectors = (0.0, 0.0, 0.0)
-    unit: Any = ""
+    order: Any = -1
 
     @property
     def platforms(self) -> list[int]:
@@ -129,10 +129,11 @@ class Lanes:
 
     def of(self, some: Places) -> "Lanes":
         """Some of the lanes."""
-        u, v = (part[some] if np.ndim(part) else part for part in self.moves)
-        x, y, z = (part[some] if np.ndim(part) else part for part in self.direction)
-        unit = self.unit[some] if np.ndim(self.unit) else self.unit
-        return Lanes(self.case[some], self.at_nodes.take(some, axis=1), (u, v), (x, y, z), unit)
+        u, v, x, y, z, order = (
+            part.take(some) if isinstance(part, np.ndarray) else part
+            for part in (*self.moves, *self.direction, self.order)
+        )
+        return Lanes(self.case.take(some), self.at_nodes.take(some, axis=1), (u, v), (x, y, z), order)
 
     def there(self, case: Places) -> "Lanes":
         """The same of lanes, one a case, where cases are chosen anew: errors of `ExactRanges.at`."""
@@ -148,22 +149,6 @@ class Lanes:
         transmitter, receiver = self.moves
         is_clock = 1.0 - np.maximum(transmitter, receiver)
         return self.at_nodes * (size * is_clock) if np.any(is_clock) else np.zeros_like(self.at_nodes)
-
-
-def joined(parts: Sequence[Lanes]) -> Lanes:
-    """Lanes beside each other."""
-    counts = [one.case.size for one in parts]
-    kinds = zip(*((*one.moves, *one.direction, one.unit) for one in parts), strict=True)
-    u, v, x, y, z, unit = (_beside(of_all, counts) for of_all in kinds)
-    case = np.concatenate([one.case for one in parts])
-    return Lanes(case, np.concatenate([one.at_nodes for one in parts], axis=1), (u, v), (x, y, z), unit)
-
-
-def _beside(values: Sequence[Any], counts: Sequence[int]) -> Any:
-    """One value for all lanes where they share it, else one for each."""
-    if all(np.ndim(value) == 0 for value in values):
-        return values[0] if len(set(values)) == 1 else np.repeat(values, counts)
-    return np.concatenate([np.full(count, value) for value, count in zip(values, counts, strict=True)])
 
 
 class SmallErrors(NamedTuple):
@@ -183,14 +168,14 @@ class SmallErrors(NamedTuple):
         """Errors whose lanes are the cases."""
         courses: dict[Any, Floats] = {}
         ways = np.zeros((len(errors), 7, max((np.size(part) for one in errors for part in one.direction), default=1)))
-        for index, (lanes, way) in enumerate(zip(errors, ways, strict=True)):
-            courses[lanes.unit if lanes.platforms else index] = lanes.at_nodes
+        for index, (lanes, way) in enumerate(zip(errors, ways, strict=True), 1):
+            courses[lanes.order if lanes.platforms else -index] = lanes.at_nodes
             for platform in lanes.platforms:
                 for axis, part in enumerate(lanes.direction):
                     way[3 * platform + axis] = part
             way[6] = not lanes.platforms
         names = list(courses)
-        course = [names.index(one.unit if one.platforms else index) for index, one in enumerate(errors)]
+        course = [names.index(one.order if one.platforms else -index) for index, one in enumerate(errors, 1)]
         return cls(np.array(list(courses.values())), np.array(course), ways)
 
     def there(self, case: Places) -> "SmallErrors":
@@ -439,7 +424,7 @@ class ExactRanges:
         """
         shifts = lanes.shifts(size)
         clock = lanes.clock(size)
-        bend = np.abs(size) * np.where(lanes.unit == "m/s", lanes.moves[0] + lanes.moves[1], 0.0)
+        bend = np.abs(size) * np.where(lanes.order == 1, lanes.moves[0] + lanes.moves[1], 0.0)
         return self.settled(clock, shifts, near, bend, lanes.case)
 
     def left_over(self, lanes: Lanes, size: Floats, place: tuple[Any, Any]) -> Floats:

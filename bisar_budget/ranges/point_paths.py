@@ -134,11 +134,14 @@ class PointPaths:
         is_short = size - last[0] >= 1.2 * step
         size = np.where(is_short, last[0] + step, size)
         if some.size < FEW and is_short.any():  # and to half of it
-            size = np.append(size, (last[0] + step / 2)[is_short])
-            some, index, fold = (np.append(one, one[is_short]) for one in (some, index, fold))
+            size = np.concatenate((size, (last[0] + step / 2)[is_short]))
+            some, index, fold = (np.concatenate((one, one[is_short])) for one in (some, index, fold))
         order = np.lexsort((size, some))
-        is_new = np.append(True, (np.diff(some[order]) > 0) | (np.diff(size[order]) > ROUNDING * size[order][1:]))
-        some, size, index, fold = (one[order][is_new] for one in (some, size, index, fold))
+        lane, before = some[order], size[order]
+        is_new = np.ones(order.size, dtype=bool)
+        is_new[1:] = (lane[1:] != lane[:-1]) | (before[1:] - before[:-1] > ROUNDING * before[1:])
+        order = order[is_new]
+        some, index, size, fold = some[order], index[order], size[order], fold[order]
         last = self._at(index, some)
         near = self._guess(index, some, last, size)
         found = self.exact.phases(self.lanes.of(some), size, near)
@@ -147,7 +150,8 @@ class PointPaths:
         is_end = is_on & (np.abs(point[5]) < PARALLEL)
 
         # Of several steps from one known point those count that come before the first that leads nowhere.
-        begins = np.append(True, (np.diff(some) > 0) | (np.diff(index) > 0))
+        begins = np.ones(some.size, dtype=bool)
+        begins[1:] = (some[1:] != some[:-1]) | (index[1:] != index[:-1])
         is_bad = ~is_on | is_end
         missed = np.cumsum(is_bad)
         missed = missed - (missed - is_bad)[np.maximum.accumulate(np.where(begins, np.arange(some.size), 0))]
@@ -175,8 +179,7 @@ class PointPaths:
         """Note known points, by lane and size."""
         if not some.size:
             return
-        first = np.flatnonzero(np.append(True, np.diff(some) > 0))
-        lane, count = some[first], np.diff(np.append(first, some.size))
+        lane, first, count = np.unique(some, return_index=True, return_counts=True)
         before = np.isfinite(self._known[0, lane]).sum(axis=1)
         width, needed = self._known.shape[2], int((before + count).max())
         if needed > width:  # the first needs few, most need one
@@ -280,8 +283,8 @@ class _Seen:
 
     def _slopes(self, every: Places) -> None:
         """Slopes at known points of the parabola through each and its neighbours; at the last of the one before."""
-        self.width, rise = np.diff(self.size, axis=1), np.diff(self.value, axis=1)
-        chord = rise / self.width
+        self.width = self.size[:, 1:] - self.size[:, :-1]
+        chord = (self.value[:, 1:] - self.value[:, :-1]) / self.width
         self.slope = np.empty(self.size.shape)
         self.slope[:, 0] = self.held.slope / self.held.limit
         before, after = self.width[:, :-1], self.width[:, 1:]
@@ -320,7 +323,7 @@ class _Seen:
         is_narrow = width <= CLOSE * top
         is_close = (b - 1 < ALMOST) & (top - found < 2 * ALMOST * top)
         is_close |= (1 - a < ALMOST) & (found - (top - width) < 2 * ALMOST * top)
-        self.inside = top - (1 - np.where(self.tries % 4 == 3, 0.5, np.clip(part, 0.01, 0.99))) * width
+        self.inside = top - (1 - np.where(self.tries % 4 == 3, 0.5, np.minimum(np.maximum(part, 0.01), 0.99))) * width
         return np.where(is_narrow, top - width, found), is_close | is_narrow
 
     def _ahead(self, every: Places, last: Places) -> tuple[Floats, Truths]:
@@ -341,7 +344,7 @@ class _Seen:
         """Sizes to look at next in the searches that go on: of many one each, and one a lane."""
         low, upto = self.low[going], self.upto[going]
         is_few, is_fresh = going.size < FEW, self.count[going] == 1
-        grown = np.clip(self.ahead[going], 1.01 * low, GROWTH * low)
+        grown = np.minimum(np.maximum(self.ahead[going], 1.01 * low), GROWTH * low)
         is_before = low < self.held.first[going]
         ahead = np.where(is_before, self.held.first[going], grown)
         size = np.where(self.is_between[going], self.inside[going], np.minimum(ahead, upto))
