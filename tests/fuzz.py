@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import yaml
 
-from bisar_budget.mission.schema import mission_schema
+from bisar_budget.mission.model import mission_schema
 from tests.conftest import ROOT
 from tests.families import FAMILIES, mission_text
 

@@ -1,9 +1,10 @@
 """The analysis that a mission's checks share: geometry, every error it can have, and what the models say of them."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
 from functools import cached_property
 
 from bisar_budget.analysis.allocation import Allocation, allocate
+from bisar_budget.analysis.spread import Tone, tones
 from bisar_budget.analysis.together import Together
 from bisar_budget.effects.combined import Correlated, correlated_errors
 from bisar_budget.effects.declared import DeclaredErrors
@@ -11,6 +12,7 @@ from bisar_budget.effects.effect import ErrorSource
 from bisar_budget.effects.models import Declared, Model
 from bisar_budget.effects.random_errors import RandomError, random_errors
 from bisar_budget.effects.sources import exact_ranges
+from bisar_budget.effects.subject import Subject
 from bisar_budget.effects.vibration import DeclaredPhase, slow_phases
 from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.model import Mission, has_instruments
@@ -19,41 +21,62 @@ from bisar_budget.ranges.exact_ranges import ExactRanges
 __all__ = ["Analysis", "Model"]
 
 
-@dataclass(frozen=True, eq=False)
 class Analysis:
-    """One mission, analysed once.
+    """Cases of one mission, analysed once; a mission as it is loaded is one case.
 
-    `is_bare` leaves out how far one autofocus correction serves the scene, and whether the published model holds.
-    Nothing is judged by them.
+    Parameters
+    ----------
+    mission : Mission
+        Some of its numbers may be arrays (cases,).
+    cases : int
+        How many.
+    geometry : BistaticGeometry, optional
+        Of many cases; omitted: that of a mission by itself.
+    nodes : int, optional
+        Of the aperture, that all cases need.
+    shown : mapping of str to Subject, optional
+        Ids of rows of which the allowable is asked though nothing is declared; omitted: all.
     """
 
-    mission: Mission
-    is_bare: bool = False
-
-    @cached_property
-    def geometry(self) -> BistaticGeometry:
-        """Both platforms at the aperture midpoint."""
-        return self.mission.geometry
+    def __init__(
+        self,
+        mission: Mission,
+        cases: int = 1,
+        *,
+        geometry: BistaticGeometry | None = None,
+        nodes: int | None = None,
+        shown: Mapping[str, Subject] | None = None,
+    ) -> None:
+        self.mission, self.cases, self.nodes, self.shown = mission, cases, nodes, shown
+        self.is_by_itself = geometry is None
+        self.geometry = mission.geometry if geometry is None else geometry
 
     @cached_property
     def exact(self) -> ExactRanges:
         """Exact ranges over the aperture."""
-        return exact_ranges(self.mission, self.geometry)
+        return exact_ranges(self.mission, self.geometry, self.nodes, self.cases)
 
     @cached_property
     def errors(self) -> DeclaredErrors:
-        """Every error the mission can have, declared or not, as those of one case."""
-        return DeclaredErrors(self.mission, 1, self.geometry, self.exact)
+        """Every error that the cases can have, declared or not, or those that are shown."""
+        return DeclaredErrors(self.mission, self.cases, self.geometry, self.exact, self.shown)
 
     @cached_property
     def sources(self) -> list[ErrorSource]:
-        """The same in plain numbers, in the order of the contract."""
+        """The errors of one case in plain numbers, in the order of the contract."""
         return [error.in_one_case() for error in self.errors.listed]
 
     @cached_property
     def random(self) -> list[RandomError]:
         """Errors of sensors and clocks that the mission names."""
-        return random_errors(self.mission) if has_instruments(self.mission) else []
+        if not has_instruments(self.mission):
+            return []
+        return random_errors(self.mission, None if self.is_by_itself else self.geometry, self.cases)
+
+    @cached_property
+    def tones(self) -> list[Tone]:
+        """Tones that make paired echoes: declared vibrations from one cycle per aperture on, and spurs."""
+        return tones(self.mission, self.geometry)
 
     @cached_property
     def slow(self) -> list[DeclaredPhase]:

@@ -620,7 +620,7 @@ class SceneEdge(NamedTuple):
 
     `difference` is the largest of the quadratic phases between edge and centre, combined as the mission says [rad],
     at `azimuth` on the rim. `autofocus_radius` is that within which it stays inside the total budget [m]; None where
-    it does as far as `searched` [m], which is 0 if nobody asked. `degeneracy` says why a part of the edge has no
+    it does as far as `searched` [m]. `degeneracy` says why a part of the edge has no
     image, `doubt` which error is over its limit there and not at the centre.
     """
 
@@ -633,8 +633,8 @@ class SceneEdge(NamedTuple):
     doubt: Note
 
     @classmethod
-    def of(cls, edges: SceneEdges, geometry: BistaticGeometry, total: float, *, is_searched: bool) -> "SceneEdge":
-        """That of the only case; `is_searched` says whether to search for how far one correction serves."""
+    def of(cls, edges: SceneEdges, geometry: BistaticGeometry, total: float) -> "SceneEdge":
+        """That of the only case."""
         correction = Correction(edges, 0, total)
         (size, rim), (difference, azimuth) = (map(float, one.of(0)) for one in (edges.rim, edges.largest))
         radius, searched, nowhere = correction.radius, correction.farthest, (math.nan, 0.0, None)
@@ -643,19 +643,19 @@ class SceneEdge(NamedTuple):
             return cls(radius, *nowhere, FARTHEST * float(edges.phases.nearest[0]), reason, NOTHING)
         if math.isinf(difference):
             return cls(radius, *nowhere, searched, phrases.no_image(), NOTHING)
-        served, doubt, worst = correction.served() if is_searched else None, NOTHING, int(edges.over[:, 0].argmax())
+        served, doubt, worst = correction.served(), NOTHING, int(edges.over[:, 0].argmax())
         if edges.over[worst, 0]:
             doubt = phrases.over_at_the_edge(
                 edges.names[worst], float(edges.over[worst, 0]), float(edges.limit[worst, 0])
             )
-        return cls(radius, difference, azimuth, served, searched if is_searched else 0.0, NOTHING, doubt)
+        return cls(radius, difference, azimuth, served, searched, NOTHING, doubt)
 
     def notes(self, total: float) -> tuple[Note, ...]:
         """Where the difference is largest, and how far one autofocus correction serves."""
         if not self.difference:
             return (phrases.same_at_the_edge(),)
         largest = phrases.largest_at_the_edge(math.degrees(self.azimuth), self.radius)
-        return (largest, phrases.one_correction_serves(self.served, total)) if self.searched else (largest,)
+        return (largest, phrases.one_correction_serves(self.served, total))
 
     @property
     def served(self) -> str:

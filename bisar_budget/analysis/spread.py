@@ -10,22 +10,23 @@ response a share E lies within the first nulls, which an image counts as its mai
 """
 
 import math
-from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from bisar_budget.analysis.allocation import Allocation, Split
-from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.constants import MAINLOBE_ENERGY
 from bisar_budget.effects.clocks import spurs_of
 from bisar_budget.effects.declared import CUBIC
 from bisar_budget.effects.echoes import SLOWEST
 from bisar_budget.effects.effect import PLATFORMS
-from bisar_budget.effects.random_errors import RandomError
 from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.effects.vibration import counted, lines_of
 from bisar_budget.mission.model import Mission, Simulation, has_instruments
+
+if TYPE_CHECKING:
+    from bisar_budget.analysis.analysis import Analysis
 
 CUBIC_POWER = 4 / 175  # of a cubic phase φ₃ at the edge: its Legendre part 2/5·φ₃, whose mean square is (4/25)/7·φ₃²
 SMALLEST_CUBIC_RAD = 1e-3  # a power of -76 dB, which no image shows
@@ -80,9 +81,15 @@ def islr_db(variance: Any, model: str, energy: float) -> Any:
     return 10 / math.log(10) * (variance + np.log(-np.expm1(-variance)) - math.log(energy))
 
 
+def islr_of(mission: Mission, variance: Any) -> Any:
+    """ISLR that noise of a phase variance [rad²] adds to an image; not a number where there is none. [dB]"""
+    with np.errstate(all="ignore"):
+        return np.where(variance > 0, islr_db(variance, "full", mainlobe_energy(mission)), math.nan)
+
+
 def shown_islr_db(mission: Mission, variance: float) -> float | None:
-    """ISLR that noise of a phase variance [rad²] adds to an image; None where there is none. [dB]"""
-    return islr_db(variance, "full", mainlobe_energy(mission)) if variance else None
+    """The same of one number; None where there is none. [dB]"""
+    return float(islr_of(mission, variance)) if variance else None
 
 
 def spread_limit(mission: Mission, allocation: Allocation, owner: str, model: str) -> Any:
@@ -126,53 +133,42 @@ def wideband_noise(mission: Mission, geometry: Any = None) -> list[SpreadPhase]:
     return found
 
 
-def noise(mission: Mission, random: Sequence[RandomError], model: str, geometry: Any = None) -> list[SpreadPhase]:
+def noise(analysis: "Analysis", model: str) -> list[SpreadPhase]:
     """List what spreads beyond the cubic: wideband vibration, noise of sensors, phase noise, links."""
-    found = wideband_noise(mission, geometry)
-    for one in random:
+    found = wideband_noise(analysis.mission, analysis.geometry)
+    for one in analysis.random:
         if one.declared is not None and (one.subject.kind != "imu" or one.subject.axis in NOISE):
             found.append(SpreadPhase(one.id, one.owner, (one.effect(model).spread * one.declared) ** 2))
     return found
 
 
-def held_by_islr(
-    mission: Mission, random: Sequence[RandomError], echoes: Sequence[Tone], model: str, geometry: Any = None
-) -> list[SpreadPhase]:
-    """List noise, and the tones that no other requirement takes; not a number where a case does not have one."""
-    found = noise(mission, random, model, geometry)
+def powers_held_by_islr(analysis: "Analysis", owners: Iterable[str], model: str) -> list[list[SpreadPhase]]:
+    """List the phases that count against ISLR, of each owner; against the mission's all do.
+
+    They are noise, the tones that no other requirement takes, and the power of the cubic where nothing else holds it:
+    that of an owner at one sigma, none where it is too small to show, or where an error has no image. A variance is
+    not a number where a case does not have the phase.
+    """
+    mission, split, together = analysis.mission, analysis.allocation.islr, analysis.together(model)
+    spreads = noise(analysis, model)
     if mission.requirements.pslr is None:
-        for one in echoes:
+        for one in analysis.tones:
             variance = np.where(one.is_there, one.phase**2 / 2, math.nan)[()]
-            found.append(SpreadPhase(one.subject.id, one.subject.owner, variance))
+            spreads.append(SpreadPhase(one.subject.id, one.subject.owner, variance))
+    found = []
+    for owner in owners:
+        powers = [one for one in spreads if split.includes(one.owner, owner)]
+        if mission.requirements.cubic_phase_error is None:
+            phase = together.cubic_without_coverage(split, owner)
+            shows = (phase > SMALLEST_CUBIC_RAD) & np.isfinite(phase)
+            if shows.any():
+                variance = np.where(shows, CUBIC_POWER * phase**2, math.nan)
+                powers.append(SpreadPhase(subject("mission", CUBIC).id, "mission", variance))
+        found.append(powers)
     return found
 
 
-def spread_powers(
-    mission: Mission, found: Sequence[SpreadPhase], split: Split, owner: str, cubic: Callable[[str], Any]
-) -> list[SpreadPhase]:
-    """Those of an owner, for the mission all, and the power of the cubic where nothing else holds it.
-
-    `cubic` is the cubic phase of an owner at one sigma [rad]; there is none where it is too small to show, or where
-    an error has no image.
-    """
-    powers = [one for one in found if split.includes(one.owner, owner)]
-    if mission.requirements.cubic_phase_error is None:
-        phase = np.asarray(cubic(owner))
-        shows = (phase > SMALLEST_CUBIC_RAD) & np.isfinite(phase)
-        if shows.any():
-            variance = np.where(shows, CUBIC_POWER * phase**2, math.nan)[()]
-            powers.append(SpreadPhase(subject("mission", CUBIC).id, "mission", variance))
-    return powers
-
-
-def declared_powers(analysis: Analysis, allocation: Allocation, owner: str, model: str) -> list[SpreadPhase]:
-    """List the phases of an owner that count against ISLR, by what one mission declares."""
-    mission = analysis.mission
-    found = held_by_islr(mission, analysis.random, tones(mission), model)
-    return spread_powers(mission, found, allocation.islr, owner, cubic_at_one_sigma(analysis, allocation, model))
-
-
-def cubic_at_one_sigma(analysis: Analysis, allocation: Allocation, model: str) -> Callable[[str], Any]:
-    """Cubic phase of each owner by a model, without coverage factor. [rad]"""
-    together = analysis.together(model)
-    return lambda owner: together.cubic_without_coverage(allocation.islr, owner)[0]
+def declared_powers(analysis: "Analysis", owner: str, model: str) -> list[SpreadPhase]:
+    """List the phases of an owner that count against ISLR, of one case, in plain numbers."""
+    (powers,) = powers_held_by_islr(analysis, [owner], model)
+    return [one._replace(variance=float(np.ravel(one.variance)[0])) for one in powers]

@@ -1,25 +1,22 @@
-"""Sums of the declared errors: phases of platforms and mission, cubic phase, location, autofocus pull-in.
-
-Rows are judged in arrays over cases, of a sweep or of a check, which is one case; a check then puts them into words.
-"""
+"""Declared errors together: phases of platforms and mission, cubic phase, location, autofocus pull-in, scene edge."""
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget import phrases
-from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.analysis.spread import SpreadPhase, Tone
+from bisar_budget.analysis.scene import SceneEdge, SceneEdges
+from bisar_budget.analysis.spread import noise
 from bisar_budget.analysis.together import Together, cubics, quadratics
-from bisar_budget.budget.judged_rows import BOUND, CODE, Floats, Judged, Judging
-from bisar_budget.budget.judgement import number, worded
+from bisar_budget.budget.judged_requirements import TAKEN_BY, EffectTotal
+from bisar_budget.budget.judged_rows import BOUND, CODE, Floats, Judged, Judging, number, worded
 from bisar_budget.budget.pull_in import caps, needed_sentence
-from bisar_budget.budget.requirement_states import TAKEN_BY, EffectTotal
 from bisar_budget.effects.combined import (
     Phases,
     combined,
@@ -39,47 +36,17 @@ _OTHER = {"published": "full", "full": "published"}
 Truths = NDArray[np.bool_]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Aggregate:
-    """One row of errors together in many cases; `is_there` are the cases that have it.
-
-    `rule` combines the `phases`; those of displacements are none. `by_other` is the sum by the model that does not
-    gate, `of_all` the root-sum-square where the row is the largest part; where either breaks the limit, a pass is a
-    warning.
-    """
-
-    judged: Judged
-    rule: str
-    phases: Phases
-    by_other: Any
-    of_all: Any = math.nan
-    is_over_by_other: Any = False
-    is_over_of_all: Any = False
-    without_autofocus: Any = 0.0
-    is_there: Any = True
-
-
 class Aggregates:
-    """Errors together in many cases; numbers of the mission and its allocation may be arrays (cases,).
+    """Errors together in many cases."""
 
-    Parameters
-    ----------
-    judging : Judging
-        Of the cases.
-    together : mapping of str to Together
-        Declared errors by each model.
-    allocation : Allocation
-        Shares of the quadratic phase, and the gain of autofocus.
-    """
-
-    def __init__(self, judging: Judging, together: Mapping[str, Together], allocation: Allocation) -> None:
-        self.judging, self.together, self.allocation, self.array = judging, together, allocation, judging.array
-        self.errors = together["full"].errors
+    def __init__(self, judging: Judging, analysis: Analysis) -> None:
+        self.judging, self.together, self.array = judging, analysis.together, judging.array
+        self.allocation, self.errors = analysis.allocation, analysis.errors
         self.needs, self.combine = self.errors.mission.requirements, self.errors.mission.allocation.combine
 
-    def rows(self, model: str) -> Iterator[Aggregate]:
+    def rows(self, model: str) -> Iterator["Aggregate"]:
         """Every row by one model, which the other may doubt, in the order of the contract."""
-        mine, theirs = self.together[model], self.together[_OTHER[model]]
+        mine, theirs = self.together(model), self.together(_OTHER[model])
         if self.combine == "each":
             yield self._largest_quadratic(mine, theirs)
         else:
@@ -91,10 +58,11 @@ class Aggregates:
         if self.allocation.n_pull is not None:
             yield self._pull_in(mine, theirs)
 
-    def _quadratic(self, mine: Together, theirs: Together, owner: str) -> Aggregate:
+    def _quadratic(self, mine: Together, theirs: Together, owner: str) -> "Aggregate":
         split, limit, gain = self.allocation.qpe, self.allocation.qpe_limit(owner), self.allocation.autofocus_gain
         members = mine.owed(split, owner)
         size, by_other = mine.combined(quadratics(members)), theirs.combined(quadratics(theirs.owed(split, owner)))
+        published, full = (size, by_other) if mine.model == "published" else (by_other, size)
         return self._row(
             subject(owner, QUADRATIC),
             self._is_declared(members),
@@ -104,10 +72,11 @@ class Aggregates:
             theirs,
             by_other,
             without_autofocus=size / limit,
-            qpe_published_rad=size if mine.model == "published" else by_other,
+            qpe_published_rad=published,
+            qpe_full_rad=np.where(np.isfinite(full), full, math.nan),
         )
 
-    def _largest_quadratic(self, mine: Together, theirs: Together) -> Aggregate:
+    def _largest_quadratic(self, mine: Together, theirs: Together) -> "Aggregate":
         """A warning where each error stands alone and all together exceed the total; else there is no row."""
         what, phases = subject("mission", QUADRATIC), quadratics(mine.phases)
         size, of_all = mine.combined(phases), mine.combined(phases, "rss")
@@ -117,7 +86,7 @@ class Aggregates:
         nothing = self.judging.row(what, None, None)
         return replace(found, judged=found.judged.where(~is_there, nothing), is_there=is_there)
 
-    def _cubic(self, mine: Together, theirs: Together) -> Aggregate:
+    def _cubic(self, mine: Together, theirs: Together) -> "Aggregate":
         phases, limit = cubics(mine.phases), self.needs.cubic_phase_error
         size = mine.combined(phases)
         return self._row(
@@ -133,7 +102,7 @@ class Aggregates:
             cubic_rad=size,
         )
 
-    def _location(self, mine: Together, theirs: Together) -> Aggregate:
+    def _location(self, mine: Together, theirs: Together) -> "Aggregate":
         limit = self.needs.location_error
         return self._row(
             subject("mission", LOCATION),
@@ -148,7 +117,7 @@ class Aggregates:
             metric=LOCATION,
         )
 
-    def _pull_in(self, mine: Together, theirs: Together) -> Aggregate:
+    def _pull_in(self, mine: Together, theirs: Together) -> "Aggregate":
         phases, pull_in = quadratics(mine.phases), math.pi * np.asarray(self.allocation.n_pull)
         return self._row(
             subject("mission", PULL_IN),
@@ -183,15 +152,18 @@ class Aggregates:
         without_autofocus: Any = 0.0,
         never_fails: bool = False,
         **fields: Any,
-    ) -> Aggregate:
+    ) -> "Aggregate":
         """Judge what errors add up to; a sum without a finite value fails: one of them has no image at all.
 
         `without_value` is its status there, where it is another one.
         """
         is_over_by_other: Any = False
         is_over_of_all: Any = False
+        by_model: dict[str, Any] = {}
         if limit is not None:
             limit = self.array(limit)
+            models = ("published", "full") if what.kind == QUADRATIC else ("published",)
+            by_model = {f"allowable_{model}": limit for model in models}
             is_over_by_other = self.errors.doubts(theirs.model, by_other > limit * BOUND)
             is_over_of_all = of_all > limit * BOUND
         judged = self.judging.row(
@@ -202,10 +174,10 @@ class Aggregates:
             without_autofocus=without_autofocus,
             is_info=limit is None,
             never_fails=never_fails,
-        )._replace(**fields)
+        )._replace(**fields, **by_model)
         has_value = is_declared & np.isfinite(size)
         if not has_value.all():
-            nothing = self.judging.row(what, None, limit, never_fails=never_fails)
+            nothing = self.judging.row(what, None, limit)._replace(**by_model)
             status = CODE[without_value or ("fail" if limit is not None else "not_declared")]
             nothing = nothing._replace(status=np.where(is_declared, status, nothing.status))
             judged = judged.where(~has_value, nothing)
@@ -213,23 +185,77 @@ class Aggregates:
         return Aggregate(judged, rule, phases, by_other, of_all, is_over_by_other, is_over_of_all, without_autofocus)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Aggregate:
+    """One row of errors together, by a model, in many cases; `is_there` are the cases that have it.
+
+    `rule` combines the `phases`; those of displacements are none. `by_other` is the sum by the model that does not
+    gate, `of_all` the root-sum-square where the row is the largest part; where either breaks the limit, a pass is a
+    warning.
+    """
+
+    judged: Judged
+    rule: str
+    phases: Phases
+    by_other: Any
+    of_all: Any = math.nan
+    is_over_by_other: Any = False
+    is_over_of_all: Any = False
+    without_autofocus: Any = 0.0
+    is_there: Any = True
+
+    def in_words(self, analysis: Analysis, model: str) -> Row:
+        """The row of the only case, by the model that judges it."""
+        mission, allocation, what = analysis.mission, analysis.allocation, self.judged.subject
+        groups, combine, owner = analysis.groups, mission.allocation.combine, what.owner
+        size, limit = number(self.judged.declared), number(self.judged.allowable)
+        said, over, notes = _said_of(what, self.rule), NOTHING, tuple[Note, ...]()
+        if combine != "each" and what.kind != PULL_IN:
+            notes = correlation_notes(combine, [group for group in groups if owner in (group.platform, "mission")])
+        if size is None:
+            over = phrases.no_ground_point()
+        elif limit is not None and size > limit * BOUND:
+            over = phrases.aggregate_over(said.what, size, limit, said.unit, *_largest(analysis, model, self))
+        if what.kind == QUADRATIC:
+            if over and size is not None and combine != "each":
+                over = over.then(needed_sentence(allocation.n_pull_needed(size, owner), caps(mission)))
+        elif over and size is not None and what.kind != LOCATION:
+            over = over.then(phrases.no_gain() if what.kind == CUBIC else phrases.one_total())
+        doubt = over if what.kind == PULL_IN else NOTHING
+        return worded(
+            mission,
+            self.judged,
+            unit=said.unit,
+            path=said.path,
+            equation=said.equation[model != "published"],
+            over=over,
+            doubt=doubt or _doubt(_OTHER[model], self, said, limit),
+            no_limit=phrases.no_requirement(),
+            not_evaluated=analysis.errors.degeneracy(model) or phrases.no_image_to_place(),
+            info=phrases.no_requirement(),
+            without_autofocus=float(np.ravel(self.without_autofocus)[0]),
+            remarks=notes,
+        )
+
+
 # ---------------------------------------------------------------------- totals of effects
-def effect_parts(together: Together, spreads: Sequence[SpreadPhase], tones: Sequence[Tone]) -> dict[str, Phases]:
+def effect_parts(analysis: Analysis, model: str) -> dict[str, Phases]:
     """Cubic phase, rms phase that spreads and peak phase of tones of each declared error by a model. [rad]"""
-    array = together.errors.array
+    array, together = analysis.errors.array, analysis.together(model)
     return {
         "cubic": cubics(together.phases),
-        "spread": [(one.row_id, np.sqrt(np.nan_to_num(array(one.variance)))) for one in spreads],
-        "tone": [(one.subject.id, array(one.is_there * one.phase)) for one in tones],
+        "spread": [(one.row_id, np.sqrt(np.nan_to_num(array(one.variance)))) for one in noise(analysis, model)],
+        "tone": [(one.subject.id, array(one.is_there * one.phase)) for one in analysis.tones],
     }
 
 
-def effect_totals(gates: Sequence[tuple[Together, Mapping[str, Phases]]]) -> list[EffectTotal]:
-    """Add up each effect of all declared errors, of the models that gate; by several the larger of each."""
+def effect_totals(analysis: Analysis) -> list[EffectTotal]:
+    """Add up each effect of all declared errors; by several models that gate the larger of each."""
     found: dict[str, dict[str, Floats]] = {kind: {} for kind in TAKEN_BY}
     totals: dict[str, Floats] = {}
-    for together, parts in gates:
-        for kind, of_kind in parts.items():
+    for model in analysis.gates:
+        together = analysis.together(model)
+        for kind, of_kind in effect_parts(analysis, model).items():
             total = together.combined(of_kind, together.rule_of_all)
             totals[kind] = np.fmax(totals.get(kind, 0.0), total)
             for row_id, size in of_kind:
@@ -281,55 +307,6 @@ _EQUATIONS = {"sum": "sum of the rows", "rss": "root-sum-square of the rows", "e
 _PATHS: dict[str, KeyPath] = {"mission": ("platforms",), "clock": ("timing_error",)}
 
 
-def aggregate_rows(analysis: Analysis, model: str) -> Iterator[Row]:
-    """Rows of one mission's errors together, under its rule of combination, by one of the two models."""
-    judging = Judging(1, analysis.mission.allocation.warn_above)
-    together = {name: analysis.together(name) for name in _OTHER}
-    with np.errstate(all="ignore"):
-        rows = list(Aggregates(judging, together, analysis.allocation).rows(model))
-    return (_in_words(analysis, model, one) for one in rows if np.all(one.is_there))
-
-
-def _in_words(analysis: Analysis, model: str, one: Aggregate) -> Row:
-    mission, allocation, what = analysis.mission, analysis.allocation, one.judged.subject
-    groups, combine, owner = analysis.groups, mission.allocation.combine, what.owner
-    size, limit = number(one.judged.declared), number(one.judged.allowable)
-    is_published = model == "published"
-    said, over, notes, others = _said_of(what, one.rule), NOTHING, tuple[Note, ...](), dict[str, Any]()
-    if combine != "each" and what.kind != PULL_IN:
-        notes = correlation_notes(combine, [group for group in groups if owner in (group.platform, "mission")])
-    if size is None:
-        over = phrases.no_ground_point()
-    elif limit is not None and size > limit * BOUND:
-        over = phrases.aggregate_over(said.what, size, limit, said.unit, *_largest(analysis, model, one))
-    if what.kind == QUADRATIC:
-        others["limits"] = (limit, limit)
-        if combine != "each" and size is not None:
-            full = one.by_other if is_published else one.judged.declared
-            others["qpe_published_rad"] = number(one.judged.qpe_published_rad)
-            others["qpe_full_rad"] = number(full) if np.isfinite(full).all() else None
-            if over:
-                over = over.then(needed_sentence(allocation.n_pull_needed(size, owner), caps(mission)))
-    elif over and size is not None and what.kind != LOCATION:
-        over = over.then(phrases.no_gain() if what.kind == CUBIC else phrases.one_total())
-    doubt = over if one.judged.never_fails else NOTHING
-    return worded(
-        mission,
-        one.judged,
-        unit=said.unit,
-        path=said.path,
-        equation=said.equation[not is_published],
-        over=over,
-        doubt=doubt or _doubt(_OTHER[model], one, said, limit),
-        no_limit=phrases.no_requirement(),
-        not_evaluated=analysis.errors.degeneracy(model) or phrases.no_image_to_place(),
-        info=phrases.no_requirement(),
-        without_autofocus=float(np.ravel(one.without_autofocus)[0]),
-        remarks=notes,
-        **{"limits": (limit, None)} | others,
-    )
-
-
 def _said_of(what: Subject, rule: str) -> _Words:
     if what.kind == CUBIC:
         return _Words("cubic phase", "rad", ("requirements", CUBIC), ("Table I, cubic column", "full model"))
@@ -364,3 +341,66 @@ def _doubt(other: str, one: Aggregate, said: _Words, limit: float | None) -> Not
         return NOTHING
     phrase = phrases.other_model_is_beyond if one.judged.subject.kind == PULL_IN else phrases.other_model_fails
     return phrase(other, float(one.by_other[0]), limit, said.unit)
+
+
+# ---------------------------------------------------------------------- the scene's edge
+@dataclass(frozen=True, eq=False)
+class JudgedScene:
+    """The edges of scenes in many cases: differences that they add, none without a declared error."""
+
+    analysis: Analysis
+    edges: SceneEdges | None
+
+    @cached_property
+    def edge(self) -> SceneEdge | None:
+        """The edge of the only case, with how far one autofocus correction serves."""
+        analysis, edges = self.analysis, self.edges
+        return None if edges is None else SceneEdge.of(edges, analysis.geometry, analysis.allocation.qpe_total)
+
+    def row(self, judging: Judging, model: str) -> "SceneRow":
+        """Judge the edges by a model; to the published one an error is the same all over the scene."""
+        what, edges = subject("mission", "spatial_variance"), self.edges
+        total = judging.array(self.analysis.allocation.qpe_total)
+        allowable = None if model == "published" else total
+        nothing = judging.row(what, None, allowable)._replace(allowable_full=total)
+        if edges is None:
+            return SceneRow(nothing, self)
+        doubt = edges.has_doubt
+        if model == "published":
+            doubt = doubt | (edges.difference > total * BOUND)
+        judged = judging.row(what, edges.difference, allowable, doubt=doubt)._replace(
+            qpe_published_rad=np.zeros(judging.cases), qpe_full_rad=edges.difference, allowable_full=total
+        )
+        nothing.status[:] = CODE["not_evaluated"]
+        return SceneRow(judged.where(np.isinf(edges.difference), nothing), self)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SceneRow:
+    """The row of the scene's edge in many cases."""
+
+    judged: Judged
+    scene: JudgedScene
+    is_there: bool = True
+
+    def in_words(self, analysis: Analysis, model: str) -> Row:
+        """The row of the only case, by the model that judges it."""
+        edge, total = self.scene.edge, analysis.allocation.qpe_total
+        doubt, degeneracy, notes = NOTHING, NOTHING, tuple[Note, ...]()
+        if edge is not None:
+            doubt, degeneracy = edge.doubt, edge.degeneracy
+            notes = () if degeneracy else edge.notes(total)
+            if model == "published" and edge.difference > total * BOUND:
+                doubt = phrases.other_model_fails("full", edge.difference, total, "rad")
+        return worded(
+            analysis.mission,
+            self.judged,
+            unit="rad",
+            path=("scene", "radius"),
+            equation="full model",
+            over=phrases.edge_over(),
+            doubt=doubt,
+            no_limit=phrases.same_all_over_the_scene(),
+            not_evaluated=degeneracy,
+            remarks=notes,
+        )

@@ -5,21 +5,14 @@ from collections.abc import Iterator, Sequence
 from datetime import date
 
 from bisar_budget import file_warnings, phrases
-from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.budget.aggregates import aggregate_rows
-from bisar_budget.budget.collection_notes import collection_notes
-from bisar_budget.budget.error_rows import error_rows
-from bisar_budget.budget.input_doubt import InputDoubt, input_doubts, with_input_doubts
-from bisar_budget.budget.model_doubt import model_doubt
-from bisar_budget.budget.orbit import straight_orbits
+from bisar_budget.budget.doubts import InputDoubt, collection_notes, input_doubts, model_doubt, straight_orbits
+from bisar_budget.budget.judged_mission import judged_mission
+from bisar_budget.budget.judged_requirements import declared_kinds
 from bisar_budget.budget.overrides import NOTHING_OUTSIDE, Outside, overrides
 from bisar_budget.budget.pull_in import pull_in_caps
-from bisar_budget.budget.random_rows import islr_rows, random_rows
-from bisar_budget.budget.required import declared_kinds, with_required
-from bisar_budget.budget.requirement_table import judged_requirements
-from bisar_budget.budget.scene_row import CheckedScene
-from bisar_budget.budget.vibration_rows import pslr_row, spur_rows, vibration_rows
+from bisar_budget.budget.requirement_table import negligible_effects, requirements_in_words, rows_in_words
+from bisar_budget.budget.waivers import apply_waivers
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.combined import unused_correlations
 from bisar_budget.effects.effect import PLATFORMS, override_notes
@@ -27,21 +20,14 @@ from bisar_budget.effects.oscillators import POOR_FIT
 from bisar_budget.faults import changes_words
 from bisar_budget.findings.mission import FileWarning, MissionFindings, Resolution
 from bisar_budget.findings.row import Row
-from bisar_budget.findings.status import RANK
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import FlownPath
 from bisar_budget.phrases import Note
 from bisar_budget.units import format_quantity
 
 
-def check_mission(
-    mission: Mission,
-    today: date,
-    *,
-    is_bare: bool = False,
-    outside: Outside = NOTHING_OUTSIDE,
-) -> MissionFindings:
-    """Check one mission.
+def check_mission(mission: Mission, today: date, *, outside: Outside = NOTHING_OUTSIDE) -> MissionFindings:
+    """Check one mission: judge it, as a single case, and put what is found into words.
 
     Parameters
     ----------
@@ -49,9 +35,6 @@ def check_mission(
         As loaded.
     today : date
         Day on which waivers are judged, UTC.
-    is_bare : bool
-        Leave out what decides nothing and is searched for: how far one autofocus correction serves the scene, and
-        whether the published model holds.
     outside : Outside
         What from outside the file bears on the verdict, besides what the mission itself carries.
 
@@ -60,17 +43,10 @@ def check_mission(
     MissionFindings
         Rows in the order of the contract, declared or not.
     """
-    analysis = Analysis(mission, is_bare)
-    gating = mission.gating_model
-    scene = None if mission.scene.radius is None else CheckedScene(analysis)
-    if gating == "strictest":
-        checked = stricter(_checked(analysis, "published", scene), _checked(analysis, "full", scene))
-    else:
-        checked = _checked(analysis, gating, scene)
-    doubts = input_doubts(mission)
-    asked = with_input_doubts(with_required(checked, mission), doubts, mission)
-    verdict = judged_requirements(asked, analysis, analysis.allocation, doubts, today)
-    rows = verdict.rows
+    analysis = Analysis(mission)
+    judged = judged_mission(analysis, today, is_whole=True)
+    waived = apply_waivers(list(rows_in_words(judged)), mission, today)
+    rows, requirements = waived.rows, requirements_in_words(judged, waived)
     geometry = analysis.geometry
     resolution = Resolution(
         range=geometry.range_resolution(mission.radar.bandwidth, SPEED_OF_LIGHT),
@@ -80,7 +56,7 @@ def check_mission(
         analysis=analysis,
         file=mission.file,
         name=mission.name,
-        model=gating,
+        model=mission.gating_model,
         combine=mission.allocation.combine,
         coverage_factor=mission.allocation.coverage_factor,
         wavelength=mission.radar.wavelength,
@@ -90,67 +66,34 @@ def check_mission(
         resolution=resolution,
         allocation=analysis.allocation,
         rows=tuple(rows),
-        requirements=verdict.requirements,
+        requirements=requirements,
         kinds=declared_kinds(mission),
         overrides=overrides(mission, outside, today),
         warnings=(
             *_changed(mission),
             *_unknown_requirement_ids(mission, rows),
             *_overruled_model(mission),
-            *verdict.warnings,
+            *waived.unused(requirements),
             *_unused_correlations(mission),
             *straight_orbits(mission),
-            *_doubtful_paths(mission, doubts),
+            *_doubtful_paths(mission, input_doubts(mission)),
             *_of_instruments(analysis),
             *pull_in_caps(mission, resolution),
             *_nothing_declared(rows),
         ),
         place=_place(mission),
         paths=tuple((name, path) for name, path in _paths(mission) if path.source),
-        scene=None if scene is None else scene.edge,
-        notes=(*verdict.notes, *collection_notes(analysis), *_unused_keys(mission), *_overridden(mission)),
+        scene=None if judged.scene is None else judged.scene.edge,
+        notes=(
+            *negligible_effects(judged),
+            *collection_notes(analysis),
+            *_unused_keys(mission),
+            *_overridden(mission),
+        ),
         document=mission.document,
         changes=mission.changes,
         model_doubt=model_doubt(analysis, rows),
     )
-
-
-def _checked(analysis: Analysis, gating: str, scene: CheckedScene | None) -> list[Row]:
-    """Rows of one complete check by one model, before waivers."""
-    mission = analysis.mission
-    allocation = analysis.allocation
-    rows = [
-        *error_rows(analysis, gating, allocation),
-        *vibration_rows(mission, allocation, gating),
-        *_instrument_rows(analysis, gating, allocation),
-        *aggregate_rows(analysis, gating),
-    ]
-    if scene is not None:
-        rows.append(scene.row(gating))
-    return [row._replace(model=gating) for row in rows]
-
-
-def _instrument_rows(analysis: Analysis, gating: str, allocation: Allocation) -> list[Row]:
-    """Rows of sensors and clocks, and of all that echoes and spreads together."""
-    return [
-        *random_rows(analysis, gating, allocation),
-        *spur_rows(analysis.mission, allocation, gating),
-        *pslr_row(analysis.mission, gating),
-        *islr_rows(analysis, gating, allocation),
-    ]
-
-
-def stricter(published: Sequence[Row], full: Sequence[Row]) -> list[Row]:
-    """Rows of two complete checks: of each the one with the stricter verdict, then the higher utilization."""
-    by_id = {row.id: row for row in published}
-    rows = [max((row, by_id.pop(row.id, row)), key=_strictness) for row in full]
-    rows += by_id.values()  # an aggregate that only one of them has
-    return rows
-
-
-def _strictness(row: Row) -> tuple[int, float, float]:
-    allowable = math.inf if row.allowable is None else row.allowable
-    return (-RANK[row.status], row.utilization or 0.0, -allowable)
 
 
 def _of_instruments(analysis: Analysis) -> Iterator[FileWarning]:

@@ -1,7 +1,4 @@
-"""One row for each error: the largest size that every requirement allows, and what is declared against it.
-
-Rows are judged in arrays over cases, of a sweep or of a check, which is one case; a check then puts them into words.
-"""
+"""One row for each error: the largest size that every requirement allows, and what is declared against it."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -11,30 +8,18 @@ from typing import Any
 import numpy as np
 
 from bisar_budget import phrases
-from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis, Model
-from bisar_budget.budget.judged_rows import BOUND, CODE, REQUIREMENTS, Floats, Judged, Judging
-from bisar_budget.budget.judgement import number, worded
+from bisar_budget.budget.judged_rows import BOUND, CODE, REQUIREMENTS, Floats, Judged, Judging, number, worded
 from bisar_budget.budget.pull_in import caps, needed_sentence
 from bisar_budget.constants import UTILIZATION_TOLERANCE
-from bisar_budget.effects.declared import CUBIC, END_OF_IMAGE, HELD, LOCATION, MODELS, QUADRATIC, DeclaredErrors, Does
+from bisar_budget.effects.declared import CUBIC, END_OF_IMAGE, HELD, LOCATION, QUADRATIC, Does
 from bisar_budget.effects.effect import ErrorSource
 from bisar_budget.effects.models import Declared
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import FRAME_AXES
 from bisar_budget.phrases import NOTHING, Note
 
-OWNERS = ("transmitter", "receiver", "clock", "mission")
 _BINDING = np.array([REQUIREMENTS.index(name) for name in (*HELD, END_OF_IMAGE)] + [-1], dtype=np.int8)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class ErrorRow:
-    """One error as judged in many cases; `quadratic` is the size that its quadratic phase allows, by each model."""
-
-    judged: Judged
-    source: ErrorSource
-    quadratic: Mapping[str, Floats]
 
 
 class ErrorRows:
@@ -44,39 +29,30 @@ class ErrorRows:
     ----------
     judging : Judging
         Of the cases.
-    errors : DeclaredErrors
+    analysis : Analysis
         Of the cases.
     limits : mapping of str to (cases,)
         Quadratic phase that each owner is held to, gain of autofocus included. [rad]
-    gain : (cases,)
-        Of autofocus.
-    is_whole : bool
-        Search for what the quadratic phase alone allows too, by both models.
     """
 
-    def __init__(
-        self, judging: Judging, errors: DeclaredErrors, limits: Mapping[str, Floats], gain: Floats, *, is_whole: bool
-    ) -> None:
-        self.judging, self.errors, self.limits, self.gain, self.is_whole = judging, errors, limits, gain, is_whole
+    def __init__(self, judging: Judging, analysis: Analysis, limits: Mapping[str, Floats]) -> None:
+        self.judging, self.errors, self.limits = judging, analysis.errors, limits
+        self.gain = judging.array(analysis.allocation.autofocus_gain)
 
-    def rows(self, gating: str, other: str) -> Iterator[ErrorRow]:
+    def rows(self, gating: str, other: str) -> Iterator["ErrorRow"]:
         """Rows by one model, which the other may doubt."""
         for place in range(len(self.errors.blocks)):
             yield from self._of_block(place, gating, other)
 
-    def _of_block(self, place: int, gating: str, other: str) -> Iterator[ErrorRow]:
-        errors, block = self.errors, self.errors.blocks[place]
+    def _of_block(self, place: int, gating: str, other: str) -> Iterator["ErrorRow"]:
+        errors, block, is_whole = self.errors, self.errors.blocks[place], self.judging.is_whole
         needs, sources = errors.mission.requirements, block.sources
         limit = np.array([self.limits[source.owner] for source in sources])
         held = (limit, needs.cubic_phase_error, needs.location_error)
         # Searches start from what declared errors are known to do.
         mine, theirs = errors.of_block(gating, place), errors.of_block(other, place)
-        allowed = block.allowed(gating, held, is_whole=self.is_whole)
-        quadratic: dict[str, Floats] = {}
-        if self.is_whole:
-            by_other = block.allowed(other, (limit, None, None), is_whole=True)
-            quadratic = {gating: allowed.quadratic, other: by_other.quadratic}
-        published = mine if gating == "published" else theirs
+        allowed = block.allowed(gating, held, is_whole=is_whole)
+        published, full = (mine, theirs) if gating == "published" else (theirs, mine)
         is_again = np.array([[not source.is_independent] for source in sources])
         judged = self.judging.row(
             sources[0].subject,
@@ -92,12 +68,20 @@ class ErrorRows:
             cubic_rad=np.where(np.isfinite(mine.cubic), np.abs(mine.cubic), math.nan),
             quadratic_use=np.abs(mine.qpe) / limit,
         )
+        if is_whole:
+            by_other = block.allowed(other, (limit, None, None), is_whole=True)
+            quadratic = {gating: allowed.quadratic, other: by_other.quadratic}
+            judged = judged._replace(
+                allowable_published=quadratic["published"],
+                allowable_full=quadratic["full"],
+                qpe_full_rad=np.where(np.isfinite(full.qpe), full.qpe, math.nan),
+                is_of_ranges=True,
+            )
         is_last = gating == "full" or errors.mission.gating_model == "published"
         if is_last and len(errors.blocks) > 1:
             block.forget()
         for row, source in enumerate(sources):
-            of_one = {name: sizes[row] for name, sizes in quadratic.items()}
-            yield ErrorRow(judged.at(row, source.subject), source, of_one)
+            yield ErrorRow(judged.at(row, source.subject), source, self.limits[source.owner])
 
 
 def _is_over(does: Does, held: tuple[Floats, float | None, float | None], is_motion: Any) -> Any:
@@ -111,43 +95,38 @@ def _is_over(does: Does, held: tuple[Floats, float | None, float | None], is_mot
     return found
 
 
-# ---------------------------------------------------------------------- in words
-def error_rows(analysis: Analysis, gating: str, allocation: Allocation) -> Iterator[Row]:
-    """Rows of every error of one mission, declared or not, in the order of the contract, by one of the two models."""
-    mission, errors = analysis.mission, analysis.errors
-    gain, judging = allocation.autofocus_gain, Judging(1, mission.allocation.warn_above)
-    limits = {owner: judging.array(allocation.qpe_limit(owner) * gain) for owner in OWNERS}
-    model, other = analysis.models(gating)
-    with np.errstate(all="ignore"):
-        rows = list(ErrorRows(judging, errors, limits, judging.array(gain), is_whole=True).rows(gating, other.name))
-    for one in rows:
-        source, row = one.source, one.judged
-        status, limit = row.status[0], number(limits[source.owner]) or 0.0
+@dataclass(frozen=True, slots=True, eq=False)
+class ErrorRow:
+    """One error as judged in many cases; `limit` is the quadratic phase that it may have. [rad]"""
+
+    judged: Judged
+    source: ErrorSource
+    limit: Floats
+    is_there: bool = True
+
+    def in_words(self, analysis: Analysis, gating: str) -> Row:
+        """The row of the only case, by the model that judges it."""
+        mission, row, source, allocation = analysis.mission, self.judged, self.source, analysis.allocation
+        model, other = analysis.models(gating)
+        gain, status, limit = allocation.autofocus_gain, row.status[0], number(self.limit) or 0.0
         over = doubt = info = NOTHING
         notes, fields = source.notes, dict[str, Any]()
         qpe = 0.0
         if source.declared is not None:
-            mine, theirs = analysis.does(model, source), analysis.does(other, source)
-            by_full = mine if gating == "full" else theirs
-            qpe, qpe_full = abs(mine.qpe), by_full.qpe if math.isfinite(by_full.qpe) else None
-            fields = {
-                "qpe_published_rad": number(row.qpe_published_rad),
-                "qpe_full_rad": qpe_full,
-                "qpe_exact_rad": qpe_full,
-                "displacement_m": mine.displacement,
-            }
+            mine = analysis.does(model, source)
+            qpe = abs(mine.qpe)
+            fields = {"displacement_m": mine.displacement}
             if mine.displacement is None and source.is_motion and model.plane.degeneracy:
                 notes = (*notes, model.plane.degeneracy)
             if status == CODE["fail"]:
-                over = _over(analysis, model, row, source, mine, limit, allocation)
+                over = _over(analysis, model, row, source, mine, limit)
             elif status == CODE["warn"]:
-                doubt = _doubt(analysis, other, source, theirs, limit)
+                doubt = _doubt(analysis, other, source, limit)
             elif not source.is_independent:
                 info = _stated_elsewhere(analysis, source)
             else:
                 info = phrases.aggregate_decides(mission.allocation.combine)
-        published, full = (number(one.quadratic[name]) for name in MODELS)
-        yield worded(
+        return worded(
             mission,
             row,
             unit=source.unit,
@@ -158,32 +137,18 @@ def error_rows(analysis: Analysis, gating: str, allocation: Allocation) -> Itera
             no_limit=model.no_limit(source),
             info=info,
             without_autofocus=qpe / (limit / gain) if gain > 1 else 0.0,
-            limits=(published, full),
             remarks=notes,
             evidence=source.evidence,
             is_independent=source.is_independent,
-            binding_requirement=_requirement(row),
-            model=gating,
+            binding_requirement=row.requirement,
             **fields,
         )
 
 
-def _requirement(row: Judged) -> str | None:
-    """The requirement that sets the allowable of the only case."""
-    return None if row.binding[0] < 0 else REQUIREMENTS[row.binding[0]]
-
-
-def _over(
-    analysis: Analysis,
-    model: Model,
-    row: Judged,
-    source: ErrorSource,
-    mine: Declared,
-    limit: float,
-    allocation: Allocation,
-) -> Note:
+# ---------------------------------------------------------------------- in words
+def _over(analysis: Analysis, model: Model, row: Judged, source: ErrorSource, mine: Declared, limit: float) -> Note:
     """Say which requirement the declared error breaks."""
-    requirements, binding = analysis.mission.requirements, _requirement(row)
+    requirements, binding = analysis.mission.requirements, row.requirement
     if binding == END_OF_IMAGE:
         return phrases.beyond_the_image(float(row.allowable[0]), source.unit)
     if binding == CUBIC and requirements.cubic_phase_error is not None:
@@ -196,12 +161,12 @@ def _over(
     over = phrases.quadratic_phase_over(qpe, limit, model.equation(source))
     if not math.isfinite(qpe):
         return over
-    return over.then(needed_sentence(allocation.n_pull_needed(qpe, source.owner), caps(analysis.mission)))
+    return over.then(needed_sentence(analysis.allocation.n_pull_needed(qpe, source.owner), caps(analysis.mission)))
 
 
-def _doubt(analysis: Analysis, other: Model, source: ErrorSource, theirs: Declared, limit: float) -> Note:
+def _doubt(analysis: Analysis, other: Model, source: ErrorSource, limit: float) -> Note:
     """Say that the model that does not gate fails the declared error, and why it thinks otherwise; else nothing."""
-    requirements = analysis.mission.requirements
+    requirements, theirs = analysis.mission.requirements, analysis.does(other, source)
     moved = 0.0 if theirs.farthest is None else math.hypot(*theirs.farthest)
     held = [(abs(theirs.qpe), limit, QUADRATIC)]
     if source.is_motion:

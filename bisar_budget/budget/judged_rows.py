@@ -1,101 +1,114 @@
 """A row of the budget in many cases at once, and how it is judged; a check is one case."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
+from enum import IntEnum
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bisar_budget import phrases
 from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.effects.declared import CUBIC, END_OF_IMAGE, LOCATION, QUADRATIC
 from bisar_budget.effects.subject import Subject
-from bisar_budget.findings.status import RANK
+from bisar_budget.faults import KeyPath
+from bisar_budget.findings.row import Row
+from bisar_budget.findings.status import RANK, STATUS
+from bisar_budget.mission.model import Mission
+from bisar_budget.phrases import NOTHING, Note
 
 Floats = NDArray[np.float64]
+Codes = NDArray[np.int8]
 
 BOUND = 1 + UTILIZATION_TOLERANCE
 CODE = {name: np.int8(rank) for name, rank in RANK.items()}
 REQUIREMENTS = (QUADRATIC, CUBIC, LOCATION, "pslr", "islr", END_OF_IMAGE)
 
+WHOLE = ("allowable_published", "allowable_full", "qpe_full_rad", "qpe_exact_rad", "islr_db")  # see `Judging`
+_IN_UNIT = ("declared", "allowable", "allowable_published", "allowable_full")  # columns in the unit of their row
+
+
+class Why(IntEnum):
+    """Why a row has another status than its own numbers give it."""
+
+    OWN = 0  # it has not
+    NOT_DECLARED_AS_REQUIRED = 1
+    INPUT_IN_DOUBT = 2
+    EFFECT_NOT_TAKEN = 3
+    NO_PLACE = 4
+    NOTHING_SPREADS = 5
+
 
 class Judged(NamedTuple):
-    """One row of many cases: codes of statuses, by the place of each in `STATUS`, and numbers; NaN where none is."""
+    """One row of many cases: codes of statuses, by the place of each in `STATUS`, and numbers; NaN where none is.
+
+    Numbers from `allowable_published` on are found where the whole of a row is asked for.
+    """
 
     subject: Subject
-    status: NDArray[np.int8]
+    status: Codes
     declared: Floats
     allowable: Floats
     utilization: Floats
-    binding: NDArray[np.int8]  # place in REQUIREMENTS of what sets the allowable, or -1: the row's metric
+    binding: Codes  # place in REQUIREMENTS of what sets the allowable, or -1: the row's metric
+    why: Codes  # of `Why`
+    model: Codes  # place in MODELS of the model that judges
     qpe_published_rad: Floats
     cubic_rad: Floats
     quadratic_use: Floats  # quadratic phase over its limit, whatever sets the allowable; NaN where it has none
-    never_fails: bool = False
+    allowable_published: Floats
+    allowable_full: Floats
+    qpe_full_rad: Floats
+    islr_db: Floats
     metric: str = QUADRATIC
-    is_of_declare: bool = False  # as `Row.is_of_declare`, in some of the cases
+    is_of_ranges: bool = False  # `qpe_full_rad` is that of exact ranges
 
     @classmethod
     def of_none(cls, what: Subject, cases: int) -> "Judged":
         """A row that is not declared in any case."""
-        status, binding = np.full(cases, RANK["not_declared"], np.int8), np.full(cases, -1, np.int8)
-        declared, allowable, utilization, qpe, cubic, use = (np.full(cases, math.nan) for _ in range(6))
-        return cls(what, status, declared, allowable, utilization, binding, qpe, cubic, use)
+        status = np.full(cases, RANK["not_declared"], np.int8)
+        return cls._with(what, status, *(np.full(cases, math.nan) for _ in range(3)))
+
+    @classmethod
+    def _with(
+        cls, what: Subject, status: Codes, declared: Floats, allowable: Floats, utilization: Floats
+    ) -> "Judged":
+        none, zero = np.full(status.shape, math.nan), np.zeros(status.shape, dtype=np.int8)
+        return cls(what, status, declared, allowable, utilization, zero - 1, zero, zero, *(none,) * 7)
+
+    def _of_columns(self, of_one: Callable[[Any], Any], names: Sequence[str]) -> "Judged":
+        columns: dict[str, Any] = {name: of_one(getattr(self, name)) for name in names}
+        return self._replace(**columns)
 
     def at(self, place: int, what: Subject) -> "Judged":
         """One of several rows that were judged together, (rows, cases), by its place."""
-        own = {name: part[place] for name, part in self._asdict().items() if isinstance(part, np.ndarray)}
-        return self._replace(subject=what, **own)
+        return self._of_columns(lambda column: column[place], _COLUMNS)._replace(subject=what)
 
     def where(self, is_other: Any, other: "Judged") -> "Judged":
         """This row, but in some cases the other."""
-        return Judged(
-            self.subject,
-            np.where(is_other, other.status, self.status),
-            np.where(is_other, other.declared, self.declared),
-            np.where(is_other, other.allowable, self.allowable),
-            np.where(is_other, other.utilization, self.utilization),
-            np.where(is_other, other.binding, self.binding),
-            np.where(is_other, other.qpe_published_rad, self.qpe_published_rad),
-            np.where(is_other, other.cubic_rad, self.cubic_rad),
-            np.where(is_other, other.quadratic_use, self.quadratic_use),
-            self.never_fails,
-            self.metric,
-            self.is_of_declare,
-        )
-
-    def apart(self, subjects: Sequence[Subject]) -> "Iterator[Judged]":
-        """The rows of a row that stands for so many, each of whose cases follow one another."""
-        cases = self.status.size // len(subjects)
-        for start, what in zip(range(0, self.status.size, cases), subjects, strict=True):
-            some = slice(start, start + cases)
-            yield Judged(
-                what,
-                self.status[some],
-                self.declared[some],
-                self.allowable[some],
-                self.utilization[some],
-                self.binding[some],
-                self.qpe_published_rad[some],
-                self.cubic_rad[some],
-                self.quadratic_use[some],
-                self.never_fails,
-                self.metric,
-                self.is_of_declare,
-            )
+        columns: dict[str, Any] = {
+            name: np.where(is_other, getattr(other, name), getattr(self, name)) for name in _COLUMNS
+        }
+        return self._replace(**columns)
 
     def in_decibel(self) -> "Judged":
         """The row with its factors of amplitude in decibel; its utilization stays that of amplitudes."""
-        with np.errstate(all="ignore"):
-            declared, allowable = (
-                np.where(column > 0, 20 * np.log10(column) + 0.0, math.nan)
-                for column in (self.declared, self.allowable)
-            )
-        return self._replace(declared=declared, allowable=allowable)
+        return self._of_columns(decibels, _IN_UNIT)
 
     def held_to(self, key: str) -> "Judged":
         """The row with the requirement that sets its allowable."""
         return self._replace(metric=key, binding=np.full_like(self.binding, REQUIREMENTS.index(key)))
+
+    @property
+    def requirement(self) -> str | None:
+        """The requirement that sets the allowable of the only case; None: its metric does."""
+        return None if self.binding[0] < 0 else REQUIREMENTS[self.binding[0]]
+
+    @property
+    def qpe_exact_rad(self) -> Floats:
+        """Quadratic phase by exact ranges, where the row is of an error that they follow. [rad]"""
+        return self.qpe_full_rad if self.is_of_ranges else np.full(self.qpe_full_rad.shape, math.nan)
 
     @property
     def margin(self) -> Floats:
@@ -106,15 +119,29 @@ class Judged(NamedTuple):
         return margin
 
 
+_COLUMNS = tuple(name for name in Judged._fields if name not in ("subject", "metric", "is_of_ranges"))
+
+
+def decibels(amplitude: Any) -> Floats:
+    """Levels of factors of amplitude; not a number where there is none. [dB]"""
+    with np.errstate(all="ignore"):
+        return np.where(amplitude > 0, 20 * np.log10(amplitude) + 0.0, math.nan)
+
+
 class Judging(NamedTuple):
-    """How many cases there are, and from which utilization on a pass of each is a warning."""
+    """How many cases there are, and from which utilization on a pass of each is a warning.
+
+    `is_whole` says whether all of a row is asked for, or what decides.
+    """
 
     cases: int
     warn_above: Any
+    is_whole: bool = False
 
     def array(self, value: Any) -> Floats:
-        """One number for each case."""
-        found: Floats = np.array(np.broadcast_to(np.asarray(value, dtype=float), (self.cases,)))
+        """One number for each case; not a number for None."""
+        number = math.nan if value is None else value
+        found: Floats = np.array(np.broadcast_to(np.asarray(number, dtype=float), (self.cases,)))
         return found
 
     def row(
@@ -136,10 +163,8 @@ class Judging(NamedTuple):
         shape = (self.cases,) if declared is None else declared.shape  # several rows judge alike: (rows, cases)
         none = np.full(shape, math.nan)
         allowed = none if allowable is None else allowable
-        unknown = np.full(shape, -1, dtype=np.int8)
         if declared is None:
-            status = np.full(shape, CODE["not_declared"])
-            return Judged(what, status, none, allowed, none, unknown, none, none, none, never_fails)
+            return Judged._with(what, np.full(shape, CODE["not_declared"]), none, allowed, none)
         is_silent = np.isnan(declared)
         with np.errstate(all="ignore"):
             use = np.where(np.isnan(allowed) & ~is_silent, 0.0, declared / allowed)
@@ -164,4 +189,65 @@ class Judging(NamedTuple):
             ],
             CODE["pass"],
         ).astype(np.int8)
-        return Judged(what, status, declared, allowed, use, unknown, none, none, none, never_fails)
+        return Judged._with(what, status, declared, allowed, use)
+
+
+# ---------------------------------------------------------------------- one case in words
+_STATUSES = tuple(STATUS)
+
+
+def worded(
+    mission: Mission,
+    row: Judged,
+    *,
+    unit: str,
+    path: KeyPath,  # of the declared value in the mission file
+    equation: str,
+    over: Note = NOTHING,  # what to say where it fails
+    doubt: Note = NOTHING,  # what makes a pass a warning
+    no_limit: Note = NOTHING,  # why there is no allowable
+    not_evaluated: Note = NOTHING,  # why a declared value cannot be judged
+    info: Note = NOTHING,  # why the row judges nothing
+    without_autofocus: float = 0.0,  # utilization without its gain
+    **others: Any,  # further fields of the row
+) -> Row:
+    """Put a row as judged, of one case, into words: they follow from its status, and decide nothing."""
+    status = _STATUSES[row.status[0]]
+    declared, allowable, utilization = (number(one) for one in (row.declared, row.allowable, row.utilization))
+    reason, remarks = no_limit if allowable is None else NOTHING, tuple[Note, ...](others.pop("remarks", ()))
+    if status == "info":
+        reason = reason or info
+    elif status == "not_evaluated":
+        reason = not_evaluated
+    elif status == "fail":
+        reason = over
+    elif status == "warn":
+        reason = doubt or phrases.above_warn_above(mission.allocation.warn_above)
+    elif status == "pass_with_autofocus":
+        reason = phrases.over_the_limit_without_autofocus(without_autofocus)
+        if utilization is not None and utilization > mission.allocation.warn_above:
+            remarks = (*remarks, phrases.near_the_limit_with_autofocus(utilization))
+    fields: dict[str, Any] = {
+        "allowable": allowable,
+        "allowable_published": number(row.allowable_published),
+        "allowable_full": number(row.allowable_full),
+        "qpe_published_rad": number(row.qpe_published_rad),
+        "qpe_full_rad": number(row.qpe_full_rad),
+        "qpe_exact_rad": number(row.qpe_exact_rad),
+        "cubic_rad": number(row.cubic_rad),
+        "islr_db": number(row.islr_db),
+        "utilization": utilization,
+        "margin": number(row.margin),
+        "line": mission.line(path),
+        "reason": reason or None,
+        "remarks": remarks,
+        "equation": equation,
+        "requirement_id": mission.requirement_ids.get(row.subject.id),
+    }
+    return Row.without_numbers(row.subject, row.metric, unit, status, declared=declared, **(fields | others))
+
+
+def number(column: Any) -> float | None:
+    """The number of the only case; None where there is none."""
+    value = column.item() if isinstance(column, np.ndarray) else float(column)
+    return None if math.isnan(value) else value

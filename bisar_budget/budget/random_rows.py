@@ -2,8 +2,6 @@
 
 Independent processes add their powers, whatever `allocation.combine` says of phases: what wideband vibration, noise
 of sensors and phase noise spread is held together to each platform's share of ISLR.
-
-Rows are judged in arrays over cases, of a sweep or of a check, which is one case; a check then puts them into words.
 """
 
 import math
@@ -20,19 +18,13 @@ from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.spread import (
     CUBIC_POWER,
     SpreadPhase,
-    Tone,
-    cubic_at_one_sigma,
-    held_by_islr,
     islr_db,
+    islr_of,
     mainlobe_energy,
-    noise,
-    shown_islr_db,
+    powers_held_by_islr,
     spread_limit,
-    spread_powers,
-    tones,
 )
-from bisar_budget.budget.judged_rows import BOUND, CODE, REQUIREMENTS, Floats, Judged, Judging
-from bisar_budget.budget.judgement import worded
+from bisar_budget.budget.judged_rows import BOUND, CODE, REQUIREMENTS, Floats, Judged, Judging, worded
 from bisar_budget.budget.pull_in import caps, needed_sentence
 from bisar_budget.effects.declared import CUBIC, QUADRATIC
 from bisar_budget.effects.effect import override_notes
@@ -83,57 +75,12 @@ def sizes_at(effect: RandomEffect, limits: Limits) -> list[Any]:
         ]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class RandomRow:
-    """The row of one error in many cases.
-
-    `is_over_other` says that the model that does not gate fails it, `bound_by_other` by which of `HELD`.
-    """
-
-    judged: Judged
-    error: RandomError
-    is_over_other: Truths
-    bound_by_other: NDArray[np.intp]
-    without_autofocus: Floats
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class IslrRow:
-    """Row of the phases of one owner that spread, taken together, in many cases.
-
-    `is_there` are the cases that have the row; `variance` is that of the phase, and `limit` and `limit_of_other` the
-    rms phases that are allowed by the model that gates and the other one. [rad², rad]
-    """
-
-    judged: Judged
-    is_there: Truths
-    members: Sequence[SpreadPhase]
-    variance: Floats
-    limit: Floats
-    limit_of_other: Floats
-
-
 class RandomRows:
-    """Errors of sensors and clocks in many cases, and what spreads of them and of vibration.
+    """Errors of sensors and clocks in many cases, and what spreads of them and of vibration."""
 
-    Numbers of the mission and its allocation may be arrays (cases,); its geometry then is that of these cases.
-    """
-
-    def __init__(
-        self,
-        judging: Judging,
-        mission: Mission,
-        allocation: Allocation,
-        errors: Sequence[RandomError],
-        geometry: Any = None,
-    ) -> None:
-        self.judging, self.mission, self.allocation = judging, mission, allocation
-        self.errors, self.geometry = errors, geometry
-
-    def noise(self, model: str) -> list[SpreadPhase]:
-        """Parts that spread beyond the cubic."""
-        found = noise(self.mission, self.errors, model, self.geometry)
-        return [one._replace(variance=self.judging.array(one.variance)) for one in found]
+    def __init__(self, judging: Judging, analysis: Analysis) -> None:
+        self.judging, self.analysis, self.mission = judging, analysis, analysis.mission
+        self.allocation, self.errors = analysis.allocation, analysis.random
 
     def _table(self, values: Sequence[Any]) -> Floats:
         """Numbers, or numbers of cases, as (values, cases)."""
@@ -158,7 +105,7 @@ class RandomRows:
             row[:] = size
         return sizes
 
-    def rows(self, model: str) -> Iterator[RandomRow]:
+    def rows(self, model: str) -> Iterator["RandomRow"]:
         """Rows of every error by a model, `published` or `full`, declared or not."""
         if not self.errors:
             return
@@ -175,44 +122,41 @@ class RandomRows:
         within = np.where(binds == 0, declared / allowable * gain, qpe / limit)
         without_autofocus = np.where((gain > 1) & (qpe > 0) & is_limited, within, 0.0)
         is_over_other = declared > sizes_of_other.min(axis=0) * BOUND
-        judged = self._judged(
+        published, full = (mine, theirs) if model == "published" else (theirs, mine)
+        judged = self.judging.row(
+            self.errors[0].subject,
             declared,
             allowable,
             doubt=is_over_other,
-            without_autofocus=without_autofocus.ravel(),
+            without_autofocus=without_autofocus,
             is_info=self.mission.allocation.combine != "each",
         )._replace(
-            binding=np.array([-1, *map(REQUIREMENTS.index, HELD)], np.int8)[binds + 1].ravel(),
-            qpe_published_rad=(qpe if model == "published" else theirs.quadratic * declared).ravel(),
-            cubic_rad=(mine.cubic * declared).ravel(),
-            quadratic_use=(qpe / (limit * gain)).ravel(),
+            binding=np.array([-1, *map(REQUIREMENTS.index, HELD)], np.int8)[binds + 1],
+            qpe_published_rad=published.quadratic * declared,
+            cubic_rad=mine.cubic * declared,
+            quadratic_use=qpe / (limit * gain),
         )
-        rows = judged.apart([error.subject for error in self.errors])
+        if self.judging.is_whole:
+            by_published, by_full = (
+                np.where(one.quadratic > 0, limit * gain / one.quadratic, math.nan) for one in (published, full)
+            )
+            judged = judged._replace(
+                allowable_published=by_published,
+                allowable_full=by_full,
+                qpe_full_rad=full.quadratic * declared,
+                islr_db=islr_of(self.mission, (mine.spread * declared) ** 2),
+            )
         columns = (is_over_other, sizes_of_other.argmin(axis=0), without_autofocus)
-        for row, error, *others in zip(rows, self.errors, *columns, strict=True):
+        for place, (error, *others) in enumerate(zip(self.errors, *columns, strict=True)):
+            row = judged.at(place, error.subject)
             yield RandomRow(row.in_decibel() if error.unit == "dB" else row, error, *others)
 
-    def _judged(self, declared: Floats, allowable: Floats, doubt: Truths, **of_row: Any) -> Judged:
-        """Judge rows (rows, cases) as one row that stands for all; what is not declared is not a number."""
-        warn_above = np.broadcast_to(self.judging.warn_above, declared.shape).ravel()
-        judged = Judging(declared.size, warn_above).row(
-            subject("mission", ISLR), declared.ravel(), allowable.ravel(), doubt=doubt.ravel(), **of_row
-        )
-        is_none = np.isnan(judged.declared)
-        judged.status[is_none], judged.utilization[is_none] = CODE["not_declared"], math.nan
-        return judged
-
     # ---------------------------------------------------------------- powers together
-    def islr_rows(self, model: str, echoes: Sequence[Tone], cubic: Callable[[str], Any]) -> Iterator[IslrRow]:
-        """Rows of what spreads in sum: for the mission, and for each owner unless only wideband vibration spreads.
-
-        `echoes` are all tones; `cubic` gives the cubic phase of an owner at one sigma [rad], which ISLR holds where
-        nothing else does.
-        """
+    def islr_rows(self, model: str) -> Iterator["IslrRow"]:
+        """Rows of what spreads in sum: for the mission, and for each owner unless only wideband vibration spreads."""
         mission, split = self.mission, self.allocation.islr
         owners = ("transmitter", "receiver", *(["clock"] if split.clock is not None else []), "mission")
-        found = held_by_islr(mission, self.errors, echoes, model, self.geometry)
-        members = [spread_powers(mission, found, split, owner, cubic) for owner in owners]
+        members = powers_held_by_islr(self.analysis, owners, model)
         powers = [self._table([one.variance for one in of_owner]) for of_owner in members]
         is_known = [~np.isnan(of_owner) for of_owner in powers]
         variance = np.array([one.sum(axis=0, where=known) for one, known in zip(powers, is_known, strict=True)])
@@ -224,76 +168,113 @@ class RandomRows:
         shares = np.sqrt(self._table([split.of(owner) for owner in owners]))
         limit, limit_of_other = (shares * spread_limit(mission, self.allocation, "mission", one) for one in models)
         rms = np.sqrt(variance)
-        judged = self._judged(
+        judged = self.judging.row(
+            subject("mission", ISLR),
             np.where(is_declared, rms, math.nan),
             np.where(is_there, limit, math.nan),
             doubt=rms > limit_of_other * BOUND,
         )
-        energy = mainlobe_energy(mission)
-        declared, allowable = (
-            np.where(column > 0, islr_db(column**2, model, energy), math.nan)
-            for column in (judged.declared, judged.allowable)
+        published, full = (limit, limit_of_other) if model == "published" else (limit_of_other, limit)
+        columns = (judged.declared, judged.allowable, published, full)  # by one rule: the whole reads as required
+        declared, allowable, by_published, by_full = (self._level(column, model) for column in columns)
+        judged = judged._replace(
+            declared=declared,
+            allowable=allowable,
+            allowable_published=by_published,
+            allowable_full=by_full,
+            islr_db=islr_of(mission, variance),
+        ).held_to(ISLR)
+        of_rows = (is_there, members, variance, limit, limit_of_other)
+        for place, (owner, *others) in enumerate(zip(owners, *of_rows, strict=True)):
+            yield IslrRow(judged.at(place, subject(owner, ISLR)), *others)
+
+    def _level(self, rms: Floats, model: str) -> Floats:
+        """ISLR of rms phases by a model; not a number where there is none. [dB]"""
+        return np.where(rms > 0, islr_db(rms**2, model, mainlobe_energy(self.mission)), math.nan)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RandomRow:
+    """The row of one error in many cases.
+
+    `is_over_other` says that the model that does not gate fails it, `bound_by_other` by which of `HELD`.
+    """
+
+    judged: Judged
+    error: RandomError
+    is_over_other: Truths
+    bound_by_other: NDArray[np.intp]
+    without_autofocus: Floats
+    is_there: bool = True
+
+    def in_words(self, analysis: Analysis, gating: str) -> Row:
+        """The row of the only case, by the model that judges it."""
+        mission, allocation, error = analysis.mission, analysis.allocation, self.error
+        combine, binding, over, doubt = mission.allocation.combine, self.judged.requirement, NOTHING, NOTHING
+        if self.judged.status[0] == CODE["fail"]:
+            over = _over(mission, error, gating, binding, allocation).then(error.extrapolated)
+        if self.is_over_other[0]:
+            limit = float(allocation.qpe_limit(error.owner) * allocation.autofocus_gain)
+            doubt = _doubt(mission, error, gating, HELD[self.bound_by_other[0]], limit)
+        equation, evidence, notes = _said(mission, error)
+        return worded(
+            mission,
+            self.judged,
+            unit=error.unit,
+            path=error.path,
+            equation=equation,
+            over=over,
+            doubt=doubt,
+            no_limit=_unlimited(mission, error, error.effect(gating)),
+            info=NOTHING if combine == "each" else phrases.aggregate_decides(combine),
+            without_autofocus=float(self.without_autofocus[0]),
+            evidence=evidence,
+            remarks=notes,
+            binding_requirement=binding,
         )
-        judged = judged._replace(declared=declared, allowable=allowable).held_to(ISLR)
-        rows = judged.apart([subject(owner, ISLR) for owner in owners])
-        for row, *others in zip(rows, is_there, members, variance, limit, limit_of_other, strict=True):
-            yield IslrRow(row, *others)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class IslrRow:
+    """Row of the phases of one owner that spread, taken together, in many cases.
+
+    `is_there` are the cases that have the row; `variance` is that of the phase, and `limit` and `limit_of_other` the
+    rms phases that are allowed by the model that gates and the other one. [rad², rad]
+    """
+
+    judged: Judged
+    is_there: Truths
+    members: Sequence[SpreadPhase]
+    variance: Floats
+    limit: Floats
+    limit_of_other: Floats
+
+    def in_words(self, analysis: Analysis, gating: str) -> Row:
+        """The row of the only case, by the model that judges it."""
+        mission, level = analysis.mission, _levels(analysis.mission, gating)
+        other, over, doubt = "full" if gating == "published" else "published", NOTHING, NOTHING
+        variance, limit, by_other = (float(one[0]) for one in (self.variance, self.limit, self.limit_of_other))
+        if math.sqrt(variance) > by_other * BOUND:
+            doubt = phrases.other_model_allows(other, level(by_other), "dB")
+        if self.judged.status[0] == CODE["fail"]:
+            largest = max(self.members, key=lambda one: np.ravel(one.variance)[0])
+            rms = math.sqrt(np.ravel(largest.variance)[0])
+            over = phrases.noise_spreads_too_much(
+                level(math.sqrt(variance)), level(limit), largest.row_id, level(rms)
+            )
+        return worded(
+            mission,
+            self.judged,
+            unit="dB",
+            path=("requirements", "islr"),
+            equation="powers of the rows",
+            over=over,
+            doubt=doubt,
+            binding_requirement=ISLR,
+        )
 
 
 # ---------------------------------------------------------------------- in words
-def _rows_of(analysis: Analysis, allocation: Allocation) -> RandomRows:
-    mission = analysis.mission
-    return RandomRows(Judging(1, mission.allocation.warn_above), mission, allocation, analysis.random)
-
-
-def random_rows(analysis: Analysis, gating: str, allocation: Allocation) -> Iterator[Row]:
-    """Rows of every error of a sensor or a clock of one mission, declared or not."""
-    with np.errstate(all="ignore"):
-        rows = list(_rows_of(analysis, allocation).rows(gating))
-    for one in rows:
-        yield _row(analysis.mission, allocation, one, gating)
-
-
-def _row(mission: Mission, allocation: Allocation, one: RandomRow, gating: str) -> Row:
-    error, size, combine = one.error, one.error.declared, mission.allocation.combine
-    mine, limit = error.effect(gating), float(allocation.qpe_limit(error.owner) * allocation.autofocus_gain)
-    binding = REQUIREMENTS[one.judged.binding[0]] if one.judged.binding[0] >= 0 else None
-    over = doubt = NOTHING
-    if one.judged.status[0] == CODE["fail"]:
-        over = _over(mission, error, gating, binding, allocation).then(error.extrapolated)
-    if one.is_over_other[0]:
-        doubt = _doubt(mission, error, gating, HELD[one.bound_by_other[0]], limit)
-    limits = [limit / effect.quadratic if effect.quadratic else None for effect in (error.published, error.full)]
-    if error.unit == "dB":
-        limits = [_decibel(factor) for factor in limits]
-    equation, evidence, notes = _said(mission, error)
-    return worded(
-        mission,
-        one.judged,
-        unit=error.unit,
-        path=error.path,
-        equation=equation,
-        over=over,
-        doubt=doubt,
-        no_limit=_unlimited(mission, error, mine),
-        info=NOTHING if combine == "each" else phrases.aggregate_decides(combine),
-        without_autofocus=float(one.without_autofocus[0]),
-        limits=(limits[0], limits[1]),
-        qpe_published_rad=None if size is None else error.published.quadratic * size,
-        qpe_full_rad=None if size is None else error.full.quadratic * size,
-        islr_db=None if size is None else shown_islr_db(mission, (mine.spread * size) ** 2),
-        evidence=evidence,
-        remarks=notes,
-        binding_requirement=binding,
-        model=gating,
-    )
-
-
-def _decibel(factor: float | None) -> float | None:
-    """Level of a factor of amplitude. [dB]"""
-    return 20 * math.log10(factor) + 0.0 if factor else None
-
-
 def _said(mission: Mission, error: RandomError) -> tuple[str, str | None, tuple[Note, ...]]:
     """Equation, evidence and notes of an error's row."""
     kind, figure, sync = error.subject.kind, error.subject.axis, mission.synchronization
@@ -367,37 +348,3 @@ def _levels(mission: Mission, model: str) -> Callable[[float], float]:
     """ISLR of an rms phase [rad] by a model, whatever the size that it is compared with. [dB]"""
     energy = mainlobe_energy(mission)
     return lambda rms: float(islr_db(rms**2, model, energy)) if rms else 0.0
-
-
-def islr_rows(analysis: Analysis, gating: str, allocation: Allocation) -> Iterator[Row]:
-    """Rows of what spreads in sum of one mission."""
-    mission, level = analysis.mission, _levels(analysis.mission, gating)  # by one rule: the whole reads as required
-    if mission.requirements.islr is None:
-        return
-    other, cubic = "full" if gating == "published" else "published", cubic_at_one_sigma(analysis, allocation, gating)
-    with np.errstate(all="ignore"):
-        rows = list(_rows_of(analysis, allocation).islr_rows(gating, tones(mission), cubic))
-    for one in (one for one in rows if one.is_there[0]):
-        variance, limit, by_other = (float(column[0]) for column in (one.variance, one.limit, one.limit_of_other))
-        over = doubt = NOTHING
-        if math.sqrt(variance) > by_other * BOUND:
-            doubt = phrases.other_model_allows(other, level(by_other), "dB")
-        levels = [level(size) if size else None for size in (limit, by_other)]
-        if one.judged.status[0] == CODE["fail"]:
-            row_id, _, largest = max(one.members, key=lambda member: member.variance)
-            over = phrases.noise_spreads_too_much(
-                level(math.sqrt(variance)), level(limit), row_id, level(math.sqrt(largest))
-            )
-        yield worded(
-            mission,
-            one.judged,
-            unit="dB",
-            path=("requirements", "islr"),
-            equation="powers of the rows",
-            over=over,
-            doubt=doubt,
-            limits=(levels[0], levels[1]) if gating == "published" else (levels[1], levels[0]),
-            islr_db=shown_islr_db(mission, variance),
-            binding_requirement=ISLR,
-            model=gating,
-        )

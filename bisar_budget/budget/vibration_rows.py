@@ -1,7 +1,4 @@
-"""Rows about what vibrates: each line of a platform, lines near each other, noise, spurs, and all echoes together.
-
-Rows are judged in arrays over cases, of a sweep or of a check, which is one case; a check then puts them into words.
-"""
+"""Rows about what vibrates: each line of a platform, lines near each other, noise, spurs, and all echoes together."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -13,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget import phrases
-from bisar_budget.analysis.allocation import Allocation
-from bisar_budget.analysis.spread import Tone, shown_islr_db, tones
+from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.analysis.spread import Tone, islr_of
 from bisar_budget.analysis.vibration_limits import (
     LARGEST_ECHO,
     Echo,
@@ -25,8 +22,7 @@ from bisar_budget.analysis.vibration_limits import (
     tone_limits,
     vibration_limits,
 )
-from bisar_budget.budget.judged_rows import BOUND, REQUIREMENTS, Floats, Judged, Judging
-from bisar_budget.budget.judgement import number, worded
+from bisar_budget.budget.judged_rows import BOUND, REQUIREMENTS, Floats, Judged, Judging, worded
 from bisar_budget.budget.pull_in import caps, needed_sentence
 from bisar_budget.effects.clocks import Spur, spurs_of
 from bisar_budget.effects.declared import CUBIC, QUADRATIC
@@ -37,7 +33,7 @@ from bisar_budget.effects.tones import tone
 from bisar_budget.effects.vibration import counted, lines_of, projected
 from bisar_budget.findings.row import Row
 from bisar_budget.mission.instruments import Oscillator
-from bisar_budget.mission.model import Mission
+from bisar_budget.mission.model import Mission, has_instruments
 from bisar_budget.mission.platforms import MotionError
 from bisar_budget.phrases import NOTHING, Note
 from bisar_budget.units import format_quantity
@@ -48,38 +44,11 @@ _ROUNDING_DB = 1e-6  # by which a level may be above what is required
 Truths = NDArray[np.bool_]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class VibrationRow:
-    """One row about vibration in many cases: a line, lines near each other, or the noise of a platform.
-
-    `is_there` are the cases that have it, `members` the lines near each other. `qpe` and `cubic` are the
-    quadratic and cubic phases that a motion below three cycles per aperture has in its worst phase [rad]: where
-    it `is_slow` it is judged by them, else `is_over_phase` says that they break what they may. `is_over_other`
-    says that the model that does not gate fails it. `both` is the peak phase of one line with an echo as high as
-    those of near frequencies on both platforms [rad], `level` the level of that echo [dB], and `is_over_both`
-    says that it is too high.
-    """
-
-    judged: Judged
-    is_there: Truths
-    limits: VibrationLimits | None = None
-    is_slow: bool = False
-    members: Truths | None = None
-    cycles: Any = math.nan
-    qpe: Any = math.nan
-    cubic: Any = math.nan
-    both: Any = math.nan
-    level: Any = math.nan
-    is_over_other: Any = False
-    is_over_phase: Any = False
-    is_over_both: Any = False
-    without_autofocus: Any = 0.0
-
-
 class Vibrations:
-    """Vibrations in many cases; numbers of the mission, its geometry and its allocation may be arrays (cases,)."""
+    """Vibrations in many cases."""
 
-    def __init__(self, judging: Judging, mission: Mission, geometry: Any, allocation: Allocation) -> None:
+    def __init__(self, judging: Judging, analysis: Analysis) -> None:
+        mission, geometry, allocation = analysis.mission, analysis.geometry, analysis.allocation
         self.judging, self.mission, self.geometry = judging, mission, geometry
         self.allocation, self.array = allocation, judging.array
         self.metric, self.tones = tone_limits(mission, allocation)
@@ -94,7 +63,7 @@ class Vibrations:
     def _columns(self, numbers: Sequence[Any]) -> Floats:
         return np.array([self.array(number) for number in numbers]).reshape(-1, self.judging.cases)
 
-    def rows(self, model: str) -> Iterator[VibrationRow]:
+    def rows(self, model: str) -> Iterator["VibrationRow"]:
         """Every row about vibration by a model, `published` or `full`, declared or not, in the order of the contract.
 
         A line that is slow in some cases only has a row of each kind.
@@ -130,7 +99,7 @@ class Vibrations:
         *,
         doubt: Any = False,
         **others: Any,
-    ) -> VibrationRow:
+    ) -> "VibrationRow":
         allowable, is_over_other = None, np.zeros(self.judging.cases, dtype=bool)
         if limits is not None:
             allowable = self.array(limits.by(model))
@@ -139,14 +108,26 @@ class Vibrations:
                 is_over_other = declared > by_other * BOUND
         judged = self.judging.row(what, declared, allowable, doubt=doubt | is_over_other, is_info=limits is None)
         judged = judged._replace(cubic_rad=self.array(others.get("cubic", math.nan)))
+        if self.judging.is_whole:
+            judged = judged._replace(qpe_full_rad=self.array(others.get("qpe", math.nan)))
+            if limits is not None:
+                judged = self._with_limits(judged, limits)
+            if declared is not None and metric == "islr":
+                variance = (self.to_phase * declared) ** 2
+                of_row = variance if what.axis == "wideband" else variance / 2
+                judged = judged._replace(islr_db=islr_of(self.mission, of_row))
         return VibrationRow(judged.held_to(metric), is_there, limits, is_over_other=is_over_other, **others)
+
+    def _with_limits(self, judged: Judged, limits: VibrationLimits) -> Judged:
+        published, full = map(self.array, limits)
+        return judged._replace(allowable_published=published, allowable_full=full)
 
     def _phases(self, name: str, index: int) -> Floats:
         """Quadratic and cubic phase of a line in its worst phase, (2, cases). [rad]"""
         phase, cycles = self.to_phase * self.amplitudes[name][index], self.cycles[name][index]
         return np.asarray(phase * np.abs(tone(math.pi * cycles)[:2]))
 
-    def _line(self, model: str, name: str, index: int, is_there: Truths) -> VibrationRow:
+    def _line(self, model: str, name: str, index: int, is_there: Truths) -> "VibrationRow":
         """A vibration from one cycle per aperture on: as its echoes, or, where ISLR holds it, the power they take."""
         cycles, both = self.cycles[name][index], self._both[name][index]
         allowed = self.mission.requirements.cubic_phase_error
@@ -177,7 +158,7 @@ class Vibrations:
             is_over_both=is_over_both,
         )
 
-    def _slow(self, name: str, index: int, is_there: Truths) -> VibrationRow:
+    def _slow(self, name: str, index: int, is_there: Truths) -> "VibrationRow":
         """A vibration below one cycle per aperture: as the quadratic and cubic phase that it is."""
         amplitude, cycles = self.amplitudes[name][index], self.cycles[name][index]
         (qpe, cubic), limits = self._phases(name, index), slow_limits(self.mission, self.allocation, name, cycles)
@@ -196,6 +177,8 @@ class Vibrations:
             quadratic_use=amplitude / limits.quadratic,
         )
         same = VibrationLimits(limits.quadratic, limits.quadratic)
+        if self.judging.is_whole:
+            judged = self._with_limits(judged, same)._replace(qpe_full_rad=qpe)
         return VibrationRow(
             judged,
             is_there,
@@ -207,7 +190,7 @@ class Vibrations:
             without_autofocus=without_autofocus,
         )
 
-    def _near_each_other(self, model: str, name: str) -> Iterator[VibrationRow]:
+    def _near_each_other(self, model: str, name: str) -> Iterator["VibrationRow"]:
         """Lines so near each other that their echoes add: each time the one line that has an echo as high."""
         for index, (members, amplitude) in enumerate(self._near[name]):
             what = subject(name, "vibration", "sinusoidal.sum", entry=index)
@@ -248,19 +231,54 @@ def _together(amplitudes: Floats, cycles: Floats) -> Iterator[tuple[Truths, Floa
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SpurRow:
-    """A tone of an oscillator in many cases, in decibel of an echo to the response; see `VibrationRow`."""
+class VibrationRow:
+    """One row about vibration in many cases: a line, lines near each other, or the noise of a platform.
+
+    `is_there` are the cases that have it, `members` the lines near each other. `qpe` and `cubic` are the
+    quadratic and cubic phases that a motion below three cycles per aperture has in its worst phase [rad]: where
+    it `is_slow` it is judged by them, else `is_over_phase` says that they break what they may. `is_over_other`
+    says that the model that does not gate fails it. `both` is the peak phase of one line with an echo as high as
+    those of near frequencies on both platforms [rad], `level` the level of that echo [dB], and `is_over_both`
+    says that it is too high.
+    """
 
     judged: Judged
-    spur: Spur
-    limits: VibrationLimits | None  # peak phases [rad]
+    is_there: Truths
+    limits: VibrationLimits | None = None
+    is_slow: bool = False
+    members: Truths | None = None
+    cycles: Any = math.nan
+    qpe: Any = math.nan
+    cubic: Any = math.nan
+    both: Any = math.nan
+    level: Any = math.nan
     is_over_other: Any = False
+    is_over_phase: Any = False
+    is_over_both: Any = False
+    without_autofocus: Any = 0.0
+
+    def in_words(self, analysis: Analysis, model: str) -> Row:
+        """The row of the only case, by the model that judges it."""
+        what, mission = self.judged.subject, analysis.mission
+        error: MotionError = getattr(mission.platforms, what.owner).motion_error
+        if self.is_slow:
+            return _slow_row(analysis, self, error)
+        if self.members is not None:
+            members = np.flatnonzero(self.members[:, 0]).tolist()
+            note = _lines_together(error, members, float(self.judged.declared[0]))
+            return _row(mission, self, error, model, ("sinusoidal", members[0], "frequency"), (note,))
+        if what.axis == "wideband":
+            wideband = error.vibration.wideband
+            seen = () if wideband is None else _seen(mission, self, error, wideband.rms)
+            return _row(mission, self, error, model, ("wideband", "rms"), seen)
+        return _line_row(analysis, self, error, model)
 
 
-def judged_spurs(judging: Judging, mission: Mission, allocation: Allocation, model: str) -> Iterator[SpurRow]:
-    """Judge the oscillators' tones by a model; they make paired echoes as vibrations do."""
-    metric, by_platform = tone_limits(mission, allocation)
-    for spur in spurs_of(mission):
+def spur_rows(judging: Judging, analysis: Analysis, model: str) -> Iterator["SpurRow"]:
+    """Judge the oscillators' tones by a model; they make paired echoes as vibrations do. [dB of echo to response]"""
+    mission = analysis.mission
+    metric, by_platform = tone_limits(mission, analysis.allocation)
+    for spur in spurs_of(mission) if has_instruments(mission) else ():
         what, phase = subject(spur.name, "oscillator", "spur", entry=spur.entry), judging.array(spur.phase)
         limits, is_over_other = by_platform.get(spur.name), np.zeros(judging.cases, dtype=bool)
         if limits is None:
@@ -276,10 +294,55 @@ def judged_spurs(judging: Judging, mission: Mission, allocation: Allocation, mod
                 doubt=is_over_other,
                 is_unknown=is_near & (metric == "pslr"),
             )
-        yield SpurRow(judged.in_decibel().held_to(metric), spur, limits, is_over_other)
+            published, full = (judging.array(limit / 2) for limit in limits)
+            judged = judged._replace(allowable_published=published, allowable_full=full)
+        judged = judged.in_decibel().held_to(metric)
+        if metric == "islr":
+            judged = judged._replace(islr_db=islr_of(mission, phase**2 / 2))
+        yield SpurRow(judged, spur, is_over_other)
 
 
-def judged_pslr(judging: Judging, found: Sequence[Tone], required: Any) -> tuple[Judged, Echo | None]:
+@dataclass(frozen=True, slots=True, eq=False)
+class SpurRow:
+    """A tone of an oscillator in many cases, in decibel of an echo to the response; see `VibrationRow`."""
+
+    judged: Judged
+    spur: Spur
+    is_over_other: Any = False
+    is_there: bool = True
+
+    def in_words(self, analysis: Analysis, model: str) -> Row:
+        """The row of the only case, by the model that judges it."""
+        mission, spur, row, doubt, over = analysis.mission, self.spur, self.judged, NOTHING, NOTHING
+        oscillator: Oscillator = getattr(mission.platforms, spur.name).oscillator
+        cycles, missing = spur.frequency * mission.collection.aperture_time, phrases.no_requirement_of("pslr")
+        if not math.isnan(row.allowable[0]):
+            over = phrases.echoes_over(float(row.declared[0]), float(row.allowable[0]))
+            if self.is_over_other[0]:
+                other, by_other = (
+                    ("published", row.allowable_published) if model == "full" else ("full", row.allowable_full)
+                )
+                doubt = phrases.other_model_allows(other, float(by_other[0]), "dB")
+        return worded(
+            mission,
+            row,
+            unit="dB",
+            path=("platforms", spur.name, "oscillator", "spurs"),
+            equation="first principles" if model == "full" else "Section V, sinusoidal",
+            over=over,
+            doubt=doubt,
+            no_limit=missing,
+            not_evaluated=phrases.echoes_on_the_mainlobe(cycles, ECHO_CYCLES),
+            info=missing,
+            evidence=oscillator.source,
+            remarks=(
+                phrases.tone_lies(spur.frequency, cycles),
+                *override_notes(spur.name, oscillator.overridden, "frequency"),
+            ),
+        )
+
+
+def pslr_row(judging: Judging, found: Sequence[Tone], required: Any) -> "PslrRow":
     """Judge the highest echo that all tones make together, in the worst of their phases.
 
     From first principles by both models: the shares of the paper's rule stay 3 dB inside it. Tones at most 2.5 cycles
@@ -291,33 +354,41 @@ def judged_pslr(judging: Judging, found: Sequence[Tone], required: Any) -> tuple
     if highest is not None:
         is_declared = np.any([np.broadcast_to(one.is_there, (judging.cases,)) for one in found], axis=0)
         judged = judged.where(is_declared, judging.row(what, highest.level, allowed))
-    return judged.in_decibel().held_to("pslr"), highest
+    judged = judged._replace(allowable_published=allowed, allowable_full=allowed)
+    return PslrRow(judged.in_decibel().held_to("pslr"), found, highest)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PslrRow:
+    """The `highest` echo that all tones make together in many cases; where PSLR is required."""
+
+    judged: Judged
+    tones: Sequence[Tone]
+    highest: Echo | None
+    is_there: bool = True
+
+    def in_words(self, analysis: Analysis, _: str) -> Row:
+        """The row of the only case."""
+        mission, over = analysis.mission, NOTHING
+        if self.highest is not None:
+            makers = [one for one, is_in in zip(self.tones, self.highest.is_of[:, 0], strict=True) if is_in]
+            largest, required = max(makers, key=lambda one: one.phase), mission.requirements.pslr or 0.0
+            level = float(self.judged.declared[0])
+            over = phrases.echoes_together_over(level, required, largest.subject.id, len(makers))
+        return worded(
+            mission,
+            self.judged,
+            unit="dB",
+            path=("requirements", "pslr"),
+            equation="first principles",
+            over=over,
+            binding_requirement="pslr",
+        )
 
 
 # ---------------------------------------------------------------------- in words
-def vibration_rows(mission: Mission, allocation: Allocation, model: str) -> Iterator[Row]:
-    """Every row about vibration of one mission, by one of the two models."""
-    judging = Judging(1, mission.allocation.warn_above)
-    with np.errstate(all="ignore"):
-        rows = list(Vibrations(judging, mission, mission.geometry, allocation).rows(model))
-    for one in rows:
-        what = one.judged.subject
-        error: MotionError = getattr(mission.platforms, what.owner).motion_error
-        if one.is_slow:
-            yield _slow_row(mission, allocation, one, error)
-        elif one.members is not None:
-            members = np.flatnonzero(one.members[:, 0]).tolist()
-            note = _lines_together(error, members, float(one.judged.declared[0]))
-            yield _row(mission, one, error, model, ("sinusoidal", members[0], "frequency"), (note,))
-        elif what.axis == "wideband":
-            wideband = error.vibration.wideband
-            seen = () if wideband is None else _seen(mission, one, error, wideband.rms)
-            yield _row(mission, one, error, model, ("wideband", "rms"), seen)
-        else:
-            yield _line_row(mission, allocation, one, error, model)
-
-
-def _line_row(mission: Mission, allocation: Allocation, one: VibrationRow, error: MotionError, model: str) -> Row:
+def _line_row(analysis: Analysis, one: VibrationRow, error: MotionError, model: str) -> Row:
+    mission, allocation = analysis.mission, analysis.allocation
     owner, index = one.judged.subject.owner, one.judged.subject.entry or 0
     key, lines = ("sinusoidal", index, "amplitude"), error.vibration.sinusoidal
     if not lines:
@@ -351,17 +422,13 @@ def _row(
     """A row of echoes or noise: `notes` stand before what is said of its limit, `more` after it."""
     what, metric, limits = one.judged.subject, one.judged.metric, one.limits
     equation = f"Section V, {key[0]}" if model == "published" else "first principles"
-    missing, margin, islr = phrases.no_requirement_of(metric), None, None
+    missing, margin = phrases.no_requirement_of(metric), None
     if limits is not None:
         margin = float(limits.margin_db)
         notes = (*notes, phrases.published_rule_is_off(margin))
         if one.is_over_other[0]:
             other = "full" if model == "published" else "published"
             doubt = phrases.other_model_allows(other, float(limits.by(other)), "m")
-    declared = float(one.judged.declared[0])
-    if metric == "islr" and not math.isnan(declared):
-        variance = (2 * math.pi * declared / mission.radar.wavelength) ** 2
-        islr = shown_islr_db(mission, variance if what.axis == "wideband" else variance / 2)
     return worded(
         mission,
         one.judged,
@@ -372,9 +439,6 @@ def _row(
         doubt=doubt,
         no_limit=missing,
         info=missing,
-        limits=(None, None) if limits is None else (number(limits.published), number(limits.full)),
-        qpe_full_rad=number(one.qpe),
-        islr_db=islr,
         evidence=error.source,
         remarks=(*notes, *more),
         published_margin_db=margin,
@@ -392,8 +456,9 @@ def _lines_together(error: MotionError, members: Sequence[int], declared: float)
     return phrases.lines_together(shown, " to ".join(dict.fromkeys(ends)), NEAR_CYCLES, declared)
 
 
-def _slow_row(mission: Mission, allocation: Allocation, one: VibrationRow, error: MotionError) -> Row:
-    what, limits, combine = one.judged.subject, one.limits, mission.allocation.combine
+def _slow_row(analysis: Analysis, one: VibrationRow, error: MotionError) -> Row:
+    mission, allocation = analysis.mission, analysis.allocation
+    what, combine = one.judged.subject, mission.allocation.combine
     cycles, qpe, cubic = (float(column[0]) for column in (one.cycles, one.qpe, one.cubic))
     is_cubic = REQUIREMENTS[one.judged.binding[0]] == CUBIC
     if is_cubic:
@@ -413,79 +478,10 @@ def _slow_row(mission: Mission, allocation: Allocation, one: VibrationRow, error
         over=over,
         info=NOTHING if combine == "each" else phrases.aggregate_decides(combine),
         without_autofocus=float(one.without_autofocus[0]),
-        limits=(None, None) if limits is None else (number(limits.published), number(limits.full)),
-        qpe_published_rad=qpe,
-        qpe_full_rad=qpe,
         evidence=error.source,
         remarks=(
             *_seen(mission, one, error, error.vibration.sinusoidal[entry].amplitude),
             phrases.slower_than_a_cycle(cycles, qpe, cubic),
         ),
         binding_requirement=CUBIC if is_cubic else QUADRATIC,
-    )
-
-
-def spur_rows(mission: Mission, allocation: Allocation, model: str) -> Iterator[Row]:
-    """Rows of the oscillators' tones of one mission. [dB of an echo to the response]"""
-    other = "full" if model == "published" else "published"
-    with np.errstate(all="ignore"):
-        rows = list(judged_spurs(Judging(1, mission.allocation.warn_above), mission, allocation, model))
-    for one in rows:
-        spur, limits, doubt = one.spur, one.limits, NOTHING
-        oscillator: Oscillator = getattr(mission.platforms, spur.name).oscillator
-        cycles, phase = spur.frequency * mission.collection.aperture_time, float(spur.phase)
-        missing, over = phrases.no_requirement_of("pslr"), NOTHING
-        levels: tuple[float | None, float | None] = (None, None)
-        if limits is not None:
-            levels = (_echo(limits.published), _echo(limits.full))
-            over = phrases.echoes_over(_echo(phase), _echo(limits.by(model)))
-            if one.is_over_other[0]:
-                doubt = phrases.other_model_allows(other, _echo(limits.by(other)), "dB")
-        yield worded(
-            mission,
-            one.judged,
-            unit="dB",
-            path=("platforms", spur.name, "oscillator", "spurs"),
-            equation="first principles" if model == "full" else "Section V, sinusoidal",
-            over=over,
-            doubt=doubt,
-            no_limit=missing,
-            not_evaluated=phrases.echoes_on_the_mainlobe(cycles, ECHO_CYCLES),
-            info=missing,
-            limits=levels,
-            islr_db=shown_islr_db(mission, phase**2 / 2) if one.judged.metric == "islr" else None,
-            evidence=oscillator.source,
-            remarks=(
-                phrases.tone_lies(spur.frequency, cycles),
-                *override_notes(spur.name, oscillator.overridden, "frequency"),
-            ),
-            model=model,
-        )
-
-
-def _echo(phase: Any) -> float:
-    """Level of the echoes of a tone. [dB]"""
-    return 20 * math.log10(phase / 2)
-
-
-def pslr_row(mission: Mission, model: str) -> Iterator[Row]:
-    """The highest echo that all tones of one mission make together; where PSLR is required."""
-    required, over, found = mission.requirements.pslr, NOTHING, tones(mission)
-    if required is None:
-        return
-    judged, highest = judged_pslr(Judging(1, mission.allocation.warn_above), found, required)
-    if highest is not None:
-        makers = [one for one, is_in in zip(found, highest.is_of[:, 0], strict=True) if is_in]
-        largest = max(makers, key=lambda one: one.phase)
-        over = phrases.echoes_together_over(float(judged.declared[0]), required, largest.subject.id, len(makers))
-    yield worded(
-        mission,
-        judged,
-        unit="dB",
-        path=("requirements", "pslr"),
-        equation="first principles",
-        over=over,
-        limits=(float(judged.allowable[0]), float(judged.allowable[0])),
-        binding_requirement="pslr",
-        model=model,
     )

@@ -7,7 +7,7 @@ from fnmatch import translate
 from typing import NamedTuple
 
 from bisar_budget import file_warnings
-from bisar_budget.budget.requirement_states import KEYS
+from bisar_budget.budget.judged_requirements import KEYS
 from bisar_budget.findings.mission import FileWarning
 from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.findings.row import DECLARE, AppliedWaiver, Row

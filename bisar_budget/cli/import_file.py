@@ -21,9 +21,9 @@ def import_file(file: str, output: str | None, channel: str | None, force: bool)
     has the scene point, the band, the aperture by the dwell on that point, both platforms' paths, and the errors that
     the file declares. What a mission has no key for stands in its comments. Needs the extra `formats`.
     """
-    from bisar_budget.formats.document import FormatError, MissingExtraError
+    from bisar_budget.formats.collected import mission_text
+    from bisar_budget.formats.containers import FormatError, MissingExtraError
     from bisar_budget.formats.importing import import_collection
-    from bisar_budget.formats.mission_text import mission_text
 
     if output is not None and output != "-" and os.path.exists(output):
         if not force:

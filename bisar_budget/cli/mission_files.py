@@ -51,7 +51,8 @@ def schema(is_of_part: bool, output: str | None) -> None:
     """
     import json
 
-    from bisar_budget.mission.schema import mission_schema, part_schema
+    from bisar_budget.mission.model import mission_schema
+    from bisar_budget.mission.parts import part_schema
 
     text = json.dumps(part_schema() if is_of_part else mission_schema(), indent=2) + "\n"
     deliver(text, output, "json")

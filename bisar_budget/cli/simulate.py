@@ -106,7 +106,7 @@ def simulate(
 
 def _export(mission: str, loaded: "Mission", output: str, standing: "Targets") -> None:
     """Write the phase history, and say what is in it."""
-    from bisar_budget.formats.document import MissingExtraError
+    from bisar_budget.formats.containers import MissingExtraError
     from bisar_budget.formats.exporting import export_phase_history
     from bisar_budget.simulate.point import SimulationError
 

@@ -7,13 +7,14 @@ from collections.abc import Iterator, Sequence
 from datetime import date
 from typing import Any, NamedTuple
 
-from bisar_budget.budget.check import check_mission
+from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.budget.judged_mission import JudgedMission, judged_mission
+from bisar_budget.budget.requirement_table import rows_in_words
 from bisar_budget.design.quantities import QuestionError, tree_of
 from bisar_budget.design.solve import Imaged
 from bisar_budget.design.table import Standing, Variation, breaking, hold_to_decisions, standing
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.faults import MissionError, SetValue
-from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.requirement import Override
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.changes import parts_of
@@ -145,7 +146,7 @@ def compare_parts(
     except PartError as error:
         raise QuestionError(f"{key}: {error}") from None
     tried = [(one, search.checked(one, today)) for one in search.candidates]
-    found = [checked.findings for _, checked in tried if checked.findings is not None]
+    found = [checked.judged for _, checked in tried if checked.judged is not None]
     if not found:
         why = tried[0][1].reason if tried else "the catalogue has none of its kind"
         raise QuestionError(f"{key}: no part makes a mission: {why}")
@@ -194,9 +195,9 @@ class _Candidate(NamedTuple):
 
 
 class _CheckedPart(NamedTuple):
-    """The mission with a part: findings, the figures that it takes of the part, why there is no mission."""
+    """The mission with a part, judged; the figures that it takes of the part; why there is no mission."""
 
-    findings: MissionFindings | None
+    judged: JudgedMission | None
     figures: tuple[str, ...] = ()
     reason: str = ""
 
@@ -237,7 +238,7 @@ class _PartSearch:
         except MissionError as error:
             fault = error.faults[0]
             return _CheckedPart(None, reason=f"{fault.key}: {fault.problem}")
-        return _CheckedPart(check_mission(mission, today, is_bare=True), self._taken(mission, one.part))
+        return _CheckedPart(judged_mission(Analysis(mission), today), self._taken(mission, one.part))
 
     def _taken(self, mission: Mission, part: Part) -> tuple[str, ...]:
         platform = getattr(mission.platforms, self.platform)
@@ -259,7 +260,7 @@ class _PartSearch:
             standing=Standing(complies=False, status="error"),
             reason=checked.reason,
         )
-        found = checked.findings
+        found = checked.judged
         if found is None:
             return state
         stands = standing(found, row, breaks)
@@ -269,7 +270,7 @@ class _PartSearch:
         texts = {evidence(one.part, figure) for figure in checked.figures}
         own = [
             (each.utilization, each.id)
-            for each in found.rows
+            for each in rows_in_words(found)
             if each.owner == self.platform and each.evidence in texts and each.utilization is not None
         ]
         use, own_row = max(own, default=(None, None))

@@ -4,9 +4,9 @@ from glob import escape
 from typing import NamedTuple
 
 from bisar_budget.design.compare import Comparison, mission_with
-from bisar_budget.design.scaled import scaled
 from bisar_budget.design.solve import Imaged, Solution
 from bisar_budget.design.table import Variation
+from bisar_budget.design.varied import scaled
 from bisar_budget.faults import SetValue
 from bisar_budget.mission.model import Mission
 from bisar_budget.verify.limits import rows_to_verify, seconds_to_verify, verify_mission

@@ -7,12 +7,22 @@ from typing import Any, NamedTuple
 
 from bisar_budget import units
 from bisar_budget.faults import InvalidValueError, fault_words, shown
-from bisar_budget.mission import later
-from bisar_budget.mission.bounds import DIRECTION, ELEVATION, LATITUDE
-from bisar_budget.mission.changes import apply_changes, next_name, parts_of
-from bisar_budget.mission.keys import nearest_keys
+from bisar_budget.mission.changes import apply_changes, nearest_keys, next_name, parts_of
 from bisar_budget.mission.model import MISSION, Mission
-from bisar_budget.mission.readers import INVALID, Late, ListOf, OneOf, Quantity, Reader, Section, TextList, Triple
+from bisar_budget.mission.readers import (
+    DIRECTION,
+    ELEVATION,
+    INVALID,
+    LATITUDE,
+    NOT_COMPUTED,
+    ListOf,
+    OneOf,
+    Quantity,
+    Reader,
+    Section,
+    TextList,
+    Triple,
+)
 from bisar_budget.mission.tree import read_tree
 from bisar_budget.units import Dimension, parse_quantity
 
@@ -173,7 +183,7 @@ def _found(tree: dict[str, Any], key: str) -> tuple[Reader, Any]:
         if inner is None and isinstance(value, str):
             raise QuestionError(f"{shown(key)}: the file has {shown(value)!r} there, which has no {shown(part)!r}")
         if isinstance(reader, Section) and part in reader.later:
-            raise QuestionError(f"{key}: {later.PROBLEM}; {reader.later[part]}")
+            raise QuestionError(f"{key}: {NOT_COMPUTED}; {reader.later[part]}")
         if inner is None:
             known = f"accepted: {', '.join(reader.keys)}" if isinstance(reader, Section) else ""
             problem = fault_words(f"{shown(part)!r} is not a known key", "", known, nearest_keys(key))
@@ -192,8 +202,8 @@ def _found(tree: dict[str, Any], key: str) -> tuple[Reader, Any]:
 
 def form_of(reader: Reader, value: Any) -> Reader:
     """Find the form of a reader that reads a value."""
-    while isinstance(reader, Late | OneOf):
-        reader = reader.load() if isinstance(reader, Late) else reader.pick(value)
+    while isinstance(reader, OneOf):
+        reader = reader.pick(value)
     return reader
 
 

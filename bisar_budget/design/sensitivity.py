@@ -15,20 +15,31 @@ import numpy as np
 
 from bisar_budget import units
 from bisar_budget.analysis.allocation import is_balanced
-from bisar_budget.budget.check import check_mission
+from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.budget.judged_mission import JudgedMission, judged_mission
+from bisar_budget.budget.judged_rows import Judged
 from bisar_budget.design.quantities import FACTOR, Number, QuestionError, as_number, form_of, tree_of
-from bisar_budget.design.scaled import scaled
 from bisar_budget.design.table import Question, Table, Variation, hold_to_decisions, standing
+from bisar_budget.design.varied import scaled
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.faults import SetValue
-from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.requirement import Override
-from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import STATUS
-from bisar_budget.mission.bounds import DIRECTION, ELEVATION, LATITUDE
 from bisar_budget.mission.model import MISSION, SHARES, Mission
 from bisar_budget.mission.parts import taken_figures
-from bisar_budget.mission.readers import INVALID, Choice, ListOf, Quantity, Reader, Triple, Version, Whole
+from bisar_budget.mission.readers import (
+    DIRECTION,
+    ELEVATION,
+    INVALID,
+    LATITUDE,
+    Choice,
+    ListOf,
+    Quantity,
+    Reader,
+    Triple,
+    Version,
+    Whole,
+)
 from bisar_budget.workers import Progress, unseen
 
 LITTLE = 1e-4  # of a utilization: less of a change is not shown
@@ -37,6 +48,7 @@ _FURTHEST = math.log(1e6)  # times: a number that would have to change by more d
 _NOTHING = 1e-9  # of a utilization: what rounding leaves of a check
 _RELAXED = 2.0  # times, an error that is relaxed
 _SAME = 1e-9  # of what is declared
+_IS_JUDGED = np.array([one.is_judged for one in STATUS.values()])
 # Half of a difference. A power law of exponent p is wrong by (p - 1)(p - 2)/6 of its square, 2e-4 for the inverse
 # square; allowables by exact ranges end their search within 1e-5 of a limit, which is 1e-3 of a hundredth.
 RELATIVE_STEP = 0.01
@@ -249,11 +261,10 @@ def sensitivity(
     """
     variation, of_parts = _stating_its_parts(Variation(mission, model))
     base = variation.read()
-    found = check_mission(base, today, is_bare=True)
+    found = judged_mission(Analysis(base), today)
     hold_to_decisions([found], row)
     stands = standing(found, None, frozenset())
-    geometry = found.geometry
-    nearest = min(geometry.transmitter.slant_range, geometry.receiver.slant_range)
+    nearest = min(path.slant_range for path in found.analysis.geometry.both)
     numbers, skipped = stated_numbers(tree_of(variation.mission), nearest)
     beside = _Beside(variation, numbers, stands.row, row, today)
     at_file = beside.uses([(None, 0)])[0] if stands.row else ""
@@ -275,7 +286,7 @@ def sensitivity(
         file=mission.file,
         name=mission.name,
         model=base.gating_model,
-        status=found.status,
+        status=stands.status,
         worst_row=at_file.worst_row,
         requirement=at_file.requirement,
         utilization=at_file.worst,
@@ -507,15 +518,15 @@ def _no_number(key: str, reader: Reader, value: Any) -> str:
 
 
 # ---------------------------------------------------------------- shares that follow what is declared
-def relaxed_errors(mission: Mission, found: MissionFindings, today: date) -> Iterator[Relaxed]:
+def relaxed_errors(mission: Mission, found: JudgedMission, today: date) -> Iterator[Relaxed]:
     """Double one declared error after the other, and see what that leaves to the others.
 
     Parameters
     ----------
     mission : Mission
         Its phase is divided by `balanced`.
-    found : MissionFindings
-        Of a check of it.
+    found : JudgedMission
+        The same, as judged.
     today : date
         Day on which waivers are judged, UTC.
     """
@@ -524,7 +535,7 @@ def relaxed_errors(mission: Mission, found: MissionFindings, today: date) -> Ite
             doubled = scaled(mission, key, _RELAXED)
         except QuestionError:  # all of it is 0
             continue
-        after = check_mission(doubled, today, is_bare=True)
+        after = judged_mission(Analysis(doubled), today)
         yield Relaxed(
             key=key,
             shares_before=_shares(found),
@@ -556,24 +567,23 @@ def _keys_of(section: Any, key: str, names: Sequence[str]) -> Iterator[str]:
     yield from (f"{key}.{name}" for name in names if getattr(section, name) is not None)
 
 
-def _shares(found: MissionFindings) -> tuple[float, float]:
-    return found.allocation.qpe.transmitter, found.allocation.qpe.receiver
+def _shares(found: JudgedMission) -> tuple[float, float]:
+    split = found.analysis.allocation.qpe
+    return split.transmitter, split.receiver
 
 
-def _of_others(owner: str, before: Sequence[Row], after: Sequence[Row]) -> tuple[str, float, float] | None:
+def _of_others(owner: str, before: Sequence[Judged], after: Sequence[Judged]) -> tuple[str, float, float] | None:
     """Worst utilization of a platform, before and after, of judged rows whose declared value stays as it is."""
-    now = {row.id: row for row in after}
-    kept = [
-        (now[row.id].utilization or 0.0, row.id, row.utilization)
-        for row in before
-        if row.owner in (owner, "clock" if owner == "receiver" else owner)
-        and row.utilization is not None
-        and math.isfinite(row.utilization)
-        and STATUS[row.status].is_judged
-        and row.id in now
-        and abs((now[row.id].declared or 0.0) - (row.declared or 0.0)) <= _SAME * abs(row.declared or 0.0)
-    ]
+    now, kept = {row.subject.id: row for row in after}, []
+    for row in before:
+        was, then = float(row.utilization[0]), now.get(row.subject.id)
+        is_owed = row.subject.owner in (owner, "clock" if owner == "receiver" else owner)
+        if then is None or not is_owed or not math.isfinite(was) or not _IS_JUDGED[row.status[0]]:
+            continue
+        old, new = np.nan_to_num([row.declared[0], then.declared[0]])
+        if abs(new - old) <= _SAME * abs(old):
+            kept.append((float(np.nan_to_num(then.utilization[0])), row.subject.id, was))
     use, row_id, _ = max(kept, default=(math.inf, "", 0.0))
     if not math.isfinite(use):
         return None
-    return row_id, max(before for _, _, before in kept), use
+    return row_id, max(was for _, _, was in kept), use

@@ -15,9 +15,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from bisar_budget.budget.check import check_mission
+from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.budget.judged_mission import JudgedMission, judged_mission
 from bisar_budget.design.quantities import FACTOR, Number, QuestionError, Range, number_of, range_of, tree_of
-from bisar_budget.design.scaled import scaled
 from bisar_budget.design.table import (
     ALIKE,
     GEOMETRY,
@@ -29,9 +29,9 @@ from bisar_budget.design.table import (
     breaking,
     hold_to_decisions,
 )
+from bisar_budget.design.varied import scaled
 from bisar_budget.faults import MissionError, SetValue
 from bisar_budget.findings.images import Verdict
-from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.requirement import Override
 from bisar_budget.mission.model import Mission
 from bisar_budget.workers import Progress, unseen
@@ -282,14 +282,15 @@ class _Search:
             self.number = of_table = number_of(tree_of(mission), key, _OF_ALL).said_like(between)
         self.range: Range = range_of(self.number, between)
 
-        def at_the_end() -> Iterator[MissionFindings]:
-            """The number may be an error that the file does not declare."""
+        def judged() -> Iterator[JudgedMission]:
+            """The mission, and that at the end of the range: the number may be an error that is not declared."""
+            yield judged_mission(Analysis(self.base), today)
             with suppress(MissionError):
                 end = self.range.high
                 last = scaled(self.base, key, end) if is_scale else variation.at({self.number: end})
-                yield check_mission(last, today, is_bare=True)
+                yield judged_mission(Analysis(last), today)
 
-        hold_to_decisions([check_mission(self.base, today, is_bare=True), *at_the_end()], row)
+        hold_to_decisions(list(judged()), row)
         question = Question(mission.data, mission.file, mission.changes, (key,), (), model, today)
         self.table = Table(question._replace(row=row, breaks=self.breaks), mission, [of_table])
         self.levels = _LEVELS_READ if self.table.to_read else _LEVELS

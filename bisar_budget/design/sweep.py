@@ -18,9 +18,8 @@ from bisar_budget.design.quantities import Choices, Number, QuestionError
 from bisar_budget.design.table import GEOMETRY, IN_UNIT, REASON, VERDICT, Column, Part, Question, Swept, Table
 from bisar_budget.faults import Fault, MissionError, SetValue, fault_words, shown
 from bisar_budget.findings.row import Row, unknown_id
-from bisar_budget.mission.load import mission_of
+from bisar_budget.mission.load import mission_of, named_by
 from bisar_budget.mission.model import Mission
-from bisar_budget.mission.named import named_by
 from bisar_budget.mission.tree import read_tree
 from bisar_budget.workers import MapBlocks, worker_pool
 
@@ -200,7 +199,7 @@ class Asked:
 
     def chunks(self) -> "Chunks":
         """How the cases are cut: into few where many are read by themselves, which some of them show."""
-        is_slow = self.table.is_alone or (self.cases.count > _FEW and self._share_read() > _SLOW)
+        is_slow = self.cases.count > _FEW and self._share_read() > _SLOW
         return Chunks(self.cases.count, _FEW if is_slow else _TOGETHER, is_slow)
 
     def _share_read(self) -> float:

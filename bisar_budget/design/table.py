@@ -16,24 +16,19 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from bisar_budget.budget import judged_cases
-from bisar_budget.budget.check import check_mission
-from bisar_budget.budget.judged_cases import check_arrays, statuses
-from bisar_budget.budget.judged_rows import CODE, REQUIREMENTS, Judged
+from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.budget.judged_mission import JudgedMission, field, judged_mission, statuses
+from bisar_budget.budget.judged_rows import REQUIREMENTS, WHOLE, Judged
 from bisar_budget.constants import SPEED_OF_LIGHT
-from bisar_budget.design.held import is_held, is_image
 from bisar_budget.design.quantities import FACTOR, Number, QuestionError, number_of, tree_of
-from bisar_budget.design.scaled import scaled
-from bisar_budget.design.varied import picked, stacked, varied
+from bisar_budget.design.varied import is_held, is_image, picked, scaled, stacked, varied
 from bisar_budget.faults import MissionError, SetNumber, SetValue
-from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.row import unknown_id
 from bisar_budget.findings.status import RANK, STATUS
 from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.changes import parts_of
-from bisar_budget.mission.load import mission_of
+from bisar_budget.mission.load import Named, mission_of
 from bisar_budget.mission.model import Mission
-from bisar_budget.mission.named import Named
 from bisar_budget.mission.tree import Tree, read_tree
 from bisar_budget.ranges.exact_ranges import nodes_for
 from bisar_budget.workers import Progress, unseen
@@ -104,7 +99,6 @@ REASON = Column("reason", "", "Why there is no mission in this case.", is_text=T
 IN_UNIT = ("declared", "allowable", "allowable_published", "allowable_full")  # fields in the unit of their row
 
 _IS_JUDGED = np.array([one.is_judged and name != "waived" for name, one in STATUS.items()])
-_GATES = np.array([one.gates for one in STATUS.values()])
 
 
 # ---------------------------------------------------------------- the worst row
@@ -157,39 +151,33 @@ class Standing(NamedTuple):
     utilization: float | None = None
 
 
-def standing(found: MissionFindings, row_id: str | None, breaks: Container[str]) -> Standing:
-    """Say how a mission that was checked by itself stands, or the row that was asked for."""
-    rows = [row for row in found.rows if row_id is None or row.id == row_id]
-    status = found.status if row_id is None else rows[0].status if rows else "not_evaluated"
-    complies = status not in breaks
-    place = -1
-    if rows:
-        codes = np.array([[RANK[row.status]] for row in rows])
-        uses = np.array([[math.nan if row.utilization is None else row.utilization] for row in rows])
-        (place,) = deciding([row.subject.kind for row in rows], codes, uses, np.array([RANK[status]]), breaks)
-    if place < 0:
-        broken = [one.key for one in found.requirements if one.status == status and row_id is None and not complies]
-        return Standing(complies, status, requirement=broken[0] if broken else None)
-    worst = rows[place]
-    return Standing(complies, status, worst.id, worst.binding_requirement or worst.metric, worst.utilization)
+def standing(judged: JudgedMission, row_id: str | None, breaks: Container[str]) -> Standing:
+    """Say how a mission by itself stands, or the row that was asked for."""
+    rows = {row.subject.id: row for row in judged.rows}
+    (status,), (row,), (use,), (requirement,) = (
+        np.ravel(column) for column in _verdict(judged, rows, row_id, breaks).values()
+    )
+    utilization = None if math.isnan(use) else float(use)
+    return Standing(status not in breaks, str(status), row or None, requirement or None, utilization)
 
 
-def hold_to_decisions(findings: Sequence[MissionFindings], row_id: str | None) -> None:
+def hold_to_decisions(judged: Sequence[JudgedMission], row_id: str | None) -> None:
     """Refuse what nothing can decide.
 
     Raises
     ------
     QuestionError
-        None of the findings has a declared error, or the row that is asked for is not there or not judged.
+        None of the missions has a declared error, or the row that is asked for is not there or not judged.
     """
-    if all(found.is_empty for found in findings):
+    if all(one.is_empty for one in judged):
         raise QuestionError("the mission declares no error: nothing decides whether it complies")
     if row_id is None:
         return
-    rows = [row for found in findings for row in found.rows]
-    of_row = [STATUS[row.status] for row in rows if row.id == row_id]
+    rows = [row for one in judged for row in one.rows]
+    of_row = [STATUS[statuses(row.status)[0]] for row in rows if row.subject.id == row_id]
     if not of_row:
-        raise QuestionError(f"--row {row_id}: {unknown_id(row_id, (row.id for row in rows), findings[0].file)}")
+        known = (row.subject.id for row in rows)
+        raise QuestionError(f"--row {row_id}: {unknown_id(row_id, known, judged[0].analysis.mission.file)}")
     if not any(status.gates for status in of_row):
         raise QuestionError(f"--row {row_id}: is {of_row[0].words}: nothing is judged there")
 
@@ -291,10 +279,10 @@ class Table:
         tree = tree_of(mission)
         self.numbers = tuple(numbers) or tuple(number_of(tree, key) for key in question.keys)
         self.asked = [_Field(name, *_of_row(name)) for name in question.columns]
-        rows = {row.id: row for row in check_mission(self.mission, question.today).rows} if self.asked else {}
-        here = [one for one in self.asked if one.row in rows]
-        self.subjects = {one.row: rows[one.row].subject for one in here}
-        self.is_alone = any(one.field not in judged_cases.FIELDS for one in self.asked)
+        wanted = {one.row for one in self.asked} | ({question.row} if question.row else set())
+        rows = judged_mission(Analysis(self.mission), question.today).rows if wanted else ()
+        self.subjects = {row.subject.id: row.subject for row in rows if row.subject.id in wanted}
+        self.is_whole = any(one.field in WHOLE for one in self.asked)
         # Numbers that decide more than themselves: a case that has another value than the mission is read.
         self.to_read = {
             one.key
@@ -410,7 +398,7 @@ class Table:
 
     def _arrays(self, found: Mapping[str, Values], cases: int) -> tuple[Places, Mission, BistaticGeometry]:
         """The cases whose numbers can be put into the mission, the mission with them, and its geometry."""
-        direct = np.full(cases, not self.is_alone)
+        direct = np.ones(cases, dtype=bool)
         for one in self.numbers:
             values = found[one.key]
             direct &= values == one.value if one.key in self.to_read else _within(one, values)
@@ -431,9 +419,7 @@ class Table:
         """Read other cases, one after the other, and note the place of each that is a mission."""
         for place in others:
             mission = self._read(found, place)
-            if mission is not None and self.is_alone:
-                self._by_itself(found, place, mission)
-            elif mission is not None:
+            if mission is not None:
                 places.append(place)
                 yield mission
 
@@ -452,63 +438,39 @@ class Table:
     def _judge(
         self, found: dict[str, Values], some: Places, mission: Mission, geometries: BistaticGeometry, nodes: int
     ) -> None:
-        question = self.question
+        question, T = self.question, mission.collection.aperture_time
+        analysis = Analysis(mission, some.size, geometry=geometries, nodes=nodes, shown=self.subjects)
+        judged = judged_mission(analysis, question.today, is_whole=self.is_whole)
+        rows = {row.subject.id: row for row in judged.rows}
+        columns = _verdict(judged, rows, question.row, question.breaks)
         with np.errstate(all="ignore"):
-            checked = check_arrays(mission, some.size, question.today, nodes, geometries, self.subjects)
-            rows = {row.subject.id: row for row in checked.rows}
-            for row_id in self.subjects.keys() - rows.keys():  # nothing declares it in any of the cases
-                none = Judged.of_none(self.subjects[row_id], some.size)
-                (*_, row) = judged_cases.with_required([none], mission, geometries, some.size)
-                rows[row_id] = judged_cases.waived(row, mission, question.today)
-            columns = _verdict(checked, question.row, question.breaks)
             geometry = (
                 geometries.range_resolution(mission.radar.bandwidth, SPEED_OF_LIGHT),
-                geometries.cross_range_resolution(mission.radar.wavelength, mission.collection.aperture_time),
+                geometries.cross_range_resolution(mission.radar.wavelength, T),
                 geometries.bistatic_angle,
                 geometries.gradient_angle,
             )
             columns |= {column.name: number for column, number in zip(GEOMETRY, geometry, strict=True)}
             for one in self.asked:
                 if one.row in rows:
-                    columns[one.name] = judged_cases.field(rows[one.row], one.field)
+                    columns[one.name] = field(rows[one.row], one.field)
                 elif one.is_text:
                     columns[one.name] = "not_declared"
-        if question.row in (None, *(row.subject.id for row in checked.rows)):
-            for name, column in columns.items():
-                found[name][some] = np.broadcast_to(column, some.shape)
-            return
-        for place in some.tolist():
-            if (case := self._read(found, place)) is not None:
-                self._by_itself(found, place, case)
-
-    def _by_itself(self, found: dict[str, Values], place: int, mission: Mission) -> None:
-        """Check a case by itself, of which a row or a column is asked that arrays do not have."""
-        checked = check_mission(mission, self.question.today, is_bare=True)
-        stands = standing(checked, self.question.row, self.question.breaks)
-        geometry, resolution = checked.geometry, checked.resolution
-        angles = (geometry.bistatic_angle, geometry.gradient_angle)
-        numbers = (resolution.range, resolution.cross_range, *angles, stands.utilization)
-        for column, number in zip((*GEOMETRY, VERDICT[2]), numbers, strict=True):
-            found[column.name][place] = math.nan if number is None else number
-        found["status"][place], found["worst_row"][place] = stands.status, stands.row or ""
-        found["binding_requirement"][place] = stands.requirement or ""
-        rows = {row.id: row for row in checked.rows}
-        for one in self.asked:
-            value = getattr(rows[one.row], one.field) if one.row in rows else "not_declared" if one.is_text else None
-            found[one.name][place] = math.nan if value is None else value
+        for name, column in columns.items():
+            found[name][some] = np.broadcast_to(column, some.shape)
 
 
-def _verdict(checked: judged_cases.Checked, row_id: str | None, breaks: Container[str]) -> dict[str, Any]:
-    """Status, worst row, utilization and requirement of each case."""
-    rows = [one for one in checked.rows if row_id in (None, one.subject.id)]
+def _verdict(
+    judged: JudgedMission, by_id: Mapping[str, Judged], row_id: str | None, breaks: Container[str]
+) -> dict[str, Any]:
+    """Status, worst row, utilization and requirement of each case, or of the row that is asked for."""
+    rows = list(judged.rows) if row_id is None else [by_id[row_id]] if row_id in by_id else []
     does_break = np.array([name in breaks for name in STATUS])
     if not rows:
         nothing = "not_evaluated"
         return {"status": nothing, "worst_row": "", "utilization": math.nan, "binding_requirement": ""}
     codes, uses = np.array([one.status for one in rows]), np.array([one.utilization for one in rows])
-    status = codes[0]
-    if row_id is None:
-        status = np.minimum(np.where(_GATES[codes], codes, CODE["pass"]).min(axis=0), checked.floor)
+    status = judged.status if row_id is None else codes[0]
     worst = deciding([one.subject.kind for one in rows], codes, uses, status, breaks)
     has_one = worst >= 0
     ids, metrics = (
@@ -519,7 +481,7 @@ def _verdict(checked: judged_cases.Checked, row_id: str | None, breaks: Containe
     requirement = np.where(binding >= 0, np.array(REQUIREMENTS, dtype=object)[binding], metrics[worst])
     unmet = np.full(status.shape, "", dtype=object)  # where no row decides, the requirement that breaks
     if row_id is None:
-        for one in reversed(checked.requirements):
+        for one in reversed(judged.requirements):
             unmet = np.where((one.status == status) & does_break[status], one.key, unmet)
     return {
         "status": statuses(status),

@@ -1,19 +1,47 @@
-"""A mission in which some numbers are arrays, one element a case: how they come into it."""
+"""A mission in which some numbers are arrays, one element a case.
 
+How they come into it, where they cannot, which cases then are missions, and how all errors below a key are scaled.
+"""
+
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from functools import partial
+from itertools import pairwise
 from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget import units
+from bisar_budget.design.quantities import QuestionError
+from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.effects.subject import MOTION
+from bisar_budget.geometry import STILL, BistaticGeometry, PlatformState, norm
 from bisar_budget.mission.changes import parts_of
-from bisar_budget.mission.covariance import KINDS, Covariance, error_index
-from bisar_budget.mission.instruments import Imu, PowerLaw
-from bisar_budget.mission.model import Mission, Simulation
-from bisar_budget.mission.platforms import CommonMotionError, FlownPath
+from bisar_budget.mission.covariance import EIGENVALUE_TOLERANCE, KINDS, Covariance, error_index
+from bisar_budget.mission.instruments import RISE, STEEPEST, Imu, PowerLaw
+from bisar_budget.mission.model import (
+    MISSION,
+    PLACE_KEYS,
+    WHOLE,
+    MetricSplits,
+    Mission,
+    Shares,
+    Simulation,
+    flies_on_earth,
+)
+from bisar_budget.mission.platforms import (
+    FARTHEST_BY,
+    LEAST_BASELINE,
+    CommonMotionError,
+    FlownPath,
+    MotionError,
+    Platform,
+    least_baseline,
+)
+from bisar_budget.mission.readers import ListOf, OneOf, Quantity, Reader, Section, Triple
+from bisar_budget.ranges.exact_ranges import Floats
 from bisar_budget.units import Dimension, parse_quantity
 
 # Sections that a file may leave out, and keys whose scalar stands for each of three axes.
@@ -150,15 +178,6 @@ def _shape(value: Any, numbers: list[float]) -> Any:
     return (names, *[_shape(part, numbers) for part in parts])
 
 
-def _leaves(value: Any) -> Iterator[Any]:
-    parts = _parts(value)
-    if parts is None:
-        yield value
-        return
-    for part in parts:
-        yield from _leaves(part)
-
-
 def _with_leaves(value: Any, put: Callable[[Any], Any]) -> Any:
     """The same with something else in the place of each number, array or word."""
     parts = _parts(value)
@@ -170,3 +189,183 @@ def _with_leaves(value: Any, put: Callable[[Any], Any]) -> Any:
     if isinstance(value, tuple):
         return value._make(found) if hasattr(value, "_make") else tuple(found)
     return type(value)(**{one.name: part for one, part in zip(fields(value), found, strict=True)})
+
+
+# ---------------------------------------------------------------- where arrays can stand, which cases are missions
+SAFE = 1 + 1e-6  # nearer to a border of what forms an image, a case is checked by itself
+
+
+def is_held(mission: Mission, key: str, *, is_stated: bool) -> bool:
+    """Whether an array can take the place of a number, which the file states or does not.
+
+    It cannot where the number decides more than itself: a path of an orbit or a log, the place of the scene on the
+    Earth, an element of a covariance matrix.
+    """
+    section, *parts = parts_of(key)
+    if section == "platforms":
+        platform: Platform = getattr(mission.platforms, parts[0])
+        if parts[1] == "motion_error":
+            return _is_held_of_error(platform.motion_error, parts[2:], is_stated)
+        if parts[1] == "oscillator":
+            if platform.oscillator is None or (parts[2] == "frequency" and platform.oscillator.sensor is not None):
+                return False  # a part holds at the frequency of its own
+            return is_stated or parts[2] in ("frequency", "bandwidth")
+        return not flies_on_earth(mission) and _is_held_of_path(platform, parts[1], is_stated)
+    if key == "collection.aperture_time" or (section == "scene" and parts[0] in PLACE_KEYS):
+        return not flies_on_earth(mission)
+    return is_stated or section in _FREE or key in _FREE
+
+
+def _is_held_of_error(error: MotionError, parts: Sequence[str], is_stated: bool) -> bool:
+    if parts[0] in MOTION:
+        return parts[0] == "acceleration" or error.covariance is None  # which replaces the others
+    if parts[0] == "covariance" and error.covariance is not None:
+        return is_stated and not error.covariance.is_matrix  # an element of a matrix has a twin
+    return is_stated or parts[0] == "imu"
+
+
+def _is_held_of_path(platform: Platform, name: str, is_stated: bool) -> bool:
+    if name == "speed":
+        return is_stated and platform.motion_azimuth is not None  # a fixed one has no direction
+    return is_stated or (name == "climb" and platform.slant_range is not None)
+
+
+# Sections and keys that a file may leave out and that may be stated by themselves.
+_FREE = {
+    *("timing_error", "common_motion_error", "requirements", "autofocus", "simulation"),
+    *("scene.radius", "scene.height_error", "allocation.coverage_factor", "allocation.warn_above"),
+    *("allocation.split.clock", "allocation.split.reserve"),
+}
+
+
+def is_image(mission: Mission, geometries: BistaticGeometry, cases: int) -> NDArray[np.bool_]:
+    """Whether each case forms an image, with room to spare; `mission` may hold arrays, (cases,).
+
+    A file that is read says so to the last digit, and why not.
+    """
+    is_one = _has_possible_figures(mission, cases)
+    half = np.asarray(mission.collection.aperture_time) / 2
+    still: Any = True
+    for name, paths in zip(PLATFORMS, geometries.both, strict=True):
+        platform = getattr(mission.platforms, name)
+        is_one &= (paths.slant_range > SAFE) & (np.asarray(paths.position[2]) - paths.sinks(half) >= 0)
+        is_one &= paths.has_frame(platform.motion_error.frame, SAFE)
+        still = still & (norm(paths.velocity) < STILL * SAFE)
+        if np.ndim(platform.speed):
+            is_one &= np.asarray(platform.speed) != 0
+    is_one &= ~np.asarray(still)
+    for spans in geometries.spans_ground(SAFE):
+        is_one &= spans
+    if mission.has_direct_path:
+        is_one &= _has_baseline(geometries.apart, np.broadcast_to(half, (cases,)))
+    return is_one & (np.asarray(mission.radar.bandwidth) * SAFE < 2 * np.asarray(mission.radar.center_frequency))
+
+
+def _has_baseline(apart: PlatformState, half: Floats) -> NDArray[np.bool_]:
+    """Whether there is a direct path to follow, with room to spare."""
+    return np.asarray(
+        least_baseline(apart, half) > SAFE * np.maximum(LEAST_BASELINE, apart.travelled(half) / FARTHEST_BY)
+    )
+
+
+def _has_possible_figures(mission: Mission, cases: int) -> NDArray[np.bool_]:
+    """Whether numbers that a file holds to each other fit, with room to spare: shares, masks and correlations."""
+    is_one = np.ones(cases, dtype=bool)
+    split = mission.allocation.split
+    for shares in split if isinstance(split, MetricSplits) else (split,):
+        if isinstance(shares, Shares):
+            total = sum(0.0 if share is None else share for share in shares)
+            is_one &= np.abs(np.asarray(total) - 1) * SAFE < WHOLE
+    for name in PLATFORMS:
+        platform: Platform = getattr(mission.platforms, name)
+        if platform.oscillator is not None:
+            for (f, level), (g, next_level) in pairwise(platform.oscillator.phase_noise or ()):
+                slope = (np.asarray(next_level) - level) / math.log10(g / f)
+                is_one &= (slope * SAFE > -STEEPEST) & (slope * SAFE < RISE)
+        covariance = platform.motion_error.covariance
+        if covariance is not None:
+            rows = [[np.broadcast_to(rho, (cases,)) for rho in row] for row in covariance.correlation]
+            least = np.linalg.eigvalsh(np.array(rows).transpose(2, 0, 1)).min(axis=1)
+            is_one &= least > -EIGENVALUE_TOLERANCE / 2
+    return is_one
+
+
+# ---------------------------------------------------------------------- scaled errors
+# What a factor does not multiply: when and how fast an error changes, and settings.
+_KEPT = (units.FREQUENCY, units.TIME, units.RATIO, units.MEMORY)
+_LEVELS = (units.POWER_RATIO, units.PHASE_NOISE, units.TONE)
+_ERRORS = ("motion_error", "common_motion_error", "timing_error", "other_errors")
+_ACCEPTED = (
+    "accepted: platforms.transmitter.motion_error, platforms.receiver.motion_error, common_motion_error, "
+    "timing_error, other_errors, or a key below one of them"
+)
+
+
+def scaled(mission: Mission, key: str, factor: Any) -> Mission:
+    """Multiply every error that stands below a key: amplitudes and sigmas, those of parts of the catalogue too.
+
+    Frequencies, correlation times and correlations stay. The factor may be an array (cases,).
+
+    Raises
+    ------
+    QuestionError
+        The key holds no errors, or the mission states none there.
+    """
+    parts = parts_of(key)
+    if not any(part in _ERRORS for part in parts[:3]):
+        raise QuestionError(f"{key}: holds no errors that --scale could multiply; {_ACCEPTED}")
+    changed, count = _below(mission, MISSION, parts, factor, key)
+    if not count:
+        raise QuestionError(f"{key}: the mission states no error there that --scale could multiply")
+    return cast(Mission, changed)
+
+
+def _below(value: Any, reader: Reader, parts: Sequence[str], factor: Any, key: str) -> tuple[Any, int]:
+    """Go down to the key, and put what is scaled in its place on the way back."""
+    if not parts:
+        return _scaled(value, reader, factor, is_clock=parts_of(key)[0] == "timing_error")
+    part, *rest = parts
+    reader = _form(reader, value)
+    if isinstance(reader, Section) and part in reader.keys and value is not None:
+        inner, count = _below(getattr(value, part), reader.keys[part].reader, rest, factor, key)
+        return value._replace(**{part: inner}), count
+    if isinstance(reader, ListOf | Triple) and part.isdigit() and value and int(part) < len(value):
+        below = reader.section if isinstance(reader, ListOf) else reader.component
+        inner, count = _below(value[int(part)], below, rest, factor, key)
+        return (*value[: int(part)], inner, *value[int(part) + 1 :]), count
+    raise QuestionError(f"{key}: the mission has no {part}; {_ACCEPTED}")
+
+
+def _scaled(value: Any, reader: Reader, factor: Any, is_clock: bool) -> tuple[Any, int]:
+    """Multiply what is below a value; with it the number of numbers that are not zero."""
+    reader = _form(reader, value)
+    if value is None:
+        return value, 0
+    if isinstance(reader, Section):
+        count = 0
+        for name, below in reader.keys.items():
+            inner, found = _scaled(getattr(value, name), below.reader, factor, is_clock)
+            value, count = value._replace(**{name: inner}), count + found
+        return value, count
+    if isinstance(reader, ListOf | Triple):
+        below_reader = reader.section if isinstance(reader, ListOf) else reader.component
+        pairs = [_scaled(entry, below_reader, factor, is_clock) for entry in value]
+        return tuple(entry for entry, _ in pairs), sum(found for _, found in pairs)
+    if isinstance(reader, Quantity):
+        if reader.dimension in _LEVELS:
+            return value + 20 * np.log10(factor), 1
+        if reader.dimension in _KEPT and not is_clock:
+            return value, 0
+        return value * factor, int(np.any(value))
+    if hasattr(value, "sigmas"):  # a covariance
+        return value._replace(sigmas=tuple(sigma * factor for sigma in value.sigmas)), int(np.any(value.sigmas))
+    return value, 0
+
+
+def _form(reader: Reader, value: Any) -> Reader:
+    """The form of a reader that gave a value that was read."""
+    if isinstance(reader, OneOf):
+        kind = Triple if isinstance(value, tuple) and not hasattr(value, "_fields") else Quantity
+        matching = [form for form in reader.forms if isinstance(form, Section) and type(value) is form.kind]
+        return next(iter([*matching, *(form for form in reader.forms if isinstance(form, kind))]), reader.forms[0])
+    return reader

@@ -36,11 +36,13 @@ _AXES: tuple[Vectors, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 _UNIT = Effect(constant=0.0, linear=0.0, qpe=1.0, cubic=0.0)  # of what only is a phase
 
 
-def exact_ranges(mission: Mission, geometry: BistaticGeometry, count: int | None = None) -> ExactRanges:
-    """Exact ranges of a mission at its scene centre, at as many nodes as it needs, or a given number."""
+def exact_ranges(
+    mission: Mission, geometry: BistaticGeometry, count: int | None = None, cases: int = 1
+) -> ExactRanges:
+    """Exact ranges of cases of a mission at their scene centres, at as many nodes as it needs, or a given number."""
     T, is_heard = mission.collection.aperture_time, mission.has_direct_path
     count = count or nodes_for(geometry, T, has_direct_path=is_heard)
-    return ExactRanges.of(geometry.both, mission.radar.wavelength, T, count, has_direct_path=is_heard)
+    return ExactRanges.of(geometry.both, mission.radar.wavelength, T, count, cases, has_direct_path=is_heard)
 
 
 class ErrorListing:

@@ -1,4 +1,9 @@
 """Radar formats in and out: CPHD, CRSD and SICD become missions, simulated phase histories become CPHD."""
 
 # What other rooms may use.
-__all__ = ["document", "exporting", "importing", "mission_text"]
+__all__ = [
+    "collected",
+    "containers",
+    "exporting",
+    "importing",
+]

@@ -1,21 +1,234 @@
-"""Files of phase histories and images: header, XML and the parameters of every pulse. The signal is never read.
+"""Radar files: header, XML and the parameters of every pulse. The signal is never read.
 
 CPHD 1.1.0 (NGA.STND.0068-1) and CRSD 1.0 (NGA.STND.0080-2) begin with a header of text lines, which says
-at which byte each block begins. SICD (NGA.STND.0024) has its XML in a segment of a NITF file.
+at which byte each block begins. SICD (NGA.STND.0024) has its XML in a segment of a NITF file. XML is read without
+entities and references, and looked up so that a fault says where it stands.
 """
 
+import math
 import os
 import stat
+from collections.abc import Iterator
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
+from typing import Any, BinaryIO, NamedTuple
 
-from bisar_budget.faults import shown
-from bisar_budget.formats.document import Element, FormatError, MissingExtraError, parse
+import numpy as np
+from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
+from bisar_budget.faults import printable, shown
+from bisar_budget.geometry import Vector
 
+_HIGHEST_POWER = 30  # of a polynomial; more is no polynomial that anybody fitted
+_INCLUDE = "{http://www.w3.org/2001/XInclude}"
+MISSING_EXTRA = "reads and writes radar formats with sarkit: pip install 'bisar-budget[formats]'"
+
+
+class FormatError(Exception):
+    """A file of a radar format that cannot be used. The message names the file, and its byte or XML path."""
+
+    def __init__(self, file: str, problem: str) -> None:
+        super().__init__(f"{printable(file)}: {problem}")
+
+
+class MissingExtraError(Exception):
+    """The extra `formats` is not installed."""
+
+    def __init__(self) -> None:
+        super().__init__(f"bisar-budget {MISSING_EXTRA}")
+
+
+class Element:
+    """An element of an XML document, which knows its file and its path there.
+
+    Paths are those of ElementPath without namespaces: `Channel/Parameters/FxC`. A step may have a condition on a
+    child, `Parameters[Identifier='1']`.
+    """
+
+    def __init__(self, file: str, node: Any) -> None:
+        self.file, self.node = file, node
+
+    @property
+    def tag(self) -> str:
+        """Name without namespace."""
+        return str(self.node.tag).rpartition("}")[2]
+
+    @property
+    def namespace(self) -> str:
+        """Namespace of its name."""
+        return str(self.node.tag).rpartition("}")[0].lstrip("{")
+
+    @property
+    def path(self) -> str:
+        """Where it stands: `/CPHD/Channel/Parameters[2]`."""
+        steps = []
+        node = self.node
+        while node is not None:
+            name = str(node.tag).rpartition("}")[2]
+            above = node.getparent()
+            alike = [one for one in above if one.tag == node.tag] if above is not None else [node]
+            steps.append(name if len(alike) == 1 else f"{name}[{alike.index(node) + 1}]")
+            node = above
+        return "/" + "/".join(reversed(steps))
+
+    def fault(self, problem: str, below: str = "") -> FormatError:
+        """An error at this element, or at a path below it."""
+        return FormatError(self.file, f"{self.path}{'/' + below if below else ''} {problem}")
+
+    def all(self, path: str) -> list["Element"]:
+        """Elements at a path."""
+        return [Element(self.file, node) for node in self.node.findall(_any_namespace(path))]
+
+    def maybe(self, path: str) -> "Element | None":
+        """First element at a path."""
+        node = self.node.find(_any_namespace(path))
+        return None if node is None else Element(self.file, node)
+
+    def one(self, path: str) -> "Element":
+        """First element at a path, which has to be there."""
+        found = self.maybe(path)
+        if found is None:
+            raise self.fault("is missing", path)
+        return found
+
+    def with_child(self, path: str, child: str, text: str) -> "Element | None":
+        """First element at a path that has a child of this text."""
+        return next((one for one in self.all(path) if one.maybe(child) and one.text(child) == text), None)
+
+    def text(self, path: str = "") -> str:
+        """Text at a path."""
+        node = self.one(path) if path else self
+        return (node.node.text or "").strip()
+
+    def number(self, path: str = "") -> float:
+        """Finite number at a path."""
+        text = self.text(path)
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            raise self.fault(f"must be a finite number (got {shown(text)!r})", path)
+        return value
+
+    def whole(self, path: str = "") -> int:
+        """Whole number from zero on at a path."""
+        text = self.text(path)
+        if not (text.isascii() and text.isdigit() and len(text) < 19):
+            raise self.fault(f"must be a whole number from 0 on (got {shown(text)!r})", path)
+        return int(text)
+
+    def vector(self, path: str = "") -> Vector:
+        """X, Y and Z at a path."""
+        node = self.one(path) if path else self
+        return (node.number("X"), node.number("Y"), node.number("Z"))
+
+    def polynomial(self, path: str = "") -> NDArray[np.float64]:
+        """Coefficients of a polynomial of one variable, (order + 1,)."""
+        node = self.one(path) if path else self
+        found = np.zeros(node._order("order1") + 1)
+        for power, value in node._coefficients("exponent1"):
+            found[power] = value
+        return found
+
+    def polynomial_2d(self, path: str = "") -> NDArray[np.float64]:
+        """Coefficients of a polynomial of two variables, (order1 + 1, order2 + 1)."""
+        node = self.one(path) if path else self
+        found = np.zeros((node._order("order1") + 1, node._order("order2") + 1))
+        for *powers, value in node._coefficients("exponent1", "exponent2"):
+            found[tuple(powers)] = value
+        return found
+
+    def path_polynomial(self, path: str) -> NDArray[np.float64]:
+        """Coefficients of a place over time, (order + 1, 3)."""
+        axes = [self.one(path).polynomial(axis) for axis in "XYZ"]
+        most = max(axis.size for axis in axes)
+        return np.stack([np.pad(axis, (0, most - axis.size)) for axis in axes], axis=1)
+
+    def matrix(self, path: str, size: int) -> NDArray[np.float64]:
+        """Symmetric matrix of `Entry` elements; what is not given is zero, of a pair one may be given."""
+        found = np.full((size, size), np.nan)
+        for entry in self.one(path).all("Entry"):
+            row, column = (entry._attribute(name, size) - 1 for name in ("index1", "index2"))
+            if min(row, column) < 0:
+                raise entry.fault("counts its indices from 1")
+            found[row, column] = entry.number()
+        filled = np.where(np.isnan(found), found.T, found)
+        symmetric: NDArray[np.float64] = np.nan_to_num((filled + filled.T) / 2)
+        return symmetric
+
+    def _order(self, name: str) -> int:
+        return self._attribute(name, _HIGHEST_POWER)
+
+    def _attribute(self, name: str, most: int) -> int:
+        text = self.node.get(name, "")
+        if not (text.isascii() and text.isdigit() and int(text[:9]) <= most):
+            raise self.fault(f"must have {name} from 0 to {most} (got {shown(text)!r})")
+        return int(text)
+
+    def _coefficients(self, *names: str) -> Iterator[Any]:
+        for node in self.all("Coef"):
+            powers = [node._attribute(name, _HIGHEST_POWER) for name in names]
+            most = [self._order(name.replace("exponent", "order")) for name in names]
+            if any(power > order for power, order in zip(powers, most, strict=True)):
+                raise node.fault("is of a higher power than the polynomial's order")
+            yield (*powers, node.number())
+
+
+def _any_namespace(path: str) -> str:
+    return "/".join(f"{{*}}{step}" for step in path.split("/"))
+
+
+def parse(file: str, data: bytes, start: int = 0) -> Element:
+    """Read an XML document without document type, entities or references to other files.
+
+    Parameters
+    ----------
+    file : str
+        For messages.
+    data : bytes
+        The document.
+    start : int
+        Byte of the file at which it begins.
+
+    Raises
+    ------
+    FormatError
+        It is no XML, or has what a description of a collection has no use for.
+    MissingExtraError
+        The extra `formats` is not installed.
+    """
+    try:
+        from lxml import etree
+    except ImportError:
+        raise MissingExtraError from None
+    for word in (b"<!DOCTYPE", b"<!ENTITY"):  # before a parser sees what they could do to it
+        at = data.find(word)
+        if at >= 0:
+            raise FormatError(file, f"byte {start + at}: XML with {word.decode()} is refused: entities are not read")
+    parser = etree.XMLParser(
+        resolve_entities=False,
+        no_network=True,
+        load_dtd=False,
+        huge_tree=False,
+        remove_comments=True,
+        remove_pis=True,
+    )
+    try:
+        root = etree.fromstring(data.strip(b" \r\n\t\0"), parser)
+    except (etree.XMLSyntaxError, ValueError) as error:
+        line, column = getattr(error, "position", (0, 0))
+        raise FormatError(
+            file,
+            f"byte {start}: no readable XML begins here, line {line}, column {column} of it: {shown(str(error))}",
+        ) from None
+    if root.getroottree().docinfo.doctype:  # in an encoding that hid it
+        raise FormatError(file, f"byte {start}: XML with a document type is refused: entities are not read")
+    for node in root.iter(f"{_INCLUDE}*"):
+        raise Element(file, node).fault("refers to another file, which is not read")
+    return Element(file, root)
+
+
+# ---------------------------------------------------------------------- the file around the XML
 _END_OF_HEADER = b"\f\n"
 _MOST_HEADER = 1 << 16  # bytes; the standard's keys take less than a thousand
 _MOST_XML = 1 << 27
@@ -40,10 +253,8 @@ class Container(NamedTuple):
         """Whether there are parameters of pulses beside the XML."""
         return "PVP" in self.blocks
 
-    def vectors(self, block: str, at: int, count: int, dtype: "np.dtype[Any]") -> "NDArray[Any]":
+    def vectors(self, block: str, at: int, count: int, dtype: np.dtype[Any]) -> NDArray[Any]:
         """Parameters of `count` vectors of a block, from a byte of it on; the rest of the file is not touched."""
-        import numpy as np
-
         start, length = self.blocks[block]
         wanted = count * dtype.itemsize
         if at + wanted > length or wanted > _MOST_VECTORS:

@@ -11,15 +11,18 @@ import io
 import math
 import os
 import tempfile
-from datetime import UTC, datetime, timedelta
+from dataclasses import dataclass
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from bisar_budget import __version__
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.faults import printable
-from bisar_budget.formats.document import MissingExtraError
-from bisar_budget.formats.file_errors import ADDED, KINDS
+from bisar_budget.formats.containers import MissingExtraError
+from bisar_budget.formats.file_errors import ADDED, KINDS, correlated
 from bisar_budget.geometry import Axes, PlatformState, Vector
 from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.paths.earth import Geodetic, SceneAxes, axes_at, geodetic
@@ -30,11 +33,7 @@ from bisar_budget.simulate.phase_history import phase_history
 from bisar_budget.simulate.point import Flight, SimulationError, flight, pulses_for
 from bisar_budget.simulate.targets import Targets
 
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    Floats = NDArray[np.float64]
+Floats = NDArray[np.float64]
 
 NAMESPACE = "http://api.nsgreg.nga.mil/schema/cphd/1.1.0"
 NOWHERE = Geodetic(0.0, 0.0, 0.0)  # of a scene whose mission does not say where it is
@@ -56,7 +55,8 @@ _VECTOR = (
 )  # fmt: skip
 
 
-class Exported(NamedTuple):
+@dataclass(frozen=True)
+class Exported:
     """A CPHD file, byte for byte, and what a person wants to know of it.
 
     `half` is half the side of its image area [m]; `remarks` say what the mission leaves open.
@@ -71,7 +71,8 @@ class Exported(NamedTuple):
     remarks: tuple[str, ...]
 
 
-class _Plan(NamedTuple):
+@dataclass(frozen=True)
+class _Plan:
     """How much is recorded: pulses, frequencies, swath of delay to each side [s], half the side of the area [m]."""
 
     pulses: int
@@ -107,8 +108,6 @@ def export_phase_history(mission: Mission, targets: Targets) -> Exported:
         import_module("sarkit.cphd")
     except ImportError:
         raise MissingExtraError from None
-    import numpy as np
-
     settings = mission.simulation or Simulation()
     plan = _plan(mission, targets)
     needed = plan.pulses * plan.samples * _BYTES_PER_SAMPLE
@@ -156,8 +155,6 @@ def export_phase_history(mission: Mission, targets: Targets) -> Exported:
 
 def _plan(mission: Mission, targets: Targets) -> _Plan:
     """Choose the image area, and the samples that keep it from repeating in range and in Doppler."""
-    import numpy as np
-
     T, radar, geometry = mission.collection.aperture_time, mission.radar, mission.geometry
     nodes = aperture_nodes(T)
     slow = flight(mission, nodes, vibrating=False)
@@ -191,10 +188,8 @@ def _plan(mission: Mission, targets: Targets) -> _Plan:
     return _Plan(pulses, samples, delay, half)
 
 
-def _scene(mission: Mission, targets: Targets, half: float) -> tuple["Floats", "NDArray[np.complex128]"]:
+def _scene(mission: Mission, targets: Targets, half: float) -> tuple[Floats, NDArray[np.complex128]]:
     """Places (n, 3) [m] and amplitudes (n,) of targets and clutter."""
-    import numpy as np
-
     places = [(one.east, one.north, 0.0) for one in targets.points]
     amplitudes = [10 ** (one.level_db / 20) for one in targets.points]
     if targets.clutter_db is None:
@@ -216,16 +211,14 @@ def _scene(mission: Mission, targets: Targets, half: float) -> tuple["Floats", "
 
 
 def _vectors(
-    mission: Mission, slow_time: "Floats", flown: Flight, axes: SceneAxes, plan: _Plan
-) -> tuple["NDArray[Any]", float]:
+    mission: Mission, slow_time: Floats, flown: Flight, axes: SceneAxes, plan: _Plan
+) -> tuple[NDArray[Any], float]:
     """Parameters of each vector, and the time of the file at the middle of the aperture. [s]
 
     A pulse is at the scene centre at its slow time. It left the transmitter R_t/c before, and is received R_r/c
     later, by the measured places; so the reference time of section 6.5.1 (5) is that slow time again. A platform's
     own time therefore runs by 1 ∓ Ṙ/c of slow time, which is what its velocity is divided by.
     """
-    import numpy as np
-
     dtype = np.dtype(
         [(name, "i8" if name == "SIGNAL" else "f8", (size,) if size > 1 else ()) for name, size in _VECTOR]
     )
@@ -266,7 +259,7 @@ def _vectors(
 
 
 # ---------------------------------------------------------------------- XML
-_Branch = list[tuple[str, Any]]
+_Leaves = dict[str, Any]  # text or number by the path of its element, in the order of the file
 
 
 def _document(
@@ -274,109 +267,71 @@ def _document(
     targets: Targets,
     plan: _Plan,
     axes: SceneAxes,
-    vectors: "NDArray[Any]",
+    vectors: NDArray[Any],
     start: Instant,
     offset: float,
     remarks: list[str],
 ) -> Any:
     """XML of the file, an lxml tree, with the reference geometry that sarkit computes from the vectors."""
-    import numpy as np
-
     etree: Any = import_module("lxml.etree")
     skcphd: Any = import_module("sarkit.cphd")
-    band = [float(vectors["FX1"][0]), float(vectors["FX2"][0])]
-    area: _Branch = [("X1Y1", _xy(-plan.half, -plan.half)), ("X2Y2", _xy(plan.half, plan.half))]
-    name = printable(mission.name)
-    branches: _Branch = [
-        (
-            "CollectionID",
-            [
-                ("CollectorName", "receiver, simulated"),
-                ("IlluminatorName", "transmitter, simulated"),
-                ("CoreName", name),
-                ("CollectType", "BISTATIC"),
-                ("RadarMode", [("ModeType", "SPOTLIGHT")]),
-                ("Classification", "UNCLASSIFIED"),
-                ("ReleaseInfo", "UNRESTRICTED"),
-            ],
-        ),
-        (
-            "Global",
-            [
-                ("DomainType", "FX"),
-                ("SGN", -1),
-                (
-                    "Timeline",
-                    [
-                        ("CollectionStart", _moment(start)),
-                        ("TxTime1", float(vectors["TxTime"][0])),
-                        ("TxTime2", float(vectors["TxTime"][-1])),
-                    ],
-                ),
-                ("FxBand", [("FxMin", band[0]), ("FxMax", band[1])]),
-                ("TOASwath", [("TOAMin", -plan.delay), ("TOAMax", plan.delay)]),
-            ],
-        ),
-        ("SceneCoordinates", _scene_coordinates(mission, plan, axes, area)),
-        (
-            "Data",
-            [
-                ("SignalArrayFormat", "CF8"),
-                ("NumBytesPVP", vectors.dtype.itemsize),
-                ("NumCPHDChannels", 1),
-                (
-                    "Channel",
-                    [
-                        ("Identifier", _CHANNEL),
-                        ("NumVectors", plan.pulses),
-                        ("NumSamples", plan.samples),
-                        ("SignalArrayByteOffset", 0),
-                        ("PVPArrayByteOffset", 0),
-                    ],
-                ),
-                ("NumSupportArrays", 0),
-            ],
-        ),
-        (
-            "Channel",
-            [
-                ("RefChId", _CHANNEL),
-                ("FXFixedCPHD", True),
-                ("TOAFixedCPHD", True),
-                ("SRPFixedCPHD", True),
-                (
-                    "Parameters",
-                    [
-                        ("Identifier", _CHANNEL),
-                        ("RefVectorIndex", plan.pulses // 2),
-                        ("FXFixed", True),
-                        ("TOAFixed", True),
-                        ("SRPFixed", True),
-                        ("SignalNormal", True),
-                        ("Polarization", [("TxPol", "UNSPECIFIED"), ("RcvPol", "UNSPECIFIED")]),
-                        ("FxC", (band[0] + band[1]) / 2),
-                        ("FxBW", band[1] - band[0]),
-                        ("TOASaved", 2 * plan.delay),
-                        ("DwellTimes", [("CODId", "1"), ("DwellId", "1")]),
-                    ],
-                ),
-            ],
-        ),
-        ("PVP", _layout(vectors)),
-        (
-            "Dwell",
-            [
-                ("NumCODTimes", 1),
-                ("CODTime", [("Identifier", "1"), ("CODTimePoly", offset)]),
-                ("NumDwellTimes", 1),
-                ("DwellTime", [("Identifier", "1"), ("DwellTimePoly", mission.collection.aperture_time)]),
-            ],
-        ),
-        *_error_parameters(mission, axes),
-        ("ProductInfo", _product(mission, targets, remarks)),
-    ]
+    low, high = float(vectors["FX1"][0]), float(vectors["FX2"][0])
+    leaves: _Leaves = {
+        "CollectionID/CollectorName": "receiver, simulated",
+        "CollectionID/IlluminatorName": "transmitter, simulated",
+        "CollectionID/CoreName": printable(mission.name),
+        "CollectionID/CollectType": "BISTATIC",
+        "CollectionID/RadarMode/ModeType": "SPOTLIGHT",
+        "CollectionID/Classification": "UNCLASSIFIED",
+        "CollectionID/ReleaseInfo": "UNRESTRICTED",
+        "Global/DomainType": "FX",
+        "Global/SGN": -1,
+        "Global/Timeline/CollectionStart": start.as_datetime().strftime("%Y-%m-%dT%H:%M:%S.%fZ"),
+        "Global/Timeline/TxTime1": float(vectors["TxTime"][0]),
+        "Global/Timeline/TxTime2": float(vectors["TxTime"][-1]),
+        "Global/FxBand/FxMin": low,
+        "Global/FxBand/FxMax": high,
+        "Global/TOASwath/TOAMin": -plan.delay,
+        "Global/TOASwath/TOAMax": plan.delay,
+        **_scene_coordinates(mission, plan, axes),
+        "Data/SignalArrayFormat": "CF8",
+        "Data/NumBytesPVP": vectors.dtype.itemsize,
+        "Data/NumCPHDChannels": 1,
+        "Data/Channel/Identifier": _CHANNEL,
+        "Data/Channel/NumVectors": plan.pulses,
+        "Data/Channel/NumSamples": plan.samples,
+        "Data/Channel/SignalArrayByteOffset": 0,
+        "Data/Channel/PVPArrayByteOffset": 0,
+        "Data/NumSupportArrays": 0,
+        "Channel/RefChId": _CHANNEL,
+        "Channel/FXFixedCPHD": True,
+        "Channel/TOAFixedCPHD": True,
+        "Channel/SRPFixedCPHD": True,
+        "Channel/Parameters/Identifier": _CHANNEL,
+        "Channel/Parameters/RefVectorIndex": plan.pulses // 2,
+        "Channel/Parameters/FXFixed": True,
+        "Channel/Parameters/TOAFixed": True,
+        "Channel/Parameters/SRPFixed": True,
+        "Channel/Parameters/SignalNormal": True,
+        "Channel/Parameters/Polarization/TxPol": "UNSPECIFIED",
+        "Channel/Parameters/Polarization/RcvPol": "UNSPECIFIED",
+        "Channel/Parameters/FxC": (low + high) / 2,
+        "Channel/Parameters/FxBW": high - low,
+        "Channel/Parameters/TOASaved": 2 * plan.delay,
+        "Channel/Parameters/DwellTimes/CODId": "1",
+        "Channel/Parameters/DwellTimes/DwellId": "1",
+        **_layout(vectors),
+        "Dwell/NumCODTimes": 1,
+        "Dwell/CODTime/Identifier": "1",
+        "Dwell/CODTime/CODTimePoly": offset,
+        "Dwell/NumDwellTimes": 1,
+        "Dwell/DwellTime/Identifier": "1",
+        "Dwell/DwellTime/DwellTimePoly": mission.collection.aperture_time,
+        **_error_parameters(mission, axes),
+        **_product(mission, targets, remarks),
+    }
     root = etree.Element(f"{{{NAMESPACE}}}CPHD", nsmap={None: NAMESPACE})
-    _grow(etree, root, branches)
+    _grow(etree, root, leaves)
     tree = root.getroottree()
     with np.errstate(all="ignore"):  # a fixed platform has no direction of motion, which the standard has rules for
         geometry = skcphd.compute_reference_geometry(tree, vectors)
@@ -384,40 +339,36 @@ def _document(
     return tree
 
 
-def _grow(etree: Any, above: Any, branches: _Branch) -> None:
-    """Put elements below one: text, or a list of elements again. A polynomial is written as its constant."""
-    for name, value in branches:
-        tag, _, attribute = name.partition("@")
-        node = etree.SubElement(above, f"{{{NAMESPACE}}}{tag}")
-        if attribute:
-            key, _, text = attribute.partition("=")
-            node.set(key, text)
-        if tag.endswith("Poly"):
+def _grow(etree: Any, root: Any, leaves: _Leaves) -> None:
+    """Put elements below the root; a step of a path may have an attribute, a polynomial is its constant."""
+    grown = {"": root}
+    for path, value in leaves.items():
+        here = ""
+        for step in path.split("/"):
+            above, here = here, f"{here}/{step}"
+            if here not in grown:
+                tag, _, attribute = step.partition("@")
+                grown[here] = etree.SubElement(grown[above], f"{{{NAMESPACE}}}{tag}")
+                if attribute:
+                    grown[here].set(*attribute.split("=", 1))
+        node = grown[here]
+        if path.endswith("Poly"):
             node.set("order1", "0")
             node.set("order2", "0")
-            coefficient = etree.SubElement(node, f"{{{NAMESPACE}}}Coef", exponent1="0", exponent2="0")
-            coefficient.text = repr(float(value))
-        elif isinstance(value, list):
-            _grow(etree, node, value)
-        elif isinstance(value, bool):
-            node.text = str(value).lower()
-        else:
-            node.text = repr(value) if isinstance(value, float) else str(value)
+            node = etree.SubElement(node, f"{{{NAMESPACE}}}Coef", exponent1="0", exponent2="0")
+        is_bool = isinstance(value, bool)
+        node.text = str(value).lower() if is_bool else repr(value) if isinstance(value, float) else str(value)
 
 
-def _xyz(vector: Vector) -> _Branch:
-    return list(zip("XYZ", map(float, vector), strict=True))
+def _xyz(path: str, vector: Vector) -> _Leaves:
+    return {f"{path}/{axis}": float(part) for axis, part in zip("XYZ", vector, strict=True)}
 
 
-def _xy(x: float, y: float) -> _Branch:
-    return [("X", x), ("Y", y)]
+def _degrees(path: str, place: Geodetic) -> _Leaves:
+    return {f"{path}/Lat": math.degrees(place.latitude), f"{path}/Lon": math.degrees(place.longitude)}
 
 
-def _degrees(place: Geodetic) -> _Branch:
-    return [("Lat", math.degrees(place.latitude)), ("Lon", math.degrees(place.longitude))]
-
-
-def _scene_coordinates(mission: Mission, plan: _Plan, axes: SceneAxes, area: _Branch) -> _Branch:
+def _scene_coordinates(mission: Mission, plan: _Plan, axes: SceneAxes) -> _Leaves:
     """Plane of the scene: x east, y north; its corners clockwise as seen from above."""
     half = plan.half
     corners = [(-half, -half), (-half, half), (half, half), (half, -half)]
@@ -426,51 +377,37 @@ def _scene_coordinates(mission: Mission, plan: _Plan, axes: SceneAxes, area: _Br
     across = mission.geometry.cross_range_resolution(mission.radar.wavelength, mission.collection.aperture_time) / 2
     pixels = math.ceil(2 * half / min(spacing, across))
     step = 2 * half / pixels
-    return [
-        ("EarthModel", "WGS_84"),
-        ("IARP", [("ECF", _xyz(axes.origin)), ("LLH", [*_degrees(place), ("HAE", place.height)])]),
-        ("ReferenceSurface", [("Planar", [("uIAX", _xyz(axes.axes[0])), ("uIAY", _xyz(axes.axes[1]))])]),
-        ("ImageArea", area),
-        (
-            "ImageAreaCornerPoints",
-            [
-                (f"IACP@index={index}", _degrees(geodetic(axes.earth_fixed((x, y, 0.0)))))
-                for index, (x, y) in enumerate(corners, 1)
-            ],
-        ),
-        (
-            "ImageGrid",
-            [
-                ("IARPLocation", [("Line", (pixels - 1) / 2), ("Sample", (pixels - 1) / 2)]),
-                ("IAXExtent", [("LineSpacing", step), ("FirstLine", 0), ("NumLines", pixels)]),
-                ("IAYExtent", [("SampleSpacing", step), ("FirstSample", 0), ("NumSamples", pixels)]),
-            ],
-        ),
-    ]
+    leaves: _Leaves = {
+        "EarthModel": "WGS_84",
+        **_xyz("IARP/ECF", axes.origin),
+        **_degrees("IARP/LLH", place),
+        "IARP/LLH/HAE": place.height,
+        **_xyz("ReferenceSurface/Planar/uIAX", axes.axes[0]),
+        **_xyz("ReferenceSurface/Planar/uIAY", axes.axes[1]),
+        **{f"ImageArea/X1Y1/{axis}": -half for axis in "XY"},
+        **{f"ImageArea/X2Y2/{axis}": half for axis in "XY"},
+    }
+    for index, (x, y) in enumerate(corners, 1):
+        leaves |= _degrees(f"ImageAreaCornerPoints/IACP@index={index}", geodetic(axes.earth_fixed((x, y, 0.0))))
+    for key in ("Line", "Sample"):
+        leaves[f"ImageGrid/IARPLocation/{key}"] = (pixels - 1) / 2
+    for extent, key in (("IAXExtent", "Line"), ("IAYExtent", "Sample")):
+        sizes = {f"{key}Spacing": step, f"First{key}": 0, f"Num{key}s": pixels}
+        leaves |= {f"ImageGrid/{extent}/{name}": size for name, size in sizes.items()}
+    return {f"SceneCoordinates/{path}": value for path, value in leaves.items()}
 
 
-def _layout(vectors: "NDArray[Any]") -> _Branch:
+def _layout(vectors: NDArray[Any]) -> _Leaves:
     fields: Any = vectors.dtype.fields
-    return [
-        (
-            name,
-            [
-                ("Offset", int(fields[name][1]) // 8),
-                ("Size", size),
-                ("Format", "X=F8;Y=F8;Z=F8;" if size == 3 else "I8" if name == "SIGNAL" else "F8"),
-            ],
-        )
-        for name, size in _VECTOR
-    ]
+    leaves: _Leaves = {}
+    for name, size in _VECTOR:
+        leaves[f"PVP/{name}/Offset"] = int(fields[name][1]) // 8
+        leaves[f"PVP/{name}/Size"] = size
+        leaves[f"PVP/{name}/Format"] = "X=F8;Y=F8;Z=F8;" if size == 3 else "I8" if name == "SIGNAL" else "F8"
+    return leaves
 
 
-def _moment(instant: Instant) -> str:
-    """An instant of UTC, to a microsecond."""
-    moment = datetime(1858, 11, 17, tzinfo=UTC) + timedelta(days=instant.day, seconds=instant.seconds)
-    return moment.strftime("%Y-%m-%dT%H:%M:%S.%fZ")
-
-
-def _product(mission: Mission, targets: Targets, remarks: list[str]) -> _Branch:
+def _product(mission: Mission, targets: Targets, remarks: list[str]) -> _Leaves:
     parameters = {
         "version": __version__,
         "mission": os.path.basename(printable(mission.file)),
@@ -484,40 +421,35 @@ def _product(mission: Mission, targets: Targets, remarks: list[str]) -> _Branch:
         parameters["clutter [dB]"] = f"{targets.clutter_db:g}"
     for index, remark in enumerate(remarks, 1):
         parameters[f"remark {index}"] = remark
-    return [(f"Parameter@name={ADDED} {key}", value) for key, value in parameters.items()]
+    return {f"ProductInfo/Parameter@name={ADDED} {key}": value for key, value in parameters.items()}
 
 
 # ---------------------------------------------------------------------- declared errors
-def _error_parameters(mission: Mission, axes: SceneAxes) -> _Branch:
+def _error_parameters(mission: Mission, axes: SceneAxes) -> _Leaves:
     """`ErrorParameters` of both platforms: one sigma as declared, without the coverage factor.
 
     Errors that both platforms share are in the sigmas of each. What has no place there stands in `AddedParameters`.
     """
     added: dict[str, str] = {}
-    sides = []
+    leaves: _Leaves = {}
+    timing = mission.timing_error  # of the receiver's clock, counted against the transmitter's
+    clock = {"DelayBias": timing.constant, "ClockFreqSF": timing.linear}
+    stated = {key: abs(value) for key, value in clock.items() if value is not None}
     for whose, side in (("transmitter", "TxPlatform"), ("receiver", "RcvPlatform")):
-        covariance, frame = _covariance(mission, whose, axes, added)
-        sensor: _Branch = []
-        timing = mission.timing_error
-        if whose == "receiver":  # whose clock is counted against the transmitter's
-            sensor = [("DelayBias", abs(timing.constant))] if timing.constant is not None else []
-            sensor += [("ClockFreqSF", abs(timing.linear))] if timing.linear is not None else []
-        sensor.append(("CollectionStartTime", 0.0))  # which the schema asks for
-        sides.append((side, [("PosVelErr", _pos_vel_err(covariance, frame)), ("RadarSensor", sensor)]))
+        leaves |= _pos_vel_err(f"{side}/PosVelErr", *_covariance(mission, whose, axes, added))
+        sensor = {**(stated if whose == "receiver" else {}), "CollectionStartTime": 0.0}  # the schema asks for it
+        leaves |= {f"{side}/RadarSensor/{key}": value for key, value in sensor.items()}
     nothing = all(
         added.get(f"{whose}.{kind}") for whose in ("transmitter", "receiver") for kind in ("position", "velocity")
     )
-    if nothing and len(sides[1][1][1][1]) == 1 and len(added) == 4:
-        return []
-    parameters: _Branch = [(f"Parameter@name={ADDED} {key}", value) for key, value in added.items()]
-    rest: _Branch = [("AddedParameters", parameters)] if parameters else []
-    return [("ErrorParameters", [("Bistatic", [*sides, *rest])])]
+    if nothing and not stated and len(added) == 4:
+        return {}
+    leaves |= {f"AddedParameters/Parameter@name={ADDED} {key}": value for key, value in added.items()}
+    return {f"ErrorParameters/Bistatic/{path}": value for path, value in leaves.items()}
 
 
-def _covariance(mission: Mission, whose: str, axes: SceneAxes, added: dict[str, str]) -> tuple["Floats", str]:
+def _covariance(mission: Mission, whose: str, axes: SceneAxes, added: dict[str, str]) -> tuple[Floats, str]:
     """Covariance (6, 6) of one platform in a frame of the standard, and that frame. [m², m²/s, m²/s²]"""
-    import numpy as np
-
     error = getattr(mission.platforms, whose).motion_error
     state: PlatformState = getattr(mission.geometry, whose)
     common = mission.common_motion_error
@@ -554,25 +486,17 @@ def _covariance(mission: Mission, whose: str, axes: SceneAxes, added: dict[str, 
     return both @ found @ both.T, "ECF"
 
 
-def _pos_vel_err(covariance: "Floats", frame: str) -> _Branch:
-    import numpy as np
-
-    sigmas = np.sqrt(np.diag(covariance))
-    scale = np.where(np.outer(sigmas, sigmas) > 0, np.outer(sigmas, sigmas), 1.0)
-    correlation = np.clip(covariance / scale, -1, 1)
-    pairs = [
-        (KINDS[row] + KINDS[column], float(correlation[row, column]))
-        for row in range(6)
-        for column in range(row + 1, 6)
-    ]
-    return [
-        ("Frame", frame),
-        *((kind, float(sigma)) for kind, sigma in zip(KINDS, sigmas, strict=True)),
-        ("CorrCoefs", pairs),
-    ]
+def _pos_vel_err(path: str, covariance: Floats, frame: str) -> _Leaves:
+    sigmas, correlation = correlated(covariance)
+    leaves: _Leaves = {f"{path}/Frame": frame}
+    leaves |= {f"{path}/{kind}": float(sigma) for kind, sigma in zip(KINDS, sigmas, strict=True)}
+    for row in range(6):
+        for column in range(row + 1, 6):
+            leaves[f"{path}/CorrCoefs/{KINDS[row]}{KINDS[column]}"] = float(correlation[row, column])
+    return leaves
 
 
-def _file(tree: Any, vectors: "NDArray[Any]", signal: "NDArray[Any]") -> bytes:
+def _file(tree: Any, vectors: NDArray[Any], signal: NDArray[Any]) -> bytes:
     """A CPHD file by sarkit's writer."""
     skcphd: Any = import_module("sarkit.cphd")
     with tempfile.TemporaryFile() as stream:  # the writer needs a file of the system

@@ -7,19 +7,18 @@ stars, which is `ric` of a mission.
 """
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
 
 from bisar_budget.constants import SPEED_OF_LIGHT
-from bisar_budget.formats.collected import DeclaredMotionError
-from bisar_budget.formats.document import Element
+from bisar_budget.formats.collected import DeclaredMotionError, Seen
+from bisar_budget.formats.containers import Element
 from bisar_budget.geometry import Axes, PlatformState, cross, unit
 from bisar_budget.paths.earth import SceneAxes
 
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    Floats = NDArray[np.float64]
+Floats = NDArray[np.float64]
 
 KINDS = ("P1", "P2", "P3", "V1", "V2", "V3")
 FRAMES = {"ECF": "scene", "RIC_ECF": "ric", "RIC_ECI": "ric"}
@@ -28,7 +27,8 @@ _UNCORRELATED = 1e-6  # of a correlation: rounding of a turned covariance
 _NEGATIVE = 2.5e-6  # of an eigenvalue of correlations that are written with six decimals
 
 
-class FileErrors(NamedTuple):
+@dataclass(frozen=True)
+class FileErrors:
     """Errors of both platforms, or common to them; clock terms of a mission; and what no key of a mission says."""
 
     transmitter: DeclaredMotionError | None = None
@@ -40,18 +40,8 @@ class FileErrors(NamedTuple):
     remarks: tuple[str, ...] = ()
 
 
-class Seen(NamedTuple):
-    """Both platforms as a mission has them, and the scene's axes."""
-
-    transmitter: PlatformState
-    receiver: PlatformState
-    axes: SceneAxes
-
-
-def sigmas_and_correlations(element: Element) -> "Floats":
+def sigmas_and_correlations(element: Element) -> Floats:
     """Covariance (6, 6) of a `PosVelErr`. [m², m²/s, m²/s²]"""
-    import numpy as np
-
     sigmas = np.array([element.number(kind) for kind in KINDS])
     if sigmas.min() < 0:
         raise element.fault("has a negative sigma")
@@ -68,16 +58,21 @@ def sigmas_and_correlations(element: Element) -> "Floats":
     return covariance
 
 
+def correlated(covariance: Floats) -> tuple[Floats, Floats]:
+    """Sigmas (n,) and correlations (n, n) of a covariance; those of an error that is zero are zero."""
+    sigmas = np.sqrt(np.clip(np.diag(covariance), 0, None))
+    scale = np.outer(sigmas, sigmas)
+    return sigmas, np.clip(covariance / np.where(scale > 0, scale, 1.0), -1, 1)
+
+
 def declared(
-    covariance: "Floats", frame: Element, state: PlatformState, axes: SceneAxes, whose: str
+    covariance: Floats, frame: Element, state: PlatformState, axes: SceneAxes, whose: str
 ) -> tuple[DeclaredMotionError, list[str]]:
     """Turn a covariance (6, 6) of a file's frame into the frame of a mission, and say what was done.
 
     ECF becomes the scene's axes, RIC_ECI is `ric`, RIC_ECF is turned into it about the radial axis. The
     turned covariance is written by its sigmas alone where nothing is correlated.
     """
-    import numpy as np
-
     name = frame.text()
     if name not in FRAMES:
         raise frame.fault(f"must be one of {', '.join(FRAMES)} (got {name!r})")
@@ -90,9 +85,7 @@ def declared(
     if name != "RIC_ECI" and covariance.any():
         into = "east, north, up" if name == "ECF" else "ric, whose in-track holds the velocity against the stars"
         remarks.append(f"Errors of the {whose} are stated in {name}; they are turned into {into}.")
-    sigmas = np.sqrt(np.clip(np.diag(turned), 0, None))
-    scale = np.where(np.outer(sigmas, sigmas) > 0, np.outer(sigmas, sigmas), 1.0)
-    correlation = np.clip(turned / scale, -1, 1)
+    sigmas, correlation = correlated(turned)
     np.fill_diagonal(correlation, 1.0)
     if float(np.linalg.eigvalsh(correlation).min()) < -_NEGATIVE:
         remarks.append(
@@ -136,7 +129,7 @@ def of_sigmas(parameters: Element | None, seen: Seen, *, is_monostatic: bool) ->
 def _of_one(mono: Element, seen: Seen) -> FileErrors:
     error = mono.one("PosVelErr")
     whole, remarks = declared(
-        sigmas_and_correlations(error), error.one("Frame"), seen.transmitter, seen.axes, "platform"
+        sigmas_and_correlations(error), error.one("Frame"), seen.transmitter.state, seen.axes, "platform"
     )
     remarks += _decorrelation(error, "position")
     constant = None
@@ -148,7 +141,7 @@ def _of_one(mono: Element, seen: Seen) -> FileErrors:
             remarks.append("timing_error.constant is 2 RangeBias/c: the range of a monostatic file is half the way.")
             remarks += _decorrelation(sensor, "range bias")
     remarks += _atmosphere(mono)
-    return _common(whole, remarks)._replace(timing_constant=constant, at=mono.path)
+    return replace(_common(whole, remarks), timing_constant=constant, at=mono.path)
 
 
 def _common(whole: DeclaredMotionError, remarks: list[str]) -> FileErrors:
@@ -158,7 +151,7 @@ def _common(whole: DeclaredMotionError, remarks: list[str]) -> FileErrors:
             "One platform transmits and receives, with the same error: it is that of common_motion_error. Its frame "
             "does not matter, since it is alike along each axis."
         )
-        return FileErrors(common=whole._replace(frame="scene"), remarks=tuple(remarks))
+        return FileErrors(common=replace(whole, frame="scene"), remarks=tuple(remarks))
     remarks.append(
         "One platform transmits and receives: the errors below are the same on both ways, and add. `combine: sum` "
         "judges them together; `rss` would take them for independent."
@@ -178,7 +171,7 @@ def _of_two(both: Element, seen: Seen) -> FileErrors:
             continue
         error = platform.one("PosVelErr")
         found[whose], said = declared(
-            sigmas_and_correlations(error), error.one("Frame"), getattr(seen, whose), seen.axes, whose
+            sigmas_and_correlations(error), error.one("Frame"), getattr(seen, whose).state, seen.axes, whose
         )
         remarks += [*said, *_decorrelation(error, f"position of the {whose}")]
         sensor = platform.maybe("RadarSensor")
@@ -217,13 +210,13 @@ def _with_added(
             continue
         said = parameter.text()
         if kind in ("position", "velocity") and said == "not declared":
-            bare = one._replace(correlation=())
-            found[whose] = bare._replace(position=None) if kind == "position" else bare._replace(velocity=None)
+            bare = replace(one, correlation=())
+            found[whose] = replace(bare, position=None) if kind == "position" else replace(bare, velocity=None)
         elif kind == "distribution" and said in ("uniform", "bound"):
-            found[whose] = one._replace(distribution=said)
+            found[whose] = replace(one, distribution=said)
         elif kind == "acceleration":
             values = [float(part) for part in said.split()[:3]]
-            found[whose] = one._replace(acceleration=(values[0], values[1], values[2]))
+            found[whose] = replace(one, acceleration=(values[0], values[1], values[2]))
         else:
             remarks.append(f"{key}: {said}")
     for whose, one in found.items():
@@ -254,17 +247,17 @@ def of_matrices(
     if mono is not None:
         error = mono.one(names[0])
         whole, remarks = declared(
-            error.matrix("PVCov", 6), error.one("Frame"), seen.transmitter, seen.axes, "platform"
+            error.matrix("PVCov", 6), error.one("Frame"), seen.transmitter.state, seen.axes, "platform"
         )
         remarks.append(f"{mono.path}/RadarSensor: errors of its times and clock are not taken over.")
-        return _common(whole, remarks)._replace(at=mono.path)
+        return replace(_common(whole, remarks), at=mono.path)
     both = parameters.maybe("Bistatic") or parameters
     error = both.one(names[0])
     remarks = []
     found = []
     for whose, side in (("transmitter", "Tx"), ("receiver", "Rcv")):
         one, said = declared(
-            error.matrix(f"{side}PVCov", 6), error.one(f"{side}Frame"), getattr(seen, whose), seen.axes, whose
+            error.matrix(f"{side}PVCov", 6), error.one(f"{side}Frame"), getattr(seen, whose).state, seen.axes, whose
         )
         found.append(one)
         remarks += said

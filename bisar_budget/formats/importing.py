@@ -4,9 +4,11 @@ import hashlib
 import math
 import os
 from collections.abc import Callable
-from dataclasses import replace
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.faults import printable, shown
@@ -15,22 +17,18 @@ from bisar_budget.formats.collected import (
     Imported,
     NoPathError,
     ReferenceGeometry,
-    Track,
+    Seen,
     fitted,
     reference_of,
 )
-from bisar_budget.formats.containers import Container, open_container
-from bisar_budget.formats.document import Element, FormatError, MissingExtraError
-from bisar_budget.formats.file_errors import FileErrors, Seen, of_matrices, of_sigmas
+from bisar_budget.formats.containers import Container, Element, FormatError, MissingExtraError, open_container
+from bisar_budget.formats.file_errors import FileErrors, of_matrices, of_sigmas
 from bisar_budget.geometry import PlatformState, Vector
-from bisar_budget.paths.earth import Geodetic, SceneAxes, axes_at, geodetic
+from bisar_budget.paths.earth import SceneAxes, axes_at, geodetic
+from bisar_budget.paths.flight import Fitted
 from bisar_budget.paths.instant import parse_instant
 
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    Floats = NDArray[np.float64]
+Floats = NDArray[np.float64]
 
 _SAMPLES = 201  # moments at which a polynomial of the file is taken; enough for one of any order there
 _SETTLING = 5  # rounds of a light time; each leaves v/c of what the one before left
@@ -41,10 +39,10 @@ _COVERED = 0.02  # of the aperture, that pulses may lack at its ends
 class _Pulses(NamedTuple):
     """Vectors of a channel: times of transmission and of reception [s], places then, Earth-fixed [m]."""
 
-    sent: "Floats"
-    transmitter: "Floats"
-    received: "Floats"
-    receiver: "Floats"
+    sent: Floats
+    transmitter: Floats
+    received: Floats
+    receiver: Floats
     reference: int  # index of the reference vector among them
     unused: int = 0  # further vectors, which lack a pulse, a time or a place
 
@@ -92,8 +90,6 @@ def import_collection(file: str, channel: str | None = None) -> Imported:
         raise MissingExtraError from None
     container = open_container(file)
     read: Callable[[Container, str | None], Imported] = _READERS[container.format.split()[0]]
-    import numpy as np
-
     with np.errstate(all="ignore"):  # what is no number in the end is refused
         return read(container, channel)
 
@@ -106,7 +102,8 @@ def _cphd(container: Container, channel: str | None) -> Imported:
     center, bandwidth = parameters.number("FxC"), parameters.number("FxBW")
     is_monostatic = xml.text("CollectionID/CollectType") == "MONOSTATIC"
     start = xml.one("Global/Timeline/CollectionStart")
-    remarks, unused = [], ""
+    name, remarks = _names(xml, "CollectionID")
+    unused = ""
     if container.has_vectors:
         data = xml.with_child("Data/Channel", "Identifier", channel)
         if data is None:
@@ -116,34 +113,29 @@ def _cphd(container: Container, channel: str | None) -> Imported:
         )
         pulses, point = _pulses_of_cphd(container, vectors, parameters)
         aperture = _dwell(xml, xml.maybe("Dwell"), parameters.one("DwellTimes"), point)
-        axes = axes_at(geodetic(point))
-        tracks = _tracks(container, pulses, axes, aperture, center)
-        remarks += _coverage(pulses, axes, aperture)
-        reference, unused = _at_reference(pulses, axes, aperture, tracks), pulses.unused_words
+        seen = _flown(container, pulses, point, aperture, center)
+        remarks += _coverage(pulses, seen.axes, aperture)
+        reference, unused = _at_reference(pulses, seen, aperture), pulses.unused_words
     else:
         point = xml.vector("ReferenceGeometry/SRP/ECF")
         dwell = xml.number("ReferenceGeometry/SRPDwellTime")
-        axes = axes_at(geodetic(point))
         aperture = _Aperture(xml.number("ReferenceGeometry/ReferenceTime"), dwell)
-        tracks = _stated(xml, axes, is_monostatic)
-        reference = reference_of(tracks[0].state, tracks[1].state, 0.0)
+        seen = _stated(xml, axes_at(geodetic(point)), is_monostatic)
+        reference = reference_of(seen, 0.0)
         remarks.append(
             "The file is XML without parameters of pulses: both platforms are taken from its ReferenceGeometry, and "
             "fly straight on. Slow time counts from its ReferenceTime, not from the centre of the dwell "
             f"({xml.number('ReferenceGeometry/SRPCODTime') - aperture.middle:+.6g} s)."
         )
     remarks += _off_reference_point(xml, point)
-    seen = Seen(tracks[0].state, tracks[1].state, axes)
     errors = of_sigmas(xml.maybe("ErrorParameters"), seen, is_monostatic=is_monostatic)
-    name, collectors = _names(xml, "CollectionID")
-    remarks = [*collectors, *remarks]
     return _imported(
-        container, channel, name, point, (center, bandwidth), aperture, start, tracks, is_monostatic, reference,
-        errors, remarks, unused,
+        container, channel, name, point, (center, bandwidth), aperture, start, seen, is_monostatic, reference, errors,
+        remarks, unused,
     )  # fmt: skip
 
 
-def _dtype(xml: Element, block: str) -> "np.dtype[Any]":
+def _dtype(xml: Element, block: str) -> np.dtype[Any]:
     """Form of the parameters of a vector, or of a pulse that was sent, as the XML describes it."""
     module: Any = import_module("sarkit.cphd" if xml.tag == "CPHD" else "sarkit.crsd")
     reads = module.get_ppp_dtype if block == "PPP" else module.get_pvp_dtype
@@ -154,9 +146,7 @@ def _dtype(xml: Element, block: str) -> "np.dtype[Any]":
     return dtype
 
 
-def _fields(xml: Element, vectors: "NDArray[Any]", block: str, *names: str) -> list["Floats"]:
-    import numpy as np
-
+def _fields(xml: Element, vectors: NDArray[Any], block: str, *names: str) -> list[Floats]:
     found = []
     for name in names:
         if name not in (vectors.dtype.names or ()):
@@ -170,9 +160,7 @@ def _fields(xml: Element, vectors: "NDArray[Any]", block: str, *names: str) -> l
     return found
 
 
-def _pulses_of_cphd(container: Container, vectors: "NDArray[Any]", parameters: Element) -> tuple[_Pulses, Vector]:
-    import numpy as np
-
+def _pulses_of_cphd(container: Container, vectors: NDArray[Any], parameters: Element) -> tuple[_Pulses, Vector]:
     names = ("TxTime", "TxPos", "RcvTime", "RcvPos", "SRPPos")
     sent, transmitter, received, receiver, points = _fields(container.xml, vectors, "PVP", *names)
     reference = parameters.whole("RefVectorIndex")
@@ -195,12 +183,10 @@ def _pulses_of_cphd(container: Container, vectors: "NDArray[Any]", parameters: E
     return kept, (x, y, z)
 
 
-def _scene_time(pulses: _Pulses, point: "Floats") -> "Floats":
+def _scene_time(pulses: _Pulses, axes: SceneAxes) -> Floats:
     """When each pulse is at the scene point: reference time of CPHD 1.1.0, section 6.5.1 (5). [s]"""
-    import numpy as np
-
-    out = np.linalg.norm(pulses.transmitter - point, axis=1)
-    back = np.linalg.norm(pulses.receiver - point, axis=1)
+    out = np.linalg.norm(pulses.transmitter - axes.origin, axis=1)
+    back = np.linalg.norm(pulses.receiver - axes.origin, axis=1)
     scene_time: Floats = pulses.sent + out / (out + back) * (pulses.received - pulses.sent)
     return scene_time
 
@@ -221,16 +207,12 @@ def _dwell(xml: Element, dwell: Element | None, used: Element, point: Vector) ->
     return _Aperture(*found)
 
 
-def _at(polynomial: "Floats", x: float, y: float) -> float:
-    import numpy as np
-
+def _at(polynomial: Floats, x: float, y: float) -> float:
     return float(np.polynomial.polynomial.polyval2d(x, y, polynomial))
 
 
 def _image_coordinates(scene: Element, point: Vector) -> tuple[float, float]:
     """IAX and IAY of a point: image area coordinates of CPHD, on a plane or on a surface of constant height. [m]"""
-    import numpy as np
-
     planar = scene.maybe("ReferenceSurface/Planar")
     if planar is not None:
         away = np.subtract(point, scene.vector("IARP/ECF"))
@@ -255,7 +237,7 @@ def _off_reference_point(xml: Element, point: Vector) -> list[str]:
     return [f"The scene point is {away:.6g} m from the image area's reference point (IARP)."]
 
 
-def _stated(xml: Element, axes: SceneAxes, is_monostatic: bool) -> tuple[Track, Track]:
+def _stated(xml: Element, axes: SceneAxes, is_monostatic: bool) -> Seen:
     """Both platforms of CPHD's `ReferenceGeometry`."""
     geometry = xml.one("ReferenceGeometry")
     paths = (
@@ -264,8 +246,9 @@ def _stated(xml: Element, axes: SceneAxes, is_monostatic: bool) -> tuple[Track, 
     tracks = []
     for path in paths:
         position, velocity = (geometry.vector(f"{path}{what}") for what in ("Pos", "Vel"))
-        tracks.append(Track(PlatformState(position=axes.place(position), velocity=axes.turned(velocity)), 1))
-    return tracks[0], tracks[1]
+        state = PlatformState(position=axes.place(position), velocity=axes.turned(velocity))
+        tracks.append(Fitted(state, order=1, farthest=0.0, rms=0.0))
+    return Seen(tracks[0], tracks[1], axes)
 
 
 # ---------------------------------------------------------------------- CRSD
@@ -281,9 +264,7 @@ def _crsd(container: Container, channel: str | None) -> Imported:
         raise sar.fault("names no transmit sequence of the file", "TxId")
     is_monostatic = xml.text("SARInfo/CollectType") == "MONOSTATIC"
     point = xml.vector("ReferenceGeometry/RefPoint/ECF")
-    axes = axes_at(geodetic(point))
-    used = sar.one("DwellTimes/Polynomials")
-    aperture = _dwell(xml, xml.maybe("DwellPolynomials"), used, point)
+    aperture = _dwell(xml, xml.maybe("DwellPolynomials"), sar.one("DwellTimes/Polynomials"), point)
     if "PVP" not in container.blocks or "PPP" not in container.blocks:
         raise FormatError(container.file, "byte 0: has no parameters of pulses (PPP) and of receive windows (PVP)")
     heard = xml.with_child("Data/Receive/Channel", "ChId", channel)
@@ -296,28 +277,25 @@ def _crsd(container: Container, channel: str | None) -> Imported:
     sends = container.vectors("PPP", sent.whole("PPPArrayByteOffset"), sent.whole("NumPulses"), _dtype(xml, "PPP"))
     pulses = _pulses_of_crsd(container, vectors, sends, point, parameters)
     center, bandwidth = sequence.number("FxC"), sequence.number("FxBW")
-    tracks = _tracks(container, pulses, axes, aperture, center)
-    seen = Seen(tracks[0].state, tracks[1].state, axes)
+    seen = _flown(container, pulses, point, aperture, center)
     errors = of_matrices(xml.maybe("ErrorParameters/SARImage"), seen, ("PosVelError", "TimeFreqCov"), (2, 3))
-    remarks = [*_coverage(pulses, axes, aperture), *_off_reference_point(xml, point)]
+    remarks = [*_coverage(pulses, seen.axes, aperture), *_off_reference_point(xml, point)]
     name = xml.maybe("ProductInfo/ProductName")
     return _imported(
         container, channel, name.text() if name is not None else "", point, (center, bandwidth), aperture,
-        xml.one("Global/CollectionRefTime"), tracks, is_monostatic, _at_reference(pulses, axes, aperture, tracks),
-        errors, remarks, pulses.unused_words,
+        xml.one("Global/CollectionRefTime"), seen, is_monostatic, _at_reference(pulses, seen, aperture), errors,
+        remarks, pulses.unused_words,
     )  # fmt: skip
 
 
 def _pulses_of_crsd(
-    container: Container, vectors: "NDArray[Any]", sends: "NDArray[Any]", point: Vector, parameters: Element
+    container: Container, vectors: NDArray[Any], sends: NDArray[Any], point: Vector, parameters: Element
 ) -> _Pulses:
     """Pulses with the time at which the echo of the scene point comes back.
 
     The receiver's place is stated for the start of its window. Its velocity carries it to the echo, less than a
     millisecond later.
     """
-    import numpy as np
-
     xml = container.xml
     begun, places, velocities, index = _fields(xml, vectors, "PVP", "RcvStart", "RcvPos", "RcvVel", "TxPulseIndex")
     sent, transmitter = _fields(xml, sends, "PPP", "TxTime", "TxPos")
@@ -341,8 +319,6 @@ def _pulses_of_crsd(
 # ---------------------------------------------------------------------- SICD
 def _sicd(container: Container, channel: str | None) -> Imported:
     """SICD (NGA.STND.0024-1): the platforms' polynomials, and the part of them that the image was formed from."""
-    import numpy as np
-
     xml = container.xml
     if channel is not None:
         raise FormatError(container.file, f"a SICD is one image and has no channel {shown(channel)!r}")
@@ -354,11 +330,10 @@ def _sicd(container: Container, channel: str | None) -> Imported:
     low, high = band.number("MinProc"), band.number("MaxProc")
     is_monostatic = xml.text("CollectionInfo/CollectType") == "MONOSTATIC"
     point = xml.vector("GeoData/SCP/ECF")
-    axes = axes_at(geodetic(point))
     middle = xml.number("SCPCOA/SCPTime")
     sent_from, heard_at = _polynomials_of_sicd(xml, is_monostatic)
 
-    def pulses_at(times: "Floats") -> _Pulses:
+    def pulses_at(times: Floats) -> _Pulses:
         """Pulses that are at the scene point at some times."""
         out, back = times, times
         if not is_monostatic:  # the aperture reference point of one platform is that of the time in between
@@ -367,18 +342,10 @@ def _sicd(container: Container, channel: str | None) -> Imported:
                 back = times + np.linalg.norm(_over(heard_at, back) - point, axis=1) / SPEED_OF_LIGHT
         return _Pulses(out, _over(sent_from, out), back, _over(heard_at, back), times.size // 2)
 
-    aperture, remarks = _aperture_of_sicd(xml, axes, middle, (low + high) / 2, pulses_at)
+    name, collectors = _names(xml, "CollectionInfo")
+    aperture, remarks = _aperture_of_sicd(xml, point, middle, (low + high) / 2, pulses_at)
     times: Floats = middle + np.linspace(-0.5, 0.5, _SAMPLES) * aperture.length
-    pulses = pulses_at(times)
-    try:
-        transmitter, receiver = (
-            fitted(times - middle, axes.places(places), aperture.length, 2 * SPEED_OF_LIGHT / (low + high))
-            for places in (pulses.transmitter, pulses.receiver)
-        )
-    except NoPathError as error:
-        raise FormatError(container.file, str(error)) from None
-    tracks = (transmitter, receiver)
-    seen = Seen(transmitter.state, receiver.state, axes)
+    seen = _flown(container, pulses_at(times), point, aperture, (low + high) / 2)
     statistics = xml.maybe("ErrorStatistics")
     components = statistics.maybe("BistaticComponents") if statistics is not None else None
     errors = (
@@ -386,24 +353,19 @@ def _sicd(container: Container, channel: str | None) -> Imported:
         if components is not None
         else of_sigmas(statistics, seen, is_monostatic=is_monostatic)
     )
-    reference = reference_of(transmitter.state, receiver.state, 0.0)
-    name, collectors = _names(xml, "CollectionInfo")
-    remarks = [*collectors, *remarks]
     return _imported(
-        container, "", name, point, ((low + high) / 2, high - low), aperture, xml.one("Timeline/CollectStart"),
-        tracks, is_monostatic, reference, errors, remarks,
+        container, "", name, point, ((low + high) / 2, high - low), aperture, xml.one("Timeline/CollectStart"), seen,
+        is_monostatic, reference_of(seen, 0.0), errors, [*collectors, *remarks],
     )  # fmt: skip
 
 
-def _over(polynomial: "Floats", times: "Floats") -> "Floats":
+def _over(polynomial: Floats, times: Floats) -> Floats:
     """Places (n, 3) of a path polynomial at times (n,)."""
-    import numpy as np
-
     places: Floats = np.asarray(np.polynomial.polynomial.polyval(times, polynomial).T, dtype=float)
     return places
 
 
-def _polynomials_of_sicd(xml: Element, is_monostatic: bool) -> tuple["Floats", "Floats"]:
+def _polynomials_of_sicd(xml: Element, is_monostatic: bool) -> tuple[Floats, Floats]:
     position = xml.one("Position")
     if is_monostatic:
         both = position.path_polynomial("ARPPoly")
@@ -427,15 +389,13 @@ def _polynomials_of_sicd(xml: Element, is_monostatic: bool) -> tuple["Floats", "
 
 
 def _aperture_of_sicd(
-    xml: Element, axes: SceneAxes, middle: float, center: float, pulses_at: Callable[["Floats"], _Pulses]
+    xml: Element, point: Vector, middle: float, center: float, pulses_at: Callable[[Floats], _Pulses]
 ) -> tuple[_Aperture, list[str]]:
     """Aperture of a pixel at the scene point: what the processed time gives, or less where the image's band says so.
 
     The wave vector of the image moves by |d(u_t + u_r)/dt · col| f/c a second; the band ImpRespBW of a column is what
     it moved in the aperture. A stripmap is processed for longer than a point is seen.
     """
-    import numpy as np
-
     formation = xml.one("ImageFormation")
     begin, end = formation.number("TStartProc"), formation.number("TEndProc")
     processed = end - begin
@@ -443,8 +403,7 @@ def _aperture_of_sicd(
         raise formation.fault("ends before it begins", "TEndProc")
     step = min(0.01, processed / 10)
     near = pulses_at(np.array([middle - step, middle + step]))
-    origin = np.array(axes.origin)
-    t, r = near.transmitter - origin, near.receiver - origin
+    t, r = near.transmitter - point, near.receiver - point
     sights: Floats = t / np.linalg.norm(t, axis=1, keepdims=True) + r / np.linalg.norm(r, axis=1, keepdims=True)
     rate = (
         abs(float((sights[1] - sights[0]) @ xml.vector("Grid/Col/UVectECF"))) / (2 * step) * center / SPEED_OF_LIGHT
@@ -474,28 +433,25 @@ def _chosen(xml: Element, channel: str | None, path: str, key: str) -> tuple[str
     return name, found
 
 
-def _tracks(
-    container: Container, pulses: _Pulses, axes: SceneAxes, aperture: _Aperture, center: float
-) -> tuple[Track, Track]:
-    import numpy as np
-
+def _flown(container: Container, pulses: _Pulses, point: Vector, aperture: _Aperture, center: float) -> Seen:
+    """Both platforms, by the places of the pulses in the aperture."""
     if not center > 0:
         raise FormatError(container.file, f"its centre frequency is {center:g} Hz")
-    times = _scene_time(pulses, np.array(axes.origin)) - aperture.middle
+    axes = axes_at(geodetic(point))
+    times = _scene_time(pulses, axes) - aperture.middle
     try:
         transmitter, receiver = (
             fitted(times, axes.places(places), aperture.length, SPEED_OF_LIGHT / center)
             for places in (pulses.transmitter, pulses.receiver)
         )
     except NoPathError as error:
-        raise FormatError(container.file, f"{container.xml.path}: {error}") from None
-    return transmitter, receiver
+        where = f"{container.xml.path}: " if container.has_vectors else ""
+        raise FormatError(container.file, f"{where}{error}") from None
+    return Seen(transmitter, receiver, axes)
 
 
 def _coverage(pulses: _Pulses, axes: SceneAxes, aperture: _Aperture) -> list[str]:
-    import numpy as np
-
-    times = _scene_time(pulses, np.array(axes.origin)) - aperture.middle
+    times = _scene_time(pulses, axes) - aperture.middle
     inside = times[np.abs(times) <= aperture.length / 2]
     lacking = [inside.min() + aperture.length / 2, aperture.length / 2 - inside.max()]
     if max(lacking) <= _COVERED * aperture.length:
@@ -515,15 +471,10 @@ def _names(xml: Element, path: str) -> tuple[str, list[str]]:
     return core, [f"{', '.join(part for part in (by, lit) if part)}."] if by or lit else []
 
 
-def _at_reference(
-    pulses: _Pulses, axes: SceneAxes, aperture: _Aperture, tracks: tuple[Track, Track]
-) -> ReferenceGeometry | None:
-    import numpy as np
-
-    at = float(_scene_time(pulses, np.array(axes.origin))[pulses.reference]) - aperture.middle
-    if abs(at) > aperture.length / 2 * (1 + 1e-9):
-        return None  # the paths are not fitted there
-    return reference_of(tracks[0].state, tracks[1].state, at)
+def _at_reference(pulses: _Pulses, seen: Seen, aperture: _Aperture) -> ReferenceGeometry | None:
+    at = float(_scene_time(pulses, seen.axes)[pulses.reference]) - aperture.middle
+    # Elsewhere the paths are not fitted.
+    return reference_of(seen, at) if abs(at) <= aperture.length / 2 * (1 + 1e-9) else None
 
 
 def _imported(
@@ -534,7 +485,7 @@ def _imported(
     band: tuple[float, float],
     aperture: _Aperture,
     start: Element,
-    tracks: tuple[Track, Track],
+    seen: Seen,
     is_monostatic: bool,
     reference: ReferenceGeometry | None,
     errors: FileErrors,
@@ -549,25 +500,19 @@ def _imported(
         raise FormatError(
             container.file, f"{container.xml.path}: a band of {band[1]:g} Hz about {band[0]:g} Hz, which is none"
         )
-    place: Geodetic = geodetic(point)
-    axes = axes_at(place)
-    transmitter, receiver = (
-        track._replace(state=replace(track.state, radial=axes.radial(track.state.position, track.state.velocity)))
-        for track in tracks
-    )
     return Imported(
         file=os.path.basename(container.file),
         format=container.format,
         xml_sha256=hashlib.sha256(container.xml_data).hexdigest(),
         channel=channel,
         name=printable(name) or os.path.basename(container.file),
-        scene=place,
+        scene=geodetic(point),
         center_frequency=band[0],
         bandwidth=band[1],
         aperture_time=aperture.length,
         center_time=_center_time(start, aperture.middle),
-        transmitter=transmitter,
-        receiver=receiver,
+        transmitter=seen.transmitter,
+        receiver=seen.receiver,
         is_monostatic=is_monostatic,
         reference=reference,
         transmitter_error=errors.transmitter,

@@ -1,21 +1,15 @@
-"""The mission file: what it may say (`model`), how it is read (`load`), its JSON Schema (`schema`)."""
+"""The mission file: what it may say (`model`), and how it is read (`load`)."""
 
 # What other rooms may use.
 __all__ = [
-    "bounds",
     "changes",
     "covariance",
     "instruments",
-    "keys",
-    "later",
     "load",
     "model",
-    "named",
     "parts",
     "platforms",
     "readers",
     "revision",
-    "schema",
-    "symmetric",
     "tree",
 ]

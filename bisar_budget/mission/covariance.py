@@ -8,11 +8,12 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Annotated, Any, NamedTuple
 
+import numpy as np
+
 from bisar_budget import units
 from bisar_budget.faults import KeyPath, Problem
 from bisar_budget.geometry import FRAME_AXES, Vector
 from bisar_budget.mission.readers import INVALID, Key, OneOf, Quantity, Reader, Report, Section, Triple
-from bisar_budget.mission.symmetric import eigensystem, exceed, quadratic_form
 
 KINDS = ("position", "velocity")
 SIZE = 6
@@ -44,11 +45,6 @@ class Covariance(NamedTuple):
         a, b, c = self.sigmas[first : first + 3]
         return (a, b, c)
 
-    def along(self, kind: str, direction: Sequence[float]) -> float:
-        """Sigma of position or velocity error along a direction given in the frame's axes: √(dᵀCd)."""
-        parts = [sigma * d for sigma, d in zip(self.of(kind), direction, strict=True)]
-        return math.sqrt(quadratic_form(self.block(kind), parts))
-
     def block(self, kind: str) -> list[tuple[float, ...]]:
         """Correlations (3, 3) of the errors of a kind among each other."""
         first = 3 * KINDS.index(kind)
@@ -65,8 +61,8 @@ class Covariance(NamedTuple):
 
 
 def _problems(correlation: _Matrix) -> Iterator[Problem]:
-    if not exceed(correlation, -EIGENVALUE_TOLERANCE):
-        smallest = min(eigensystem(correlation)[0])
+    smallest = float(np.linalg.eigvalsh(correlation)[0])
+    if smallest <= -EIGENVALUE_TOLERANCE:
         yield Problem(
             f"is not positive semi-definite: the correlation matrix has the eigenvalue {smallest:.3g}",
             "no error has such a covariance",

@@ -8,9 +8,9 @@ from typing import Annotated, Any, NamedTuple
 from bisar_budget import units
 from bisar_budget.faults import InvalidValueError, KeyPath, Problem
 from bisar_budget.geometry import Vector
-from bisar_budget.mission import later
 from bisar_budget.mission.readers import (
     INVALID,
+    LATER_METHODS,
     Choice,
     Key,
     ListOf,
@@ -289,7 +289,7 @@ class Synchronization(NamedTuple):
     method: Annotated[
         str,
         Key(
-            Choice(*METHODS, refused=later.METHODS),
+            Choice(*METHODS, refused=LATER_METHODS),
             "linear: pulses are exchanged, between them the phase is interpolated; "
             "direct_path: the receiver hears the transmitter and takes it as its clock.",
         ),

@@ -9,7 +9,9 @@ from bisar_budget import units
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.faults import Changed, KeyPath, Place, Problem, SetValue, shown
 from bisar_budget.geometry import BistaticGeometry
-from bisar_budget.mission.bounds import (
+from bisar_budget.mission.instruments import SYNCHRONIZATION, Synchronization
+from bisar_budget.mission.platforms import INSTANT, CommonMotionError, Platforms, without_image
+from bisar_budget.mission.readers import (
     COORDINATE,
     DIRECTION,
     DURATION,
@@ -21,15 +23,11 @@ from bisar_budget.mission.bounds import (
     RANGE,
     SHARE,
     SIDELOBE_REQUIREMENT,
-)
-from bisar_budget.mission.platforms import CommonMotionError, Platforms, without_image
-from bisar_budget.mission.readers import (
     Choice,
     Day,
     Glob,
     Key,
     Label,
-    Late,
     ListOf,
     OneOf,
     Quantity,
@@ -41,11 +39,10 @@ from bisar_budget.mission.readers import (
     Whole,
     Words,
 )
+from bisar_budget.paths.instant import Instant
 
 if TYPE_CHECKING:
-    from bisar_budget.mission.instruments import Synchronization
     from bisar_budget.paths.earth import SceneAxes
-    from bisar_budget.paths.instant import Instant
 
 
 class Document(NamedTuple):
@@ -84,9 +81,7 @@ class Collection(NamedTuple):
     pulses: Annotated[int | None, Key(Whole(2, 10_000_000), "For the simulator; omitted: what the patch needs.")] = (
         None
     )
-    center_time: Annotated["Instant | None", Key(Late("routes", "INSTANT"), "UTC of the middle of the aperture.")] = (
-        None
-    )
+    center_time: Annotated[Instant | None, Key(INSTANT, "UTC of the middle of the aperture.")] = None
 
 
 class Scene(NamedTuple):
@@ -314,8 +309,8 @@ class Mission(NamedTuple):
     ] = None
     timing_error: Annotated[TimingError, Key(Section(TimingError))] = TimingError()
     synchronization: Annotated[
-        "Synchronization | None",
-        Key(Late("instruments", "SYNCHRONIZATION"), "How the receiver follows the transmitter's oscillator."),
+        Synchronization | None,
+        Key(SYNCHRONIZATION, "How the receiver follows the transmitter's oscillator."),
     ] = None
     other_errors: Annotated[tuple[OtherError, ...], Key(ListOf(OtherError))] = ()
     requirements: Annotated[Requirements, Key(Section(Requirements))] = Requirements()
@@ -429,3 +424,16 @@ def names_files(root: Mapping[str, Any]) -> bool:
 
 
 MISSION = Section(Mission)
+# Of the JSON Schemas of the mission file and of a part's: keywords that every editor's YAML support reads.
+DRAFT = "http://json-schema.org/draft-07/schema#"
+
+
+def mission_schema() -> dict[str, Any]:
+    """Return the schema; quantities are text with a unit or a bare number, whose unit the tool itself checks."""
+    definitions: dict[str, Any] = {}
+    return {
+        "$schema": DRAFT,
+        "title": "bisar-budget mission file",
+        **MISSION.definition(definitions),
+        "definitions": definitions,
+    }

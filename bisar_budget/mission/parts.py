@@ -21,7 +21,6 @@ from bisar_budget.faults import (
     shown,
 )
 from bisar_budget.geometry import Vector
-from bisar_budget.mission.bounds import COORDINATE, VELOCITY
 from bisar_budget.mission.instruments import (
     FORMS,
     IMU_KINDS,
@@ -40,10 +39,12 @@ from bisar_budget.mission.instruments import (
     PowerLawFigures,
     VelocityRandomWalk,
 )
-from bisar_budget.mission.model import Mission
+from bisar_budget.mission.model import DRAFT, Mission
 from bisar_budget.mission.platforms import MotionError, Platforms
 from bisar_budget.mission.readers import (
+    COORDINATE,
     INVALID,
+    VELOCITY,
     Choice,
     Key,
     Label,
@@ -211,17 +212,6 @@ def figure_text(value: Any) -> str:
     if isinstance(value, list):
         return f"[{', '.join(map(figure_text, value))}]"
     return str(value)
-
-
-def read_part(file: str) -> Part:
-    """Read the file of a part.
-
-    Raises
-    ------
-    PartError
-        It cannot be read, or is no part.
-    """
-    return _read(file)[0]
 
 
 def read_entry(file: str) -> Entry:
@@ -632,3 +622,45 @@ def _oscillator_of(oscillator: Oscillator, read: _Read, path: KeyPath, report: R
             return INVALID
         overridden.append(Overridden("frequency", "oscillator.frequency", part.name, at))
     return oscillator._replace(**taken, overridden=tuple(overridden))
+
+
+# ---------------------------------------------------------------------- JSON Schema of a part
+_SOME: dict[str, Any] = {"not": {"const": []}}  # an empty list states nothing
+
+
+def part_schema() -> dict[str, Any]:
+    """Return the schema of the file of a part, one alternative for each kind; quantities as in `mission_schema`."""
+    definitions: dict[str, Any] = {}
+    kinds = []
+    for kind, section in SECTIONS.items():
+        kinds.append(section.schema(definitions))
+        definitions[section.kind.__name__] |= _rules(FIGURES[kind])
+    return {
+        "$schema": DRAFT,
+        "$id": "urn:bisar-budget:schema:part",
+        "title": "bisar-budget part file",
+        "description": "An inertial sensor, a GNSS receiver or an oscillator: its figures, and where they stand.",
+        "type": "object",
+        "required": ["kind"],
+        "oneOf": kinds,
+        "definitions": definitions,
+    }
+
+
+def _rules(figures: Sequence[str]) -> dict[str, Any]:
+    """Schema rules for a part's figures together: one of them is there, and each has a source.
+
+    Of an oscillator exactly one form is there, and a mask has its frequency. Zeros are for the tool to see.
+    """
+    ways = [{"required": [figure], "properties": {figure: _SOME}} for figure in figures if figure != "frequency"]
+    of_each = {"required": ["source"], "properties": {"source": {"type": "object"}}}
+    sourced = [
+        {
+            "if": {"allOf": [of_each, {"required": [figure], "properties": {figure: _SOME}}]},
+            "then": {"properties": {"source": {"required": [figure]}}},
+        }
+        for figure in figures
+    ]
+    if set(FORMS) <= set(figures):
+        return {"oneOf": ways, "dependencies": {"phase_noise": ["frequency"]}, "allOf": sourced}
+    return {"anyOf": ways, "allOf": sourced}

@@ -9,23 +9,35 @@ from typing import Any
 
 from bisar_budget.faults import Problem
 from bisar_budget.geometry import STRAIGHT, PlatformState
-from bisar_budget.mission import routes
 from bisar_budget.mission.instruments import Overridden
 from bisar_budget.mission.model import Mission
-from bisar_budget.mission.platforms import FlownPath, MotionError, Platform, Platforms, without_image
+from bisar_budget.mission.platforms import (
+    ORBIT,
+    TRAJECTORY,
+    FlownPath,
+    MotionError,
+    OrbitSource,
+    Platform,
+    Platforms,
+    TrajectorySource,
+    without_image,
+)
 from bisar_budget.mission.readers import INVALID, Report
 from bisar_budget.paths import earth
+from bisar_budget.paths.elements import read_omm, read_tle
+from bisar_budget.paths.ephemeris import read_oem
 from bisar_budget.paths.flight import (
     Fitted,
     Log,
-    Orbit,
     PathDoubt,
     PathFileError,
     interpolated,
     slow_times,
     smoothed,
 )
-from bisar_budget.paths.instant import Instant
+from bisar_budget.paths.flight_log import hold_to_motion, read_csv
+from bisar_budget.paths.messages import decoded
+from bisar_budget.paths.sbet import read_accuracy, read_sbet
 from bisar_budget.resources import DISK, Files, UnreadableError
 from bisar_budget.units import format_quantity
 
@@ -35,6 +47,11 @@ _FILES = ("tle", "omm", "oem", "file", "accuracy")  # keys of a path that name o
 _MOST_BYTES = 500_000_000
 _LOGS_KEPT = 2  # of a mission that is read again and again, such as by `solve`
 _logs: dict[tuple[object, ...], Log] = {}  # by what they were read from; the bytes themselves are let go
+_ORBITS = {
+    "tle": lambda data, name, *of: read_tle(decoded(data, name), name, *of),
+    "omm": read_omm,
+    "oem": read_oem,
+}
 _FARTHEST_M = 4.1e8  # of a satellite from the Earth's centre
 _LOST = 0.1  # of the slant range: a satellite that may be farther off leaves nothing of the geometry
 _NOISE_M = 1.0  # residual of a log that is doubted where the file declares no position error; as of an ephemeris
@@ -84,7 +101,7 @@ def report_files(root: Any, read: Beside, report: Report) -> None:
     platforms = root.get("platforms")
     for name in Platforms._fields:
         platform = platforms.get(name) if isinstance(platforms, dict) else None
-        for key, section in (("orbit", routes.ORBIT), ("trajectory", routes.TRAJECTORY)):
+        for key, section in (("orbit", ORBIT), ("trajectory", TRAJECTORY)):
             named = section.each(platform.get(key)) if isinstance(platform, dict) else {}
             for form in _FILES:
                 file = named.get(form)
@@ -173,17 +190,17 @@ def _with_radial(state: PlatformState, axes: earth.SceneAxes) -> PlatformState:
         return state
 
 
-def _of_orbit(mission: Mission, route: routes.OrbitSource, axes: earth.SceneAxes, read: Beside) -> FlownPath:
+def _of_orbit(mission: Mission, route: OrbitSource, axes: earth.SceneAxes, read: Beside) -> FlownPath:
     center = mission.collection.center_time
     if center is None:
         raise _UnusablePathError(("orbit",), Problem("needs an instant", "accepted: collection.center_time"))
-    form = next(form for form in ("tle", "omm", "oem") if getattr(route, form) is not None)
+    form = next(form for form in _ORBITS if getattr(route, form) is not None)
     named = getattr(route, form)
     file = named if isinstance(named, str) else None
     try:
         data = read(file) if file is not None else "\n".join(named).encode()
         name = file or "the element set"
-        orbit = _read_orbit(form, data, name, route.object, center)
+        orbit = _ORBITS[form](data, name, route.object, center)
         widest = math.inf
         if orbit.span is not None:
             before, after = center.since(orbit.span[0]), orbit.span[1].since(center)
@@ -227,25 +244,7 @@ def _hold_to_range(doubt: PathDoubt, slant_range: float, said: Sequence[str], re
         )
 
 
-def _read_orbit(form: str, data: bytes, name: str, wanted: str | None, center: Instant) -> Orbit:
-    if form == "oem":
-        from bisar_budget.paths import ephemeris
-
-        return ephemeris.read_oem(data, name, wanted, center)
-    if form == "omm":
-        from bisar_budget.paths import mean_elements
-
-        return mean_elements.read_omm(data, name, wanted, center)
-    from bisar_budget.paths import fields, two_lines
-
-    return two_lines.read_tle(fields.decoded(data, name), name, wanted, center)
-
-
-def _of_log(
-    mission: Mission, route: routes.TrajectorySource, axes: earth.SceneAxes | None, read: Beside
-) -> FlownPath:
-    from bisar_budget.paths import log_motion
-
+def _of_log(mission: Mission, route: TrajectorySource, axes: earth.SceneAxes | None, read: Beside) -> FlownPath:
     aperture_time = mission.collection.aperture_time
     try:
         data = read(route.file)
@@ -253,9 +252,9 @@ def _of_log(
         log = _log(route, data, digest)
         if log.is_earth_fixed:
             known = _known(axes, "trajectory")
-            log = log._replace(places=known.places(log.places), is_earth_fixed=False)
+            log = replace(log, places=known.places(log.places), is_earth_fixed=False)
         times = slow_times(log, mission.collection.center_time, route.center, aperture_time, route.file)
-        log_motion.hold_to_motion(times, log.places, aperture_time, route.file)
+        hold_to_motion(times, log.places, aperture_time, route.file)
         fitted = smoothed(times, log.places, aperture_time)
     except PathFileError as error:
         raise _UnusablePathError(("trajectory", "file"), _of_file(route.file, error)) from None
@@ -267,7 +266,7 @@ def _of_log(
     return path._replace(doubt_of="residual of the smoothed log, root mean square", is_doubted=fitted.rms > _NOISE_M)
 
 
-def _log(route: routes.TrajectorySource, data: bytes, digest: str) -> Log:
+def _log(route: TrajectorySource, data: bytes, digest: str) -> Log:
     """Read a log, or take it as it was read before."""
     key = (route.file, route.format, route.week, digest)
     log = _logs.pop(key, None) or _read_log(route, data)
@@ -277,40 +276,28 @@ def _log(route: routes.TrajectorySource, data: bytes, digest: str) -> Log:
     return log
 
 
-def _read_log(route: routes.TrajectorySource, data: bytes) -> Log:
+def _read_log(route: TrajectorySource, data: bytes) -> Log:
     """Read a log; its format is stated, or that of its name."""
     is_sbet = route.format == "sbet" or (route.format is None and route.file.lower().endswith((".out", ".sbet")))
     if is_sbet:
-        from bisar_budget.paths import sbet
-
-        return sbet.read_sbet(data, route.file, route.week)
+        return read_sbet(data, route.file, route.week)
     if route.week is not None:
         raise _UnusablePathError(("trajectory", "week"), Problem("is for an SBET; this log is read as CSV"))
-    from bisar_budget.paths import flight_log
-
-    return flight_log.read_csv(data, route.file)
+    return read_csv(data, route.file)
 
 
 def _by_accuracy(
-    mission: Mission, route: routes.TrajectorySource, error: MotionError, read: Beside
+    mission: Mission, route: TrajectorySource, error: MotionError, read: Beside
 ) -> tuple[MotionError, str]:
     """Errors that the accuracy file of a log states, where the mission file states none; and its SHA-256."""
-    from bisar_budget.paths import sbet
-
     file = route.accuracy or ""
     key = ("trajectory", "accuracy")
     if error.frame != "scene":
         raise _UnusablePathError(key, Problem("states errors east, north, up", "accepted: motion_error.frame: scene"))
     try:
         data = read(file)
-        stated = sbet.read_accuracy(
-            data,
-            file,
-            route.week,
-            mission.collection.center_time,
-            route.center,
-            mission.collection.aperture_time,
-        )
+        collection = mission.collection
+        stated = read_accuracy(data, file, route.week, collection.center_time, route.center, collection.aperture_time)
     except PathFileError as unusable:
         raise _UnusablePathError(key, _of_file(file, unusable)) from None
     if error.distribution != "normal" and error.covariance is None and None in (error.position, error.velocity):

@@ -1,11 +1,12 @@
 """Platforms of a mission file: where they fly, in one of five ways, and how wrong their motion is measured."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from bisar_budget.faults import KeyPath, Problem
+from bisar_budget import units
+from bisar_budget.faults import InvalidValueError, KeyPath, Problem
 from bisar_budget.geometry import (
     STILL,
     STRAIGHT,
@@ -16,8 +17,9 @@ from bisar_budget.geometry import (
     norm,
     state_from_angles,
 )
-from bisar_budget.mission import later
-from bisar_budget.mission.bounds import (
+from bisar_budget.mission.covariance import COVARIANCE, Covariance, misplaced_axes
+from bisar_budget.mission.instruments import IMU, OSCILLATOR, RANDOM, GaussMarkov, Imu, Oscillator, Overridden
+from bisar_budget.mission.readers import (
     ACCELERATION,
     COORDINATE,
     DIRECTION,
@@ -25,7 +27,10 @@ from bisar_budget.mission.bounds import (
     DISTRIBUTIONS,
     ELEVATION,
     HEIGHT,
+    INVALID,
     JERK,
+    LATER_FORMATS,
+    LATER_FRAMES,
     LATITUDE,
     RANGE,
     SIZE,
@@ -33,13 +38,21 @@ from bisar_budget.mission.bounds import (
     SPEED,
     VELOCITY,
     VIBRATION_FREQUENCY,
+    Choice,
+    Key,
+    ListOf,
+    OneOf,
+    Quantity,
+    Reader,
+    Reference,
+    Report,
+    Section,
+    Text,
+    TextList,
+    Triple,
+    Whole,
 )
-from bisar_budget.mission.readers import Choice, Key, Late, ListOf, OneOf, Reference, Section, Text, TextList, Triple
-
-if TYPE_CHECKING:
-    from bisar_budget.mission.covariance import Covariance
-    from bisar_budget.mission.instruments import GaussMarkov, Imu, Oscillator, Overridden
-    from bisar_budget.mission.routes import OrbitSource, TrajectorySource
+from bisar_budget.paths.instant import parse_instant
 
 LEAST_BASELINE = 1.0  # m, between platforms of which one hears the other
 FARTHEST_BY = 3  # times the least baseline, that they move by in half an aperture: so far a fit of 16 nodes is true
@@ -105,9 +118,9 @@ class MotionError(NamedTuple):
     velocity: Annotated[Vector | None, Key(Triple(VELOCITY, or_scalar=True), "Constant part.")] = None
     acceleration: Annotated[Vector | None, Key(Triple(ACCELERATION, or_scalar=True), "Constant part.")] = None
     covariance: Annotated[
-        "Covariance | None",
+        Covariance | None,
         Key(
-            Late("covariance", "COVARIANCE"),
+            COVARIANCE,
             "Of position and velocity, instead of the two: 6 x 6 in m and s, or sigmas with correlations.",
         ),
     ] = None
@@ -117,14 +130,14 @@ class MotionError(NamedTuple):
         str | tuple[str, ...] | None,
         Key(PARTS, "Parts of the catalogue (`bisar-budget sensors`), or files; keys of this file override theirs."),
     ] = None
-    imu: Annotated["Imu | None", Key(Late("instruments", "IMU"), "Figures of the inertial sensor.")] = None
+    imu: Annotated[Imu | None, Key(IMU, "Figures of the inertial sensor.")] = None
     random: Annotated[
-        "tuple[GaussMarkov, ...]",
-        Key(Late("instruments", "RANDOM"), "Position errors that change within the aperture."),
+        tuple[GaussMarkov, ...],
+        Key(RANDOM, "Position errors that change within the aperture."),
     ] = ()
     source: Annotated[str | None, Key(Text(), "Where the values come from; shown as evidence.")] = None
     of_parts: tuple[tuple[str, str], ...] = ()
-    overridden: "tuple[Overridden, ...]" = ()
+    overridden: tuple[Overridden, ...] = ()
 
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
@@ -137,8 +150,6 @@ class MotionError(NamedTuple):
         covariance: Covariance | None = values.get("covariance")
         if covariance is None:
             return
-        from bisar_budget.mission.covariance import misplaced_axes
-
         both = [kind for kind in ("position", "velocity") if values.get(kind) is not None]
         if both:
             yield Problem(f"replaces position and velocity, but there is also a {both[0]}", at=("covariance",))
@@ -169,7 +180,7 @@ class CommonMotionError(NamedTuple):
     frame: Annotated[
         str,
         Key(
-            Choice("scene", refused=later.FRAMES),
+            Choice("scene", refused=LATER_FRAMES),
             "east, north, up.",
         ),
     ] = "scene"
@@ -178,6 +189,96 @@ class CommonMotionError(NamedTuple):
     acceleration: Annotated[Vector | None, Key(Triple(ACCELERATION, or_scalar=True), "Constant part.")] = None
     distribution: Annotated[str, Key(DISTRIBUTION, DISTRIBUTIONS)] = "normal"
     source: Annotated[str | None, Key(Text(), "Where the values come from; shown as evidence.")] = None
+
+
+# ---------------------------------------------------------------------- where a platform flies
+_FILE = Reference()
+_ORBIT_WAYS = ("tle", "omm", "oem")
+
+
+class _Lines(Reader):
+    """The two lines of an element set."""
+
+    is_word = True
+    what = "[line 1, line 2]"
+
+    def read(self, value: Any, path: tuple[Any, ...], report: Report) -> Any:
+        """Read both."""
+        if not isinstance(value, list) or len(value) != 2 or not all(isinstance(line, str) for line in value):
+            report(path, Problem("must be the name of a file, or the two lines of an element set"))
+            return INVALID
+        return tuple(value)
+
+    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
+        """Array of two lines."""
+        return {"type": "array", "items": {"type": "string"}, "minItems": 2, "maxItems": 2}
+
+
+class OrbitSource(NamedTuple):
+    """An orbit; the mission needs the scene's latitude, longitude and height, and `collection.center_time`."""
+
+    tle: Annotated[
+        str | tuple[str, str] | None,
+        Key(
+            OneOf(lambda value: _Lines() if isinstance(value, list) else _FILE, (_FILE, _Lines())),
+            "File of two-line elements, or the two lines; SGP4.",
+        ),
+    ] = None
+    omm: Annotated[str | None, Key(_FILE, "Orbit mean-elements message, XML, JSON or CSV; SGP4.")] = None
+    oem: Annotated[str | None, Key(_FILE, "Orbit ephemeris message, text or XML; interpolated as it says.")] = None
+    object: Annotated[str | None, Key(Reference(), "Name or catalogue number, where a file has several.")] = None
+
+    @staticmethod
+    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
+        """Hold it to one source."""
+        given = [way for way in _ORBIT_WAYS if values.get(way) is not None]
+        if len(given) != 1 and values.keys() >= set(_ORBIT_WAYS):
+            said = f"mixes {' with '.join(given)}" if given else "is empty"
+            yield Problem(said, f"accepted: one of {', '.join(_ORBIT_WAYS)}")
+
+
+class _Instant(Reader):
+    """An instant of UTC."""
+
+    is_word = True
+    what = "2026-06-01T05:20:31.250Z and the like"
+
+    def leaf(self, value: Any) -> Any:
+        """Read 2026-06-01T05:20:31.250Z."""
+        found = parse_instant(value) if isinstance(value, str) else None
+        if found is None:
+            raise InvalidValueError("must be an instant of UTC", f"accepted: {self.what}")
+        return found
+
+    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
+        """Date and time."""
+        return {"type": "string", "format": "date-time"}
+
+
+FORMATS = ("csv", "sbet")
+
+
+class TrajectorySource(NamedTuple):
+    """A log of a flight."""
+
+    file: Annotated[str, Key(_FILE, "Beside the mission file.")]
+    format: Annotated[
+        str | None, Key(Choice(*FORMATS, refused=LATER_FORMATS), "Omitted: by the name's ending; .out is sbet.")
+    ] = None
+    week: Annotated[int | None, Key(Whole(0, 9999), "GPS week in which an SBET begins, not rolled over.")] = None
+    center: Annotated[
+        float | None,
+        Key(
+            Quantity(units.TIME, ge=-1e11, le=1e11),
+            "Time of the log that is the middle of the aperture; omitted: collection.center_time, or 0 s.",
+        ),
+    ] = None
+    accuracy: Annotated[
+        str | None, Key(_FILE, "SBET accuracy file (smrmsg): fills position and velocity of motion_error.")
+    ] = None
+
+
+ORBIT, TRAJECTORY, INSTANT = Section(OrbitSource), Section(TrajectorySource), _Instant()
 
 
 class Way(NamedTuple):
@@ -250,8 +351,8 @@ class Platform(NamedTuple):
     ] = None
     jerk: Annotated[Vector | None, Key(Triple(JERK), "Rate of the acceleration, at the midpoint.")] = None
     snap: Annotated[Vector | None, Key(Triple(SNAP), "Rate of the jerk.")] = None
-    orbit: Annotated["OrbitSource | None", Key(Late("routes", "ORBIT"), "A satellite, by its orbit.")] = None
-    trajectory: Annotated["TrajectorySource | None", Key(Late("routes", "TRAJECTORY"), "A log of a flight.")] = None
+    orbit: Annotated[OrbitSource | None, Key(ORBIT, "A satellite, by its orbit.")] = None
+    trajectory: Annotated[TrajectorySource | None, Key(TRAJECTORY, "A log of a flight.")] = None
     latitude: Annotated[float | None, Key(LATITUDE, "Geodetic, WGS-84.")] = None
     longitude: Annotated[float | None, Key(DIRECTION, "Positive to the east.")] = None
     altitude: Annotated[float | None, Key(HEIGHT, "Above the ellipsoid; level flight follows it.")] = None
@@ -265,9 +366,7 @@ class Platform(NamedTuple):
     ] = None
     climb: Annotated[float | None, Key(VELOCITY, "Vertical speed, up positive.")] = None
     motion_error: Annotated[MotionError, Key(Section(MotionError))] = MotionError()
-    oscillator: Annotated[
-        "Oscillator | None", Key(Late("instruments", "OSCILLATOR"), "The oscillator and its noise.")
-    ] = None
+    oscillator: Annotated[Oscillator | None, Key(OSCILLATOR, "The oscillator and its noise.")] = None
     path: FlownPath | None = None
 
     @staticmethod

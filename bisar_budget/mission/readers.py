@@ -9,13 +9,12 @@ library would, in a fifth of the import time: `check` starts in every commit of 
 import math
 import re
 from collections.abc import Callable, Mapping
-from importlib import import_module
 from typing import Any, NamedTuple
 
+from bisar_budget import units
 from bisar_budget.faults import InvalidValueError, KeyPath, Problem
-from bisar_budget.mission import later
 from bisar_budget.resources import docstring
-from bisar_budget.units import ANGLE, Dimension, format_quantity, parse_quantity
+from bisar_budget.units import Dimension, format_quantity, parse_quantity
 
 INVALID: Any = object()  # in place of a value that was reported
 Report = Callable[[KeyPath, Problem], None]
@@ -101,7 +100,7 @@ class Quantity(Reader):
             if not holds
         )
         said = format_quantity(bound, self.dimension.si)
-        if self.dimension is ANGLE:  # three digits of a radian are not 90 deg
+        if self.dimension is units.ANGLE:  # three digits of a radian are not 90 deg
             said = f"{math.degrees(bound):.6g} deg"
         raise InvalidValueError(f"must be {words} {said}", hint=self._meant(self._text(value)))
 
@@ -237,12 +236,14 @@ class Words(Reader):
     """A list of some of a few words, each once."""
 
     def __init__(self, *names: str, accepted: str = "") -> None:
-        self.word = Choice(*names, accepted=accepted)
+        self.word: Reader = Choice(*names, accepted=accepted)
+        self.problem = Problem("must be a list", f"accepted: some of {accepted or ', '.join(names)}")
+        self.fewest, self.most = 0.0, math.inf
 
     def read(self, value: Any, path: KeyPath, report: Report) -> Any:
         """Read each word at its own place."""
-        if not isinstance(value, list):
-            report(path, Problem("must be a list", f"accepted: some of {self.word.accepted}"))
+        if not isinstance(value, list) or not self.fewest <= len(value) <= self.most:
+            report(path, self.problem)
             return INVALID
         words = tuple([_read(self.word, word, (*path, index), report) for index, word in enumerate(value)])
         for index, word in enumerate(words):
@@ -256,30 +257,23 @@ class Words(Reader):
         return {"type": "array", "items": self.word.schema(definitions), "uniqueItems": True}
 
 
-class TextList(Reader):
+class TextList(Words):
     """A list of the names of a few parts, each once."""
 
     is_word = True
 
-    def read(self, value: Any, path: KeyPath, report: Report) -> Any:
-        """Read each text at its own place."""
-        if not isinstance(value, list) or not 1 <= len(value) <= _FEW:
-            report(path, Problem(f"must be a list of 1 to {_FEW} names"))
-            return INVALID
-        texts = tuple([_read(Text(), text, (*path, index), report) for index, text in enumerate(value)])
-        for index, text in enumerate(texts):
-            if text is not INVALID and text in texts[:index]:
-                report((*path, index), Problem("is in the list twice"))
-                return INVALID
-        return INVALID if INVALID in texts else texts
+    def __init__(self) -> None:
+        self.word = Reference()
+        self.problem = Problem(f"must be a list of 1 to {_FEW} names")
+        self.fewest, self.most = 1, _FEW
 
     def below(self, part: str) -> Reader | None:
         """Give the reader of one name."""
-        return Reference() if is_place(part) else None
+        return self.word if is_place(part) else None
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
         """Array of text."""
-        return {"type": "array", "items": Text().schema(definitions), "minItems": 1, "maxItems": _FEW}
+        return {"type": "array", "items": self.word.schema(definitions), "minItems": 1, "maxItems": self.most}
 
 
 class Whole(Reader):
@@ -374,7 +368,7 @@ class Section(Reader):
         }
         self.defaults: dict[str, Any] = kind._field_defaults
         self.required = [name for name in self.keys if name not in self.defaults]
-        self.later = later.KEYS.get(kind.__name__, {})
+        self.later = LATER.get(kind.__name__, {})
         self.problems = getattr(kind, "problems", None)
 
     def read(self, value: Any, path: KeyPath, report: Report) -> Any:
@@ -387,7 +381,7 @@ class Section(Reader):
         for name, item in value.items():
             key = self.keys.get(name)
             if name in self.later:
-                report((*path, name), Problem(later.PROBLEM, self.later[name], is_of_key=True))
+                report((*path, name), Problem(NOT_COMPUTED, self.later[name], is_of_key=True))
                 is_valid = False
                 continue
             if key is None:
@@ -494,26 +488,6 @@ class OneOf(Reader):
         return {"anyOf": [form.schema(definitions) for form in self.forms]}
 
 
-class Late(Reader):
-    """A reader of a rare key, `name` in a module of this room: it is imported when a file has the key."""
-
-    def __init__(self, module: str, name: str) -> None:
-        self.module, self.name = module, name
-
-    def load(self) -> Reader:
-        """Import it."""
-        reader: Reader = getattr(import_module(f"bisar_budget.mission.{self.module}"), self.name)
-        return reader
-
-    def read(self, value: Any, path: KeyPath, report: Report) -> Any:
-        """Read by it."""
-        return self.load().read(value, path, report)
-
-    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
-        """Write its schema."""
-        return self.load().schema(definitions)
-
-
 def is_place(part: str) -> bool:
     """Whether a part of a key is the number of an entry, from 0."""
     return part.isascii() and part.isdigit() and len(part) < 9
@@ -533,3 +507,69 @@ def did_you_mean(given: object, known: tuple[str, ...]) -> str:
 
     near = get_close_matches(str(given)[:_MAX_TEXT], known, 1)
     return f"Did you mean {near[0]!r}?" if near else ""
+
+
+# ---------------------------------------------------------------------- bounds
+# Nothing real comes near them, and squares stay finite.
+FREQUENCY = Quantity(units.FREQUENCY, gt=0, ge=1e3, le=1e13)
+VIBRATION_FREQUENCY = Quantity(units.FREQUENCY, gt=0, le=1e9)
+DURATION = Quantity(units.TIME, gt=0, ge=1e-6, le=1e6)
+COORDINATE = Quantity(units.LENGTH, ge=-1e9, le=1e9)
+RANGE = Quantity(units.LENGTH, gt=0, le=1e9)
+SIZE = Quantity(units.LENGTH, ge=0, le=1e9)
+VELOCITY = Quantity(units.SPEED, ge=-1e6, le=1e6)
+SPEED = Quantity(units.SPEED, ge=0, le=1e6)
+ACCELERATION = Quantity(units.ACCELERATION, ge=-1e6, le=1e6)
+JERK = Quantity(units.JERK, ge=-1e6, le=1e6)
+SNAP = Quantity(units.SNAP, ge=-1e6, le=1e6)
+DIRECTION = Quantity(units.ANGLE, ge=-2 * math.pi, le=2 * math.pi)
+LATITUDE = Quantity(units.ANGLE, ge=-math.pi / 2, le=math.pi / 2)
+HEIGHT = Quantity(units.LENGTH, ge=-1e4, le=1e9)
+ELEVATION = Quantity(units.ANGLE, ge=0, le=math.pi / 2)
+PHASE = Quantity(units.ANGLE, ge=-1e6, le=1e6)
+# With a turn at the aperture edge a response has no mainlobe; 45 without a unit would be seven.
+PHASE_REQUIREMENT = Quantity(units.ANGLE, gt=0, ge=1e-6, le=2 * math.pi)
+SIDELOBE_REQUIREMENT = Quantity(units.POWER_RATIO, lt=0, ge=-200)
+SHARE = Quantity(units.RATIO, gt=0, ge=1e-6, le=1)
+DISTRIBUTION = Choice("normal", "uniform", "bound")
+DISTRIBUTIONS = "normal: the values are one sigma; uniform, bound: they are not exceeded."
+
+
+# ---------------------------------------------------------------------- what is not computed yet
+# Keys and words that the contract of the mission file has and this version does not compute, each with a way out. One
+# of them in a file is an error that says so: an unknown key would be told which other key was perhaps meant.
+NOT_COMPUTED = "is not computed by this version yet"
+_LEAVE = "accepted: leave it out"
+_MOTION = f"{_LEAVE}, and state what it does as position, velocity and acceleration errors"
+_OSCILLATOR = f"{_LEAVE}, and state the noise with it, as phase_noise or spurs"
+_OTHER = f"{_LEAVE}; of an error from elsewhere its quadratic_phase_error counts"
+_LINK = "accepted: method linear with interval and error, or direct_path with error"
+_SPECTRUM = f"{_LEAVE}, and state sinusoidal lines and the rms of wideband"
+_SCALE = f"{_LEAVE}, and state what it does as accelerometer_bias"
+
+# By the name of the section, as its class has it, and the key: what is accepted instead.
+LATER: Mapping[str, Mapping[str, str]] = {
+    "MotionError": {"time_tag": _MOTION, "lever_arm": _MOTION},
+    "Vibration": {"spectrum": _SPECTRUM, "spectrum_level": _SPECTRUM},
+    "Imu": {"accelerometer_scale_factor": _SCALE},
+    "ImuPart": {"accelerometer_scale_factor": _SCALE},
+    "Oscillator": dict.fromkeys(("acceleration_sensitivity", "aging", "vibration", "level"), _OSCILLATOR),
+    "OscillatorPart": dict.fromkeys(("acceleration_sensitivity", "aging", "vibration", "level"), _OSCILLATOR),
+    "Synchronization": dict.fromkeys(("age", "averaging", "time_error", "frequency_error"), _LINK),
+    "CommonMotionError": {"random": f"{_LEAVE}, and state it in motion_error.random of each platform"},
+    "OtherError": dict.fromkeys(("cubic_phase_error", "location_error", "islr"), _OTHER),
+    "OrbitSource": dict.fromkeys(("eof", "sp3"), "accepted: the same orbit as tle, omm or oem"),
+    "TrajectorySource": dict.fromkeys(
+        ("time_scale", "geoid_separation"), f"{_LEAVE}; a log in CSV has UTC, and heights above the ellipsoid"
+    ),
+    "AllocationRules": {"specify": _LEAVE},
+    "Mission": {
+        "propagation": f"{_LEAVE}, and state what it does in other_errors",
+        "earth_orientation": f"{_LEAVE}; UT1 is taken to be UTC",
+    },
+}
+LATER_METHODS: Mapping[str, str] = {"holdover": NOT_COMPUTED}
+LATER_FRAMES: Mapping[str, str] = dict.fromkeys(
+    ("track", "look", "ric"), f"{NOT_COMPUTED} of both platforms at once: each has axes of its own"
+)
+LATER_FORMATS: Mapping[str, str] = dict.fromkeys(("pos", "nmea", "gpx", "ulog"), NOT_COMPUTED)

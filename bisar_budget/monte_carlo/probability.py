@@ -21,9 +21,8 @@ from bisar_budget.constants import MAX_DRAWS
 from bisar_budget.effects.effect import PLATFORMS, ErrorSource, ImagePlane
 from bisar_budget.findings.monte_carlo import MonteCarlo, Requirement
 from bisar_budget.mission.model import Mission, Simulation, has_instruments
-from bisar_budget.mission.symmetric import eigensystem
 from bisar_budget.monte_carlo.draws import Share, drawing_of, in_turn, joined
-from bisar_budget.monte_carlo.variables import HeldSum, Variable
+from bisar_budget.monte_carlo.variables import HeldSum, Variable, eigensystem
 from bisar_budget.phrases import Note
 
 if TYPE_CHECKING:

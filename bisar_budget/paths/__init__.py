@@ -3,14 +3,11 @@
 # What other rooms may use.
 __all__ = [
     "earth",
+    "elements",
     "ephemeris",
-    "fields",
     "flight",
     "flight_log",
     "instant",
-    "log_motion",
-    "mean_elements",
-    "polynomials",
+    "messages",
     "sbet",
-    "two_lines",
 ]

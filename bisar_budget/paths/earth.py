@@ -1,16 +1,25 @@
-"""The Earth as WGS-84 has it: geodetic places, and the axes of a scene on it. Single places need no array library.
+"""The Earth as WGS-84 has it: geodetic places, the axes of a scene on it, and how it turns below the stars.
 
 Earth-fixed axes: x through Greenwich on the equator, z through the north pole. [m]
+
+Orbits are turned to the Earth with UT1 = UTC and without polar motion. Both that is left out comes from tables which
+the IERS issues every week. UT1 - UTC is kept below 0.9 s: 1 ms turns the Earth by 0.51 m at the distance of a low
+orbit. Polar motion is up to 0.6", which is 20 m there. The turn is the same throughout an aperture: it moves the
+whole path, and bends nothing.
 """
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
-from bisar_budget.geometry import Axes, Vector, cross, dot, unit
+import numpy as np
+from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
+from bisar_budget.geometry import STRAIGHT, Axes, Vector, cross, dot, unit
+from bisar_budget.paths.flight import PathFileError
+from bisar_budget.paths.instant import DAY, TAI_LESS, Instant, tai
+
+Floats = NDArray[np.float64]
 
 # NGA.STND.0036, table 3.1
 EQUATORIAL_RADIUS = 6378137.0  # m
@@ -38,13 +47,12 @@ class SceneAxes(NamedTuple):
 
     def place(self, earth_fixed: Vector) -> Vector:
         """A place in the scene's axes. [m]"""
-        return self.turned(_minus(earth_fixed, self.origin))
+        x, y, z = earth_fixed
+        return self.turned((x - self.origin[0], y - self.origin[1], z - self.origin[2]))
 
-    def places(self, earth_fixed: "NDArray[np.float64]") -> "NDArray[np.float64]":
+    def places(self, earth_fixed: Floats) -> Floats:
         """Places (n, 3) in the scene's axes. [m]"""
-        import numpy as np
-
-        turned: NDArray[np.float64] = (earth_fixed - np.array(self.origin)) @ np.array(self.axes).T
+        turned: Floats = (earth_fixed - np.array(self.origin)) @ np.array(self.axes).T
         return turned
 
     def turned(self, earth_fixed: Vector) -> Vector:
@@ -59,9 +67,8 @@ class SceneAxes(NamedTuple):
 
     def turned_back(self, vector: Vector) -> Vector:
         """A direction or velocity of the scene in Earth-fixed axes."""
-        (a, b, c), (u, v, w), (p, q, r) = self.axes
-        e, n, h = vector
-        return (a * e + u * n + p * h, b * e + v * n + q * h, c * e + w * n + r * h)
+        x, y, z = (dot(axis, vector) for axis in zip(*self.axes, strict=True))
+        return (x, y, z)
 
     def radial(self, place: Vector, velocity: Vector) -> Axes:
         """Axes of the `ric` frame of a platform, in the scene's axes.
@@ -78,16 +85,25 @@ class SceneAxes(NamedTuple):
         return self.turned(radial), self.turned(cross(across, radial)), self.turned(across)
 
 
+def earth_fixed_places(latitude: Any, longitude: Any, height: Any) -> Floats:
+    """Earth-fixed coordinates (..., 3) [m] of geodetic places, each (...), [rad], [rad], [m]."""
+    sine, cosine = np.sin(latitude), np.cos(latitude)
+    _, normal = curvature_radii(sine)
+    level = (normal + height) * cosine
+    polar = (normal * (1 - _ECCENTRICITY_SQUARED) + height) * sine
+    return np.stack([level * np.cos(longitude), level * np.sin(longitude), polar], axis=-1)
+
+
 def earth_fixed(place: Geodetic) -> Vector:
     """Earth-fixed coordinates of a geodetic place. [m]"""
-    sine, cosine = math.sin(place.latitude), math.cos(place.latitude)
-    normal = _prime_vertical(sine)
-    level = (normal + place.height) * cosine
-    return (
-        level * math.cos(place.longitude),
-        level * math.sin(place.longitude),
-        (normal * (1 - _ECCENTRICITY_SQUARED) + place.height) * sine,
-    )
+    x, y, z = earth_fixed_places(*place).tolist()
+    return (x, y, z)
+
+
+def curvature_radii(sine: Any) -> tuple[Any, Any]:
+    """Radii of curvature along the meridian and across it, by the sine of the latitude. [m]"""
+    across = EQUATORIAL_RADIUS / np.sqrt(1 - _ECCENTRICITY_SQUARED * sine * sine)
+    return across**3 * (1 - _ECCENTRICITY_SQUARED) / EQUATORIAL_RADIUS**2, across
 
 
 def geodetic(point: Vector) -> Geodetic:
@@ -144,44 +160,92 @@ def flown(place: Geodetic, heading: float, speed: float, climb: float, time_s: f
     Euler's formula. Runge and Kutta's fourth order, in Earth-fixed axes: there a pole is a place like others.
     """
     axes = axes_at(place)
-    here = axes.origin
-    along = axes.turned_back((math.sin(heading), math.cos(heading), 0.0))
     step = time_s / _STEPS
+    start = np.array(axes.origin)
 
-    def rates(point: Vector, direction: Vector) -> tuple[Vector, Vector]:
-        at = geodetic(point)
-        east, north, up = axes_at(at).axes
-        turn = speed / _radius_along(at, math.atan2(dot(direction, east), dot(direction, north)))
-        moves = _sum((speed, direction), (climb, up))
-        return moves, (-turn * up[0], -turn * up[1], -turn * up[2])
+    def rates(state: Floats) -> Floats:
+        """Rates of the way from the start and of the direction, (2, 3)."""
+        at = geodetic(tuple((start + state[0]).tolist()))
+        east, north, up = np.array(axes_at(at).axes)
+        along, across = curvature_radii(math.sin(at.latitude))
+        radius = 1 / ((state[1] @ north) ** 2 / along + (state[1] @ east) ** 2 / across) + at.height
+        return np.array([speed * state[1] + climb * up, -speed / radius * up])
 
+    # From the start on, so that rounding is that of the way and not of the Earth's radius.
+    state: Floats = np.array([STRAIGHT, axes.turned_back((math.sin(heading), math.cos(heading), 0.0))])
     for _ in range(_STEPS):
-        a, p = rates(here, along)
-        b, q = rates(_sum((1, here), (step / 2, a)), _sum((1, along), (step / 2, p)))
-        c, r = rates(_sum((1, here), (step / 2, b)), _sum((1, along), (step / 2, q)))
-        d, s = rates(_sum((1, here), (step, c)), _sum((1, along), (step, r)))
-        here = _sum((1, here), (step / 6, a), (step / 3, b), (step / 3, c), (step / 6, d))
-        along = _sum((1, along), (step / 6, p), (step / 3, q), (step / 3, r), (step / 6, s))
-    return here
-
-
-def _radius_along(place: Geodetic, heading: float) -> float:
-    """Radius of curvature of the way of constant height over a place, by its compass heading: Euler's formula. [m]"""
-    sine = math.sin(place.latitude)
-    across = _prime_vertical(sine)
-    along = across * (1 - _ECCENTRICITY_SQUARED) / (1 - _ECCENTRICITY_SQUARED * sine * sine)
-    return 1 / (math.cos(heading) ** 2 / along + math.sin(heading) ** 2 / across) + place.height
-
-
-def _sum(*parts: tuple[float, Vector]) -> Vector:
-    """Sum of vectors times their factors."""
-    x, y, z = (math.fsum(factor * vector[axis] for factor, vector in parts) for axis in range(3))
+        a = rates(state)
+        b = rates(state + step / 2 * a)
+        c = rates(state + step / 2 * b)
+        d = rates(state + step * c)
+        state = state + step / 6 * (a + 2 * b + 2 * c + d)
+    x, y, z = (start + state[0]).tolist()
     return (x, y, z)
 
 
-def _prime_vertical(sine: float) -> float:
-    return EQUATORIAL_RADIUS / math.sqrt(1 - _ECCENTRICITY_SQUARED * sine * sine)
+# ---------------------------------------------------------------------- below the stars
+INSTALL = "pip install 'bisar-budget[orbits]'"
+Turn = Callable[[Vector, Instant], Vector]
+_JULIAN_DATE_OF_MJD = 2400000.5
+_J2000 = 51544  # modified Julian day, at noon
+_CENTURY = 36525.0  # days
+_POLAR_MOTION = math.radians(0.6 / 3600)  # rad
 
 
-def _minus(a: Vector, b: Vector) -> Vector:
-    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
+def from_teme(place: Vector, instant: Instant) -> Vector:
+    """Earth-fixed coordinates from those of the true equator and mean equinox of date."""
+    angle = sidereal_time(instant)
+    sine, cosine = math.sin(angle), math.cos(angle)
+    x, y, z = place
+    return (cosine * x + sine * y, cosine * y - sine * x, z)
+
+
+def sidereal_time(ut1: Instant) -> float:
+    """Greenwich mean sidereal time of the IAU, 1982. [rad]
+
+    Source: Vallado, Fundamentals of Astrodynamics and Applications, 4th edition, equation 3-45 (also Aoki and others,
+    1982). Its 876600 hours a century are a turn a day, and are left to the seconds of the day: written as it stands,
+    the sum has 1e-7 s.
+    """
+    centuries = (ut1.day - _J2000 - 0.5 + ut1.seconds / DAY) / _CENTURY
+    at_midnight = (ut1.day - _J2000 - 0.5) / _CENTURY
+    seconds = (
+        (67310.54841 + 8640184.812866 * at_midnight - DAY / 2) % DAY
+        + ut1.seconds * (1 + 8640184.812866 / (_CENTURY * DAY))
+        + (0.093104 - 6.2e-6 * centuries) * centuries**2
+    )
+    return seconds * (2 * math.pi / DAY)
+
+
+def celestial_turn(is_j2000: bool) -> Turn:
+    """From the axes of the GCRF, or the mean equator and equinox of J2000, to Earth-fixed ones.
+
+    Precession and nutation are those of the IAU, 2006 and 2000A (IERS Conventions 2010, chapter 5). The axes of J2000
+    are 0.023" from the GCRF's, 0.8 m at the distance of a low orbit; a file that calls the GCRF `EME2000` is that
+    much off.
+
+    Raises
+    ------
+    PathFileError
+        The package pyerfa is not installed.
+    """
+    try:
+        import erfa
+    except ImportError:
+        raise PathFileError(f"needs the package pyerfa: {INSTALL}") from None
+
+    bias: Floats = erfa.bp06(_JULIAN_DATE_OF_MJD, _J2000 + 0.5)[0].T if is_j2000 else np.eye(3)
+
+    def turn(place: Vector, instant: Instant) -> Vector:
+        tt = tai(instant).after(-TAI_LESS["TT"])
+        days = (tt.day, tt.seconds / DAY), (instant.day, instant.seconds / DAY)
+        dates = (number for day, part in days for number in (_JULIAN_DATE_OF_MJD + day, part))
+        x, y, z = (erfa.c2t06a(*dates, 0.0, 0.0) @ (bias @ place)).tolist()
+        return (x, y, z)
+
+    return turn
+
+
+def unknown_rotation(place: Vector) -> tuple[float, float]:
+    """How far a place moves by 0.1 s of UT1, and by polar motion at most. [m]"""
+    return 0.1 * ROTATION_RATE * math.hypot(place[0], place[1]), _POLAR_MOTION * math.hypot(*place)

@@ -13,13 +13,18 @@ from typing import NamedTuple
 
 from bisar_budget.faults import shown
 from bisar_budget.geometry import Vector
-from bisar_budget.paths.fields import LATEST, decoded, epoch_in, hold_to_size, number_in
-from bisar_budget.paths.flight import Orbit, PathDoubt, PathFileError
-from bisar_budget.paths.instant import DAY, Instant
-from bisar_budget.paths.interpolation import Sample, interpolate
-from bisar_budget.paths.leap_seconds import FIRST_DAY, TAI_LESS, has_leap_second, tai, tai_less_utc, utc
-from bisar_budget.paths.markup import MessageElement, parse_markup
-from bisar_budget.paths.turning import Turn, celestial_turn, from_teme, unknown_rotation
+from bisar_budget.paths.earth import Turn, celestial_turn, from_teme, unknown_rotation
+from bisar_budget.paths.flight import Orbit, PathDoubt, PathFileError, Sample, interpolate
+from bisar_budget.paths.instant import DAY, FIRST_DAY, TAI_LESS, Instant, has_leap_second, tai, tai_less_utc, utc
+from bisar_budget.paths.messages import (
+    LATEST,
+    MessageElement,
+    decoded,
+    epoch_in,
+    hold_to_size,
+    number_in,
+    parse_markup,
+)
 
 _EARTH_FIXED = re.compile(r"ITRF[- ]?(\d\d|\d{4})?|WGS[- ]?84")
 _CELESTIAL = {"GCRF": False, "ICRF": False, "EME2000": True, "J2000": True}

@@ -6,16 +6,19 @@ say how far the polynomial is from what the file has.
 """
 
 import math
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from bisect import bisect_right
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
-from bisar_budget.geometry import PlatformState, Vector
+import numpy as np
+from numpy.polynomial import chebyshev, legendre
+from numpy.typing import NDArray
+
+from bisar_budget.geometry import STRAIGHT, PlatformState, Vector
 from bisar_budget.paths.instant import Instant
-from bisar_budget.paths.polynomials import least_squares, path_of, powers_of, powers_of_chebyshev
 
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
+Floats = NDArray[np.float64]
 
 _NODES = 15  # Chebyshev points of an interpolation, so many coefficients
 _LEAST_WINDOW = 10.0  # s; in a shorter one rounding of an Earth-fixed place, 1e-9 m, is an acceleration
@@ -49,7 +52,8 @@ class PathDoubt(NamedTuple):
 NO_DOUBT = PathDoubt(0.0, "")
 
 
-class Orbit(NamedTuple):
+@dataclass(frozen=True)
+class Orbit:
     """A path that is known at any instant of a span.
 
     `place` takes an instant and gives Earth-fixed coordinates [m]. `words` says what it is, for reports; `epoch` is
@@ -66,20 +70,22 @@ class Orbit(NamedTuple):
     remedy: str = ""
 
 
-class Log(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Log:
     """Measured places (n, 3) [m] at rising times (n,) [s], Earth-fixed or in the scene's axes.
 
     Times count from `start`; without one they are those of the log itself. `words` says what it is, for reports.
     """
 
-    times: "NDArray[np.float64]"
-    places: "NDArray[np.float64]"
+    times: Floats
+    places: Floats
     is_earth_fixed: bool
     words: str
     start: Instant | None = None
 
 
-class Fitted(NamedTuple):
+@dataclass(frozen=True)
+class Fitted:
     """A path as a polynomial, its order, and how far it is from the file's places, at most and root mean square [m].
 
     `samples` is how many of a log's places the polynomial smooths; none of an orbit, which is interpolated.
@@ -107,26 +113,11 @@ def interpolated(place: Callable[[float], Vector], aperture_time_s: float, wides
         Longest time around the middle in which there are places.
     """
     half = min(max(aperture_time_s, _LEAST_WINDOW), widest_s) / 2
-    nodes = [math.cos(math.pi * (n + 0.5) / _NODES) for n in range(_NODES)]
-    places = [place(half * node) for node in nodes]
-    monomials = powers_of_chebyshev(_NODES)
-    coefficients = []
-    for axis in range(3):
-        chebyshev = [
-            (2 if order else 1)
-            / _NODES
-            * math.fsum(places[n][axis] * math.cos(math.pi * order * (n + 0.5) / _NODES) for n in range(_NODES))
-            for order in range(_NODES)
-        ]
-        # What is below rounding would be divided by high powers of the window.
-        kept = [one if abs(one) > _UNSEEN_M else 0.0 for one in chebyshev]
-        coefficients.append(
-            [
-                math.fsum(kept[order] * monomials[order][power] for order in range(power, _NODES)) / half**power
-                for power in range(_NODES)
-            ]
-        )
-    state = path_of([[axis[power] for axis in coefficients] for power in range(_NODES)])
+    nodes = chebyshev.chebpts1(_NODES)
+    places = np.array([place(half * node) for node in nodes.tolist()])
+    series: Floats = np.linalg.solve(chebyshev.chebvander(nodes, _NODES - 1), places)
+    series[np.abs(series) <= _UNSEEN_M] = 0.0  # what is below rounding would be divided by high powers of the window
+    state = path_of(powers_of(series, half, chebyshev.cheb2poly))
     apart = []
     for n in range(_NODES + 1):
         tau = aperture_time_s / 2 * math.cos(math.pi * n / _NODES)
@@ -138,7 +129,7 @@ def interpolated(place: Callable[[float], Vector], aperture_time_s: float, wides
     return Fitted(state, len(state.bends) + 2, max(apart), rms, doubts=doubts)
 
 
-def smoothed(times: "NDArray[np.float64]", places: "NDArray[np.float64]", aperture_time_s: float) -> Fitted:
+def smoothed(times: Floats, places: Floats, aperture_time_s: float) -> Fitted:
     """Path that fits the places of a log within the aperture by least squares.
 
     The order is that of the least Bayesian information criterion (Schwarz 1978), to 8 at most and to half the
@@ -159,8 +150,6 @@ def smoothed(times: "NDArray[np.float64]", places: "NDArray[np.float64]", apertu
     PathFileError
         Fewer than five places within the aperture.
     """
-    import numpy as np
-
     half = aperture_time_s / 2
     inside = np.abs(times) <= half * (1 + 1e-9)
     count = int(inside.sum())
@@ -172,7 +161,7 @@ def smoothed(times: "NDArray[np.float64]", places: "NDArray[np.float64]", apertu
     fits = [least_squares(at, wanted, order) for order in range(2, min(_HIGHEST, (count - 1) // 2) + 1)]
     independent = _independent(fits[-1][1])
 
-    def information(left: "NDArray[np.float64]", order: int) -> float:
+    def information(left: Floats, order: int) -> float:
         squares = (left**2).mean(axis=0) + _UNSEEN_M**2
         # Each axis has its own noise, and a coefficient of each order. The last factor is that of AICc (Hurvich &
         # Tsai 1989): a few samples are fitted too well by chance.
@@ -195,7 +184,7 @@ def smoothed(times: "NDArray[np.float64]", places: "NDArray[np.float64]", apertu
 
 def slow_times(
     log: Log, center: Instant | None, center_seconds: float | None, aperture_time_s: float, name: str
-) -> "NDArray[np.float64]":
+) -> Floats:
     """Slow time of each sample of a log that has what the aperture needs.
 
     Parameters
@@ -222,8 +211,6 @@ def slow_times(
         The log does not cover the aperture, give or take one sample, or has a gap in it of more than five usual
         intervals: medians, in the aperture or of the log. Or the middle is on a clock that the log does not have.
     """
-    import numpy as np
-
     times, start = log.times, log.start
     if start is not None:
         if center_seconds is not None:
@@ -259,16 +246,103 @@ def slow_times(
     return slow
 
 
-def _independent(left: "NDArray[np.float64]") -> float:
+def _independent(left: Floats) -> float:
     """How many independent samples residuals (n, 3) are worth: n over the sum of their correlation to its first zero.
 
     White noise is worth all its samples. Each axis counts alike.
     """
-    import numpy as np
-
     count = len(left)
     spectrum = np.abs(np.fft.rfft(left, 2 * count, axis=0)) ** 2
     correlation = np.fft.irfft(spectrum, axis=0)[:count]
     correlation = (correlation / np.maximum(correlation[0], _UNSEEN_M**2)).mean(axis=1)
     ends = int(np.argmax(correlation <= 0)) or count
     return max(2.0, count / float(1 + 2 * correlation[1:ends].sum()))
+
+
+# ---------------------------------------------------------------------- polynomials of slow time
+def least_squares(at: Floats, places: Floats, order: int) -> tuple[Floats, Floats]:
+    """Legendre series of an order through places, and what it leaves of them.
+
+    Parameters
+    ----------
+    at : (n,) ndarray
+        Where the places are, -1 … 1.
+    places : (n, 3) ndarray
+        [m]
+
+    Returns
+    -------
+    (order + 1, 3) ndarray, (n, 3) ndarray
+        Coefficients, and places less the series. [m]
+    """
+    basis = legendre.legvander(at, order)
+    coefficients: Floats = np.asarray(np.linalg.lstsq(basis, places, rcond=None)[0], dtype=float)
+    return coefficients, places - basis @ coefficients
+
+
+def powers_of(coefficients: Floats, half_s: float, convert: Callable[..., Any] = legendre.leg2poly) -> Floats:
+    """Coefficients (order + 1, 3) of τ⁰, τ¹, … of a series over -`half_s` … `half_s`. [m], [m/s], …
+
+    `convert` turns coefficients of the series into those of powers; omitted: of a Legendre series.
+    """
+    powers = np.zeros_like(coefficients)
+    for axis in range(3):
+        found = convert(coefficients[:, axis])  # without the highest that are zero
+        powers[: len(found), axis] = found
+    return powers / half_s ** np.arange(len(powers))[:, None]
+
+
+def path_of(powers: Iterable[Iterable[float]]) -> PlatformState:
+    """A path from its coefficients of τ⁰, τ¹, …, at least two; the highest bends that are zero are left out."""
+    vectors: list[Vector] = [(float(x), float(y), float(z)) for x, y, z in powers]
+    position, velocity, (x, y, z), *bends = vectors if len(vectors) > 2 else [*vectors, STRAIGHT]
+    while bends and bends[-1] == STRAIGHT:
+        bends.pop()
+    return PlatformState(position=position, velocity=velocity, acceleration=(2 * x, 2 * y, 2 * z), bends=tuple(bends))
+
+
+# ---------------------------------------------------------------------- places between those of a table
+class Sample(NamedTuple):
+    """A time of days without leap seconds, and position and velocity. [m], [m/s]"""
+
+    time: Instant
+    place: Vector
+    velocity: Vector
+
+
+def interpolate(samples: Sequence[Sample], time: Instant, count: int, is_hermite: bool) -> Vector:
+    """Place at a time, from the samples around it. [m]
+
+    The samples are the same throughout an interval between two of them. Neighbouring intervals, where the count is
+    even or not, share the sample between them: the path has no jumps.
+    """
+    after = bisect_right(samples, time, key=lambda one: one.time)
+    first = min(max(after - (count + 1) // 2, 0), len(samples) - count)
+    near = samples[first : first + count]
+    return _through(near, [one.time.since(time) for one in near], is_hermite)
+
+
+def _through(near: Sequence[Sample], times: Sequence[float], is_hermite: bool) -> Vector:
+    """Value at time 0 of the polynomial of Lagrange through places, or that of Hermite through velocities too.
+
+    Sources: Abramowitz & Stegun, equations 25.2.1 and 25.2.2; Burden & Faires, Numerical Analysis, theorem 3.9.
+    """
+    terms: list[list[float]] = [[], [], []]
+    for j, sample in enumerate(near):
+        others = [times[j] - one for n, one in enumerate(times) if n != j]
+        basis = math.prod(-one / (times[j] - one) for n, one in enumerate(times) if n != j)
+        if is_hermite:
+            square = basis * basis
+            slope = math.fsum(1 / one for one in others)
+            of_place, of_velocity = (1 + 2 * times[j] * slope) * square, -times[j] * square
+        else:
+            of_place, of_velocity = basis, 0.0
+        for axis in range(3):
+            terms[axis].append(of_place * sample.place[axis])
+            if of_velocity:
+                terms[axis].append(of_velocity * sample.velocity[axis])
+    try:
+        x, y, z = (math.fsum(axis) for axis in terms)
+    except (OverflowError, ValueError):  # samples that are much nearer to each other than others
+        return (math.nan, math.nan, math.nan)
+    return (x, y, z)

@@ -13,6 +13,7 @@ import csv
 import math
 import re
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from typing import NamedTuple, NoReturn
 
 import numpy as np
@@ -20,9 +21,10 @@ from numpy.typing import NDArray
 
 from bisar_budget import units
 from bisar_budget.faults import InvalidValueError, fault_words, shown
-from bisar_budget.paths.earth import EQUATORIAL_RADIUS, FLATTENING
+from bisar_budget.paths.earth import Floats, earth_fixed_places
 from bisar_budget.paths.flight import Log, PathFileError
 from bisar_budget.paths.instant import DAY, Instant, parse_instant
+from bisar_budget.units import format_quantity
 
 LARGEST = 200_000_000  # bytes; four hours at 200 Hz
 _CHUNK = 1 << 16  # lines that are text and numbers at once
@@ -35,10 +37,8 @@ _DIMENSIONS = {"latitude": units.ANGLE, "longitude": units.ANGLE, "time": units.
 _HEADER = re.compile(r"([^\[\]()]*)(?:\[([^\[\]]*)\])?\s*")
 _QUOTED = re.compile('"').search
 _IN_NUMBERS = b"0123456789+-.eE \t"
-_STAMP = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d:[0-5]\d(?:\.\d{1,12})?Z", re.ASCII)
+_SECONDS = re.compile(r"[0-5]\d(?:[.,]\d{1,12})?(?:Z|\+00:00)", re.ASCII).fullmatch
 _EXAMPLE = "2026-06-01T05:20:31.250Z"
-
-_Numbers = NDArray[np.float64]
 
 
 class _Column(NamedTuple):
@@ -75,9 +75,9 @@ class _Rows(NamedTuple):
     """
 
     lines: NDArray[np.int64]
-    coordinates: _Numbers
-    times: _Numbers
-    minutes: _Numbers
+    coordinates: Floats
+    times: Floats
+    minutes: Floats
 
 
 def read_csv(data: bytes, name: str) -> Log:
@@ -152,16 +152,6 @@ def read_csv(data: bytes, name: str) -> Log:
     span = times[-1] - times[0]
     words = f"CSV of {', '.join(kind)}, {_counted(len(times))} over {span:.6g} s"
     return Log(times, places, kind != _KINDS[2], words, start)
-
-
-def earth_fixed_places(latitude: _Numbers, longitude: _Numbers, height: _Numbers) -> _Numbers:
-    """Earth-fixed coordinates (n, 3) [m] of geodetic places, each (n,), [rad], [rad], [m]: `earth.earth_fixed`."""
-    sine, cosine = np.sin(latitude), np.cos(latitude)
-    eccentricity_squared = FLATTENING * (2 - FLATTENING)
-    normal = EQUATORIAL_RADIUS / np.sqrt(1 - eccentricity_squared * sine * sine)
-    level = (normal + height) * cosine
-    polar = (normal * (1 - eccentricity_squared) + height) * sine
-    return np.stack([level * np.cos(longitude), level * np.sin(longitude), polar], axis=1)
 
 
 def _text(data: bytes, name: str) -> str:
@@ -298,7 +288,7 @@ def _rows(texts: list[str], lines: NDArray[np.int64], header: _Header, name: str
     raise AssertionError("a row that has no fault was refused")
 
 
-def _plain_cells(texts: list[str], header: _Header) -> tuple[_Numbers, list[str] | None] | None:
+def _plain_cells(texts: list[str], header: _Header) -> tuple[Floats, list[str] | None] | None:
     """Numbers (n, 3 or 4) and stamps of rows without quotes; None where they are something else."""
     delimiter = header.delimiter
     if {text.count(delimiter) for text in texts} != {header.width - 1} or any(map(_QUOTED, texts)):
@@ -315,7 +305,7 @@ def _plain_cells(texts: list[str], header: _Header) -> tuple[_Numbers, list[str]
     return numbers, [text.split(delimiter, place + 1)[place].strip() for text in texts]
 
 
-def _quoted_cells(texts: list[str], header: _Header) -> tuple[_Numbers, list[str] | None] | None:
+def _quoted_cells(texts: list[str], header: _Header) -> tuple[Floats, list[str] | None] | None:
     """The same of rows with quotes, which takes six times as long."""
     try:
         rows = list(csv.reader(texts, delimiter=header.delimiter, skipinitialspace=True))
@@ -330,44 +320,21 @@ def _quoted_cells(texts: list[str], header: _Header) -> tuple[_Numbers, list[str
     return numbers, [row[header.time.place].strip() for row in rows] if header.is_utc else None
 
 
-def _times(texts: list[str]) -> tuple[_Numbers, _Numbers] | None:
+def _times(texts: list[str]) -> tuple[Floats, Floats] | None:
     """Minutes since MJD 0 [s] and the seconds after; None where one of them is no stamp."""
-    found = _alike_times(texts)
-    if found is not None:
-        return found
-    instants = [parse_instant(text) for text in texts]
-    if None in instants:
+    minutes = [_minute(text[:17]) for text in texts]
+    seconds = [text[17:] for text in texts]
+    if None in minutes or not all(map(_SECONDS, seconds)):
         return None
-    days, seconds = np.array(instants, dtype=float).T
-    return days * DAY, seconds
+    numbers = [text.replace("Z", "").replace("+00:00", "").replace(",", ".") for text in seconds]
+    return np.array(minutes), np.array(numbers, dtype=float)
 
 
-def _alike_times(texts: list[str]) -> tuple[_Numbers, _Numbers] | None:
-    """The same of stamps that have as many digits as the first, and end in Z; None of others."""
-    if not _STAMP.fullmatch(texts[0]):
-        return None
-    width, decimals = len(texts[0]), max(len(texts[0]) - 21, 0)
-    if set(map(len, texts)) != {width}:
-        return None
-    try:
-        letters = np.frombuffer("".join(texts).encode("ascii"), np.uint8).reshape(-1, width)
-    except UnicodeEncodeError:
-        return None
-    digits = [17, 18, *range(20, 20 + decimals)]
-    figures = letters[:, digits] - np.uint8(ord("0"))  # what stands before 0 wraps around
-    others = [n for n in range(19, width) if n not in digits]
-    if (figures > 9).any() or (figures[:, 0] > 5).any() or (letters[:, others] != letters[0, others]).any():
-        return None
-    # Few minutes are read as text: each is that of many rows.
-    begins = np.flatnonzero(np.concatenate([[True], (letters[1:, :17] != letters[:-1, :17]).any(axis=1)]))
-    minutes = [parse_instant(f"{texts[row][:17]}00Z") for row in begins]
-    if None in minutes:
-        return None
-    days, seconds = np.array(minutes, dtype=float).T
-    repeats = np.diff(np.append(begins, len(texts)))
-    # A quotient of whole numbers is rounded once, as the decimal fraction is.
-    whole = figures @ 10 ** np.arange(1 + decimals, -1, -1)
-    return np.repeat(days * DAY + seconds, repeats), whole / 10.0**decimals
+@lru_cache(maxsize=256)
+def _minute(text: str) -> float | None:
+    """Seconds since MJD 0 of the beginning of a stamp, which is that of many rows; None if it is none."""
+    instant = parse_instant(f"{text}00Z")
+    return None if instant is None else instant.day * DAY + instant.seconds
 
 
 def _cells(text: str, delimiter: str) -> list[str] | str:
@@ -409,3 +376,94 @@ def _time(seconds: float, start: Instant | None) -> str:
 
 def _counted(number: int, noun: str = "place") -> str:
     return f"{number} {noun}" + "s" * (number != 1)
+
+
+# ---------------------------------------------------------------------- logs that no platform can have flown
+# A receiver that has frozen goes on writing its last place; one that is slower than its log writes each place several
+# times; a filter that is set anew, or a cell that is wrong, makes a step that no platform takes. A polynomial through
+# such places is smooth all the same, and wrong. What is below the limits here is noise, and counts as the residual.
+_STILL_M = 1e-3  # over a whole aperture; the noise of any receiver is more
+_SAME_M = 1e-6  # between two places; the same numbers, turned to the scene's axes, are rounded to 1e-9 m
+_LEAST_M = 0.1  # of what is missed or jumped: six decimals of a degree are rounded by as much
+_HARDEST = 30.0  # m/s², 3 g; and no platform takes that back within three samples
+_USUAL = 20  # times the median; the largest of thousands of normal numbers is 4 times it, that of rough noise 10
+_BESIDE = 3  # steps on each side that a step is compared with
+_BEYOND = 10  # samples beyond each end of the aperture that say what is usual
+
+
+def hold_to_motion(times: Floats, places: Floats, aperture_time_s: float, name: str) -> None:
+    """Refuse a log that no platform can have flown.
+
+    Parameters
+    ----------
+    times : (n,) ndarray
+        Slow time, rising; what is far outside the aperture is not looked at. [s]
+    places : (n, 3) ndarray
+        In any axes. [m]
+    aperture_time_s : float
+        Length of the aperture. [s]
+    name : str
+        What messages call the log.
+
+    Raises
+    ------
+    PathFileError
+        The places in the aperture are one place to 1 mm. Or places are those before them while the platform moves by
+        more than 0.1 m, at its mean speed in the aperture. Or a step is off the median of seven around it by more
+        than 0.1 m, by more than 3 g would make it, and by more than 20 times what is usual.
+    """
+    half = aperture_time_s / 2 * (1 + 1e-9)
+    first, last = int(np.searchsorted(times, -half, "left")), int(np.searchsorted(times, half, "right"))
+    at, flown = times[first:last], places[first:last]
+    if at.size < 2 * _BESIDE - 1:  # too few for a path, too
+        return
+    extent = float(np.linalg.norm(flown - flown[0], axis=1).max())
+    if extent <= _STILL_M:
+        raise PathFileError(
+            f"{name}: stands still: its {at.size} places in the aperture are the same to {1e3 * _STILL_M:g} mm",
+            "accepted: the log of a platform that moves",
+            "A fixed platform needs no log: give its place, and speed 0",
+        )
+    _hold_to_new_places(at, flown, extent, name)
+    near = slice(max(first - _BEYOND, 0), last + _BEYOND)
+    _hold_to_small_steps(times[near], places[near], half, name)
+
+
+def _hold_to_new_places(at: Floats, flown: Floats, extent: float, name: str) -> None:
+    """Refuse places that are the same as those before them, while the platform moves."""
+    is_held = np.linalg.norm(np.diff(flown, axis=0), axis=1) <= _SAME_M
+    if not is_held.any():
+        return
+    edges = np.diff(np.concatenate([[0], is_held.astype(np.int8), [0]]))
+    begins, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+    durations = at[ends] - at[begins]
+    longest = int(durations.argmax())
+    missed = extent * float(durations[longest] / (at[-1] - at[0]))
+    if missed > _LEAST_M:
+        raise PathFileError(
+            f"{name}: repeats places: {int(is_held.sum())} of {at.size} in the aperture are the place before; from "
+            f"{at[begins[longest]]:+.4g} s of mid-aperture on for {durations[longest]:.3g} s, in which the platform "
+            f"moves {format_quantity(missed, 'm')}",
+            f"accepted: repeats in which it moves at most {_LEAST_M:g} m",
+            "Leave out places that were not measured anew, or write more digits",
+        )
+
+
+def _hold_to_small_steps(times: Floats, places: Floats, half: float, name: str) -> None:
+    """Refuse steps between neighbouring places that those around them do not allow."""
+    steps = np.diff(times)
+    velocities = np.diff(places, axis=0) / steps[:, None]
+    around = np.pad(velocities, ((_BESIDE, _BESIDE), (0, 0)), mode="reflect")
+    usual = np.median(np.lib.stride_tricks.sliding_window_view(around, 2 * _BESIDE + 1, axis=0), axis=-1)
+    off = np.linalg.norm(velocities - usual, axis=1) * steps
+    allowed = np.maximum(np.maximum(_LEAST_M, _HARDEST * steps**2), _USUAL * np.median(off))
+    is_jump = (off > allowed) & (times[1:] >= -half) & (times[:-1] <= half)
+    if is_jump.any():
+        worst = int(np.where(is_jump, off / allowed, 0.0).argmax())
+        jump, least = format_quantity(float(off[worst]), "m"), format_quantity(float(allowed[worst]), "m", 2)
+        raise PathFileError(
+            f"{name}: jumps by {jump} within {steps[worst]:.3g} s, {times[worst]:+.4g} s from mid-aperture; the "
+            f"steps beside it allow {least}",
+            "accepted: the log of a flight without steps",
+            "Take out the places that are wrong, or smooth the log before",
+        )

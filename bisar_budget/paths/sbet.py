@@ -14,14 +14,11 @@ import math
 from typing import NamedTuple, NoReturn
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bisar_budget.geometry import Vector
-from bisar_budget.paths.earth import EQUATORIAL_RADIUS, FLATTENING
+from bisar_budget.paths.earth import Floats, curvature_radii, earth_fixed_places
 from bisar_budget.paths.flight import Log, PathFileError, slow_times
-from bisar_budget.paths.flight_log import earth_fixed_places
-from bisar_budget.paths.instant import Instant
-from bisar_budget.paths.leap_seconds import TAI_LESS, tai_less_utc, utc
+from bisar_budget.paths.instant import TAI_LESS, Instant, tai_less_utc, utc
 
 LARGEST = 1_000_000_000  # bytes; ten hours at 200 Hz
 WEEK = 604800.0  # s
@@ -49,8 +46,6 @@ _SIGMAS = (
     *((f"{axis} position RMS", 1 + n, 0.0, 1e4, "m") for n, axis in enumerate(("north", "east", "down"))),
     *((f"{axis} velocity RMS", 4 + n, 0.0, 1e3, "m/s") for n, axis in enumerate(("north", "east", "down"))),
 )
-
-_Numbers = NDArray[np.float64]
 
 
 class Accuracy(NamedTuple):
@@ -151,7 +146,7 @@ def read_accuracy(
     return Accuracy((east, north, down), (east_rate, north_rate, down_rate), len(inside))
 
 
-def _records(data: bytes, name: str, width: int, fields: tuple[tuple[str, int, float, float, str], ...]) -> _Numbers:
+def _records(data: bytes, name: str, width: int, fields: tuple[tuple[str, int, float, float, str], ...]) -> Floats:
     """Records (n, width) whose fields are where they can be."""
     size = 8 * width
     if len(data) > LARGEST:
@@ -179,7 +174,7 @@ def _records(data: bytes, name: str, width: int, fields: tuple[tuple[str, int, f
 
 
 def _first_wrong(
-    records: _Numbers, fields: tuple[tuple[str, int, float, float, str], ...]
+    records: Floats, fields: tuple[tuple[str, int, float, float, str], ...]
 ) -> tuple[int, str, float, str] | None:
     """Index, field, value and unit of what is out of its range first."""
     found = []
@@ -195,7 +190,7 @@ def _first_wrong(
     return min(found, key=lambda one: one[0], default=None)
 
 
-def _risen(times: _Numbers, name: str) -> _Numbers:
+def _risen(times: Floats, name: str) -> Floats:
     """Times that go on over the end of a week."""
     steps = np.diff(times)
     times = times + np.concatenate([[0.0], np.cumsum(np.where(steps <= -_ROLLED, WEEK, 0.0))])
@@ -209,7 +204,7 @@ def _risen(times: _Numbers, name: str) -> _Numbers:
     return times
 
 
-def _hold_to_velocities(times: _Numbers, records: _Numbers, name: str) -> None:
+def _hold_to_velocities(times: Floats, records: Floats, name: str) -> None:
     """Refuse velocities that are not those of the positions."""
     if len(times) < 2 or not records[:, 4:7].any():
         return
@@ -221,9 +216,7 @@ def _hold_to_velocities(times: _Numbers, records: _Numbers, name: str) -> None:
     flown = _summed((velocities[1:] + velocities[:-1]) / 2 * steps)
     # Radii of curvature between two records, and the shorter way around.
     at, above = (latitude[1:] + latitude[:-1]) / 2, (height[1:] + height[:-1]) / 2
-    eccentricity_squared = FLATTENING * (2 - FLATTENING)
-    across = EQUATORIAL_RADIUS / np.sqrt(1 - eccentricity_squared * np.sin(at) ** 2)
-    along = across**3 * (1 - eccentricity_squared) / EQUATORIAL_RADIUS**2
+    along, across = curvature_radii(np.sin(at))
     turned = np.diff(longitude)
     turned -= 2 * math.pi * np.round(turned / (2 * math.pi))
     moved = _summed(
@@ -257,7 +250,7 @@ def _hold_to_velocities(times: _Numbers, records: _Numbers, name: str) -> None:
     )
 
 
-def _summed(parts: _Numbers) -> _Numbers:
+def _summed(parts: Floats) -> Floats:
     return np.concatenate([np.zeros((1, 3)), np.cumsum(parts, axis=0)])
 
 

@@ -6,8 +6,11 @@ from contextlib import nullcontext
 from fnmatch import fnmatchcase
 from functools import partial
 
+import numpy as np
+
 from bisar_budget.analysis.vibration_limits import tone_limits
-from bisar_budget.budget.aggregates import aggregate_rows
+from bisar_budget.budget.aggregates import Aggregates
+from bisar_budget.budget.judged_rows import Judging
 from bisar_budget.effects.declared import QUADRATIC
 from bisar_budget.effects.echoes import SLOWEST
 from bisar_budget.effects.effect import PLATFORMS
@@ -15,7 +18,6 @@ from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.effects.vibration import lines_of
 from bisar_budget.faults import printable
 from bisar_budget.findings.images import Verdict, VerifiedMission
-from bisar_budget.findings.row import Row
 from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.verify import duration, phase_cases
 from bisar_budget.verify import vibration_cases as vibration
@@ -97,9 +99,12 @@ def cases(study: Study) -> dict[str, Case]:
     return dict(_cases(study))
 
 
-def _aggregates(study: Study) -> Iterator[Row]:
-    for model in study.models:
-        yield from aggregate_rows(study.analysis, model.name)
+def _warns_of_the_total(study: Study) -> bool:
+    """Whether each error stands alone, and all together exceed the total: only then the row exists."""
+    aggregates = Aggregates(Judging(1, study.mission.allocation.warn_above), study.analysis)
+    rows = (row for model in study.models for row in aggregates.rows(model.name))
+    with np.errstate(all="ignore"):
+        return any(row.judged.subject == subject("mission", QUADRATIC) and np.all(row.is_there) for row in rows)
 
 
 def _verify_row(mission: Mission, row_id: str) -> Verdict:
@@ -137,7 +142,7 @@ def _of_tones_by_islr(study: Study) -> Iterator[tuple[Subject, Case]]:
 
 def _of_instruments(study: Study) -> Iterator[tuple[str, Case]]:
     """Sensors and clocks that have a limit, and what all noise spreads together."""
-    from bisar_budget.budget.random_rows import islr_rows
+    from bisar_budget.budget.random_rows import RandomRows
     from bisar_budget.effects.clocks import spurs_of
     from bisar_budget.verify.random_cases import (
         limits_of,
@@ -166,8 +171,12 @@ def _of_instruments(study: Study) -> Iterator[tuple[str, Case]]:
             yield row_id, partial(verify_spread_tone, study, blank, spur.name, size, cycles)
     if study.mission.requirements.pslr is not None:
         yield "mission.pslr", partial(verify_pslr, study)
-    for row in islr_rows(study.analysis, study.models[-1].name, study.allocation):
-        yield row.id, partial(verify_islr, study, row.subject)
+    if study.mission.requirements.islr is not None:
+        rows = RandomRows(Judging(1, study.mission.allocation.warn_above), study.analysis)
+        with np.errstate(all="ignore"):
+            found = [row.judged.subject for row in rows.islr_rows(study.models[-1].name) if row.is_there[0]]
+        for of_owner in found:
+            yield of_owner.id, partial(verify_islr, study, of_owner)
 
 
 def _cases(study: Study) -> Iterator[tuple[str, Case]]:
@@ -190,8 +199,7 @@ def _cases(study: Study) -> Iterator[tuple[str, Case]]:
     yield from _of_instruments(study)
     requirements = mission.requirements
     if mission.allocation.combine == "each":
-        # The row exists only where it warns.
-        if any(row.subject == subject("mission", QUADRATIC) for row in _aggregates(study)):
+        if _warns_of_the_total(study):
             row_id = subject("mission", QUADRATIC).id
             yield row_id, partial(phase_cases.total, study, row_id, "mission")
     else:

@@ -7,7 +7,7 @@ import numpy as np
 
 from bisar_budget.analysis.allocation import range_walk_cap
 from bisar_budget.analysis.vibration_limits import slow_limits
-from bisar_budget.budget.collection_notes import COARSE_CELL_RAD, phase_across_a_cell
+from bisar_budget.budget.doubts import COARSE_CELL_RAD, phase_across_a_cell
 from bisar_budget.budget.pull_in import ROOM
 from bisar_budget.effects.declared import CUBIC
 from bisar_budget.effects.effect import ErrorSource

@@ -204,7 +204,7 @@ def verify_islr(study: Study, of: Subject) -> Verdict:
     limit = spread_limit(mission, study.allocation, of.owner, model) or 0.0
     level = islr_db(limit**2, model, mainlobe_energy(mission))
     blank = Verdict(id=of.id, model=study.model, boundary_error=level, unit="dB")
-    powers = declared_powers(study.analysis, study.allocation, of.owner, model)
+    powers = declared_powers(study.analysis, of.owner, model)
     total = math.fsum(one.variance for one in powers)
     if not total:
         return blank._replace(reason=reasons.no_spread_declared())

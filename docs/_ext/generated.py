@@ -207,8 +207,6 @@ def _all_sections(root: readers.Section = MISSION) -> dict[str, readers.Section]
 
 
 def _forms(reader: readers.Reader) -> list[readers.Reader]:
-    if isinstance(reader, readers.Late):
-        return _forms(reader.load())
     if isinstance(reader, readers.OneOf):
         return [each for form in reader.forms for each in _forms(form)]
     return [reader]

@@ -8,7 +8,7 @@ import jsonschema
 import pytest
 import yaml
 
-from bisar_budget.mission.schema import mission_schema
+from bisar_budget.mission.model import mission_schema
 from tests.conftest import ROOT
 
 HERE = Path(__file__).parent

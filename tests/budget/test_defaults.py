@@ -17,7 +17,7 @@ from bisar_budget.design.quantities import tree_of
 from bisar_budget.design.sweep import sweep
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.mission.load import parse_mission
-from bisar_budget.mission.schema import mission_schema
+from bisar_budget.mission.model import mission_schema
 from tests.conftest import BASE, PAPER, ROOT, TODAY, row
 
 SQUINT = math.radians(50)  # of the transmitter, which flies level

@@ -7,12 +7,12 @@ from datetime import date
 import pytest
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.budget.model_doubt import model_doubt
+from bisar_budget.budget.doubts import model_doubt
 from bisar_budget.findings.mission import MissionFindings, Report
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.report import Style, render
 from bisar_budget.units import format_limit
-from tests.conftest import findings, mission_text, row
+from tests.conftest import findings, row
 from tests.families import FAMILIES
 from tests.families import mission_text as of_family
 
@@ -92,11 +92,6 @@ class TestWhoIsAsked:
         assert (position.allowable_published, position.allowable_full is None) == (None, False)
         assert undeclared.model_doubt == ""
         assert not findings(**PLAIN, platforms__receiver__motion_error__position=[0, 0, 0]).model_doubt
-
-    def test_a_bare_check_compares_nothing(self) -> None:
-        mission = parse_mission(mission_text(**POSITION), "m.yaml")
-        assert check_mission(mission, DAY).model_doubt
-        assert not check_mission(mission, DAY, is_bare=True).model_doubt
 
     @pytest.mark.parametrize("rule", ["each", "sum", "rss"])
     def test_every_rule_of_combination(self, rule: str) -> None:

@@ -7,7 +7,7 @@ from datetime import timedelta
 
 import pytest
 
-from bisar_budget.budget.required import Missing, missing_declarations
+from bisar_budget.budget.judged_requirements import Missing, missing_declarations
 from bisar_budget.faults import MissionError
 from bisar_budget.findings.mission import Report
 from bisar_budget.mission.load import parse_mission

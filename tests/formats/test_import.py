@@ -13,9 +13,9 @@ from tests.formats.flown import SAMPLES, element, sample, values, written
 
 pytest.importorskip("sarkit.cphd")
 
-from bisar_budget.formats.document import FormatError
+from bisar_budget.formats.collected import mission_text, mission_tree
+from bisar_budget.formats.containers import FormatError
 from bisar_budget.formats.importing import import_collection
-from bisar_budget.formats.mission_text import mission_text, mission_tree
 from bisar_budget.mission.load import parse_mission
 
 BISTATIC = "example-cphd-1.0.1.xml"

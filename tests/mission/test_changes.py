@@ -6,8 +6,7 @@ import pytest
 
 from bisar_budget.budget.check import check_mission
 from bisar_budget.faults import InvalidValueError, MissionError, SetValue, changes_words
-from bisar_budget.mission.changes import read_changes
-from bisar_budget.mission.keys import all_keys, nearest_keys
+from bisar_budget.mission.changes import all_keys, nearest_keys, read_changes
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.mission.model import Mission
 from tests.conftest import ROOT

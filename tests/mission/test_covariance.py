@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from bisar_budget.faults import MissionError
 from bisar_budget.geometry import FRAME_AXES
 from bisar_budget.mission.load import parse_mission
-from bisar_budget.mission.symmetric import eigensystem, exceed
+from bisar_budget.monte_carlo.variables import eigensystem
 from tests.conftest import findings, mission_text, row
 
 ERROR = "platforms__receiver__motion_error"
@@ -47,13 +47,6 @@ class TestEigenvalues:
         v = np.array(vectors)
         assert v @ v.T == pytest.approx(np.eye(6), abs=1e-13)
         assert v @ np.diag(values) @ v.T == pytest.approx(matrix, abs=1e-13 * (1 + scale))
-
-    @given(loadings, st.floats(-2, 2))
-    def test_exceed_a_floor(self, rows, floor: float) -> None:
-        matrix = np.array(rows) + np.array(rows).T
-        smallest = float(np.linalg.eigvalsh(matrix)[0])
-        assume(abs(smallest - floor) > 1e-9)
-        assert exceed(matrix.tolist(), floor) == (smallest > floor)
 
 
 class TestWhatIsOne:

@@ -14,7 +14,7 @@ from bisar_budget.faults import MissionError
 from bisar_budget.findings.mission import Report
 from bisar_budget.mission.instruments import PowerLaw
 from bisar_budget.mission.load import load_mission, parse_mission
-from bisar_budget.mission.parts import FIGURES, PartError, catalogue, entries, evidence, folders, read_part
+from bisar_budget.mission.parts import FIGURES, PartError, catalogue, entries, evidence, folders, read_entry
 from bisar_budget.report import Style, render
 from bisar_budget.resources import resource
 from bisar_budget.units import (
@@ -179,7 +179,7 @@ def test_exchanged_pulses_have_an_interval() -> None:
 
 
 def _name(part: str) -> str:
-    return read_part(str(resource("specs", "sensors") / f"{part}.yaml")).name
+    return read_entry(str(resource("specs", "sensors") / f"{part}.yaml")).part.name
 
 
 class TestCatalogue:
@@ -215,7 +215,7 @@ class TestCatalogue:
                 "motion_error:\n  sensor: [stim300, mosaic-x5-rtk]\n  velocity: 1 cm/s\n  imu: {gyro_bias: 2 deg/h}\n"
             )
         ).platforms.receiver.motion_error
-        part = read_part(str(resource("specs", "sensors") / "stim300.yaml"))
+        part = read_entry(str(resource("specs", "sensors") / "stim300.yaml")).part
         assert error.imu.gyro_bias[0] == pytest.approx(math.radians(2) / 3600)
         assert error.imu.angle_random_walk == part.angle_random_walk
         assert error.velocity == (0.01, 0.01, 0.01)
@@ -228,7 +228,7 @@ class TestCatalogue:
         text = receiver("motion_error: {sensor: [stim300, mosaic-x5-rtk], velocity: 1 cm/s, source: survey 3}")
         mission = parse_mission(text)
         sources = {one.id: one for one in Analysis(mission).sources}
-        part = read_part(str(resource("specs", "sensors") / "mosaic-x5-rtk.yaml"))
+        part = read_entry(str(resource("specs", "sensors") / "mosaic-x5-rtk.yaml")).part
         position, velocity = sources["receiver.position.x"], sources["receiver.velocity.x"]
         assert position.evidence == evidence(part, "position")
         assert position.path == ("platforms", "receiver", "motion_error", "sensor")
@@ -379,11 +379,11 @@ class TestCatalogue:
         file = tmp_path / "part.yaml"
         file.write_text(text)
         with pytest.raises(PartError, match=r"part\.yaml") as caught:
-            read_part(str(file))
+            read_entry(str(file))
         assert said in str(caught.value)
 
     def test_a_pipe_is_no_part(self, tmp_path) -> None:
         """It would be waited for without end."""
         os.mkfifo(tmp_path / "part.yaml")
         with pytest.raises(PartError, match="no regular file"):
-            read_part(str(tmp_path / "part.yaml"))
+            read_entry(str(tmp_path / "part.yaml"))

@@ -3,7 +3,7 @@
 import pytest
 
 from bisar_budget.faults import MissionError, SetValue
-from bisar_budget.mission.keys import nearest_keys, section_hint
+from bisar_budget.mission.changes import nearest_keys, section_hint
 from bisar_budget.mission.load import parse_mission
 from tests.conftest import mission_text
 

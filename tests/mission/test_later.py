@@ -8,12 +8,12 @@ import pytest
 from bisar_budget.design.quantities import QuestionError, number_of, range_of, tree_of
 from bisar_budget.design.sensitivity import sensitivity
 from bisar_budget.faults import Fault, MissionError
-from bisar_budget.mission import later, model
+from bisar_budget.mission import model
 from bisar_budget.mission.instruments import Imu, Oscillator, Synchronization
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.parts import ImuPart, OscillatorPart
-from bisar_budget.mission.platforms import CommonMotionError, MotionError, Vibration
-from bisar_budget.mission.routes import OrbitSource, TrajectorySource
+from bisar_budget.mission.platforms import CommonMotionError, MotionError, OrbitSource, TrajectorySource, Vibration
+from bisar_budget.mission.readers import LATER
 from tests.conftest import TODAY, mission_text
 
 RECEIVER = "platforms__receiver__"
@@ -91,7 +91,7 @@ def test_the_table_names_sections_of_the_file_and_keys_that_they_do_not_have() -
         *(model.Mission, model.OtherError, model.AllocationRules, ImuPart, OscillatorPart, Imu),
     )
     by_name = {kind.__name__: kind for kind in kinds}
-    for name, keys in later.KEYS.items():
+    for name, keys in LATER.items():
         assert keys.keys().isdisjoint(by_name[name]._fields), name
 
 

@@ -11,8 +11,7 @@ from bisar_budget.design.cases import grid, words_of
 from bisar_budget.design.quantities import tree_of
 from bisar_budget.design.sweep import Asked, part_of
 from bisar_budget.faults import SetValue
-from bisar_budget.mission.load import load_mission
-from bisar_budget.mission.named import named_by
+from bisar_budget.mission.load import load_mission, named_by
 from tests.conftest import ROOT
 
 MISSIONS = ROOT / "specs" / "missions"

@@ -17,8 +17,15 @@ from hypothesis import strategies as st
 from bisar_budget.faults import MissionError
 from bisar_budget.mission.instruments import FORMS
 from bisar_budget.mission.load import load_mission
-from bisar_budget.mission.parts import FIGURES, SECTIONS, PartError, catalogue, folders, read_entry, read_part
-from bisar_budget.mission.schema import part_schema
+from bisar_budget.mission.parts import (
+    FIGURES,
+    SECTIONS,
+    PartError,
+    catalogue,
+    folders,
+    part_schema,
+    read_entry,
+)
 from bisar_budget.mission.tree import MAX_BYTES
 from tests.acceptance.test_missions import _Core
 from tests.conftest import ROOT, mission_text
@@ -449,4 +456,4 @@ class TestCheck:
 
 
 def test_a_part_whose_source_ends_in_a_colon_has_one(tmp_path: Path) -> None:
-    assert read_part(str(written(tmp_path, IMU.replace("source: y", "source: 'see: '")))).source == "see: "
+    assert read_entry(str(written(tmp_path, IMU.replace("source: y", "source: 'see: '")))).part.source == "see: "

@@ -19,7 +19,7 @@ from bisar_budget.faults import MissionError
 from bisar_budget.geometry import Vector
 from bisar_budget.mission import paths
 from bisar_budget.mission.load import load_mission
-from bisar_budget.paths import earth, flight_log, two_lines
+from bisar_budget.paths import earth, elements
 from bisar_budget.paths.ephemeris import read_oem
 from bisar_budget.paths.instant import Instant
 from bisar_budget.units import format_quantity
@@ -36,7 +36,7 @@ FLIGHT = {"latitude": "48.2 deg", "longitude": "11.1 deg", "altitude": "3 km", "
 
 def overpass(center: Instant) -> earth.Geodetic:
     """A place some 300 km beside the satellite of `TLE`."""
-    below = earth.geodetic(two_lines.read_tle(TLE, "x", None, center).place(center))
+    below = earth.geodetic(elements.read_tle(TLE, "x", None, center).place(center))
     return earth.Geodetic(below.latitude, below.longitude + 0.05 / math.cos(below.latitude), 500.0)
 
 
@@ -133,8 +133,8 @@ class TestEveryKindOfPath:
     def test_a_log_that_has_not_changed_is_read_once(self, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         """`solve` reads its mission some hundred times."""
         monkeypatch.setattr(paths, "_logs", {})
-        read, reads = flight_log.read_csv, []
-        monkeypatch.setattr(flight_log, "read_csv", lambda *given: reads.append(given) or read(*given))
+        read, reads = paths.read_csv, []
+        monkeypatch.setattr(paths, "read_csv", lambda *given: reads.append(given) or read(*given))
         (folder / "m.yaml").write_text(aircraft())
         first, again = (load_mission(str(folder / "m.yaml")).platforms.receiver.path for _ in range(2))
         assert again == first
@@ -526,7 +526,7 @@ def test_elements_are_refused_from_a_tenth_of_the_slant_range_on(folder: Path, d
     center = EPOCH.after(days * 86400)
     (folder / "m.yaml").write_text(satellite(center))
     scene = earth.earth_fixed(overpass(center))
-    away = math.dist(two_lines.read_tle(TLE, "x", None, center).place(center), scene)
+    away = math.dist(elements.read_tle(TLE, "x", None, center).place(center), scene)
     if 1e3 + 2e3 * days <= away / 10:
         assert load_mission(str(folder / "m.yaml")).platforms.transmitter.path.doubt_m > 6e4
         return

@@ -7,11 +7,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from bisar_budget.paths import fields, markup
+from bisar_budget.paths import messages
+from bisar_budget.paths.elements import read_omm, read_tle
 from bisar_budget.paths.ephemeris import read_oem
 from bisar_budget.paths.flight import PathFileError
-from bisar_budget.paths.mean_elements import read_omm
-from bisar_budget.paths.two_lines import read_tle
 from tests.paths.orbit_files import (
     CENTER,
     CONSTANTS,
@@ -295,14 +294,14 @@ def test_samples_of_another_century_give_no_traceback(kind: str) -> None:
 
 
 def test_what_is_too_large_is_not_read(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(fields, "LARGEST_BYTES", 1_000_000)
+    monkeypatch.setattr(messages, "LARGEST_BYTES", 1_000_000)
     text = "#" * 1_000_001
     for read in (lambda: read_tle(text, "x", None, CENTER), lambda: read_omm(text.encode(), "x", None, CENTER)):
         with pytest.raises(PathFileError, match=r"^x: is larger than 1 MB; keep the objects needed$"):
             read()
     with pytest.raises(PathFileError, match=r"^x: is larger than 1 MB; keep the time needed$"):
         read_oem(text.encode(), "x", None, INSIDE)
-    monkeypatch.setattr(markup, "_MOST", 1000)
+    monkeypatch.setattr(messages, "_MOST", 1000)
     for data in (b"<omm>" * 100, b"<omm>" + b"<a/>" * 2000 + b"</omm>"):
         with pytest.raises(PathFileError, match=r"^x:1: has more than 1000 elements, or 32 in each other$"):
             read_omm(data, "x", None, CENTER)

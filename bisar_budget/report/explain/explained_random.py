@@ -334,7 +334,7 @@ def _level(model: str, variance: str) -> str:
 def explained_islr(analysis: Analysis, allocation: Allocation, row: Row) -> Iterator[Step]:
     """Powers of everything that spreads, together."""
     mission, model, owner = analysis.mission, row.model or "published", row.owner
-    members = {one.row_id: one.variance for one in declared_powers(analysis, allocation, owner, model)}
+    members = {one.row_id: one.variance for one in declared_powers(analysis, owner, model)}
     total, energy = math.fsum(members.values()), mainlobe_energy(mission)
     known: dict[str, float] = {}
     rule = "the published rule takes the variance for it"

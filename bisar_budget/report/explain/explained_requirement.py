@@ -3,11 +3,16 @@
 from collections.abc import Iterator
 
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.budget.aggregates import effect_totals
-from bisar_budget.budget.input_doubt import declared_position_error, input_doubts, is_in_doubt
-from bisar_budget.budget.required import missing_declarations
-from bisar_budget.budget.requirement_states import MAKES_UP, SMALL_RAD, TENTH, UntakenEffect, untaken_effects
-from bisar_budget.budget.requirement_table import effects_by
+from bisar_budget.budget.aggregates import effect_parts, effect_totals
+from bisar_budget.budget.doubts import declared_position_error, input_doubts, is_in_doubt
+from bisar_budget.budget.judged_requirements import (
+    MAKES_UP,
+    SMALL_RAD,
+    TENTH,
+    UntakenEffect,
+    missing_declarations,
+    untaken_effects,
+)
 from bisar_budget.faults import printable
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.requirement import JudgedRequirement
@@ -69,7 +74,7 @@ def not_judged(found: MissionFindings, row: Row) -> Iterator[Step]:
     elif code == "place-is-not-known":
         yield from _displacing(analysis, row, reason)
     else:
-        for one in untaken_effects(mission, effect_totals(effects_by(analysis))):
+        for one in untaken_effects(mission, effect_totals(analysis)):
             if row.id in one.makers and one.makers[row.id][0]:
                 yield from _untaken(analysis, row, one)
 
@@ -89,8 +94,9 @@ def _untaken(analysis: Analysis, row: Row, one: UntakenEffect) -> Iterator[Step]
     """How large an effect is that no requirement takes, what would be negligible, and the part of a row."""
     kind = one.kind
     totals = []
-    for together, effects in effects_by(analysis):
-        rule, parts = together.rule_of_all, effects[kind]
+    for model in analysis.gates:
+        together, parts = analysis.together(model), effect_parts(analysis, model)[kind]
+        rule = together.rule_of_all
         totals.append((float(together.combined(parts, rule)[0]), rule, together.phase_parts(parts, rule)))
     total, rule, parts = max(totals, key=lambda found: found[0])
     yield from combined(f"{_EFFECTS[kind]}: no requirement takes it", rule, parts, total, symbol="total")

@@ -1,4 +1,4 @@
-"""Whether every requirement was judged: the rows that judge each, and the effects that none takes, in many cases.
+"""Whether every requirement was judged: the rows that judge each, the effects that none takes, what must be declared.
 
 Exit 0 means that every requirement was judged and is met. Each effect of each declared error is judged once: the
 quadratic phase by its requirement; the cubic by its own, else by ISLR; what spreads by ISLR; a tone by PSLR, else by
@@ -8,7 +8,7 @@ tenth of the quadratic requirement and below 0.08 rad. Above, the rows that make
 Every number is an array over the cases, (n,): a check is one case.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,8 +16,13 @@ from numpy.typing import NDArray
 
 from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
+from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.effects.subject import Subject, subject
+from bisar_budget.findings.requirement import DeclaredKinds
+from bisar_budget.findings.row import DECLARE
 from bisar_budget.findings.status import RANK, STATUS
 from bisar_budget.mission.model import Mission
+from bisar_budget.mission.platforms import Platform
 
 Codes = NDArray[np.int8]  # places of statuses in STATUS: the worst has the lowest
 Floats = NDArray[np.float64]
@@ -26,9 +31,8 @@ Truths = NDArray[np.bool_]
 KEYS = (QUADRATIC, CUBIC, LOCATION, "pslr", "islr", "declare")
 UNITS = {QUADRATIC: "rad", CUBIC: "rad", LOCATION: "m", "pslr": "dB", "islr": "dB", "declare": ""}
 TENTH, SMALL_RAD = 0.1, 0.08  # of the quadratic requirement; and of any image
-MAKES_UP = (
-    0.1  # of the largest part: a row with less does not make an effect up, if all that have less are negligible
-)
+# Of the largest part: a row with less does not make an effect up, if all that have less are negligible.
+MAKES_UP = 0.1
 
 # Requirements that take an effect, in the order in which one is suggested.
 TAKEN_BY = {"cubic": (CUBIC, "islr"), "spread": ("islr",), "tone": ("pslr", "islr")}
@@ -36,20 +40,6 @@ TAKEN_BY = {"cubic": (CUBIC, "islr"), "spread": ("islr",), "tone": ("pslr", "isl
 _NONE = np.int8(len(STATUS))  # of a row that judges nothing
 _BREAKS = [RANK[name] for name in ("fail", "not_evaluated")]
 _IS_JUDGED = np.array([one.is_judged for one in STATUS.values()])
-
-
-class SeenRow(NamedTuple):
-    """A row as requirements see it.
-
-    `judges` is the place in KEYS of the requirement that it is held to, -1: none. `quadratic_use` is its quadratic
-    phase over what that may be, whatever sets its allowable; NaN where it has none.
-    """
-
-    id: str
-    status: Codes
-    utilization: Floats
-    judges: NDArray[np.int8]
-    quadratic_use: Floats
 
 
 class EffectTotal(NamedTuple):
@@ -139,7 +129,10 @@ def status_of(status: Codes, row_id: str, is_limited: Any, untaken: Sequence[Unt
 
 def requirement_states(
     mission: Mission,
-    rows: Sequence[SeenRow],
+    codes: Codes,
+    utilization: Floats,
+    judges: Codes,
+    quadratic_use: Floats,
     waived: Mapping[str, Any],
     *,
     has_noise: Any,
@@ -151,8 +144,14 @@ def requirement_states(
     ----------
     mission : Mission
         Some of its numbers may be arrays (n,).
-    rows : sequence of SeenRow
-        Judged rows, those that are waived with the status `waived`.
+    codes : (rows, n)
+        Statuses of the judged rows, of those that are waived `waived`.
+    utilization : (rows, n)
+        Theirs; not a number where there is none.
+    judges : (rows, n)
+        Place in KEYS of the requirement that each is held to, -1: none.
+    quadratic_use : (rows, n)
+        Quadratic phase of each over what that may be, whatever sets its allowable; not a number where it has none.
     waived : mapping of str to bool
         Keys of the requirements that a valid waiver names.
     has_noise : (n,) bool
@@ -160,11 +159,7 @@ def requirement_states(
     is_misplaced : (n,) bool
         Whether a declared error displaces the image by an amount that no row holds.
     """
-    codes = np.array([row.status for row in rows])
-    uses = np.array([np.nan_to_num(row.utilization, nan=0.0, posinf=np.inf) for row in rows])
-    judges = np.array([row.judges for row in rows])
-    quadratic_use = np.array([row.quadratic_use for row in rows])
-    found = []
+    uses, found = np.nan_to_num(utilization, nan=0.0, posinf=np.inf), []
     for key in required_keys(mission):
         mine = _IS_JUDGED[codes] & (judges == KEYS.index(key))
         levels, used = np.where(mine, codes, _NONE), uses
@@ -193,6 +188,121 @@ def requirement_states(
     return found
 
 
-def code(name: str) -> Codes:
-    """One status, as an array of one case."""
-    return np.array([RANK[name]], dtype=np.int8)
+# ---------------------------------------------------------------------- what must be declared
+DECLARATIONS = subject("mission", DECLARE)  # the row of all that is asked for
+
+
+class Missing(NamedTuple):
+    """An error that the file should declare and does not: owner and kind of its rows, and its key in the file."""
+
+    owner: str
+    kind: str
+    key: str
+
+
+# What declares a kind of error, and where it stands below a platform. A zero declares; an empty section does not.
+_DECLARES: Mapping[str, tuple[str, Callable[[Platform], bool]]] = {
+    "position": ("motion_error.position", lambda one: one.motion_error.stated("position") is not None),
+    "velocity": ("motion_error.velocity", lambda one: one.motion_error.stated("velocity") is not None),
+    "acceleration": ("motion_error.acceleration", lambda one: one.motion_error.acceleration is not None),
+    "covariance": ("motion_error.covariance", lambda one: one.motion_error.covariance is not None),
+    "vibration": ("motion_error.vibration", lambda one: one.motion_error.vibration.is_stated),
+    "imu": ("motion_error.imu", lambda one: one.motion_error.imu is not None and one.motion_error.imu.is_stated),
+    "random": ("motion_error.random", lambda one: bool(one.motion_error.random)),
+    "oscillator": ("oscillator", lambda one: one.oscillator is not None),
+}
+
+
+def declared_kinds(mission: Mission) -> DeclaredKinds:
+    """List the kinds of error that a mission owes or declares, by owner: which it declares, and which lack a source.
+
+    A covariance is position and velocity. With a direct path as clock there are no timing errors and no oscillators.
+    """
+    declared, missing, without_source = list[str](), list[str](), list[str]()
+    still = still_platforms(mission)
+    for name in PLATFORMS:
+        platform: Platform = getattr(mission.platforms, name)
+        for kind, (_, declares) in _DECLARES.items():
+            if kind == "covariance" or (kind == "oscillator" and mission.has_direct_path):
+                continue
+            is_declared = declares(platform)
+            if is_declared:
+                declared.append(f"{name}.{kind}")
+                if not _has_source(platform, kind):
+                    without_source.append(f"{name}.{kind}")
+            elif name not in still or kind in ("position", "oscillator"):
+                missing.append(f"{name}.{kind}")
+    if not mission.has_direct_path:
+        has_clock = any(term is not None for term in mission.timing_error)
+        (declared if has_clock else missing).append("timing")
+    common, link, others = mission.common_motion_error, mission.synchronization, mission.other_errors
+    if mission.scene.height_error is not None:
+        declared.append("terrain")
+    for kind, is_declared, has_source in (  # nobody owes these
+        ("common", common is not None, common is not None and common.source),
+        ("synchronization", link is not None, link is not None and link.source),
+        ("other", bool(others), all(one.source for one in others)),
+    ):
+        if is_declared:
+            declared.append(kind)
+            without_source += [] if has_source else [kind]
+    return DeclaredKinds(tuple(declared), tuple(missing), tuple(without_source))
+
+
+def _has_source(platform: Platform, kind: str) -> bool:
+    error = platform.motion_error
+    if kind == "oscillator":
+        return platform.oscillator is not None and bool(platform.oscillator.source)
+    if kind == "imu":
+        stated = {} if error.imu is None else error.imu._asdict()
+        source = stated.pop("source", None)
+        return bool(source) or all(error.evidence(key) for key, figure in stated.items() if figure is not None)
+    if kind == "random":
+        return bool(error.evidence("random")) or all(process.source for process in error.random)
+    return bool(error.source if kind == "vibration" else error.evidence(kind))
+
+
+def still_platforms(mission: Mission) -> list[str]:
+    """Names of the platforms that do not move in the frame of the scene."""
+    return [name for name in PLATFORMS if getattr(mission.platforms, name).state.is_still]
+
+
+def missing_declarations(mission: Mission, still: Container[str] | None = None) -> list[Missing]:
+    """List what `requirements.declare` asks for and the file does not declare: all of it, each once.
+
+    A covariance declares position and velocity. The clock is declared by any term of its error, a vibration by lines
+    or noise, an inertial sensor by any of its figures. A platform that does not move owes its position only, and an
+    oscillator where it is asked for by the platform's name. An error that is common to both platforms says nothing
+    of their own.
+
+    Parameters
+    ----------
+    mission : Mission
+        As loaded.
+    still : container of str, optional
+        Names of the platforms that do not move; omitted: by their paths.
+    """
+    if not mission.requirements.declare:
+        return []
+    if still is None:
+        still = still_platforms(mission)
+    return list(dict.fromkeys(_missing(mission, still)))
+
+
+def _missing(mission: Mission, still: Container[str]) -> Iterator[Missing]:
+    for asked in mission.requirements.declare:
+        owner, dot, kind = asked.rpartition(".")
+        if kind == "timing":
+            if all(term is None for term in mission.timing_error):
+                yield Missing("clock", kind, "timing_error")
+            continue
+        key, declares = _DECLARES[kind]
+        for name in (owner,) if dot else PLATFORMS:
+            owes = name not in still or kind == "position" or (kind == "oscillator" and bool(dot))
+            if owes and not declares(getattr(mission.platforms, name)):
+                yield Missing(name, kind, f"platforms.{name}.{key}")
+
+
+def is_asked_for(what: Subject, missing: Missing) -> bool:
+    """Whether a row is about what is asked for and missing."""
+    return what.owner == missing.owner and (what.kind == missing.kind or missing.owner == "clock")

@@ -1,0 +1,211 @@
+"""Doubts about what is checked: paths that stray, satellites that fly straight, a model or a collection at its edge.
+
+A path by an orbit or a log says how far the truth may be from it: by the age of its elements, the interpolation of
+its ephemeris, the residual of its smoothed log. A position error that is smaller cannot be that of this path.
+
+A satellite whose path the file leaves straight has none of the curvature of its orbit: over an aperture T the missing
+acceleration a moves the true path by aT²/8, 25 m in 5 s.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from bisar_budget import file_warnings, phrases
+from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.constants import EARTH_GRAVITATIONAL_PARAMETER, EARTH_RADIUS, SPEED_OF_LIGHT
+from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.effects.subject import Subject
+from bisar_budget.faults import KeyPath
+from bisar_budget.findings.mission import FileWarning
+from bisar_budget.findings.row import Row
+from bisar_budget.geometry import PlatformState, Vector, norm
+from bisar_budget.mission.model import Mission
+from bisar_budget.mission.platforms import FlownPath, MotionError, Platform
+from bisar_budget.phrases import NOTHING, Note
+
+if TYPE_CHECKING:
+    from bisar_budget.paths.earth import SceneAxes
+
+LEAST_M = 1e-3  # of a doubt; what is less is no story beside any declared error, zero included
+
+
+class InputDoubt(NamedTuple):
+    """A platform whose path is in doubt by more than the file declares.
+
+    `doubt` is how far the truth may be from the path [m], `declared` the root-sum-square of the position errors that
+    the file declares, without the coverage factor, 0 where it declares none [m]. `note` says both.
+    """
+
+    owner: str
+    doubt: float
+    declared: float
+    note: Note
+
+
+def input_doubts(mission: Mission) -> list[InputDoubt]:
+    """Platforms whose paths are in doubt by more than the file declares."""
+    found = []
+    for name in PLATFORMS:
+        platform: Platform = getattr(mission.platforms, name)
+        path, declared = platform.path, declared_position_error(platform.motion_error)
+        if path is not None and path.doubt_m > least_doubt(path, declared):
+            key = f"platforms.{name}.motion_error.position"
+            note = phrases.input_in_doubt(path.doubt_m, path.doubt_of, declared, key)
+            found.append(InputDoubt(name, path.doubt_m, declared or 0.0, note))
+    return found
+
+
+def declared_position_error(error: MotionError) -> Any:
+    """Root-sum-square of the position errors of a platform, or None: constant ones, and random ones of GNSS. [m]
+
+    Numbers of the mission may be arrays (cases,), and so may be the result.
+    """
+    stated = error.stated("position")
+    sizes = [*(stated or ()), *(sigma for one in error.random for sigma in one.sigma)]
+    return sum(size**2 for size in sizes) ** 0.5 if sizes else None
+
+
+def least_doubt(path: FlownPath, declared: Any) -> Any:
+    """Doubt of a path that a declared position error allows, or None; shaped as that error. [m]"""
+    if declared is None:
+        return LEAST_M if path.is_doubted else path.doubt_m
+    return declared + (LEAST_M - declared) * (declared < LEAST_M)
+
+
+def is_in_doubt(what: Subject, owner: str, mission: Mission) -> bool:
+    """Whether a row is of a position error of a platform, along the axes that the file states it in."""
+    error: MotionError = getattr(mission.platforms, owner).motion_error
+    frame = "scene" if error.stated("position") is None else error.frame
+    return what.owner == owner and what.kind == "position" and what.frame == frame
+
+
+# ---------------------------------------------------------------------- straight orbits
+FASTEST_FLIGHT = 3e3  # m/s; no aircraft is as fast, and no satellite in a low orbit as slow
+
+
+def orbital_acceleration(position: Vector) -> Vector:
+    """Acceleration of a circular orbit through a place: μ/r² towards the Earth's centre. [m/s²]
+
+    Parameters
+    ----------
+    position : (3,)
+        East, north, up of the scene centre, which lies on a sphere of the Earth's mean radius. [m]
+
+    Notes
+    -----
+    Derived here, for axes that do not turn. In the scene's axes, which turn with the Earth at ω = 7.3e-5 rad/s, the
+    acceleration is less by 2ω×v + ω×(ω×r): up to 1.1 m/s² at 7.6 km/s, by the latitude and the orbit's inclination.
+    """
+    x, y, up = position
+    from_centre = (x, y, up + EARTH_RADIUS)
+    factor = -EARTH_GRAVITATIONAL_PARAMETER / norm(from_centre) ** 3
+    return (factor * x, factor * y, factor * from_centre[2])
+
+
+def free_fall(axes: "SceneAxes", state: PlatformState) -> Vector:
+    """Acceleration of a satellite in the axes of a scene on the Earth: −μr/r³ − 2ω×v − ω×(ω×r). [m/s²]
+
+    Derived here: r against the stars, written in axes that turn at ω.
+    """
+    from bisar_budget.paths.earth import ROTATION_RATE
+
+    x, y, z = axes.earth_fixed(state.position)
+    u, v, _ = axes.turned_back(state.velocity)
+    factor = -EARTH_GRAVITATIONAL_PARAMETER / math.hypot(x, y, z) ** 3
+    turning = ROTATION_RATE**2
+    return axes.turned(
+        (
+            factor * x + 2 * ROTATION_RATE * v + turning * x,
+            factor * y - 2 * ROTATION_RATE * u + turning * y,
+            factor * z,
+        )
+    )
+
+
+def straight_orbits(mission: Mission) -> Iterator[FileWarning]:
+    """Doubt each platform that is as fast as a satellite and has no `acceleration`; say what its orbit would have.
+
+    A file that writes an acceleration has decided, zero included.
+    """
+    for name in PLATFORMS:
+        platform: Platform = getattr(mission.platforms, name)
+        speed = norm(platform.state.velocity)
+        if speed <= FASTEST_FLIGHT or platform.acceleration is not None or platform.is_of_the_earth:
+            continue
+        key: KeyPath = ("speed",) if platform.velocity is None else ("velocity",)
+        axes = mission.scene.axes
+        if axes is not None:
+            acceleration = free_fall(axes, platform.state)
+        else:
+            acceleration = orbital_acceleration(platform.state.position)
+        message = file_warnings.satellite_flies_straight(name, speed, acceleration, axes is not None)
+        yield FileWarning(line=mission.line(("platforms", name, *key)), message=message, is_doubt=True)
+
+
+# ---------------------------------------------------------------------- the published model
+APART = 0.05  # of the full model's allowable; farther from it, the published one does not hold
+
+
+def model_doubt(analysis: Analysis, rows: Sequence[Row]) -> Note:
+    """Say of which declared error the published model, where it decides, does not hold; nothing if it does.
+
+    Named is the row of which the two allowables say most differently how much of them is used.
+
+    Parameters
+    ----------
+    analysis : Analysis
+        Of the mission.
+    rows : sequence of Row
+        As judged: those that the published model judges are looked at, of errors as stated and not zero.
+    """
+    stated = {source.id for source in analysis.stated if source.declared}
+    apart = [row for row in rows if row.model == "published" and row.id in stated and _is_apart(row)]
+    if not apart:
+        return NOTHING
+    worst = max(apart, key=_difference)
+    return phrases.published_model_does_not_hold(
+        worst.id, worst.allowable_published, worst.allowable_full, worst.unit, len(apart) - 1
+    )
+
+
+def _is_apart(row: Row) -> bool:
+    published, full = row.allowable_published, row.allowable_full
+    if published is None or full is None:
+        return published is not full
+    return abs(published - full) > APART * full
+
+
+def _difference(row: Row) -> float:
+    """How differently the two allowables say how much of them is used."""
+    declared, limits = row.declared or 0.0, (row.allowable_published, row.allowable_full)
+    published, full = (0.0 if limit is None else declared / limit for limit in limits)
+    return abs(published - full)
+
+
+# ---------------------------------------------------------------------- the collection
+_TURNING_RAD = 0.1  # half the turn of a line of sight; the quartic term is 1 % of the quadratic there
+COARSE_CELL_RAD = 1.0  # of phase between points a range cell apart; beyond, a response spreads over cells
+_ABSORBED_RAD = 6.1  # of the same, where the image shows half; measured, uniform window, 8 to 300 MHz
+
+
+def collection_notes(analysis: Analysis) -> Iterator[Note]:
+    """Say where the published model leaves the collection, and where an image shows less than the full one."""
+    mission = analysis.mission
+    for name, state in (("transmitter", analysis.geometry.transmitter), ("receiver", analysis.geometry.receiver)):
+        if not state.is_straight:
+            yield phrases.path_curves(name)
+        turn = norm(state.look_rate) * mission.collection.aperture_time / 2
+        if turn > _TURNING_RAD:
+            yield phrases.sight_turns(name, turn)
+    if mission.has_direct_path:
+        yield phrases.direct_path_is_the_clock()
+    cell = phase_across_a_cell(analysis)
+    if cell > COARSE_CELL_RAD:
+        yield phrases.range_cells_are_coarse(cell, 100 / (1 + (cell / _ABSORBED_RAD) ** 2))
+
+
+def phase_across_a_cell(analysis: Analysis) -> float:
+    """Quadratic phase between points of the ground a range cell c/B apart. [rad]"""
+    (by_constant, _), _ = analysis.exact.phases_per_term
+    return float(abs(by_constant[0])) * SPEED_OF_LIGHT / analysis.mission.radar.bandwidth

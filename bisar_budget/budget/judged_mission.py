@@ -1,0 +1,403 @@
+"""All rows and requirements of a mission, judged in many cases at once; a check is one case.
+
+Rows are made by their families, each by every model that gates. Of two the stricter verdict holds. Then follows what
+no row says by itself: what must be declared, paths in doubt, effects that no requirement takes, waivers.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import date
+from functools import cached_property
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.analysis.scene import SceneEdges, scene_edges
+from bisar_budget.analysis.spread import noise
+from bisar_budget.budget.aggregates import Aggregates, JudgedScene, Misplacing, effect_totals, misplacing
+from bisar_budget.budget.doubts import FASTEST_FLIGHT, declared_position_error, is_in_doubt, least_doubt
+from bisar_budget.budget.error_rows import ErrorRows
+from bisar_budget.budget.judged_requirements import (
+    DECLARATIONS,
+    KEYS,
+    RequirementState,
+    UntakenEffect,
+    is_asked_for,
+    missing_declarations,
+    requirement_states,
+    status_of,
+    untaken_effects,
+)
+from bisar_budget.budget.judged_rows import CODE, REQUIREMENTS, Judged, Judging, Why
+from bisar_budget.budget.random_rows import RandomRows
+from bisar_budget.budget.vibration_rows import Vibrations, pslr_row, spur_rows
+from bisar_budget.budget.waivers import is_waived
+from bisar_budget.effects.declared import END_OF_IMAGE, LOCATION, MODELS
+from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.effects.subject import subject
+from bisar_budget.findings.row import DECLARE, Row
+from bisar_budget.findings.status import STATUS
+from bisar_budget.geometry import BistaticGeometry, norm
+from bisar_budget.mission.model import Mission
+
+_STATUSES = tuple(STATUS)
+BROKEN = [CODE["fail"], CODE["not_evaluated"]]  # what a waiver covers
+_GATES = np.array([one.gates for one in STATUS.values()])
+_OWNERS = (*PLATFORMS, "clock", "mission")
+
+Codes = NDArray[np.int8]
+Truths = NDArray[np.bool_]
+
+
+class FamilyRow(Protocol):
+    """A row as its family judges it by a model."""
+
+    @property
+    def judged(self) -> Judged:
+        """The row in all cases."""
+
+    @property
+    def is_there(self) -> Any:
+        """Cases that have it."""
+
+    def in_words(self, analysis: Analysis, model: str) -> Row:
+        """The row of the only case."""
+
+
+@dataclass(frozen=True, eq=False)
+class JudgedMission:
+    """A mission as judged in many cases.
+
+    `rows` are in the order of the contract and after waivers, `before` the same before waivers, in which each row may
+    say why its numbers do not decide. `families` has the rows as they were made, by each model that gates.
+    """
+
+    analysis: Analysis
+    families: Mapping[str, Sequence[FamilyRow]]
+    rows: tuple[Judged, ...]
+    before: tuple[Judged, ...]
+    requirements: tuple[RequirementState, ...]
+    untaken: Sequence[UntakenEffect]
+    misplacing: Misplacing
+    scene: JudgedScene | None
+    floor: Codes  # the best status that each case can have
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether no case declares an error at all: nothing was judged."""
+        nothing = (
+            row.metric == DECLARE
+            or np.all((row.status == CODE["not_declared"]) | (row.why == Why.NOT_DECLARED_AS_REQUIRED))
+            for row in self.rows
+        )
+        return all(nothing)
+
+    @cached_property
+    def status(self) -> Codes:
+        """Status of the mission in each case: the worst of what gates, and no better than the floor."""
+        codes = np.array([row.status for row in self.rows])
+        worst = np.where(_GATES[codes], codes, CODE["pass"]).min(axis=0)
+        return np.asarray(np.minimum(worst, self.floor), dtype=np.int8)
+
+
+def judged_mission(analysis: Analysis, today: date, *, is_whole: bool = False) -> JudgedMission:
+    """Judge every row and every requirement.
+
+    Parameters
+    ----------
+    analysis : Analysis
+        Of cases that need the same number of nodes.
+    today : date
+        Day on which waivers are judged, UTC.
+    is_whole : bool
+        Find all of each row, not only what decides.
+    """
+    with np.errstate(all="ignore"):
+        return _Judgement(analysis, today, is_whole).found()
+
+
+class _Judgement:
+    def __init__(self, analysis: Analysis, today: date, is_whole: bool) -> None:
+        self.analysis, self.mission, self.today = analysis, analysis.mission, today
+        self.cases, self.shown = analysis.cases, analysis.shown
+        self.judging = Judging(self.cases, self.mission.allocation.warn_above, is_whole)
+
+    def found(self) -> JudgedMission:
+        analysis, mission = self.analysis, self.mission
+        families = {model: list(self._families(model)) for model in analysis.gates}
+        by_model = [self._rows(model, found) for model, found in families.items()]
+        rows = [*self._undeclared(by_model[-1]), *_stricter(*reversed(by_model))]
+        if mission.requirements.declare:
+            rows.insert(0, Judged.of_none(DECLARATIONS, self.cases)._replace(metric=DECLARE))
+        of_all = RowStatuses(rows, mission)
+        of_all.require_declarations(analysis.geometry)
+        of_all.doubt_inputs(self._in_doubt)
+        untaken = untaken_effects(mission, effect_totals(analysis))
+        (place,) = (row.declared for row in rows if row.subject.id == f"mission.{LOCATION}")
+        displacing = misplacing(analysis.together("full"), place)
+        is_misplaced = np.any([displacing.where(self.cases), *self._in_doubt.values()], axis=0)
+        has_noise = self._has_noise()
+        own = of_all.status.copy()
+        of_all.judge_effects(untaken)
+        of_all.judge_place(is_misplaced)
+        of_all.judge_spread(has_noise)
+        before = of_all.status
+        after = of_all.waived(self.today)
+        states = requirement_states(
+            mission,
+            # A requirement judges effects by itself, and is waived where its row is.
+            np.where((after == CODE["waived"]) & np.isin(own, BROKEN), CODE["waived"], own),
+            np.array([row.utilization for row in rows]),
+            of_all.judges(),
+            np.array([row.quadratic_use for row in rows]),
+            {key: is_waived(mission, self.today, [f"mission.{key}"]) for key in KEYS},
+            has_noise=has_noise,
+            is_misplaced=is_misplaced,
+        )
+        after_waivers = (np.where(one.status == CODE["waived"], CODE["pass"], one.status) for one in states)
+        return JudgedMission(
+            analysis=analysis,
+            families=families,
+            rows=of_all.rows_with(after),
+            before=of_all.rows_with(before),
+            requirements=tuple(states),
+            untaken=untaken,
+            misplacing=displacing,
+            scene=self._scene,
+            floor=np.min([self._floor(), *after_waivers], axis=0),
+        )
+
+    # ---------------------------------------------------------------- rows of the families
+    def _families(self, model: str) -> Iterator[FamilyRow]:
+        """Every row by a model, in the order of the contract."""
+        other, needs = "published" if model == "full" else "full", self.mission.requirements
+        yield from self._errors.rows(model, other)
+        if self._vibrates or self._shows_vibration:
+            yield from self._vibrations.rows(model)
+        yield from self._random.rows(model)
+        yield from spur_rows(self.judging, self.analysis, model)
+        if needs.pslr is not None:
+            yield pslr_row(self.judging, self.analysis.tones, needs.pslr)
+        if needs.islr is not None:
+            yield from self._random.islr_rows(model)
+        yield from Aggregates(self.judging, self.analysis).rows(model)
+        if self._scene is not None:
+            yield self._scene.row(self.judging, model)
+
+    def _rows(self, model: str, families: Sequence[FamilyRow]) -> dict[str, Judged]:
+        """Rows by their ids: one may be of another family in some of the cases, and is in none of them nowhere."""
+        found: dict[str, Judged] = {}
+        by_model = np.full(self.cases, MODELS.index(model), np.int8)
+        for one in families:
+            judged = one.judged._replace(model=by_model)
+            row_id = judged.subject.id
+            if one.is_there is True or np.all(one.is_there):
+                found[row_id] = judged
+            elif np.any(one.is_there):
+                found[row_id] = (
+                    found.get(row_id, Judged.of_none(judged.subject, self.cases))
+                    .where(one.is_there, judged)
+                    ._replace(metric=judged.metric)
+                )
+        return found
+
+    @cached_property
+    def _errors(self) -> ErrorRows:
+        return ErrorRows(self.judging, self.analysis, self._limits)
+
+    @cached_property
+    def _limits(self) -> Mapping[str, Any]:
+        """Quadratic phase that each owner is held to, gain of autofocus included. [rad]"""
+        allocation = self.analysis.allocation
+        gain = allocation.autofocus_gain
+        return {owner: self.judging.array(allocation.qpe_limit(owner) * gain) for owner in _OWNERS}
+
+    @cached_property
+    def _vibrations(self) -> Vibrations:
+        return Vibrations(self.judging, self.analysis)
+
+    @property
+    def _vibrates(self) -> bool:
+        motions = (getattr(self.mission.platforms, name).motion_error.vibration for name in PLATFORMS)
+        return any(one.sinusoidal or one.wideband for one in motions)
+
+    @property
+    def _shows_vibration(self) -> bool:
+        return self.shown is None or any(what.kind == "vibration" for what in self.shown.values())
+
+    @cached_property
+    def _random(self) -> RandomRows:
+        return RandomRows(self.judging, self.analysis)
+
+    @cached_property
+    def _scene(self) -> JudgedScene | None:
+        if self.mission.scene.radius is None:
+            return None
+        edges: SceneEdges | None = scene_edges(self.analysis.errors, self._limits, self.analysis.allocation.qpe)
+        return JudgedScene(self.analysis, edges)
+
+    # ---------------------------------------------------------------- what no row says by itself
+    @cached_property
+    def _in_doubt(self) -> dict[str, Truths]:
+        """Platforms with a path, and in which cases that is in doubt by more than the file declares."""
+        found = {}
+        for name in PLATFORMS:
+            platform = getattr(self.mission.platforms, name)
+            if platform.path is not None:
+                least = least_doubt(platform.path, declared_position_error(platform.motion_error))
+                found[name] = platform.path.doubt_m > self.judging.array(least)
+        return found
+
+    def _undeclared(self, known: Mapping[str, Judged]) -> Iterator[Judged]:
+        """Rows that are shown, and of position errors of paths in doubt, that no case declares."""
+        wanted = dict(self.shown or {})
+        for name, is_doubtful in self._in_doubt.items():
+            own = (subject(name, "position", axis) for axis in "xyz") if is_doubtful.any() else ()
+            wanted |= {one.id: one for one in own if is_in_doubt(one, name, self.mission)}
+        there = {*known, DECLARATIONS.id}
+        return (Judged.of_none(one, self.cases) for row_id, one in wanted.items() if row_id not in there)
+
+    def _has_noise(self) -> Truths:
+        """Cases that declare something that spreads, or a tone that ISLR holds."""
+        spreads = (one.variance for model in self.analysis.gates for one in noise(self.analysis, model))
+        found = [~np.isnan(self.judging.array(one)) for one in spreads]
+        if self.mission.requirements.pslr is None:
+            found += [np.broadcast_to(one.is_there, (self.cases,)) for one in self.analysis.tones]
+        return np.asarray(np.any([np.zeros(self.cases, bool), *found], axis=0))
+
+    def _floor(self) -> Codes:
+        """Best status that each case can have: paths may be in doubt, and nothing declared."""
+        floor, analysis = np.full(self.cases, CODE["pass"]), self.analysis
+        for name, path in zip(PLATFORMS, analysis.geometry.both, strict=True):
+            platform = getattr(self.mission.platforms, name)
+            if platform.path is not None and platform.path.doubts:
+                floor[~self._in_doubt[name] | bool(platform.path.samples)] = CODE["warn"]
+            if platform.acceleration is None and not platform.is_of_the_earth:
+                floor[np.broadcast_to(norm(path.velocity) > FASTEST_FLIGHT, floor.shape)] = CODE["warn"]
+        is_random = any(one.declared is not None for one in analysis.random)
+        if not (analysis.errors.stated or self._vibrates or is_random):
+            floor[:] = CODE["not_evaluated"]
+        return floor
+
+
+class RowStatuses:
+    """Statuses of rows in many cases, (rows, cases), as what no row says by itself changes them, and why.
+
+    Each step turns rows into rows that are not evaluated; one that fails stays so.
+    """
+
+    def __init__(self, rows: Sequence[Judged], mission: Mission) -> None:
+        self.rows, self.mission = rows, mission
+        self.subjects = [row.subject for row in rows]
+        self.status, self.why = np.array([row.status for row in rows]), np.array([row.why for row in rows])
+
+    def _settle(self, which: Sequence[bool], is_so: Any, why: Why) -> None:
+        """Some rows are not evaluated, where it is so, (rows, cases) or (cases,)."""
+        these = np.array(which, dtype=bool)[:, None] & is_so
+        self.status = np.where(these, CODE["not_evaluated"], self.status)
+        self.why = np.where(these, np.int8(why), self.why)
+
+    def require_declarations(self, geometry: BistaticGeometry) -> None:
+        """What the file should declare and does not is not evaluated; the first row says whether all is there."""
+        if not self.mission.requirements.declare:
+            return
+        still = np.array([np.broadcast_to(path.is_still, self.status.shape[1:]) for path in geometry.both])
+        for which in np.unique(still, axis=1).T:  # nearly always one: a platform that moves does in every case
+            these = (still == which[:, None]).all(axis=0)
+            names = [name for name, is_still in zip(PLATFORMS, which, strict=True) if is_still]
+            missing = missing_declarations(self.mission, names)
+            self.status[0, these] = CODE["not_evaluated" if missing else "pass"]
+            owed = [any(is_asked_for(what, one) for one in missing) for what in self.subjects]
+            self._settle(owed, these & (self.status == CODE["not_declared"]), Why.NOT_DECLARED_AS_REQUIRED)
+
+    def doubt_inputs(self, in_doubt: Mapping[str, Truths]) -> None:
+        """Position errors of a path that is in doubt by more than the file declares are not evaluated."""
+        for name, is_doubtful in in_doubt.items():
+            if is_doubtful.any():
+                owed = [is_in_doubt(what, name, self.mission) for what in self.subjects]
+                self._settle(owed, is_doubtful & (self.status != CODE["fail"]), Why.INPUT_IN_DOUBT)
+
+    def judge_effects(self, untaken: Sequence[UntakenEffect]) -> None:
+        """What makes up an effect that no requirement takes is not evaluated, and what does a little of it `info`."""
+        for place, row in enumerate(self.rows):
+            row_id = row.subject.id
+            of_row = [one for one in untaken if row_id in one.parts]
+            if not of_row:
+                continue
+            status = status_of(self.status[place], row_id, ~np.isnan(row.allowable), of_row)
+            is_judged = (status == CODE["not_evaluated"]) | (status == CODE["fail"])
+            is_made = is_judged & np.any([one.makers[row_id] for one in of_row], axis=0)
+            self.status[place] = status
+            self.why[place] = np.where(is_made, np.int8(Why.EFFECT_NOT_TAKEN), self.why[place])
+
+    def judge_place(self, is_misplaced: Truths) -> None:
+        """Where the image is displaced by an amount that no row holds, the location is not evaluated."""
+        if self.mission.requirements.location_error is not None:
+            which = [what.id == f"mission.{LOCATION}" for what in self.subjects]
+            self._settle(which, is_misplaced & self._is_open, Why.NO_PLACE)
+
+    def judge_spread(self, has_noise: Truths) -> None:
+        """Of a cubic phase alone ISLR is not evaluated."""
+        if not has_noise.all():
+            which = [what.kind == "islr" for what in self.subjects]
+            self._settle(which, ~has_noise & self._is_open, Why.NOTHING_SPREADS)
+
+    @property
+    def _is_open(self) -> Truths:
+        return np.asarray((self.status != CODE["fail"]) & (self.status != CODE["not_declared"]))
+
+    def waived(self, today: date) -> Codes:
+        """The statuses with rows waived that fail or are not evaluated and that a waiver that holds names."""
+        if not self.mission.waivers:
+            return self.status
+        is_named = np.array([[is_waived(self.mission, today, [what.id])] for what in self.subjects])
+        if is_waived(self.mission, today, [DECLARATIONS.id]):
+            is_named = is_named | (self.why == Why.NOT_DECLARED_AS_REQUIRED)
+        return np.where(is_named & np.isin(self.status, BROKEN), CODE["waived"], self.status)
+
+    def judges(self) -> Codes:
+        """Place in `KEYS` of the requirement that judges each row, -1: none, since it is not declared."""
+        binding = np.array([row.binding for row in self.rows])
+        metric = np.array([[KEYS.index(row.metric)] for row in self.rows])
+        judges = np.where((binding >= 0) & (binding < REQUIREMENTS.index(END_OF_IMAGE)), binding, metric)
+        return np.where(self.why == Why.NOT_DECLARED_AS_REQUIRED, -1, judges).astype(np.int8)
+
+    def rows_with(self, status: Codes) -> tuple[Judged, ...]:
+        """The rows with these statuses; one that has become `info` uses nothing."""
+        found = []
+        for row, code, why in zip(self.rows, status, self.why, strict=True):
+            is_info = (code == CODE["info"]) & (row.status != code)
+            use = np.where(is_info, np.nan, row.utilization) if is_info.any() else row.utilization
+            found.append(row._replace(status=code, why=why, utilization=use))
+        return tuple(found)
+
+
+def _stricter(full: Mapping[str, Judged], published: Mapping[str, Judged] | None = None) -> list[Judged]:
+    """Rows of complete checks: of two each time the one with the stricter verdict, then the higher utilization."""
+    if published is None:
+        return list(full.values())
+    found, others = [], dict(published)
+    for row_id, one in full.items():
+        other = others.pop(row_id, None)
+        if other is None:
+            found.append(one)
+            continue
+        use = [np.nan_to_num(row.utilization, nan=0.0) for row in (one, other)]
+        size = [np.where(np.isnan(row.allowable), np.inf, row.allowable) for row in (one, other)]
+        tie = other.status == one.status
+        is_other = (other.status < one.status) | (tie & (use[1] > use[0]))
+        is_other |= tie & (use[1] == use[0]) & (size[1] < size[0])
+        found.append(one.where(is_other, other))
+    return [*found, *others.values()]  # an aggregate that only one of them has
+
+
+def statuses(codes: Codes) -> NDArray[np.object_]:
+    """Names of statuses by their codes."""
+    return np.array(_STATUSES, dtype=object)[codes]
+
+
+def field(row: Judged, name: str) -> Any:
+    """One field of a row, (cases,)."""
+    return statuses(row.status) if name == "status" else getattr(row, name)

@@ -1,0 +1,33 @@
+"""How a mission stands by the findings of its check, row by row: what the case table says of many has to be this."""
+
+from collections.abc import Container
+
+from bisar_budget.design.table import ALIKE, Standing
+from bisar_budget.findings.mission import MissionFindings
+from bisar_budget.findings.row import Row
+from bisar_budget.findings.status import STATUS
+
+
+def standing(found: MissionFindings, row_id: str | None, breaks: Container[str]) -> Standing:
+    """Say whether a mission, or a row that is asked for, complies, and which row binds."""
+    rows = [row for row in found.rows if row_id is None or row.id == row_id]
+    status = found.status if row_id is None else rows[0].status if rows else "not_evaluated"
+    complies = status not in breaks
+    deciding = [row for row in rows if _decides(row, breaks) and (complies or row.status in breaks)]
+    if not deciding:
+        broken = [one.key for one in found.requirements if one.status == status and row_id is None and not complies]
+        return Standing(complies, status, requirement=broken[0] if broken else None)
+    highest = max(map(_use, deciding))
+    worst = next(row for row in deciding if _use(row) >= highest - ALIKE * abs(highest) or _use(row) == highest)
+    return Standing(complies, status, worst.id, worst.binding_requirement or worst.metric, worst.utilization)
+
+
+def _decides(row: Row, breaks: Container[str]) -> bool:
+    """Whether a row is judged by a number; what only ever warns decides nothing, unless a warning does."""
+    is_judged = STATUS[row.status].is_judged and row.status != "waived"
+    has_say = row.utilization is not None or row.status != "not_evaluated"
+    return is_judged and has_say and ("warn" in breaks or row.subject.kind != "autofocus_pull_in")
+
+
+def _use(row: Row) -> float:
+    return -1.0 if row.utilization is None else row.utilization
