@@ -797,3 +797,11 @@ def waived(line: int | None, until: date, reason: str, is_expired: bool) -> str:
     """Of a row that fails."""
     place = "--set" if line is None else f"line {line}"
     return f"{'expired ' if is_expired else ''}waiver of {place}, until {until}: {reason}"
+
+
+@phrase
+def nothing_verified(rows: int) -> str:
+    """Of a mission of whose limits no image gave a verdict."""
+    return (
+        f"nothing was verified: {rows} row{'s' if rows != 1 else ''} with a limit, and no image gave a verdict on any"
+    )

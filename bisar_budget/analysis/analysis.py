@@ -86,7 +86,7 @@ class Analysis:
     def together(self, model: str) -> Together:
         """The declared errors together, by a model."""
         if model not in self._together:
-            self._together[model] = Together(self.errors, model, self.slow, self.random)
+            self._together[model] = Together(self.errors, model, self.slow, self.random, self.groups)
         return self._together[model]
 
     @cached_property

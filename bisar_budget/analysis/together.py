@@ -13,7 +13,6 @@ from bisar_budget.effects.combined import (
     Phases,
     combined_displacement,
     combined_phase,
-    correlated_errors,
     displacement_parts,
     phase_parts,
 )
@@ -40,19 +39,21 @@ class Together:
         Vibrations below one cycle per aperture.
     random : sequence of RandomError
         Errors of sensors and clocks, declared or not.
+    groups : sequence of Correlated
+        Covariances of the mission.
     """
 
     def __init__(
-        self, errors: DeclaredErrors, model: str, slow: Sequence[DeclaredPhase], random: Sequence[RandomError]
+        self,
+        errors: DeclaredErrors,
+        model: str,
+        slow: Sequence[DeclaredPhase],
+        random: Sequence[RandomError],
+        groups: Sequence[Correlated],
     ) -> None:
-        self.errors, self.model, self.slow, self.random = errors, model, slow, random
+        self.errors, self.model, self.slow, self.random, self.groups = errors, model, slow, random, groups
         self.rule = errors.mission.allocation.combine
         self.motion = [error for error in errors.stated if error.is_motion]
-
-    @cached_property
-    def groups(self) -> tuple[Correlated, ...]:
-        """Covariances of the mission."""
-        return correlated_errors(self.errors.mission)
 
     @property
     def rule_of_all(self) -> str:

@@ -9,9 +9,9 @@ __all__ = [
     "judged_mission",
     "judged_requirements",
     "judged_rows",
-    "overrides",
     "pull_in",
     "random_rows",
     "requirement_table",
     "verdicts",
+    "waivers",
 ]

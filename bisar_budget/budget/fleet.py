@@ -11,7 +11,7 @@ from functools import partial
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.budget.overrides import NOTHING_OUTSIDE, Outside
+from bisar_budget.budget.waivers import NOTHING_OUTSIDE, Outside
 from bisar_budget.faults import MissionError, SetValue
 from bisar_budget.findings.mission import MissionFindings, UnusableMission
 from bisar_budget.mission.load import load_mission

@@ -17,8 +17,9 @@ from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.scene import SceneEdges, scene_edges
 from bisar_budget.analysis.spread import noise
 from bisar_budget.budget.aggregates import Aggregates, JudgedScene, Misplacing, effect_totals, misplacing
-from bisar_budget.budget.doubts import FASTEST_FLIGHT, declared_position_error, is_in_doubt, least_doubt
+from bisar_budget.budget.doubts import declared_position_error, is_in_doubt, least_doubt
 from bisar_budget.budget.error_rows import ErrorRows
+from bisar_budget.budget.file_warnings import FASTEST_FLIGHT
 from bisar_budget.budget.judged_requirements import (
     DECLARATIONS,
     KEYS,
@@ -275,7 +276,7 @@ class _Judgement:
             if platform.path is not None and platform.path.doubts:
                 floor[~self._in_doubt[name] | bool(platform.path.samples)] = CODE["warn"]
             if platform.acceleration is None and not platform.is_of_the_earth:
-                floor[np.broadcast_to(norm(path.velocity) > FASTEST_FLIGHT, floor.shape)] = CODE["warn"]
+                floor[np.broadcast_to(np.asarray(norm(path.velocity)) > FASTEST_FLIGHT, floor.shape)] = CODE["warn"]
         is_random = any(one.declared is not None for one in analysis.random)
         if not (analysis.errors.stated or self._vibrates or is_random):
             floor[:] = CODE["not_evaluated"]

@@ -8,12 +8,10 @@ with less they leave the image smeared at a hundredth of a cell of walk as at a 
 """
 
 import math
-from collections.abc import Iterator
 from typing import NamedTuple
 
-from bisar_budget import file_warnings, phrases
+from bisar_budget import phrases
 from bisar_budget.analysis.allocation import range_walk_cap
-from bisar_budget.findings.mission import FileWarning, Resolution
 from bisar_budget.mission.model import Mission
 from bisar_budget.phrases import Note
 from bisar_budget.units import format_quantity
@@ -51,9 +49,9 @@ def needed_sentence(n_pull: float, caps: Caps) -> Note:
         What `caps` says of the mission.
     """
     if caps.scene is not None and caps.scene < min(n_pull, caps.walk):
-        allowed = f"the scene's size allows {_down(caps.scene)}"
+        allowed = f"the scene's size allows {rounded_down(caps.scene)}"
     elif n_pull > caps.walk:
-        allowed = f"range walk allows {_down(caps.walk)}"
+        allowed = f"range walk allows {rounded_down(caps.walk)}"
     else:
         return phrases.passes_from(math.ceil(n_pull * 100 * (1 - 1e-12)) / 100)
     return phrases.beyond_autofocus(_up(n_pull), allowed)
@@ -67,27 +65,8 @@ def _up(number: float) -> str:
     return f"{math.ceil(number / step * (1 - 1e-12)) * step:.3g}"
 
 
-def _down(number: float) -> str:
+def rounded_down(number: float) -> str:
     """Three digits, rounded down; whole from a hundred on, with a space between thousands."""
     if number >= 100:
         return f"{math.floor(number * (1 + 1e-12)):,}".replace(",", " ")
     return format_quantity(number, "", 3, "down")
-
-
-def pull_in_caps(mission: Mission, resolution: Resolution) -> Iterator[FileWarning]:
-    """Warn where `autofocus.n_pull` is more than counts, by range walk, or than the scene's size leaves."""
-    n_pull, algorithm = mission.autofocus.n_pull, mission.autofocus.algorithm
-    if n_pull is None:
-        return
-    line = mission.line(("autofocus", "n_pull"))
-    limit = caps(mission)
-    if n_pull > limit.walk:
-        cells = n_pull / limit.walk / 2
-        message = file_warnings.walks_over_range_cells(n_pull, cells, _down(limit.walk))
-        yield FileWarning(line=line, message=message)
-    radius = mission.scene.radius
-    smear = 4 * n_pull * resolution.cross_range
-    if radius is not None and limit.scene is not None and n_pull > limit.scene:
-        held = _down(limit.scene)
-        message = file_warnings.smears_beyond_the_scene(n_pull, smear, algorithm, ROOM[algorithm], radius, held)
-        yield FileWarning(line=line, message=message)

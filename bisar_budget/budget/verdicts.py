@@ -3,7 +3,8 @@
 from collections.abc import Mapping, Sequence
 from datetime import date
 
-from bisar_budget import file_warnings, phrases
+from bisar_budget import phrases
+from bisar_budget.budget import file_warnings
 from bisar_budget.budget.waivers import apply_waivers
 from bisar_budget.findings.images import Verdict, VerifiedMission
 from bisar_budget.findings.mission import FileWarning, MissionFindings

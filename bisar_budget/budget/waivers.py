@@ -1,17 +1,23 @@
-"""Waivers: rows and requirements that may be broken until a date. What is waived, expired or useless is said."""
+"""Decisions beside the errors: waivers of rows and requirements, and what from outside a file bears on its verdict.
 
+What is waived, expired or useless is said; so are options, settings, the environment and parts of a project.
+"""
+
+import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import date
 from fnmatch import translate
 from typing import NamedTuple
 
-from bisar_budget import file_warnings
+from bisar_budget.budget import file_warnings
 from bisar_budget.budget.judged_requirements import KEYS
-from bisar_budget.findings.mission import FileWarning
-from bisar_budget.findings.requirement import JudgedRequirement
+from bisar_budget.faults import KeyPath, printable
+from bisar_budget.findings.requirement import JudgedRequirement, Override
 from bisar_budget.findings.row import DECLARE, AppliedWaiver, Row
 from bisar_budget.mission.model import Mission
+from bisar_budget.phrases import Note
+from bisar_budget.resources import resource
 
 _BROKEN = ("fail", "not_evaluated")  # statuses that a waiver covers
 
@@ -28,21 +34,19 @@ class Waived(NamedTuple):
     requirements: Mapping[str, tuple[AppliedWaiver, ...]]
     covered: Sequence[tuple[int, int]]  # rows that it names, and those of them that are broken
 
-    def unused(self, judged: Sequence[JudgedRequirement]) -> list[FileWarning]:
-        """Warn of waivers that name nothing, everything, or nothing that is broken."""
+    def unused(self, judged: Sequence[JudgedRequirement]) -> Iterator[tuple[KeyPath, Note]]:
+        """Say which waivers name nothing, everything, or nothing that is broken."""
         broken = {one.id for one in judged if one.status in (*_BROKEN, "waived")}
         ids = [one.id for one in judged]
-        warnings = []
         for index, (waiver, (named, failing)) in enumerate(zip(self.mission.waivers, self.covered, strict=True)):
-            line = self.mission.line(("waivers", index, "id"))
+            key = ("waivers", index, "id")
             requirements = [ids[place] for place in named_by(waiver.id, ids)]
             if not named and not requirements:
-                warnings.append(FileWarning(line=line, message=file_warnings.waiver_matches_nothing(waiver.id)))
+                yield key, file_warnings.waiver_matches_nothing(waiver.id)
             elif named == len(self.rows):
-                warnings.append(FileWarning(line=line, message=file_warnings.waiver_matches_everything(waiver.id)))
+                yield key, file_warnings.waiver_matches_everything(waiver.id)
             elif not failing and broken.isdisjoint(requirements):
-                warnings.append(FileWarning(line=line, message=file_warnings.waiver_not_used(waiver.id)))
-        return warnings
+                yield key, file_warnings.waiver_not_used(waiver.id)
 
 
 def apply_waivers(rows: Sequence[Row], mission: Mission, today: date) -> Waived:
@@ -104,3 +108,55 @@ def named_by(pattern: str, ids: Sequence[str]) -> list[int]:
         return [place for place, row_id in enumerate(ids) if row_id == pattern]
     matches = map(re.compile(translate(pattern)).match, ids)
     return [place for place, match in enumerate(matches) if match or ids[place] == pattern]
+
+
+# ---------------------------------------------------------------------- from outside the file
+class Outside(NamedTuple):
+    """Influences on all missions of a run: options that somebody gave, and where the day of waivers comes from."""
+
+    options: tuple[Override, ...] = ()
+    day_origin: str = "the caller"
+    is_day_given: bool = False  # by the option --date, which is said even where no waiver stands
+
+
+NOTHING_OUTSIDE = Outside()
+
+
+def overrides(mission: Mission, outside: Outside, today: date) -> tuple[Override, ...]:
+    """Gather what from outside the file bears on the verdict of one mission.
+
+    Parameters
+    ----------
+    mission : Mission
+        As loaded, with the options that changed it and the parts that it takes figures from.
+    outside : Outside
+        Of the run.
+    today : date
+        Day on which waivers are judged, UTC. It bears on the verdict where the file has a waiver.
+    """
+    found = list(outside.options)
+    if mission.waivers or outside.is_day_given:
+        found.append(Override("--date", today.isoformat(), outside.day_origin))
+    found += [Override("--set", f"{change.key}={change.text}", "command line") for change in mission.changes]
+    return (*found, *_own_parts(mission))
+
+
+def _own_parts(mission: Mission) -> Iterator[Override]:
+    """Parts of the project that stand in for those of the catalogue with the same name."""
+    catalogue = str(resource("specs", "sensors")) if mission.parts else ""
+    for name, file, _ in mission.parts:
+        if name.endswith((".yaml", ".yml")) or os.path.dirname(file) == catalogue:
+            continue
+        if any(os.path.exists(os.path.join(catalogue, name + suffix)) for suffix in (".yaml", ".yml")):
+            yield Override(
+                f"part {printable(name)}", _shown(file, mission.file), "the project's, in place of the catalogue's"
+            )
+
+
+def _shown(file: str, mission_file: str) -> str:
+    """Path of a file from the folder of the mission file, the same wherever the command runs."""
+    try:
+        path = os.path.relpath(file, os.path.dirname(mission_file) or os.curdir)
+    except (OSError, ValueError):  # the current folder is gone; another drive
+        path = file
+    return printable(path.replace(os.sep, "/"))

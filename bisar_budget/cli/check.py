@@ -34,7 +34,7 @@ from bisar_budget.report import FORMATS
 
 if TYPE_CHECKING:
     from bisar_budget.budget.fleet import Draws
-    from bisar_budget.budget.overrides import Outside
+    from bisar_budget.budget.waivers import Outside
     from bisar_budget.faults import SetValue
     from bisar_budget.findings.mission import MissionFindings, Option, Report, UnusableMission
     from bisar_budget.report import Style
@@ -383,7 +383,7 @@ def check_all(
     else bears on the verdicts.
     """
     from bisar_budget.budget.fleet import check_files, whole, without_analysis
-    from bisar_budget.budget.overrides import NOTHING_OUTSIDE
+    from bisar_budget.budget.waivers import NOTHING_OUTSIDE
     from bisar_budget.findings.mission import Report
 
     keep = whole if verifying or illustrated else without_analysis

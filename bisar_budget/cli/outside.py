@@ -12,7 +12,7 @@ from click.core import ParameterSource
 from bisar_budget.cli.streams import day_of_run
 
 if TYPE_CHECKING:
-    from bisar_budget.budget.overrides import Outside
+    from bisar_budget.budget.waivers import Outside
     from bisar_budget.findings.requirement import Override
 
 DAY_OF_RUN = "the day of the run"
@@ -41,7 +41,7 @@ def _settings_file() -> str:
 
 def outside(today: datetime | None) -> "Outside":
     """Gather the options of the command that bear on verdicts; `today` is the value of --date."""
-    from bisar_budget.budget.overrides import Outside
+    from bisar_budget.budget.waivers import Outside
 
     return Outside(tuple(_options()), day_origin(today), today is not None)
 

@@ -57,7 +57,7 @@ def sensitivity(
     smaller slant range. With balanced shares a second table says what relaxing an error costs the others. Exit code:
     0, or 2 for wrong usage or an unusable mission file.
     """
-    from bisar_budget.budget.overrides import overrides
+    from bisar_budget.budget.waivers import overrides
     from bisar_budget.design import sensitivity as asking
     from bisar_budget.design.quantities import QuestionError
     from bisar_budget.report import Style

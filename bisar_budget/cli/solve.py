@@ -89,7 +89,7 @@ def solve(
     1 if no value of the range or no part complies or if the image refutes the limit (--verify), 2 for wrong usage or
     an unusable mission file.
     """
-    from bisar_budget.budget.overrides import overrides
+    from bisar_budget.budget.waivers import overrides
     from bisar_budget.design import compare
     from bisar_budget.design import solve as solving
     from bisar_budget.design.quantities import QuestionError

@@ -136,7 +136,7 @@ def sweep(
     if cases_file is not None and sample is not None:
         raise click.UsageError("--sample draws from the ranges of --vary; --cases has cases of its own.")
     spare([mission, *([cases_file] if cases_file else [])], [output, plot])
-    from bisar_budget.budget.overrides import overrides
+    from bisar_budget.budget.waivers import overrides
     from bisar_budget.cluster.parts_folder import ClusterError
     from bisar_budget.design.cases import TableError
     from bisar_budget.design.quantities import QuestionError

@@ -70,7 +70,7 @@ def verify(
     each limit is formed again with its gain and refocused. Exit code: 0, or 1 if a limit is optimistic, 2
     for wrong usage, an unusable file, or a mission on whose limits no image gave a verdict.
     """
-    from bisar_budget.budget.overrides import NOTHING_OUTSIDE, overrides
+    from bisar_budget.budget.waivers import NOTHING_OUTSIDE, overrides
     from bisar_budget.report import Style
     from bisar_budget.report.formats import verification
 

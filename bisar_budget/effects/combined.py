@@ -8,16 +8,15 @@ Phases and displacements are arrays over cases, (cases,); of one case they may b
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bisar_budget import file_warnings, phrases
+from bisar_budget import phrases
 from bisar_budget.effects.effect import PLATFORMS, ErrorSource
 from bisar_budget.effects.subject import subject
-from bisar_budget.faults import Place
 from bisar_budget.geometry import FRAME_AXES
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
@@ -147,17 +146,6 @@ def correlation_notes(rule: str, groups: Sequence[Correlated]) -> tuple[Note, ..
     if rule == "rss":
         return tuple(phrases.counted_as_one(group.id) for group in groups)
     return tuple(phrases.correlations_unused(group.id) for group in groups)
-
-
-def unused_correlations(mission: Mission) -> Iterator[tuple[Place | None, Note]]:
-    """Warn of correlations that no row and no aggregate looks at: line and message."""
-    if mission.allocation.combine != "each":
-        return
-    for name in PLATFORMS:
-        error: MotionError = getattr(mission.platforms, name).motion_error
-        if error.covariance is not None and error.covariance.has_correlations():
-            line = mission.line(("platforms", name, "motion_error", "covariance"))
-            yield line, file_warnings.correlations_not_used(name)
 
 
 def likely_error(group: Correlated, members: Sequence[ErrorSource]) -> tuple[float, ...]:

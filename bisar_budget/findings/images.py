@@ -6,7 +6,7 @@ the bistatic look direction φ_b, y′ across it, counter-clockwise.
 
 from typing import NamedTuple
 
-from bisar_budget import file_warnings
+from bisar_budget import phrases
 from bisar_budget.faults import SetValue
 from bisar_budget.findings.requirement import Override
 from bisar_budget.geometry import GroundVector
@@ -92,7 +92,7 @@ class VerifiedMission(NamedTuple):
         """Say that no limit got a verdict; empty if one did."""
         if any({row.verdict, row.verdict_autofocus} - {"not_evaluated", None} for row in self.rows):
             return NOTHING
-        return file_warnings.nothing_verified(len(self.rows))
+        return phrases.nothing_verified(len(self.rows))
 
 
 class PointImage(NamedTuple):

@@ -178,7 +178,8 @@ class _Predictions:
     """Figures without draws: combinations by the rules of `check`, standard uncertainties, a normal distribution."""
 
     def __init__(self, analysis: Analysis, variables: Sequence[Variable]) -> None:
-        self.together, self.variables = Together(analysis.errors, "full", (), analysis.random), variables
+        self.together = Together(analysis.errors, "full", (), analysis.random, analysis.groups)
+        self.variables = variables
 
     def combined(self, judged: HeldSum, rule: str) -> float | None:
         """Size that a rule of `allocation.combine` holds to the limit, coverage factor included; None: no image."""

@@ -22,7 +22,7 @@ from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
-from bisar_budget import file_warnings
+from bisar_budget.budget import file_warnings
 from bisar_budget.catalogue import SYMBOLS
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission import readers

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from bisar_budget.budget.doubts import orbital_acceleration
+from bisar_budget.budget.file_warnings import orbital_acceleration
 from bisar_budget.findings.mission import Report
 from bisar_budget.findings.status import exit_code
 from bisar_budget.report import FORMATS, Style, render

@@ -5,7 +5,8 @@ import pickle
 
 import pytest
 
-from bisar_budget import file_warnings, phrases
+from bisar_budget import phrases
+from bisar_budget.budget import file_warnings
 from bisar_budget.budget.check import check_mission
 from bisar_budget.findings.images import Verdict, VerifiedMission
 from bisar_budget.findings.mission import Report

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bisar_budget.budget.doubts import free_fall, straight_orbits
+from bisar_budget.budget.file_warnings import free_fall, straight_orbits
 from bisar_budget.faults import MissionError
 from bisar_budget.mission import paths
 from bisar_budget.mission.load import parse_mission

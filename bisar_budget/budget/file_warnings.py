@@ -1,0 +1,321 @@
+"""Warnings of a mission file: every sentence, its name is its code as in `phrases`, and when it is said.
+
+Most change no verdict; what is in doubt is a warning at least. A finder gives a sentence and the key that it is said
+of; the line of the key is looked up here, once.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.budget.doubts import input_doubts
+from bisar_budget.budget.pull_in import ROOM, caps, rounded_down
+from bisar_budget.constants import EARTH_GRAVITATIONAL_PARAMETER, EARTH_RADIUS
+from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.effects.oscillators import POOR_FIT
+from bisar_budget.faults import KeyPath, changes_words
+from bisar_budget.findings.mission import FileWarning, Resolution
+from bisar_budget.findings.row import Row
+from bisar_budget.geometry import PlatformState, Vector, norm
+from bisar_budget.mission.model import Mission
+from bisar_budget.mission.platforms import Platform
+from bisar_budget.phrases import Note, phrase
+from bisar_budget.units import format_quantity
+
+if TYPE_CHECKING:
+    from bisar_budget.paths.earth import SceneAxes
+
+
+class _Warned(NamedTuple):
+    """A sentence and the key of the file that it is said of; None: of the whole."""
+
+    key: KeyPath | None
+    message: Note
+    is_doubt: bool = False
+    is_of_options: bool = False
+
+
+def file_warnings(
+    analysis: Analysis, rows: Sequence[Row], waivers: Sequence[tuple[KeyPath, Note]], resolution: Resolution
+) -> tuple[FileWarning, ...]:
+    """Everything about the file of a mission that should not go unsaid.
+
+    Parameters
+    ----------
+    analysis : Analysis
+        Of the mission.
+    rows : sequence of Row
+        As judged.
+    waivers : sequence of (key, sentence)
+        What is to be said of waivers.
+    resolution : Resolution
+        On the ground.
+    """
+    mission = analysis.mission
+    found = (
+        *_of_the_whole(mission, rows),
+        *(_Warned(*one) for one in waivers),
+        *_unused_correlations(mission),
+        *straight_orbits(mission),
+        *_doubtful_paths(mission),
+        *_of_instruments(analysis),
+        *_of_autofocus(mission, resolution),
+        *_nothing_declared(rows),
+    )
+    return tuple(FileWarning(None if one.key is None else mission.line(one.key), *one[1:]) for one in found)
+
+
+# ---------------------------------------------------------------------- what is checked
+def _of_the_whole(mission: Mission, rows: Sequence[Row]) -> Iterator[_Warned]:
+    if mission.changes:
+        yield _Warned(None, another_mission(changes_words(mission.changes)), is_of_options=True)
+    known = {row.id for row in rows} if mission.requirement_ids else set()
+    for row_id in mission.requirement_ids:
+        if row_id not in known:
+            yield _Warned(("requirement_ids", row_id), id_of_no_row(row_id))
+    if mission.gating_model != mission.allocation.model:
+        yield _Warned(("synchronization", "method"), full_model_gates(mission.allocation.model))
+
+
+def _nothing_declared(rows: Sequence[Row]) -> Iterator[_Warned]:
+    if all(row.status == "not_declared" or row.is_of_declare for row in rows):
+        yield _Warned(None, nothing_declared())
+
+
+@phrase
+def another_mission(changes: str) -> str:
+    """Of a mission that options changed."""
+    return f"checked is not the mission of the file: {changes}"
+
+
+@phrase
+def id_of_no_row(row_id: str) -> str:
+    """Of a key of `requirement_ids`."""
+    return f"requirement_ids: {row_id} is the id of no row"
+
+
+@phrase
+def full_model_gates(model: str) -> str:
+    """Of a mission with a direct path, which asks for another model."""
+    return f"allocation.model {model}: the published model does not know the direct path; the full model gates"
+
+
+@phrase
+def nothing_declared() -> str:
+    """Of a mission that states no error."""
+    return "no error is declared: nothing was judged"
+
+
+# ---------------------------------------------------------------------- how platforms fly
+def _doubtful_paths(mission: Mission) -> Iterator[_Warned]:
+    """Paths in doubt where rows do not say it; a place that strays is no part of a log's residual."""
+    owners = {one.owner for one in input_doubts(mission)}
+    for name in PLATFORMS:
+        platform: Platform = getattr(mission.platforms, name)
+        path = platform.path
+        if path is not None and (name not in owners or path.samples):
+            yield from (
+                _Warned(("platforms", name, platform.way), path_is_doubtful(name, doubt), is_doubt=True)
+                for doubt in path.doubts
+            )
+
+
+@phrase
+def path_is_doubtful(platform: str, doubt: str) -> str:
+    """Of a path by an orbit or a log."""
+    return f"platforms.{platform}: {doubt}"
+
+
+FASTEST_FLIGHT = 3e3  # m/s; no aircraft is as fast, and no satellite in a low orbit as slow
+
+
+def orbital_acceleration(position: Vector) -> Vector:
+    """Acceleration of a circular orbit through a place: μ/r² towards the Earth's centre. [m/s²]
+
+    Parameters
+    ----------
+    position : (3,)
+        East, north, up of the scene centre, which lies on a sphere of the Earth's mean radius. [m]
+
+    Notes
+    -----
+    Derived here, for axes that do not turn. In the scene's axes, which turn with the Earth at ω = 7.3e-5 rad/s, the
+    acceleration is less by 2ω×v + ω×(ω×r): up to 1.1 m/s² at 7.6 km/s, by the latitude and the orbit's inclination.
+    """
+    x, y, up = position
+    from_centre = (x, y, up + EARTH_RADIUS)
+    factor = -EARTH_GRAVITATIONAL_PARAMETER / norm(from_centre) ** 3
+    return (factor * x, factor * y, factor * from_centre[2])
+
+
+def free_fall(axes: "SceneAxes", state: PlatformState) -> Vector:
+    """Acceleration of a satellite in the axes of a scene on the Earth: −μr/r³ − 2ω×v − ω×(ω×r). [m/s²]
+
+    Derived here: r against the stars, written in axes that turn at ω.
+    """
+    from bisar_budget.paths.earth import ROTATION_RATE
+
+    x, y, z = axes.earth_fixed(state.position)
+    u, v, _ = axes.turned_back(state.velocity)
+    factor = -EARTH_GRAVITATIONAL_PARAMETER / math.hypot(x, y, z) ** 3
+    turning = ROTATION_RATE**2
+    return axes.turned(
+        (
+            factor * x + 2 * ROTATION_RATE * v + turning * x,
+            factor * y - 2 * ROTATION_RATE * u + turning * y,
+            factor * z,
+        )
+    )
+
+
+def straight_orbits(mission: Mission) -> Iterator[_Warned]:
+    """Doubt each platform that is as fast as a satellite and has no `acceleration`; say what its orbit would have.
+
+    Over an aperture T the missing acceleration a moves the true path by aT²/8 against the straight one: 25 m in 5 s.
+    A file that writes an acceleration has decided, zero included.
+    """
+    for name in PLATFORMS:
+        platform: Platform = getattr(mission.platforms, name)
+        speed, axes = norm(platform.state.velocity), mission.scene.axes
+        if speed <= FASTEST_FLIGHT or platform.acceleration is not None or platform.is_of_the_earth:
+            continue
+        key = ("platforms", name, "speed" if platform.velocity is None else "velocity")
+        if axes is not None:
+            acceleration = free_fall(axes, platform.state)
+        else:
+            acceleration = orbital_acceleration(platform.state.position)
+        yield _Warned(key, satellite_flies_straight(name, speed, acceleration, axes is not None), is_doubt=True)
+
+
+@phrase
+def satellite_flies_straight(platform: str, speed: float, acceleration: Sequence[float], has_axes: bool) -> str:
+    """Of a satellite's path without the acceleration of its orbit. [m/s, m/s²]"""
+    parts = ", ".join(f"{part + 0.0:.3f} m/s^2" for part in acceleration)
+    if has_axes:
+        how = "(gravity of a point mass, less what the Earth's rotation adds)"
+    else:
+        how = (
+            "(towards the Earth's centre; the Earth's rotation changes it by up to 1.1 m/s^2, which needs the "
+            "latitude)"
+        )
+    return (
+        f"platforms.{platform}: {speed / 1e3:.3g} km/s is the speed of a satellite, and the path is straight. "
+        f"A circular orbit has acceleration: [{parts}] {how}"
+    )
+
+
+# ---------------------------------------------------------------------- how errors are stated
+def _of_instruments(analysis: Analysis) -> Iterator[_Warned]:
+    """What sensors and clocks are stated by, and what is stated twice."""
+    mission, sync = analysis.mission, analysis.mission.synchronization
+    T = mission.collection.aperture_time
+    if sync is not None and not sync.is_direct_path and (sync.interval or 0.0) > T:
+        yield _Warned(("synchronization", "interval"), exchanges_are_rare(T))
+    for error in analysis.random:
+        if error.noise is not None and error.noise.misfit > POOR_FIT:
+            key = f"platforms.{error.owner}.oscillator"
+            yield _Warned(error.path, no_power_law_fits(key, error.noise.misfit))
+        declared = error.subject.axis == "accelerometer_bias" and error.declared is not None
+        if declared and getattr(mission.platforms, error.owner).motion_error.acceleration is not None:
+            yield _Warned(error.path, stated_twice(error.owner))
+
+
+def _unused_correlations(mission: Mission) -> Iterator[_Warned]:
+    """Correlations that no row and no aggregate looks at."""
+    for name in PLATFORMS if mission.allocation.combine == "each" else ():
+        covariance = getattr(mission.platforms, name).motion_error.covariance
+        if covariance is not None and covariance.has_correlations():
+            yield _Warned(("platforms", name, "motion_error", "covariance"), correlations_not_used(name))
+
+
+@phrase
+def stated_twice(platform: str) -> str:
+    """Of a platform with an acceleration error and an accelerometer bias."""
+    return f"platforms.{platform}.motion_error: acceleration and the accelerometer bias are both stated; they add"
+
+
+@phrase
+def correlations_not_used(platform: str) -> str:
+    """Of a covariance where each error is judged alone."""
+    return (
+        f"platforms.{platform}.motion_error.covariance: correlations are not used where each error is judged alone; "
+        "combine: rss uses them"
+    )
+
+
+@phrase
+def no_power_law_fits(key: str, misfit: float) -> str:
+    """Of an oscillator's Allan deviation."""
+    return f"{key}: no power law fits the Allan deviation; the fit is off by {100 * misfit:.3g} %"
+
+
+@phrase
+def exchanges_are_rare(aperture_time: float) -> str:
+    """Of clocks that are synchronised less than once in an aperture. [s]"""
+    return (
+        f"synchronization.interval: pulses are exchanged less than once in an aperture of {aperture_time:g} s; "
+        "straight lines between them may make the phase worse than it is without"
+    )
+
+
+# ---------------------------------------------------------------------- autofocus
+def _of_autofocus(mission: Mission, resolution: Resolution) -> Iterator[_Warned]:
+    """An `autofocus.n_pull` that is more than counts, by range walk, or than the scene's size leaves."""
+    n_pull, algorithm, radius = mission.autofocus.n_pull, mission.autofocus.algorithm, mission.scene.radius
+    if n_pull is None:
+        return
+    key, limit = ("autofocus", "n_pull"), caps(mission)
+    if n_pull > limit.walk:
+        cells = n_pull / limit.walk / 2
+        yield _Warned(key, walks_over_range_cells(n_pull, cells, rounded_down(limit.walk)))
+    if radius is not None and limit.scene is not None and n_pull > limit.scene:
+        smear, held = 4 * n_pull * resolution.cross_range, rounded_down(limit.scene)
+        yield _Warned(key, smears_beyond_the_scene(n_pull, smear, algorithm, ROOM[algorithm], radius, held))
+
+
+@phrase
+def walks_over_range_cells(n_pull: float, cells: float, cap: str) -> str:
+    """Of a pull-in range that range walk does not leave; `cap` is the `n_pull` of half a cell, rounded down."""
+    return (
+        f"autofocus.n_pull: {n_pull:g} counts as {cap}, f0/B, where an error walks half a range cell; one of "
+        f"{n_pull:g}π rad walks {cells:.3g} cells, which correction along one dimension does not take out"
+    )
+
+
+@phrase
+def smears_beyond_the_scene(
+    n_pull: float, smear: float, algorithm: str, room: float, radius: float, held: str
+) -> str:
+    """Of a pull-in range that the scene's size does not leave. [m]"""
+    return (
+        f"autofocus.n_pull: an error of {n_pull:g}π rad smears a point over {format_quantity(smear, 'm')}; "
+        f"{algorithm} needs {room:g} times that. A scene of {format_quantity(2 * radius, 'm')} across holds "
+        f"n_pull {held}"
+    )
+
+
+# ---------------------------------------------------------------------- waivers
+@phrase
+def waiver_matches_nothing(row_id: str) -> str:
+    """Of a waiver."""
+    return f"waiver {row_id}: matches no row"
+
+
+@phrase
+def waiver_matches_everything(row_id: str) -> str:
+    """Of a waiver."""
+    return f"waiver {row_id}: names every row and would hide any new failure"
+
+
+@phrase
+def waiver_not_used(row_id: str) -> str:
+    """Of a waiver."""
+    return f"waiver {row_id}: not used: no row that it names fails"
+
+
+# ---------------------------------------------------------------------- images
+@phrase
+def limit_is_optimistic(row_id: str, shown: str) -> str:
+    """Of a limit of no row of the check that an image refutes."""
+    return f"{row_id}: optimistic limit: {shown}"
