@@ -19,9 +19,9 @@ import numpy as np
 
 from bisar_budget import evaluators, phrases
 from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG
-from bisar_budget.effects.effect import PLATFORMS, ErrorSource
+from bisar_budget.effects.effect import PLATFORMS, ErrorSource, number
 from bisar_budget.effects.sources import ErrorListing
-from bisar_budget.geometry import BistaticGeometry, angle_between_lines
+from bisar_budget.geometry import BistaticGeometry, GroundVector, angle_between_lines
 from bisar_budget.mission.model import Mission
 from bisar_budget.phrases import NOTHING, Note
 from bisar_budget.ranges import point_paths
@@ -42,32 +42,44 @@ _TOGETHER = 1 << 13  # lanes of a block
 _FLOORS = (FLOOR_RAD, FLOOR_RAD, FLOOR_M)
 
 
-class Does(NamedTuple):
-    """Phases and displacements by errors of a given size, in each case.
+class Declared(NamedTuple):
+    """Phases and displacements by errors of a given size, in each case; or plain numbers in one.
 
     Quadratic and cubic phase at the aperture edge, of the worse sign, signed like the first order of the declared
     one [rad]; displacement east and north by the declared sign, and by the opposite one [m]. Displacements are NaN
-    where there is none: a plane without an inverse, or no ground point that has the range history, which makes phases
-    infinite.
+    where there is none, in one case None: a plane without an inverse, or no ground point that has the range history,
+    which makes phases infinite.
     """
 
-    qpe: Floats
-    cubic: Floats
-    displacement: tuple[Floats, Floats]
-    opposite: tuple[Floats, Floats]
+    qpe: Any
+    cubic: Any
+    displacement: Any
+    opposite: Any
 
     @property
-    def farthest(self) -> tuple[Floats, Floats]:
+    def farthest(self) -> Any:
         """Displacement by the sign that moves farther, turned to the declared one's side. [m]"""
+        if self.displacement is None or self.opposite is None:
+            return None
         (x, y), (u, v) = self.displacement, self.opposite
         is_ahead, is_gone = np.hypot(x, y) >= np.hypot(u, v), np.isnan(x) | np.isnan(u)
         east, north = (np.where(is_ahead, a, -b) for a, b in ((x, u), (y, v)))
         return np.where(is_gone, math.nan, east), np.where(is_gone, math.nan, north)
 
-    def of(self, some: Any) -> "Does":
+    def of(self, some: Any) -> "Declared":
         """The same of some of the errors."""
         (x, y), (u, v) = self.displacement, self.opposite
-        return Does(self.qpe[some], self.cubic[some], (x[some], y[some]), (u[some], v[some]))
+        return Declared(self.qpe[some], self.cubic[some], (x[some], y[some]), (u[some], v[some]))
+
+    def in_one_case(self) -> "Declared":
+        """The same with plain numbers in the place of arrays of one case."""
+        return Declared(number(self.qpe), number(self.cubic), point(self.displacement), point(self.opposite))
+
+
+def point(place: tuple[Any, Any]) -> GroundVector | None:
+    """A place of the ground in the only case; None where there is none. [m]"""
+    east, north = map(number, place)
+    return None if math.isnan(east) else (east, north)
 
 
 class Allowed(NamedTuple):
@@ -82,7 +94,7 @@ class Allowed(NamedTuple):
     binding: Any
 
 
-class ImagePlanes(NamedTuple):
+class ImagePlane(NamedTuple):
     """Q⁻¹ of each case: takes constant and linear range error to the displacement of the image."""
 
     adjugate: tuple[Any, Any]
@@ -100,7 +112,7 @@ class ImagePlanes(NamedTuple):
         )
 
 
-def published_planes(geometry: BistaticGeometry) -> tuple[ImagePlanes, Any]:
+def published_planes(geometry: BistaticGeometry) -> tuple[ImagePlane, Any]:
     """Invert Q with the range held constant, (19) and (30); and the angle between its gradients. [deg]
 
     That Q can be singular where the true gradients are not: its second row is v/R, theirs v⊥/R.
@@ -111,7 +123,7 @@ def published_planes(geometry: BistaticGeometry) -> tuple[ImagePlanes, Any]:
     first, second, (determinant,) = evaluators.published_ground_inverse(*ground)
     # (30): the first column holds (-rate_y, rate_x), the second (s_y, -s_x).
     degrees = np.degrees(angle_between_lines((-second[1], first[1]), (second[0], -first[0])))
-    return ImagePlanes((first, second), determinant, degrees < MIN_GRADIENT_ANGLE_DEG), degrees
+    return ImagePlane((first, second), determinant, degrees < MIN_GRADIENT_ANGLE_DEG), degrees
 
 
 class ErrorBlock:
@@ -200,20 +212,20 @@ class ErrorBlock:
         return found
 
     # ---------------------------------------------------------------- errors of any size
-    def does(self, model: str, size: Floats) -> Does:
+    def does(self, model: str, size: Floats) -> Declared:
         """Effects of errors of given sizes by a model, (errors, cases); NaN for an error without a size."""
         effect = self.effects[model]
         qpe, cubic = effect.qpe * size + 0.0, effect.cubic * size + 0.0
         moved = self.table.planes[model].displacement(effect, size)
         east, north = (np.where(self.is_motion, part, math.nan) for part in moved)
-        found = Does(qpe, cubic, (east, north), (0.0 - east, 0.0 - north))
+        found = Declared(qpe, cubic, (east, north), (0.0 - east, 0.0 - north))
         if model == "full":
             is_large = self.is_large(size)
             if is_large.any():
                 self._exactly(found, size, is_large)
         return found
 
-    def _exactly(self, found: Does, size: Floats, is_large: Truths) -> None:
+    def _exactly(self, found: Declared, size: Floats, is_large: Truths) -> None:
         """Put what exact ranges say into the places that are too large for a first order."""
         sizes = size[is_large]
         known = self.followed(is_large, np.abs(sizes))
@@ -394,7 +406,7 @@ class DeclaredErrors:
         self.has_direct_path = mission.has_direct_path
         self.each = np.arange(cases)
         published, self.published_angle_deg = published_planes(geometries)
-        self.planes = {"published": published, "full": ImagePlanes(exact.adjugate, exact.determinant)}
+        self.planes = {"published": published, "full": ImagePlane(exact.adjugate, exact.determinant)}
         half = exact.half
         (a, b), (c, d) = ([element / exact.determinant for element in row] for row in exact.adjugate)
         (q_0, q_1), (c_0, c_1) = exact.phases_per_term
@@ -412,7 +424,7 @@ class DeclaredErrors:
         starts = range(0, len(self.listed), size)
         self.blocks = [ErrorBlock(self, self.listed[start : start + size]) for start in starts]
         self._place = {error.id: divmod(place, size) for place, error in enumerate(self.listed)}
-        self._does: dict[tuple[str, int], Does] = {}
+        self._does: dict[tuple[str, int], Declared] = {}
 
     def array(self, value: Any) -> Floats:
         """One number for each case."""
@@ -459,12 +471,12 @@ class DeclaredErrors:
         block, place = self._place[error.id]
         return self.blocks[block], place
 
-    def does(self, model: str, error: ErrorSource) -> Does:
+    def does(self, model: str, error: ErrorSource) -> Declared:
         """Effect of a declared error by a model, (cases,)."""
         block, place = self._place[error.id]
         return self.of_block(model, block).of(place)
 
-    def of_block(self, model: str, block: int) -> Does:
+    def of_block(self, model: str, block: int) -> Declared:
         """Effects of the declared errors of a block by a model, (errors, cases)."""
         key = (model, block)
         if key not in self._does:

@@ -12,7 +12,7 @@ import numpy as np
 from bisar_budget import phrases
 from bisar_budget.effects.subject import MOTION, Subject
 from bisar_budget.faults import KeyPath
-from bisar_budget.geometry import GroundVector, Vector
+from bisar_budget.geometry import Vector
 from bisar_budget.phrases import Note
 from bisar_budget.ranges.exact_ranges import Effect
 
@@ -108,28 +108,3 @@ class ErrorSource(NamedTuple):
     def moves(self, platform: str) -> bool:
         """Whether it is an error of a platform's position; one of the mission's own is of both."""
         return self.owner in (platform, "mission")
-
-
-class ImagePlane(NamedTuple):
-    """Q⁻¹: takes constant and linear range error to the displacement of the image."""
-
-    adjugate: tuple[tuple[float, ...], ...]
-    determinant: float
-    degeneracy: Note
-
-    @property
-    def inverse(self) -> list[list[float]]:
-        """(2, 2) [m/m, m/(m/s)], where it is not degenerate."""
-        return [[element / self.determinant for element in row] for row in self.adjugate]
-
-    def displacement(self, effect: Effect, declared: float) -> GroundVector | None:
-        """Displacement on the ground, (2,), by (25) with the Q of a model; None where it has no inverse. [m]"""
-        if self.degeneracy:
-            return None
-        scale = declared / self.determinant
-        (a, b), (c, d) = self.adjugate
-        # Adding 0.0 turns -0.0, which reads as a claim about a sign, into 0.0.
-        return (
-            (a * effect.constant + b * effect.linear) * scale + 0.0,
-            (c * effect.constant + d * effect.linear) * scale + 0.0,
-        )

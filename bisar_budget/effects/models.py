@@ -11,10 +11,11 @@ from bisar_budget.effects.declared import (
     END_OF_IMAGE,
     HELD,
     SHARE,
+    Declared,
     DeclaredErrors,
-    Does,
+    point,
 )
-from bisar_budget.effects.effect import ErrorSource, ImagePlane, number
+from bisar_budget.effects.effect import ErrorSource, number
 from bisar_budget.geometry import GroundVector
 from bisar_budget.phrases import Note
 from bisar_budget.ranges.exact_ranges import Effect
@@ -32,30 +33,6 @@ class ExactPhases(NamedTuple):
     turn: float
 
 
-class Declared(NamedTuple):
-    """Effect of one error of a given size, with the fields of `Does`; None where there is no displacement."""
-
-    qpe: float
-    cubic: float
-    displacement: GroundVector | None
-    opposite: GroundVector | None
-
-    @classmethod
-    def of(cls, does: Does) -> "Declared":
-        """That of the only case."""
-        moves = [(number(east), number(north)) for east, north in (does.displacement, does.opposite)]
-        ahead, back = (None if math.isnan(move[0]) else move for move in moves)
-        return cls(number(does.qpe), number(does.cubic), ahead, back)
-
-    @property
-    def farthest(self) -> GroundVector | None:
-        """Displacement by the sign that moves farther, turned to the declared one's side. [m]"""
-        if self.displacement is None or self.opposite is None:
-            return None
-        back = (-self.opposite[0], -self.opposite[1])
-        return max(self.displacement, back, key=lambda move: math.hypot(*move))
-
-
 class Model:
     """One of both models, of the errors of one case."""
 
@@ -63,13 +40,15 @@ class Model:
         self.errors, self.exact, self.name = errors, errors.exact, name
         self.is_published = name == "published"
         self.is_blind = self.is_published and errors.has_direct_path  # to what the collection has
-        planes = errors.planes[name]
-        rows = [tuple(map(number, row)) for row in planes.adjugate]
-        self.plane = ImagePlane((rows[0], rows[1]), number(planes.determinant), errors.degeneracy(name))
+        self.plane, self.degeneracy = errors.planes[name], errors.degeneracy(name)
 
     def effect(self, source: ErrorSource) -> Effect:
         """Effect of a unit of an error; by the full model of one too small for a second order."""
         return source.effect if self.is_published else source.full
+
+    def displacement(self, effect: Effect, size: float) -> GroundVector | None:
+        """Displacement on the ground by (25) with the Q of the model; None where that has no inverse. [m]"""
+        return point(self.plane.displacement(effect, size))
 
     def equation(self, source: ErrorSource) -> str:
         """Where it comes from."""
@@ -88,7 +67,7 @@ class Model:
         block, place = self.errors.block_of(source)
         sizes = np.full(block.declared.shape, math.nan)
         sizes[place] = size
-        return Declared.of(block.does(self.name, sizes).of(place))
+        return block.does(self.name, sizes).of(place).in_one_case()
 
     def allowed(self, source: ErrorSource, limits: Sequence[float | None]) -> tuple[float | None, str | None]:
         """Smallest size, of either sign, at which an error reaches a limit, and which of `HELD` that is; or None.
@@ -162,7 +141,7 @@ class Model:
 
     def left_over_small(self, source: ErrorSource, size: float) -> Sequence[float]:
         """The same at the displaced point, of an error so small that its effects are proportional to it. [m]"""
-        east, north = self.plane.displacement(source.full, size) or (0.0, 0.0)
+        east, north = self.displacement(source.full, size) or (0.0, 0.0)
         by_east, by_north = self.exact.slopes
         left = size * self.exact.range_error(self.errors.lanes(source)) + east * by_east + north * by_north
         found: list[float] = left[:, 0].tolist()

@@ -29,7 +29,7 @@ def location(study: Study, requirement: float) -> Verdict:
     try:
         scale = _scale(study, sizes, requirement)
         if scale is None:
-            degeneracy = study.plane.degeneracy
+            degeneracy = study.analysis.published.degeneracy
             why = reasons.displacement_degenerates(degeneracy) if degeneracy else reasons.errors_move_nothing(rule)
             return blank._replace(reason=why)
         said = _places(study, sizes, scale)
@@ -96,8 +96,8 @@ def _scale(study: Study, sizes: Sizes, requirement: float) -> float | None:
         place = published_displacement(study, sizes, 1.0)
         length = math.hypot(*place) if place else 0.0
         return requirement / length if length else None
-    plane = study.analysis.full.plane
-    moves = [plane.displacement(source.full, size) or (0.0, 0.0) for source, size in sizes]
+    full = study.analysis.full
+    moves = [full.displacement(source.full, size) or (0.0, 0.0) for source, size in sizes]
     length = math.hypot(math.fsum(m[0] for m in moves), math.fsum(m[1] for m in moves))
     if not length:
         return None

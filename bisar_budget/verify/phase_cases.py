@@ -257,7 +257,8 @@ def compare(excess: float, tolerance: float) -> str:
 
 def published_displacement(study: Study, sizes: Sizes, scale: float) -> GroundVector | None:
     """Displacement of errors together by (25); None where it has none."""
-    moves = [study.plane.displacement(source.effect, scale * size) for source, size in sizes]
+    published = study.analysis.published  # (25)
+    moves = [published.displacement(source.effect, scale * size) for source, size in sizes]
     if any(move is None for move in moves):
         return None
     return (math.fsum(m[0] for m in moves if m), math.fsum(m[1] for m in moves if m))

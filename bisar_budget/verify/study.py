@@ -51,7 +51,6 @@ class Study:
         self.geometry, self.sources = self.analysis.geometry, self.analysis.sources
         self.model = mission.gating_model
         self.allocation = self.analysis.allocation
-        self.plane = self.analysis.published.plane  # (25)
         self.collection = PointCollection(mission, self.geometry)
 
     @property

@@ -158,7 +158,7 @@ def test_phases_have_no_rounding_of_the_ranges() -> None:
     analysis = Analysis(parse_mission(family_text("geostationary_drone", 3)))
     source = next(one for one in analysis.sources if one.id == "transmitter.position.x")
     lanes = analysis.errors.lanes(source).of(np.zeros(10, dtype=int))
-    near = analysis.full.plane.displacement(source.full, 1.0)
+    near = analysis.full.displacement(source.full, 1.0)
     found = analysis.exact.phases(lanes, 1 + np.arange(10) * 1e-6, near)
     phases = np.array((found.quadratic, found.cubic)).T
     assert np.abs(phases[0]).max() > 1e-3
