@@ -539,18 +539,11 @@ class ExactRanges:
         """Search with the slopes of the centre: a third of the work, where it settles in a few steps."""
         gradient = _of(self.gradient, of)
         for _ in range(FEW):
-            (a, c, quadratic_east, cubic_east), (b, d, quadratic_north, cubic_north) = gradient
-            determinant = a * d - b * c
-            constant, linear, quadratic, cubic = self.fit @ _left(measured, east, north, room)
-            step_east = (b * linear - d * constant) / determinant
-            step_north = (c * constant - a * linear) / determinant
+            left = self.fit @ _left(measured, east, north, room)
+            _, step_east, step_north, phases = _newton_step(left, *gradient)
             east, north = east + step_east, north + step_north
             (k,) = _of([self.k], of)
             is_done = k * (np.abs(step_east) + np.abs(step_north)) < UNSEEN_RAD / NEAR
-            phases = (
-                k * (quadratic + quadratic_east * step_east + quadratic_north * step_north),
-                k * (cubic + cubic_east * step_east + cubic_north * step_north),
-            )
             self._keep(found, alive, of, is_done, east, north, phases, np.ones(alive.size))
             going = np.flatnonzero(~is_done)
             if not going.size:
@@ -571,21 +564,12 @@ class ExactRanges:
         before = np.full(alive.size, math.inf)
         for _ in range(ITERATIONS):
             seen, nearest = _seen(measured, east, north, room)
-            (constant, linear, quadratic, cubic), by_east, by_north = np.matmul(self.fit, seen)
-            a, c, quadratic_east, cubic_east = by_east  # what a step of a metre adds to what is left
-            b, d, quadratic_north, cubic_north = by_north
-            determinant = a * d - b * c
-            step_east = (b * linear - d * constant) / determinant
-            step_north = (c * constant - a * linear) / determinant
+            determinant, step_east, step_north, phases = _newton_step(*np.matmul(self.fit, seen))
             east, north = east + step_east, north + step_north
             step = step_east * step_east + step_north * step_north
             k, meets, at_centre, half = _of([self.k, self.nearest, self.determinant, self.half], of)
             is_apart = nearest >= MEETS * meets
             is_done = is_apart & (k * step < UNSEEN_RAD * nearest)
-            phases = (
-                k * (quadratic + quadratic_east * step_east + quadratic_north * step_north),
-                k * (cubic + cubic_east * step_east + cubic_north * step_north),
-            )
             is_right = is_done & (determinant * at_centre > 0)
             turn = determinant / (at_centre * half)
             self._keep(found, alive, of, is_right, east, north, phases, turn)
@@ -608,14 +592,31 @@ class ExactRanges:
         phases: tuple[Floats, Floats],
         turn: Floats,
     ) -> None:
-        """Note the lanes that have settled; what is less than rounding leaves is none."""
+        """Note the lanes that have settled, phases in metres; what is less than rounding leaves is none."""
         places = alive[is_done]
         found.is_found[places] = True
         found.east[places], found.north[places], found.turn[places] = east[is_done], north[is_done], turn[is_done]
-        (rounding,) = _of([self.rounding], of[is_done])
+        k, rounding = _of([self.k, self.rounding], of[is_done])
         for kept, phase in zip((found.quadratic, found.cubic), phases, strict=True):
-            one = phase[is_done]
+            one = k * phase[is_done]
             kept[places] = np.where(np.abs(one) > rounding, one, 0.0)
+
+
+def _newton_step(
+    left: Floats, by_east: Floats, by_north: Floats
+) -> tuple[Floats, Floats, Floats, tuple[Floats, Floats]]:
+    """Step east and north after which nothing is left of the constant and the linear part, to first order. [m]
+
+    Parts of what is left (4, lanes) [m], and what a step of a metre adds to them. With the step the determinant of
+    its equations, and the quadratic and cubic part after it. [m]
+    """
+    constant, linear, quadratic, cubic = left
+    (a, c, quadratic_east, cubic_east), (b, d, quadratic_north, cubic_north) = by_east, by_north
+    determinant = a * d - b * c
+    east = (b * linear - d * constant) / determinant
+    north = (c * constant - a * linear) / determinant
+    quadratic = quadratic + quadratic_east * east + quadratic_north * north
+    return determinant, east, north, (quadratic, cubic + cubic_east * east + cubic_north * north)
 
 
 def _weighted(along: Sequence[Any], weight: Any) -> Sequence[Any]:
