@@ -19,7 +19,7 @@ import numpy as np
 
 from bisar_budget import evaluators, phrases
 from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG
-from bisar_budget.effects.effect import PLATFORMS, ErrorSource, number
+from bisar_budget.effects.effect import PLATFORMS, ErrorSource, plain
 from bisar_budget.effects.sources import ErrorListing
 from bisar_budget.geometry import BistaticGeometry, GroundVector, angle_between_lines
 from bisar_budget.mission.model import Mission
@@ -73,12 +73,12 @@ class Declared(NamedTuple):
 
     def in_one_case(self) -> "Declared":
         """The same with plain numbers in the place of arrays of one case."""
-        return Declared(number(self.qpe), number(self.cubic), point(self.displacement), point(self.opposite))
+        return Declared(plain(self.qpe), plain(self.cubic), point(self.displacement), point(self.opposite))
 
 
 def point(place: tuple[Any, Any]) -> GroundVector | None:
     """A place of the ground in the only case; None where there is none. [m]"""
-    east, north = map(number, place)
+    east, north = map(plain, place)
     return None if math.isnan(east) else (east, north)
 
 

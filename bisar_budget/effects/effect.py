@@ -34,7 +34,7 @@ def override_notes(platform: str, overridden: Sequence["Overridden"], *figures: 
     )
 
 
-def number(column: Any) -> float:
+def plain(column: Any) -> float:
     """The number of the only case."""
     return float(column.item(0) if isinstance(column, np.ndarray) else column)
 
@@ -69,10 +69,10 @@ class ErrorSource(NamedTuple):
 
     def in_one_case(self) -> "ErrorSource":
         """The same with plain numbers in the place of arrays of one case."""
-        effect, full = (Effect._make(map(number, one)) for one in (self.effect, self.full))
-        declared = None if self.declared is None else number(self.declared)
+        effect, full = (Effect._make(map(plain, one)) for one in (self.effect, self.full))
+        declared = None if self.declared is None else plain(self.declared)
         return self._replace(
-            declared=declared, effect=effect, full=full, direction=tuple(map(number, self.direction))
+            declared=declared, effect=effect, full=full, direction=tuple(map(plain, self.direction))
         )
 
     @property

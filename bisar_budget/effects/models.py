@@ -15,7 +15,7 @@ from bisar_budget.effects.declared import (
     DeclaredErrors,
     point,
 )
-from bisar_budget.effects.effect import ErrorSource, number
+from bisar_budget.effects.effect import ErrorSource, plain
 from bisar_budget.geometry import GroundVector
 from bisar_budget.phrases import Note
 from bisar_budget.ranges.exact_ranges import Effect
@@ -81,7 +81,7 @@ class Model:
             of_all[place] = math.nan if limit is None else limit
             held.append(None if limit is None else of_all)
         found = block.allowed(self.name, held, is_whole=False)
-        size, binding = number(found.smallest[place]), int(found.binding[place, 0])
+        size, binding = plain(found.smallest[place]), int(found.binding[place, 0])
         return (None, None) if math.isnan(size) else (size, (*HELD, END_OF_IMAGE)[binding])
 
     def allowable(self, source: ErrorSource, requirement: str, limit: float) -> float | None:
