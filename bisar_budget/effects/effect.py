@@ -1,4 +1,4 @@
-"""Effect of one unit of an error on the range history and the image, by the published and the full model.
+"""Effect of one unit of an error on the range history and the image, by both models; its subject and its name.
 
 Effects are those of Rigling & Moses (Tables I and II), and of the full model, which lets the line of sight turn and
 counts what the displacement of the image adds (`ranges.exact_ranges`).
@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from bisar_budget import phrases
-from bisar_budget.effects.subject import MOTION, Subject
 from bisar_budget.faults import KeyPath
 from bisar_budget.geometry import Vector
 from bisar_budget.phrases import Note
@@ -18,6 +17,42 @@ from bisar_budget.ranges.exact_ranges import Effect
 
 if TYPE_CHECKING:
     from bisar_budget.mission.instruments import Overridden
+
+from functools import cache
+
+MOTION = ("position", "velocity", "acceleration")  # kinds of error that a platform's measured path can have
+
+
+class Subject(NamedTuple):
+    """The thing that a row or an error is about. `subject` makes it, with its id; nobody reads an id to find out.
+
+    `owner` is the one whose share it counts against: transmitter, receiver, clock, or mission for what is nobody's.
+    `kind` is position, velocity, acceleration, vibration, timing, terrain, other, or the name of a sum. `axis` is the
+    axis of `frame`, the term of the clock, the name of another error, the sort of a vibration, and `entry` the place
+    of one in the file.
+    """
+
+    id: str
+    owner: str
+    kind: str
+    axis: str = ""
+    frame: str = "scene"
+    entry: int | None = None
+
+
+@cache
+def subject(owner: str, kind: str, axis: str = "", frame: str = "scene", entry: int | None = None) -> Subject:
+    """Name an error or a sum as the contract does."""
+    if kind in ("timing", "other"):  # of one owner each
+        parts = [kind, axis]
+    elif owner == "clock":
+        parts = ["timing", kind]
+    elif owner == "mission" and kind in MOTION:
+        parts = ["common", kind, axis]
+    else:
+        parts = [owner, kind, axis, "" if entry is None else str(entry)]
+    return Subject(".".join(filter(None, parts)), owner, kind, axis, frame, entry)
+
 
 PLATFORMS = ("transmitter", "receiver")
 MOTION_UNITS = dict(zip(MOTION, ("m", "m/s", "m/s^2"), strict=True))
@@ -71,9 +106,7 @@ class ErrorSource(NamedTuple):
         """The same with plain numbers in the place of arrays of one case."""
         effect, full = (Effect._make(map(plain, one)) for one in (self.effect, self.full))
         declared = None if self.declared is None else plain(self.declared)
-        return self._replace(
-            declared=declared, effect=effect, full=full, direction=tuple(map(plain, self.direction))
-        )
+        return self._replace(declared=declared, effect=effect, full=full, direction=tuple(map(plain, self.direction)))
 
     @property
     def owner(self) -> str:

@@ -6,7 +6,7 @@ import numpy as np
 
 from bisar_budget.budget.pull_in import ROOM
 from bisar_budget.budget.verdicts import rows_worth_showing
-from bisar_budget.effects.subject import Subject
+from bisar_budget.effects.effect import Subject
 from bisar_budget.findings.images import FLOOR_DB, ImageEvidence, PointImage, Verdict
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.mission.model import Mission

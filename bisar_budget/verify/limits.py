@@ -12,10 +12,8 @@ from bisar_budget.analysis.vibration_limits import tone_limits
 from bisar_budget.budget.aggregates import Aggregates
 from bisar_budget.budget.judged_rows import Judging
 from bisar_budget.effects.declared import QUADRATIC
-from bisar_budget.effects.echoes import SLOWEST
-from bisar_budget.effects.effect import PLATFORMS
-from bisar_budget.effects.subject import Subject, subject
-from bisar_budget.effects.vibration import lines_of
+from bisar_budget.effects.effect import PLATFORMS, Subject, subject
+from bisar_budget.effects.vibration import SLOWEST, lines_of
 from bisar_budget.faults import printable
 from bisar_budget.findings.images import Verdict, VerifiedMission
 from bisar_budget.mission.model import Mission, Simulation
@@ -143,7 +141,7 @@ def _of_tones_by_islr(study: Study) -> Iterator[tuple[Subject, Case]]:
 def _of_instruments(study: Study) -> Iterator[tuple[str, Case]]:
     """Sensors and clocks that have a limit, and what all noise spreads together."""
     from bisar_budget.budget.random_rows import RandomRows
-    from bisar_budget.effects.clocks import spurs_of
+    from bisar_budget.effects.oscillators import spurs_of
     from bisar_budget.verify.random_cases import (
         limits_of,
         verify_islr,

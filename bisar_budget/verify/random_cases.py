@@ -13,10 +13,10 @@ import numpy as np
 from bisar_budget.analysis.spread import declared_powers, islr_db, mainlobe_energy, shown_islr_db, spread_limit, tones
 from bisar_budget.analysis.vibration_limits import echo_phase, highest_echo
 from bisar_budget.budget.random_rows import HELD, ISLR, held_effect, limits_for, sizes_at
-from bisar_budget.effects.clocks import Spur
 from bisar_budget.effects.declared import CUBIC
+from bisar_budget.effects.effect import Subject, subject
+from bisar_budget.effects.oscillators import Spur
 from bisar_budget.effects.random_errors import RandomError, process_of
-from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.effects.vibration import sight_of
 from bisar_budget.findings.images import Verdict
 from bisar_budget.mission.model import Simulation

@@ -9,8 +9,7 @@ import numpy as np
 from bisar_budget.analysis.analysis import Analysis, Model
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.declared import QUADRATIC
-from bisar_budget.effects.effect import PLATFORMS, ErrorSource
-from bisar_budget.effects.subject import Subject
+from bisar_budget.effects.effect import PLATFORMS, ErrorSource, Subject
 from bisar_budget.mission.model import Mission
 from bisar_budget.ranges.exact_ranges import FINE, STILL, ExactRanges, followed
 from bisar_budget.simulate.autofocus import ALGORITHMS

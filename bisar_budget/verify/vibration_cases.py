@@ -14,10 +14,8 @@ import numpy as np
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.vibration_limits import vibration_limits
 from bisar_budget.constants import SPEED_OF_LIGHT
-from bisar_budget.effects.echoes import SLOWEST, near_lines, worst_phases
-from bisar_budget.effects.effect import PLATFORMS
-from bisar_budget.effects.subject import Subject, subject
-from bisar_budget.effects.vibration import Line, lines_of
+from bisar_budget.effects.effect import PLATFORMS, Subject, subject
+from bisar_budget.effects.vibration import SLOWEST, Line, lines_of, near_lines, worst_phases
 from bisar_budget.findings.images import Verdict
 from bisar_budget.mission.model import Mission
 from bisar_budget.phrases import Note

@@ -5,8 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.constants import SPEED_OF_LIGHT
-from bisar_budget.effects.effect import MOTION_UNITS, PLATFORMS, ErrorSource
-from bisar_budget.effects.subject import Subject, subject
+from bisar_budget.effects.effect import MOTION_UNITS, PLATFORMS, ErrorSource, Subject, subject
 from bisar_budget.faults import KeyPath, printable
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.geometry import FRAME_AXES, PlatformState
