@@ -232,7 +232,7 @@ class PointPaths:
         for _ in range(ROUNDS):
             others = best[:, held.group]
             upto = np.where(held.is_alone, np.choose(held.row, others), others.min(axis=0))
-            seen = _Seen(self, held, np.minimum(held.most, upto), tries)
+            seen = _SearchState(self, held, np.minimum(held.most, upto), tries)
             ends = seen.is_sure
             np.minimum.at(best, (held.row[ends], held.group[ends]), seen.found[ends])
             going = np.flatnonzero(~ends)
@@ -243,7 +243,7 @@ class PointPaths:
             held, tries = held.of(going), tries[going] + seen.is_between[going]
 
 
-class _Seen:
+class _SearchState:
     """What known points tell of searches.
 
     Attributes

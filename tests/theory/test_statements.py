@@ -8,15 +8,8 @@ import pytest
 
 from bisar_budget import evaluators
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.geometry import (
-    PRINTED,
-    TRUE,
-    BistaticGeometry,
-    LinePiece,
-    PlatformState,
-    gradients_of,
-    indicated_point,
-)
+from bisar_budget.effects.effect import PRINTED, TRUE, LinePiece, gradients_of, indicated_point
+from bisar_budget.geometry import BistaticGeometry, PlatformState
 from bisar_budget.mission.load import load_mission
 from bisar_budget.ranges.exact_ranges import aperture_nodes
 from bisar_budget.simulate.exact import exact_effect
