@@ -31,7 +31,7 @@ CREST = 0.01  # of a limit: so little below it, the crest of a curve through few
 DEPARTS = 0.5  # of the limit: a value so far from a straight line may have been anywhere in between
 COARSE = 0.02  # of the size: within a shorter interval a curve is trusted
 GROWTH = 1.5  # of a size in a step
-ROUNDS = 400
+ROUNDS = 100  # of a search; none is known that takes more than 25
 NEWTON = 3  # steps on a cubic
 FEW = 256  # lanes: of so few, several points cost as much as one
 LADDER = np.array((0.25, 0.5, 0.75, 1.0, 1.3))  # of the size that is looked at first, where nothing is known
@@ -169,8 +169,8 @@ class PointPaths:
         end = _parallel_between(before, point)
         step = np.where(is_end, 0.9 * (end - before[0]), (point[0] - before[0]) / 2)
         is_fold = (np.abs(before[5]) < FOLDS) & (fold < LEAST_STEP * point[0])
-        is_over = ~is_end & (is_fold | (step < FINEST_STEP * point[0]))
         is_near = is_end & (np.abs(before[5]) < NEAR_FOLD)
+        is_over = ~is_near & ((is_fold & ~is_end) | (step < FINEST_STEP * point[0]))
         self.end[some[is_near]] = end[is_near]
         self.end[some[is_over]] = (before[0] + np.minimum(step, fold))[is_over]
         self._step[some], self._is_lost[some] = step, True
@@ -240,7 +240,8 @@ class PointPaths:
                 return
             some, size = seen.next(going)
             self._follow(held.lane[some], size)
-            held, tries = held.of(going), tries[going] + seen.is_between[going]
+            held, tries, low = held.of(going), tries[going] + seen.is_between[going], seen.low[going]
+        np.minimum.at(best, (held.row, held.group), low)  # which is safe, and no search is known that comes here
 
 
 class _SearchState:
