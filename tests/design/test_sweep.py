@@ -86,8 +86,8 @@ def assert_as_checked(mission, cases, whole, columns=(), model=None, near=NEAR) 
                 want = math.nan if want is None else want
                 # ISLR holds cubic phases: exact ranges know them to 4e-10 rad, the smallest that counts is 1e-3.
                 holds_cubic = ".islr." in name and case.requirements.cubic_phase_error is None
-                near = 1e-6 if holds_cubic else NEAR
-                assert got[name] == pytest.approx(want, rel=near, nan_ok=True), (values, name)
+                within = 1e-6 if holds_cubic else NEAR
+                assert got[name] == pytest.approx(want, rel=within, nan_ok=True), (values, name)
 
 
 COLUMNS = (
