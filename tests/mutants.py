@@ -38,7 +38,7 @@ _TABLES = "bisar_budget/theory/published.py"
 _EVALUATORS = "bisar_budget/evaluators.py"
 _GEOMETRY = "bisar_budget/geometry.py"
 _POINT = "bisar_budget/simulate/point.py"
-_PIECES = "bisar_budget/effects/pieces.py"
+_PIECES = "bisar_budget/effects/effect.py"
 _PHASES = "bisar_budget/verify/phase_cases.py"
 _NOISE = "bisar_budget/verify/spread_cases.py"
 

@@ -7,12 +7,10 @@ from bisar_budget.analysis.allocation import Allocation, allocate
 from bisar_budget.analysis.spread import Tone, tones
 from bisar_budget.analysis.together import Together
 from bisar_budget.effects.combined import Correlated, correlated_errors
-from bisar_budget.effects.declared import DeclaredErrors
-from bisar_budget.effects.effect import ErrorSource
-from bisar_budget.effects.models import Declared, Model
+from bisar_budget.effects.declared import Declared, DeclaredErrors, Model
+from bisar_budget.effects.effect import ErrorSource, Subject
 from bisar_budget.effects.random_errors import RandomError, random_errors
 from bisar_budget.effects.sources import exact_ranges
-from bisar_budget.effects.subject import Subject
 from bisar_budget.effects.vibration import DeclaredPhase, slow_phases
 from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.model import Mission, has_instruments
@@ -124,7 +122,7 @@ class Analysis:
 
     def does(self, model: Model, source: ErrorSource) -> Declared:
         """Effect of a declared error by a model."""
-        return Declared.of(self.errors.does(model.name, source))
+        return self.errors.does(model.name, source).in_one_case()
 
     def declared(self, model: Model) -> dict[str, Declared]:
         """Effect of each declared error by a model, by row id, along the axes that the file states it in."""

@@ -27,7 +27,7 @@ from bisar_budget.effects.combined import combined, combined_phase, correlated_e
 from bisar_budget.effects.declared import DeclaredErrors
 from bisar_budget.geometry import BistaticGeometry, GroundVector
 from bisar_budget.phrases import NOTHING, Note
-from bisar_budget.ranges.exact_ranges import ExactRanges, Floats, Lanes, Places, SmallErrors, Truths, joined
+from bisar_budget.ranges.exact_ranges import ExactRanges, Floats, Lanes, Places, SmallErrors, Truths
 from bisar_budget.ranges.point_paths import PointPaths
 from bisar_budget.units import format_quantity
 
@@ -217,7 +217,7 @@ class ScenePhases:
     def _lanes(self) -> Lanes:
         """Lanes of the errors that are large in any case, in all of them, of each sign."""
         large = np.flatnonzero(self.is_large.any(axis=1))
-        return joined([self.errors.lanes(self.members[i], sign) for i in large for sign in (1.0, -1.0)])
+        return self.errors.lanes(*(self.members[i] for i in large), signs=(1.0, -1.0))
 
     @cached_property
     def _by_sign(self) -> Floats:

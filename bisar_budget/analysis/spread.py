@@ -17,12 +17,10 @@ import numpy as np
 
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.constants import MAINLOBE_ENERGY
-from bisar_budget.effects.clocks import spurs_of
 from bisar_budget.effects.declared import CUBIC
-from bisar_budget.effects.echoes import SLOWEST
-from bisar_budget.effects.effect import PLATFORMS
-from bisar_budget.effects.subject import Subject, subject
-from bisar_budget.effects.vibration import counted, lines_of
+from bisar_budget.effects.effect import PLATFORMS, Subject, subject
+from bisar_budget.effects.oscillators import spurs_of
+from bisar_budget.effects.vibration import SLOWEST, counted, lines_of
 from bisar_budget.mission.model import Mission, Simulation, has_instruments
 
 if TYPE_CHECKING:

@@ -25,9 +25,8 @@ from numpy.typing import NDArray
 from bisar_budget import evaluators
 from bisar_budget.analysis.allocation import Allocation, Split
 from bisar_budget.analysis.spread import Tone, mainlobe_energy, spread_phase
-from bisar_budget.effects.echoes import near_groups, worst_phases
 from bisar_budget.effects.effect import PLATFORMS
-from bisar_budget.effects.vibration import cubic_part, quadratic_part
+from bisar_budget.effects.vibration import cubic_part, near_groups, quadratic_part, worst_phases
 from bisar_budget.mission.model import Mission
 
 LARGEST_ECHO = 2.0  # rad; beyond, echoes are above the response

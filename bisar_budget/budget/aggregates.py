@@ -23,8 +23,8 @@ from bisar_budget.effects.combined import (
     correlation_notes,
 )
 from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
+from bisar_budget.effects.effect import Subject, subject
 from bisar_budget.effects.random_errors import displaces_unknown
-from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.effects.vibration import DeclaredPhase
 from bisar_budget.faults import KeyPath
 from bisar_budget.findings.row import Row

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.constants import SPEED_OF_LIGHT
-from bisar_budget.effects.effect import PLATFORMS
-from bisar_budget.effects.subject import Subject
+from bisar_budget.effects.effect import PLATFORMS, Subject
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import norm
 from bisar_budget.mission.model import Mission

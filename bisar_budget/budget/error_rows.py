@@ -12,9 +12,8 @@ from bisar_budget.analysis.analysis import Analysis, Model
 from bisar_budget.budget.judged_rows import BOUND, CODE, REQUIREMENTS, Floats, Judged, Judging, number, worded
 from bisar_budget.budget.pull_in import caps, needed_sentence
 from bisar_budget.constants import UTILIZATION_TOLERANCE
-from bisar_budget.effects.declared import CUBIC, END_OF_IMAGE, HELD, LOCATION, QUADRATIC, Does
+from bisar_budget.effects.declared import CUBIC, END_OF_IMAGE, HELD, LOCATION, QUADRATIC, Declared
 from bisar_budget.effects.effect import ErrorSource
-from bisar_budget.effects.models import Declared
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import FRAME_AXES
 from bisar_budget.phrases import NOTHING, Note
@@ -84,7 +83,7 @@ class ErrorRows:
             yield ErrorRow(judged.at(row, source.subject), source, self.limits[source.owner])
 
 
-def _is_over(does: Does, held: tuple[Floats, float | None, float | None], is_motion: Any) -> Any:
+def _is_over(does: Declared, held: tuple[Floats, float | None, float | None], is_motion: Any) -> Any:
     """Whether any effect of errors is over what it is held to."""
     limit, cubic, location = held
     found = np.abs(does.qpe) / limit > BOUND
@@ -116,8 +115,8 @@ class ErrorRow:
             mine = analysis.does(model, source)
             qpe = abs(mine.qpe)
             fields = {"displacement_m": mine.displacement}
-            if mine.displacement is None and source.is_motion and model.plane.degeneracy:
-                notes = (*notes, model.plane.degeneracy)
+            if mine.displacement is None and source.is_motion and model.degeneracy:
+                notes = (*notes, model.degeneracy)
             if status == CODE["fail"]:
                 over = _over(analysis, model, row, source, mine, limit)
             elif status == CODE["warn"]:

@@ -36,8 +36,7 @@ from bisar_budget.budget.random_rows import RandomRows
 from bisar_budget.budget.vibration_rows import Vibrations, pslr_row, spur_rows
 from bisar_budget.budget.waivers import is_waived
 from bisar_budget.effects.declared import END_OF_IMAGE, LOCATION, MODELS
-from bisar_budget.effects.effect import PLATFORMS
-from bisar_budget.effects.subject import subject
+from bisar_budget.effects.effect import PLATFORMS, subject
 from bisar_budget.findings.row import DECLARE, Row
 from bisar_budget.findings.status import STATUS
 from bisar_budget.geometry import BistaticGeometry, norm

@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
-from bisar_budget.effects.effect import PLATFORMS
-from bisar_budget.effects.subject import Subject, subject
+from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.findings.requirement import DeclaredKinds
 from bisar_budget.findings.row import DECLARE
 from bisar_budget.findings.status import RANK, STATUS

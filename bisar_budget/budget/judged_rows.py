@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from bisar_budget import phrases
 from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.effects.declared import CUBIC, END_OF_IMAGE, LOCATION, QUADRATIC
-from bisar_budget.effects.subject import Subject
+from bisar_budget.effects.effect import Subject
 from bisar_budget.faults import KeyPath
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import RANK, STATUS

@@ -27,10 +27,9 @@ from bisar_budget.analysis.spread import (
 from bisar_budget.budget.judged_rows import BOUND, CODE, REQUIREMENTS, Floats, Judged, Judging, worded
 from bisar_budget.budget.pull_in import caps, needed_sentence
 from bisar_budget.effects.declared import CUBIC, QUADRATIC
-from bisar_budget.effects.effect import override_notes
+from bisar_budget.effects.effect import override_notes, subject
 from bisar_budget.effects.oscillators import POOR_FIT
 from bisar_budget.effects.random_errors import RandomEffect, RandomError, process_of
-from bisar_budget.effects.subject import subject
 from bisar_budget.findings.row import Row
 from bisar_budget.mission.instruments import Oscillator
 from bisar_budget.mission.model import Mission

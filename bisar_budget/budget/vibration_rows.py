@@ -24,13 +24,19 @@ from bisar_budget.analysis.vibration_limits import (
 )
 from bisar_budget.budget.judged_rows import BOUND, REQUIREMENTS, Floats, Judged, Judging, worded
 from bisar_budget.budget.pull_in import caps, needed_sentence
-from bisar_budget.effects.clocks import Spur, spurs_of
 from bisar_budget.effects.declared import CUBIC, QUADRATIC
-from bisar_budget.effects.echoes import NEAR_CYCLES, SLOWEST, near_groups, worst_phases
-from bisar_budget.effects.effect import PLATFORMS, override_notes
-from bisar_budget.effects.subject import Subject, subject
-from bisar_budget.effects.tones import tone
-from bisar_budget.effects.vibration import counted, lines_of, projected
+from bisar_budget.effects.effect import PLATFORMS, Subject, override_notes, subject
+from bisar_budget.effects.oscillators import Spur, spurs_of
+from bisar_budget.effects.spectra import tone
+from bisar_budget.effects.vibration import (
+    NEAR_CYCLES,
+    SLOWEST,
+    counted,
+    lines_of,
+    near_groups,
+    projected,
+    worst_phases,
+)
 from bisar_budget.findings.row import Row
 from bisar_budget.mission.instruments import Oscillator
 from bisar_budget.mission.model import Mission, has_instruments

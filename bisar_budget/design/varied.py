@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from bisar_budget import units
 from bisar_budget.design.quantities import QuestionError
-from bisar_budget.effects.effect import PLATFORMS
-from bisar_budget.effects.subject import MOTION
+from bisar_budget.effects.effect import MOTION, PLATFORMS
 from bisar_budget.geometry import STILL, BistaticGeometry, PlatformState, norm
 from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.covariance import EIGENVALUE_TOLERANCE, KINDS, Covariance, error_index

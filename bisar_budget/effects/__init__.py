@@ -2,18 +2,12 @@
 
 # What other rooms may use.
 __all__ = [
-    "clocks",
     "combined",
     "declared",
-    "echoes",
     "effect",
-    "models",
     "oscillators",
-    "pieces",
     "random_errors",
     "sources",
     "spectra",
-    "subject",
-    "tones",
     "vibration",
 ]

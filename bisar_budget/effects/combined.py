@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget import phrases
-from bisar_budget.effects.effect import PLATFORMS, ErrorSource
-from bisar_budget.effects.subject import subject
+from bisar_budget.effects.effect import PLATFORMS, ErrorSource, subject
 from bisar_budget.geometry import FRAME_AXES
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError

@@ -19,13 +19,13 @@ import numpy as np
 
 from bisar_budget import evaluators, phrases
 from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG
-from bisar_budget.effects.effect import PLATFORMS, ErrorSource
+from bisar_budget.effects.effect import PLATFORMS, ErrorSource, plain
 from bisar_budget.effects.sources import ErrorListing
-from bisar_budget.geometry import BistaticGeometry, angle_between_lines
+from bisar_budget.geometry import BistaticGeometry, GroundVector, angle_between_lines
 from bisar_budget.mission.model import Mission
 from bisar_budget.phrases import NOTHING, Note
 from bisar_budget.ranges import point_paths
-from bisar_budget.ranges.exact_ranges import Effect, ExactRanges, Floats, Lanes, Places, Truths, joined
+from bisar_budget.ranges.exact_ranges import Effect, ExactRanges, Floats, Lanes, Places, Truths
 from bisar_budget.ranges.point_paths import Held, PointPaths
 
 QUADRATIC, CUBIC, LOCATION = "quadratic_phase_error", "cubic_phase_error", "location_error"
@@ -39,36 +39,47 @@ SHARE = 0.004  # what the second order may add, of a phase, a displacement or a 
 FLOOR_RAD, FLOOR_M = 1e-3, 2e-3  # and whatever the size
 
 _TOGETHER = 1 << 13  # lanes of a block
-_ROWS = np.array([point_paths.QUADRATIC, point_paths.CUBIC, point_paths.WAY])
 _FLOORS = (FLOOR_RAD, FLOOR_RAD, FLOOR_M)
 
 
-class Does(NamedTuple):
-    """Phases and displacements by errors of a given size, in each case.
+class Declared(NamedTuple):
+    """Phases and displacements by errors of a given size, in each case; or plain numbers in one.
 
     Quadratic and cubic phase at the aperture edge, of the worse sign, signed like the first order of the declared
     one [rad]; displacement east and north by the declared sign, and by the opposite one [m]. Displacements are NaN
-    where there is none: a plane without an inverse, or no ground point that has the range history, which makes phases
-    infinite.
+    where there is none, in one case None: a plane without an inverse, or no ground point that has the range history,
+    which makes phases infinite.
     """
 
-    qpe: Floats
-    cubic: Floats
-    displacement: tuple[Floats, Floats]
-    opposite: tuple[Floats, Floats]
+    qpe: Any
+    cubic: Any
+    displacement: Any
+    opposite: Any
 
     @property
-    def farthest(self) -> tuple[Floats, Floats]:
+    def farthest(self) -> Any:
         """Displacement by the sign that moves farther, turned to the declared one's side. [m]"""
+        if self.displacement is None or self.opposite is None:
+            return None
         (x, y), (u, v) = self.displacement, self.opposite
         is_ahead, is_gone = np.hypot(x, y) >= np.hypot(u, v), np.isnan(x) | np.isnan(u)
         east, north = (np.where(is_ahead, a, -b) for a, b in ((x, u), (y, v)))
         return np.where(is_gone, math.nan, east), np.where(is_gone, math.nan, north)
 
-    def of(self, some: Any) -> "Does":
+    def of(self, some: Any) -> "Declared":
         """The same of some of the errors."""
         (x, y), (u, v) = self.displacement, self.opposite
-        return Does(self.qpe[some], self.cubic[some], (x[some], y[some]), (u[some], v[some]))
+        return Declared(self.qpe[some], self.cubic[some], (x[some], y[some]), (u[some], v[some]))
+
+    def in_one_case(self) -> "Declared":
+        """The same with plain numbers in the place of arrays of one case."""
+        return Declared(plain(self.qpe), plain(self.cubic), point(self.displacement), point(self.opposite))
+
+
+def point(place: tuple[Any, Any]) -> GroundVector | None:
+    """A place of the ground in the only case; None where there is none. [m]"""
+    east, north = map(plain, place)
+    return None if math.isnan(east) else (east, north)
 
 
 class Allowed(NamedTuple):
@@ -83,7 +94,7 @@ class Allowed(NamedTuple):
     binding: Any
 
 
-class ImagePlanes(NamedTuple):
+class ImagePlane(NamedTuple):
     """Q⁻¹ of each case: takes constant and linear range error to the displacement of the image."""
 
     adjugate: tuple[Any, Any]
@@ -101,7 +112,7 @@ class ImagePlanes(NamedTuple):
         )
 
 
-def published_planes(geometry: BistaticGeometry) -> tuple[ImagePlanes, Any]:
+def published_planes(geometry: BistaticGeometry) -> tuple[ImagePlane, Any]:
     """Invert Q with the range held constant, (19) and (30); and the angle between its gradients. [deg]
 
     That Q can be singular where the true gradients are not: its second row is v/R, theirs v⊥/R.
@@ -112,7 +123,7 @@ def published_planes(geometry: BistaticGeometry) -> tuple[ImagePlanes, Any]:
     first, second, (determinant,) = evaluators.published_ground_inverse(*ground)
     # (30): the first column holds (-rate_y, rate_x), the second (s_y, -s_x).
     degrees = np.degrees(angle_between_lines((-second[1], first[1]), (second[0], -first[0])))
-    return ImagePlanes((first, second), determinant, degrees < MIN_GRADIENT_ANGLE_DEG), degrees
+    return ImagePlane((first, second), determinant, degrees < MIN_GRADIENT_ANGLE_DEG), degrees
 
 
 class ErrorBlock:
@@ -201,20 +212,20 @@ class ErrorBlock:
         return found
 
     # ---------------------------------------------------------------- errors of any size
-    def does(self, model: str, size: Floats) -> Does:
+    def does(self, model: str, size: Floats) -> Declared:
         """Effects of errors of given sizes by a model, (errors, cases); NaN for an error without a size."""
         effect = self.effects[model]
         qpe, cubic = effect.qpe * size + 0.0, effect.cubic * size + 0.0
         moved = self.table.planes[model].displacement(effect, size)
         east, north = (np.where(self.is_motion, part, math.nan) for part in moved)
-        found = Does(qpe, cubic, (east, north), (0.0 - east, 0.0 - north))
+        found = Declared(qpe, cubic, (east, north), (0.0 - east, 0.0 - north))
         if model == "full":
             is_large = self.is_large(size)
             if is_large.any():
                 self._exactly(found, size, is_large)
         return found
 
-    def _exactly(self, found: Does, size: Floats, is_large: Truths) -> None:
+    def _exactly(self, found: Declared, size: Floats, is_large: Truths) -> None:
         """Put what exact ranges say into the places that are too large for a first order."""
         sizes = size[is_large]
         known = self.followed(is_large, np.abs(sizes))
@@ -249,11 +260,11 @@ class ErrorBlock:
         """The ways of the point by the errors that displace it: of each positive sign first."""
         if self._follows is None:
             table, full = self.table, self.effects["full"]
-            lanes = [table.lanes(self.sources[place], sign) for place in self.moves for sign in (1.0, -1.0)]
+            lanes = table.lanes(*(self.sources[place] for place in self.moves), signs=(1.0, -1.0))
             of_moving = Effect._make(part[self.moves] for part in full)
             moved = np.array(table.planes["full"].displacement(of_moving, 1.0))  # (2, moving, cases)
             per_unit = np.stack((moved, -moved), axis=2).reshape(2, -1)
-            self._follows = PointPaths(self.exact, joined(lanes), per_unit)
+            self._follows = PointPaths(self.exact, lanes, per_unit)
         return self._follows
 
     def forget(self) -> None:
@@ -301,28 +312,18 @@ class ErrorBlock:
         is_whole : bool
             Search for the size that the quadratic phase alone allows too.
         """
-        held = [place for place, limit in enumerate(limits) if limit is not None]
-        limit = np.array([self._limit(place, limits[place]) for place in held])
-        per_unit = self.per_unit(model)[held]
+        limit = np.array([self._limit(place, one) for place, one in enumerate(limits)])
+        per_unit = self.per_unit(model)
         with np.errstate(all="ignore"):
             small = np.where((per_unit > 0) & ~np.isnan(limit), limit / per_unit, math.inf)
-        order = np.argsort(small, axis=0, kind="stable")  # the one that binds is likely to be found first
-        smallest, binding = np.full(small.shape[1:], math.inf), np.full(small.shape[1:], -1, dtype=np.int8)
-        for turn in order:
-            requirement = np.array(held)[turn]
-            first, of = (np.take_along_axis(one, turn[None], axis=0)[0] for one in (small, limit))
-            found = self.reaching(model, requirement, of, first, smallest)
-            is_less = found < smallest
-            smallest, binding = np.where(is_less, found, smallest), np.where(is_less, requirement, binding)
-        quadratic = smallest
-        if is_whole and len(held) > 1:  # also where another requirement binds
-            is_other = binding > 0
-            beyond = self.reaching(model, np.zeros_like(order[0]), np.where(is_other, limit[0], math.nan), small[0])
-            quadratic = np.where(is_other, beyond, np.where(binding == 0, smallest, math.inf))
+        held = [place for place, one in enumerate(limits) if one is not None]
+        found = self._searched(limit, small, held, is_whole=is_whole) if model == "full" and self.moves else small
+        smallest = found.min(axis=0)
+        binding = np.where(np.isfinite(smallest), found.argmin(axis=0), -1).astype(np.int8)
         if model == "full":
             binding = np.where(self.ends_image(smallest), len(HELD), binding)
-        smallest, quadratic = (np.where(np.isfinite(one), one, math.nan) for one in (smallest, quadratic))
-        return Allowed(smallest, quadratic, binding)
+        smallest, quadratic = (np.where(np.isfinite(one), one, math.nan) for one in (smallest, found[0]))
+        return Allowed(smallest, quadratic if is_whole else smallest, binding)
 
     def ends_image(self, size: Floats) -> Truths:
         """Whether allowables, as found, are where the image ends: the search stopped there short of its limit."""
@@ -333,31 +334,41 @@ class ErrorBlock:
         return found
 
     def _limit(self, place: int, limit: Any) -> Floats:
-        """A limit of each error; what only is a phase is held to that of the quadratic."""
+        """A limit of each error, not a number: none; what only is a phase is held to that of the quadratic."""
+        limit = math.nan if limit is None else limit
         whole = np.broadcast_to(limit, self.declared.shape)
         return whole if place == 0 else np.where(self.is_motion, whole, math.nan)
 
-    def reaching(self, model: str, requirement: Places, limit: Floats, small: Floats, upto: Any = math.inf) -> Floats:
-        """Smallest sizes, of either sign, at which errors reach limits; infinite: none does `upto`.
+    def _searched(self, limit: Floats, small: Floats, held: Sequence[int], *, is_whole: bool) -> Floats:
+        """Smallest sizes, of either sign, at which errors reach limits, (3, errors, cases); infinite: none does.
 
-        `requirement` is the place of each limit in `HELD`; `small` is the size were effects those of small errors. By
-        the full model none is looked for that takes its platform farther than a tenth of the slant range, or than the
-        declared one does.
+        `small` are the sizes were effects those of small errors. None is looked for that takes its platform farther
+        than a tenth of the slant range, or than the declared one does; nor, but for what the quadratic phase allows
+        where `is_whole`, beyond what another limit allows: the one that binds is likely to be found first.
         """
-        if model == "published" or not self.moves:
-            return np.where(small <= upto, small, math.inf)
-        most = np.minimum(upto, np.fmax(self.farthest, np.abs(self.declared)))
-        first = np.minimum(small, most)
-        with np.errstate(all="ignore"):
-            adds = np.array(self.table.per_metre)[requirement, np.arange(self.cases)] * self.grows(first)
-            is_searched = self._is_moving & (adds > SHARE * limit)
-        found = np.where(small <= most, small, math.inf)
-        if is_searched.any():
-            of = requirement[is_searched]
-            slopes = np.array([self.effects["full"].qpe, self.effects["full"].cubic, self.per_unit("full")[2]])
-            held = Held(_ROWS[of], limit[is_searched], np.choose(of, slopes[:, is_searched]))
-            numbers = first[is_searched], most[is_searched]
-            found[is_searched] = self.paths.either_reaching(self._lanes_of(is_searched), held, *numbers)
+        most = np.fmax(self.farthest, np.abs(self.declared))
+        found = np.full(small.shape, math.inf)
+        slopes = np.array([self.effects["full"].qpe, self.effects["full"].cubic, self.per_unit("full")[2]])
+        per_metre, searches = np.array(self.table.per_metre), list[Held]()
+        is_few = 2 * len(held) * self.declared.size < point_paths.FEW  # then all are searched for together
+        for turn in np.array(held)[np.argsort(small[held], axis=0, kind="stable")]:
+            of, first, slope = (np.take_along_axis(one, turn[None], axis=0)[0] for one in (limit, small, slopes))
+            is_alone = (turn == 0) & is_whole
+            upto = np.minimum(most, np.where(is_alone, math.inf, found.min(axis=0)))
+            with np.errstate(all="ignore"):
+                adds = per_metre[turn, np.arange(self.cases)] * self.grows(np.minimum(first, upto))
+                some = self._is_moving & (adds > SHARE * of)
+            at_once = np.where((first <= upto) & ~some, first, math.inf)
+            np.put_along_axis(found, turn[None], at_once[None], axis=0)
+            if not some.any():
+                continue
+            numbers = of[some], slope[some], first[some], upto[some], np.flatnonzero(some), is_alone[some]
+            for lane, sign in zip(self._lanes_of(some), (1.0, -1.0), strict=True):
+                searches.append(Held(lane, turn[some], *numbers).turned(sign))
+                if not is_few:
+                    self.paths.first_reaching(searches.pop(), found.reshape(3, -1))
+        if searches:
+            self.paths.first_reaching(Held(*map(np.concatenate, zip(*searches, strict=True))), found.reshape(3, -1))
         return found
 
 
@@ -395,7 +406,7 @@ class DeclaredErrors:
         self.has_direct_path = mission.has_direct_path
         self.each = np.arange(cases)
         published, self.published_angle_deg = published_planes(geometries)
-        self.planes = {"published": published, "full": ImagePlanes(exact.adjugate, exact.determinant)}
+        self.planes = {"published": published, "full": ImagePlane(exact.adjugate, exact.determinant)}
         half = exact.half
         (a, b), (c, d) = ([element / exact.determinant for element in row] for row in exact.adjugate)
         (q_0, q_1), (c_0, c_1) = exact.phases_per_term
@@ -413,12 +424,11 @@ class DeclaredErrors:
         starts = range(0, len(self.listed), size)
         self.blocks = [ErrorBlock(self, self.listed[start : start + size]) for start in starts]
         self._place = {error.id: divmod(place, size) for place, error in enumerate(self.listed)}
-        self._does: dict[tuple[str, int], Does] = {}
+        self._does: dict[tuple[str, int], Declared] = {}
 
     def array(self, value: Any) -> Floats:
         """One number for each case."""
-        found: Floats = np.array(np.broadcast_to(np.asarray(value, dtype=float), (self.cases,)))
-        return found
+        return np.full(self.cases, value, dtype=float)
 
     def displaces(self, error: ErrorSource) -> bool:
         """Whether an error moves platforms or a clock that is listened to: what only is a phase displaces nothing."""
@@ -428,28 +438,45 @@ class DeclaredErrors:
         """Whether an error is one of a clock that the direct path stands in for."""
         return error.owner == "clock" and self.has_direct_path
 
-    def lanes(self, error: ErrorSource, sign: float = 1.0) -> Lanes:
-        """A unit of an error, with a sign, in each case."""
+    def lanes(self, *errors: ErrorSource, signs: Sequence[float] = (1.0,)) -> Lanes:
+        """A unit of errors, of each sign, in each case; by error, sign and case."""
+        moved = [error.platforms for error in errors]
+        orders = [list(self.edge).index(error.unit) if error.platforms else -1 for error in errors]
+        courses = np.array([self._course(error, order) for error, order in zip(errors, orders, strict=True)])
+        at_nodes = np.moveaxis(courses[:, None] * np.array(signs)[:, None, None], 2, 0)
+        moves: list[list[Any]] = [[float(platform in one) for one in moved] for platform in (0, 1)]
+        u, v, order = (self._of_each(values, len(signs)) for values in (*moves, orders))
+        x, y, z = (self._of_each([error.direction[axis] for error in errors], len(signs)) for axis in (0, 1, 2))
+        case = np.tile(self.each, len(errors) * len(signs))
+        return Lanes(case, at_nodes.reshape(len(at_nodes), -1), (u, v), (x, y, z), order)
+
+    def _course(self, error: ErrorSource, order: int) -> Floats:
+        """Position error at the nodes of a unit of an error, or the range error of what moves no platform."""
         exact = self.exact
-        if error.platforms:
-            moves = (float(0 in error.platforms), float(1 in error.platforms))
-            return Lanes(self.each, sign * exact.powers[error.unit], moves, error.direction, error.unit)
+        if order >= 0:
+            return exact.powers[error.unit]
         if error.is_motion:
-            return Lanes(self.each, sign * exact.clock_course(error.unit))
+            return exact.clock_course(error.unit)
         # A phase as such: a quadratic that displaces nothing.
-        return Lanes(self.each, sign * ((exact.times / exact.half) ** 2 - 1 / 3) / exact.k)
+        return np.asarray(((exact.times / exact.half) ** 2 - 1 / 3) / exact.k)
+
+    def _of_each(self, values: Sequence[Any], signs: int) -> Any:
+        """One value of each error for its lanes, or the one that all have."""
+        if any(isinstance(value, np.ndarray) for value in values):
+            return np.repeat([self.array(value) for value in values], signs, axis=0).reshape(-1)
+        return values[0] if len(set(values)) == 1 else np.repeat(values, signs * self.cases)
 
     def block_of(self, error: ErrorSource) -> tuple[ErrorBlock, int]:
         """The block that has an error, and its place there."""
         block, place = self._place[error.id]
         return self.blocks[block], place
 
-    def does(self, model: str, error: ErrorSource) -> Does:
+    def does(self, model: str, error: ErrorSource) -> Declared:
         """Effect of a declared error by a model, (cases,)."""
         block, place = self._place[error.id]
         return self.of_block(model, block).of(place)
 
-    def of_block(self, model: str, block: int) -> Does:
+    def of_block(self, model: str, block: int) -> Declared:
         """Effects of the declared errors of a block by a model, (errors, cases)."""
         key = (model, block)
         if key not in self._does:
@@ -479,3 +506,130 @@ class DeclaredErrors:
         if model == "full" or degrees >= MIN_GRADIENT_ANGLE_DEG:
             return NOTHING
         return phrases.no_displacement(float(degrees))
+
+
+class ExactPhases(NamedTuple):
+    """Displacement east, north [m]; quadratic and cubic phase at the aperture edge, signed like β̃. [rad]
+
+    `turn` is what range and Doppler gradients span there, over what they span at the centre.
+    """
+
+    displacement: GroundVector
+    quadratic: float
+    cubic: float
+    turn: float
+
+
+class Model:
+    """One of both models of one collection, for whoever asks for a single error: plain numbers, None for nothing."""
+
+    def __init__(self, errors: DeclaredErrors, name: str) -> None:
+        self.errors, self.exact, self.name = errors, errors.exact, name
+        self.is_published = name == "published"
+        self.is_blind = self.is_published and errors.has_direct_path  # to what the collection has
+        self.plane, self.degeneracy = errors.planes[name], errors.degeneracy(name)
+
+    def effect(self, source: ErrorSource) -> Effect:
+        """Effect of a unit of an error; by the full model of one too small for a second order."""
+        return source.effect if self.is_published else source.full
+
+    def displacement(self, effect: Effect, size: float) -> GroundVector | None:
+        """Displacement on the ground by (25) with the Q of the model; None where that has no inverse. [m]"""
+        return point(self.plane.displacement(effect, size))
+
+    def equation(self, source: ErrorSource) -> str:
+        """Where it comes from."""
+        return source.equation if self.is_published or not source.is_motion else "full model"
+
+    def no_limit(self, source: ErrorSource) -> Note:
+        """Say why an error has no limit from its quadratic phase."""
+        if self.is_published:
+            return source.no_limit
+        if self.errors.is_heard_out(source):
+            return phrases.clock_is_heard()
+        return phrases.no_size_reaches_the_limit() if source.is_motion else phrases.no_quadratic_phase()
+
+    def does(self, source: ErrorSource, size: float) -> Declared:
+        """Effect of an error of a given size."""
+        block, place = self.errors.block_of(source)
+        sizes = np.full(block.declared.shape, math.nan)
+        sizes[place] = size
+        return block.does(self.name, sizes).of(place).in_one_case()
+
+    def allowed(self, source: ErrorSource, limits: Sequence[float | None]) -> tuple[float | None, str | None]:
+        """Smallest size, of either sign, at which an error reaches a limit, and which of `HELD` that is; or None.
+
+        `limits` are those of quadratic and cubic phase [rad], and of the displacement. [m]
+        """
+        block, place = self.errors.block_of(source)
+        held: list[Any] = []
+        for limit in limits:
+            of_all = np.full(block.declared.shape, math.nan)
+            of_all[place] = math.nan if limit is None else limit
+            held.append(None if limit is None else of_all)
+        found = block.allowed(self.name, held, is_whole=False)
+        size, binding = plain(found.smallest[place]), int(found.binding[place, 0])
+        return (None, None) if math.isnan(size) else (size, (*HELD, END_OF_IMAGE)[binding])
+
+    def allowable(self, source: ErrorSource, requirement: str, limit: float) -> float | None:
+        """Smallest size, of either sign, at which an error reaches one limit; or None."""
+        return self.allowed(source, [limit if name == requirement else None for name in HELD])[0]
+
+    def small(self, source: ErrorSource, requirement: str, limit: float) -> float:
+        """Size at which an error would reach a limit, were its effects those of a small one; infinite: never."""
+        block, place = self.errors.block_of(source)
+        per_unit = float(block.per_unit(self.name)[HELD.index(requirement), place, 0])
+        return limit / per_unit if per_unit else math.inf
+
+    def farthest(self, source: ErrorSource) -> float:
+        """Size beyond which an error is none of navigation; infinite: it has no effect whatever its size. [unit]"""
+        block, place = self.errors.block_of(source)
+        return float(block.farthest[place, 0])
+
+    def ends_image(self, source: ErrorSource, size: float) -> bool:
+        """Whether an allowable, as found, is where the image ends; to a linear model none does."""
+        block, place = self.errors.block_of(source)
+        return not self.is_published and bool(block.ends_image(np.full(block.declared.shape, size))[place, 0])
+
+    def is_linear_at(self, source: ErrorSource, requirement: str, limit: float) -> bool:
+        """Whether effects of an error are proportional to its size up to a limit."""
+        block, place = self.errors.block_of(source)
+        which = HELD.index(requirement)
+        per_unit = block.per_unit(self.name)[which]
+        with np.errstate(all="ignore"):
+            first = np.minimum(np.where(per_unit > 0, limit / per_unit, math.inf), block.farthest)
+            adds = self.errors.per_metre[which] * block.grows(first)
+        return self.is_published or not self.errors.displaces(source) or bool(adds[place, 0] <= SHARE * limit)
+
+    # ---------------------------------------------------------------- by exact ranges
+    def is_small(self, source: ErrorSource, size: float) -> bool:
+        """Whether effects of an error are proportional to its size, as far as anybody can see."""
+        block, place = self.errors.block_of(source)
+        return not block.is_large(np.full(block.declared.shape, size))[place, 0]
+
+    def at(self, source: ErrorSource, size: float) -> ExactPhases | None:
+        """Phases and displacement of an error of a size, with its sign, by exact ranges; None: no ground point."""
+        block, place = self.errors.block_of(source)
+        some = np.zeros(block.declared.shape, dtype=bool)
+        some[place] = True
+        known = block.followed(some, np.array([abs(size)]))[0 if size > 0 else 1]
+        _, east, north, quadratic, cubic, turn = known[:, 0].tolist()
+        return None if math.isnan(east) else ExactPhases((east, north), quadratic, cubic, turn)
+
+    def largest_range_error(self, source: ErrorSource) -> float:
+        """Largest range error at the nodes of a small unit of an error, before it displaces anything. [m/unit]"""
+        return float(np.abs(self.exact.range_error(self.errors.lanes(source))).max())
+
+    def left_over(self, source: ErrorSource, size: float, place: GroundVector) -> Sequence[float]:
+        """Range error at the nodes that an error leaves at a ground point. [m]"""
+        left = self.exact.left_over(self.errors.lanes(source), np.array([size]), place)
+        found: list[float] = left[:, 0].tolist()
+        return found
+
+    def left_over_small(self, source: ErrorSource, size: float) -> Sequence[float]:
+        """The same at the displaced point, of an error so small that its effects are proportional to it. [m]"""
+        east, north = self.displacement(source.full, size) or (0.0, 0.0)
+        by_east, by_north = self.exact.slopes
+        left = size * self.exact.range_error(self.errors.lanes(source)) + east * by_east + north * by_north
+        found: list[float] = left[:, 0].tolist()
+        return found

@@ -1,23 +1,59 @@
-"""Effect of one unit of an error on the range history and the image, by the published and the full model.
+"""Effect of one unit of an error on the range history and the image, by both models; its subject and its name.
 
 Effects are those of Rigling & Moses (Tables I and II), and of the full model, which lets the line of sight turn and
 counts what the displacement of the image adds (`ranges.exact_ranges`).
 """
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from bisar_budget import phrases
-from bisar_budget.effects.subject import MOTION, Subject
+from bisar_budget import evaluators, phrases
 from bisar_budget.faults import KeyPath
-from bisar_budget.geometry import GroundVector, Vector
+from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState, Vector
 from bisar_budget.phrases import Note
 from bisar_budget.ranges.exact_ranges import Effect
 
 if TYPE_CHECKING:
     from bisar_budget.mission.instruments import Overridden
+
+from functools import cache
+
+MOTION = ("position", "velocity", "acceleration")  # kinds of error that a platform's measured path can have
+
+
+class Subject(NamedTuple):
+    """The thing that a row or an error is about. `subject` makes it, with its id; nobody reads an id to find out.
+
+    `owner` is the one whose share it counts against: transmitter, receiver, clock, or mission for what is nobody's.
+    `kind` is position, velocity, acceleration, vibration, timing, terrain, other, or the name of a sum. `axis` is the
+    axis of `frame`, the term of the clock, the name of another error, the sort of a vibration, and `entry` the place
+    of one in the file.
+    """
+
+    id: str
+    owner: str
+    kind: str
+    axis: str = ""
+    frame: str = "scene"
+    entry: int | None = None
+
+
+@cache
+def subject(owner: str, kind: str, axis: str = "", frame: str = "scene", entry: int | None = None) -> Subject:
+    """Name an error or a sum as the contract does."""
+    if kind in ("timing", "other"):  # of one owner each
+        parts = [kind, axis]
+    elif owner == "clock":
+        parts = ["timing", kind]
+    elif owner == "mission" and kind in MOTION:
+        parts = ["common", kind, axis]
+    else:
+        parts = [owner, kind, axis, "" if entry is None else str(entry)]
+    return Subject(".".join(filter(None, parts)), owner, kind, axis, frame, entry)
+
 
 PLATFORMS = ("transmitter", "receiver")
 MOTION_UNITS = dict(zip(MOTION, ("m", "m/s", "m/s^2"), strict=True))
@@ -34,9 +70,9 @@ def override_notes(platform: str, overridden: Sequence["Overridden"], *figures: 
     )
 
 
-def number(column: Any) -> float:
+def plain(column: Any) -> float:
     """The number of the only case."""
-    return float(column) if isinstance(column, float) else float(np.ravel(column)[0])
+    return float(column.item(0) if isinstance(column, np.ndarray) else column)
 
 
 class ErrorSource(NamedTuple):
@@ -69,11 +105,9 @@ class ErrorSource(NamedTuple):
 
     def in_one_case(self) -> "ErrorSource":
         """The same with plain numbers in the place of arrays of one case."""
-        effect, full = (Effect._make(map(number, one)) for one in (self.effect, self.full))
-        declared = None if self.declared is None else number(self.declared)
-        return self._replace(
-            declared=declared, effect=effect, full=full, direction=tuple(map(number, self.direction))
-        )
+        effect, full = (Effect._make(map(plain, one)) for one in (self.effect, self.full))
+        declared = None if self.declared is None else plain(self.declared)
+        return self._replace(declared=declared, effect=effect, full=full, direction=tuple(map(plain, self.direction)))
 
     @property
     def owner(self) -> str:
@@ -110,26 +144,65 @@ class ErrorSource(NamedTuple):
         return self.owner in (platform, "mission")
 
 
-class ImagePlane(NamedTuple):
-    """Q⁻¹: takes constant and linear range error to the displacement of the image."""
+# ---------------------------------------------------------------------- pieces of a range error, (26) to (29)
+PRINTED, TRUE = "v/R as printed, ranges held", "v⊥/R, lines of sight as they turn"
 
-    adjugate: tuple[tuple[float, ...], ...]
-    determinant: float
-    degeneracy: Note
 
-    @property
-    def inverse(self) -> list[list[float]]:
-        """(2, 2) [m/m, m/(m/s)], where it is not degenerate."""
-        return [[element / self.determinant for element in row] for row in self.adjugate]
+class LinePiece(NamedTuple):
+    """A piece of the range error: centre τ_i from mid-aperture [s], value (27) [m] and slope (28) [m/s] there."""
 
-    def displacement(self, effect: Effect, declared: float) -> GroundVector | None:
-        """Displacement on the ground, (2,), by (25) with the Q of a model; None where it has no inverse. [m]"""
-        if self.degeneracy:
-            return None
-        scale = declared / self.determinant
-        (a, b), (c, d) = self.adjugate
-        # Adding 0.0 turns -0.0, which reads as a claim about a sign, into 0.0.
-        return (
-            (a * effect.constant + b * effect.linear) * scale + 0.0,
-            (c * effect.constant + d * effect.linear) * scale + 0.0,
-        )
+    time: float
+    value: float
+    slope: float
+
+
+def gradients_of(model: str) -> str:
+    """Say by which gradients of range and Doppler a model has Q_i: what is printed, or what is true."""
+    return PRINTED if model == "published" else TRUE
+
+
+def indicated_point(
+    geometry: BistaticGeometry, piece: LinePiece, model: str, seen_from: GroundVector = (0.0, 0.0)
+) -> GroundVector:
+    """Ground point that a piece of range error indicates, (29), relative to the scatterer. [m]
+
+    Parameters
+    ----------
+    geometry : BistaticGeometry
+        Of the whole aperture.
+    piece : LinePiece
+        Of the range error; what the scatterer itself has is no part of it.
+    model : str
+        `published`: Q_i of (30) as printed, platforms where they are at τ_i, speeds over ranges held constant. Any
+        other: the gradients that the lines of sight have at τ_i.
+    seen_from : (2,)
+        Where the scatterer lies. [m]
+
+    Returns
+    -------
+    (2,)
+        East and north.
+
+    Raises
+    ------
+    ZeroDivisionError
+        Range and Doppler gradients are parallel at τ_i.
+    """
+    east, north = seen_from
+    held, look, rate = [], [0.0, 0.0], [0.0, 0.0]
+    for state in (geometry.transmitter, geometry.receiver):
+        (x, y, z), velocity = state.at(piece.time)
+        then = PlatformState(position=(x - east, y - north, z), velocity=velocity)
+        slant_range = math.dist(state.position, (east, north, 0.0))
+        held += [x - east, y - north, *velocity[:2], slant_range]
+        for axis in range(2):
+            look[axis] += then.look[axis]
+            rate[axis] += then.look_rate[axis]
+    if model == "published":
+        (a, b), (c, d), (determinant,) = evaluators.published_ground_inverse(*held)
+    else:
+        (a, b), (c, d), (determinant,) = evaluators.full_ground_inverse(*look, *rate)
+    return (
+        (a * piece.value + b * piece.slope) / determinant,
+        (c * piece.value + d * piece.slope) / determinant,
+    )

@@ -1,14 +1,18 @@
-"""Phase noise of an oscillator, from its mask, its Allan deviation or its power law. Spectra are one-sided."""
+"""Phase noise of an oscillator, from its mask, Allan deviation or power law, and its spurs. Spectra are one-sided."""
 
 import math
 from collections.abc import Sequence
 from functools import lru_cache
 from itertools import combinations, pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from bisar_budget import evaluators, phrases
-from bisar_budget.effects.spectra import PowerLawPiece
+from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.effects.spectra import PowerLawPiece, held
 from bisar_budget.mission.instruments import Oscillator, Points, PowerLaw
+from bisar_budget.mission.model import Mission
 from bisar_budget.phrases import NOTHING, Note
 
 POOR_FIT = 0.2  # of an Allan deviation, from where a power law does not describe it
@@ -159,3 +163,42 @@ def _least_squares(rows: Sequence[Sequence[float]]) -> list[float] | None:
     for i in reversed(range(count)):
         right[i] = (right[i] - math.fsum(matrix[i][j] * right[j] for j in range(i + 1, count))) / matrix[i][i]
     return [value / size for value, size in zip(right, sizes, strict=True)]
+
+
+class Spur(NamedTuple):
+    """A tone of an oscillator: platform, entry by frequency, frequency [Hz], peak phase at centre frequency [rad].
+
+    `left` is the part of it that exchanged pulses leave, which the phase has.
+    """
+
+    name: str
+    entry: int
+    frequency: float
+    phase: Any
+    left: Any
+
+
+def spurs_of(mission: Mission) -> list[Spur]:
+    """Tones that reach the image: none where the direct path is the receiver's clock."""
+    if mission.has_direct_path:
+        return []
+    found = []
+    for name in PLATFORMS:
+        oscillator = getattr(mission.platforms, name).oscillator
+        for index, (frequency, level) in enumerate(oscillator.spurs if oscillator is not None else ()):
+            scale = mission.radar.center_frequency / oscillator.frequency
+            left = _left_of(frequency, mission)
+            # A sideband of a phase φ has the amplitude φ/2 of the carrier.
+            found.append(Spur(name, index, frequency, 2 * 10 ** (level / 20) * scale * left, left))
+    return found
+
+
+def _left_of(frequency: float, mission: Mission) -> Any:
+    """Largest part of a tone that exchanged pulses leave, at its own frequency or at one that it is folded to."""
+    sync = mission.synchronization
+    if sync is None or sync.interval is None:
+        return 1.0
+    turns = frequency * np.asarray(sync.interval)
+    images = [np.rint(turns) + n for n in (-1, 0, 1)]
+    passed = [np.where(image != 0, np.sqrt(held(2 * math.pi * (turns - image))), 0.0) for image in images]
+    return np.max([1 - np.sqrt(held(2 * math.pi * turns)), *passed], axis=0)

@@ -20,11 +20,9 @@ from numpy.typing import NDArray
 
 from bisar_budget import evaluators
 from bisar_budget.constants import ROUNDING, STANDARD_GRAVITY
-from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.oscillators import Noise, noise_of
-from bisar_budget.effects.spectra import link_parts, parts, synchronized_parts
-from bisar_budget.effects.subject import Subject, subject
-from bisar_budget.effects.tones import Floats, gauss_markov
+from bisar_budget.effects.spectra import Floats, gauss_markov, link_parts, parts, synchronized_parts
 from bisar_budget.faults import KeyPath
 from bisar_budget.geometry import BistaticGeometry, PlatformState
 from bisar_budget.mission.instruments import IMU_KINDS, GaussMarkov, Oscillator

@@ -19,9 +19,10 @@ from bisar_budget.effects.effect import (
     NOWHERE,
     PLATFORMS,
     ErrorSource,
+    Subject,
     override_notes,
+    subject,
 )
-from bisar_budget.effects.subject import Subject, subject
 from bisar_budget.faults import KeyPath
 from bisar_budget.geometry import FRAME_AXES, BistaticGeometry, Vectors
 from bisar_budget.mission.model import Mission

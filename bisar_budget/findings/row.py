@@ -5,7 +5,7 @@ from datetime import date
 from typing import Any, NamedTuple
 
 from bisar_budget import phrases
-from bisar_budget.effects.subject import Subject
+from bisar_budget.effects.effect import Subject
 from bisar_budget.faults import printable, sentences
 from bisar_budget.findings.status import RANK
 from bisar_budget.geometry import GroundVector

@@ -31,6 +31,7 @@ from bisar_budget.paths.ephemeris import read_oem
 from bisar_budget.paths.flight import (
     Fitted,
     Log,
+    Orbit,
     PathDoubt,
     PathFileError,
     interpolated,
@@ -38,6 +39,7 @@ from bisar_budget.paths.flight import (
     smoothed,
 )
 from bisar_budget.paths.flight_log import hold_to_motion, read_csv
+from bisar_budget.paths.instant import Instant
 from bisar_budget.paths.messages import decoded
 from bisar_budget.paths.sbet import read_accuracy, read_sbet
 from bisar_budget.resources import DISK, Files, UnreadableError
@@ -49,6 +51,8 @@ _FILES = ("tle", "omm", "oem", "file", "accuracy")  # keys of a path that name o
 _MOST_BYTES = 500_000_000
 _LOGS_KEPT = 2  # of a mission that is read again and again, such as by `solve`
 _logs: dict[tuple[object, ...], Log] = {}  # by what they were read from; the bytes themselves are let go
+_PATHS_KEPT = 256  # of cases that a sweep reads: where nothing that a path follows from changes
+_paths: dict[tuple[object, ...], FlownPath] = {}  # by what they follow from
 _ORBITS = {
     "tle": lambda data, name, *of: read_tle(decoded(data, name), name, *of),
     "omm": read_omm,
@@ -193,39 +197,56 @@ def _of_orbit(mission: Mission, route: OrbitSource, axes: earth.SceneAxes, read:
     file = named if isinstance(named, str) else None
     try:
         data = read(file) if file is not None else "\n".join(named).encode()
-        name = file or "the element set"
-        orbit = _ORBITS[form](data, name, route.object, center)
-        widest = math.inf
-        if orbit.span is not None:
-            before, after = center.since(orbit.span[0]), orbit.span[1].since(center)
-            if min(before, after) < mission.collection.aperture_time / 2:
-                raise PathFileError(
-                    f"{file}: covers {orbit.span[0].as_text()} to {orbit.span[1].as_text()}, the aperture is "
-                    f"{mission.collection.aperture_time:g} s around {center.as_text()}"
-                )
-            widest = 2 * min(before, after)
-        far = math.hypot(*orbit.place(center))
-        if far > _FARTHEST_M:
-            raise PathFileError(
-                f"{name}: is {far:.4g} m from the Earth's centre, farther than the Moon; are its units km?"
-            )
-        half = mission.collection.aperture_time / 2
+        digest, T = hashlib.sha256(data).hexdigest(), mission.collection.aperture_time
 
-        def places(times: earth.Floats) -> earth.Floats:
-            return axes.places(np.array([orbit.place(center.after(time)) for time in times.tolist()]))
+        def found() -> FlownPath:
+            orbit = _ORBITS[form](data, file or "the element set", route.object, center)
+            return _orbit_path(orbit, file, center, axes, T)
 
-        fitted = interpolated(places, 2 * half, widest)
-        # An interpolation is worst between the places of a file.
-        instants = [center.after(part * half) for part in (0.0, -0.5, 0.5, -1.0, 1.0)]
-        of_orbit = max((orbit.doubts(instant) for instant in instants), key=len)
-        doubt = max(orbit.doubt(instant) for instant in instants)
-        _hold_to_range(doubt, fitted.state.slant_range, of_orbit, orbit.remedy, name)
+        path: FlownPath = _kept(_paths, _PATHS_KEPT, (form, file, digest, route.object, center, axes, T), found)
     except PathFileError as error:
         raise _UnusablePathError(("orbit", form), _of_file(file, error)) from None
+    return path._replace(sha256=digest)
+
+
+def _kept(kept: dict[tuple[object, ...], Any], most: int, key: tuple[object, ...], made: Callable[[], Any]) -> Any:
+    """What follows from a key, as it was made before or made now; so many are kept, the last that were asked for."""
+    found = kept.pop(key, None) or made()
+    kept[key] = found
+    for old in list(kept)[:-most]:
+        kept.pop(old, None)
+    return found
+
+
+def _orbit_path(
+    orbit: Orbit, file: str | None, center: Instant, axes: earth.SceneAxes, aperture_time_s: float
+) -> FlownPath:
+    name, half, widest = file or "the element set", aperture_time_s / 2, math.inf
+    if orbit.span is not None:
+        before, after = center.since(orbit.span[0]), orbit.span[1].since(center)
+        if min(before, after) < half:
+            raise PathFileError(
+                f"{file}: covers {orbit.span[0].as_text()} to {orbit.span[1].as_text()}, the aperture is "
+                f"{aperture_time_s:g} s around {center.as_text()}"
+            )
+        widest = 2 * min(before, after)
+    far = math.hypot(*orbit.place(center))
+    if far > _FARTHEST_M:
+        words = f"{far:.4g} m from the Earth's centre, farther than the Moon; are its units km?"
+        raise PathFileError(f"{name}: is {words}")
+
+    def places(times: earth.Floats) -> earth.Floats:
+        return axes.places(np.array([orbit.place(center.after(time)) for time in times.tolist()]))
+
+    fitted = interpolated(places, aperture_time_s, widest)
+    # An interpolation is worst between the places of a file.
+    instants = [center.after(part * half) for part in (0.0, -0.5, 0.5, -1.0, 1.0)]
+    of_orbit = max((orbit.doubts(instant) for instant in instants), key=len)
+    doubt = max(orbit.doubt(instant) for instant in instants)
+    _hold_to_range(doubt, fitted.state.slant_range, of_orbit, orbit.remedy, name)
     age = None if orbit.epoch is None else center.since(orbit.epoch)
-    path = _flown(fitted, orbit.words, file, hashlib.sha256(data).hexdigest())
     doubts = (*of_orbit, *fitted.doubts)
-    return path._replace(
+    return _flown(fitted, orbit.words, file)._replace(
         age=age, doubts=doubts, doubt_m=doubt.size + fitted.farthest, doubt_of=doubt.words, is_doubted=bool(doubts)
     )
 
@@ -247,15 +268,23 @@ def _of_log(mission: Mission, route: TrajectorySource, axes: earth.SceneAxes | N
     try:
         data = read(route.file)
         digest = hashlib.sha256(data).hexdigest()
-        log = _log(route, data, digest)
-        if log.is_earth_fixed:
-            known = _known(axes, "trajectory")
-            log = replace(log, places=known.places(log.places), is_earth_fixed=False)
-        times = slow_times(log, mission.collection.center_time, route.center, aperture_time, route.file)
-        hold_to_motion(times, log.places, aperture_time, route.file)
-        fitted = smoothed(times, log.places, aperture_time)
+        key = (route, digest, mission.collection.center_time, axes, aperture_time)
+        path: FlownPath = _kept(_paths, _PATHS_KEPT, key, lambda: _log_path(mission, route, axes, data, digest))
     except PathFileError as error:
         raise _UnusablePathError(("trajectory", "file"), _of_file(route.file, error)) from None
+    return path
+
+
+def _log_path(
+    mission: Mission, route: TrajectorySource, axes: earth.SceneAxes | None, data: bytes, digest: str
+) -> FlownPath:
+    log, aperture_time = _log(route, data, digest), mission.collection.aperture_time
+    if log.is_earth_fixed:
+        known = _known(axes, "trajectory")
+        log = replace(log, places=known.places(log.places), is_earth_fixed=False)
+    times = slow_times(log, mission.collection.center_time, route.center, aperture_time, route.file)
+    hold_to_motion(times, log.places, aperture_time, route.file)
+    fitted = smoothed(times, log.places, aperture_time)
     words = log.words
     if log.start is None:
         words += f", {route.center or 0.0:.12g} s of it at mid-aperture"
@@ -267,10 +296,7 @@ def _of_log(mission: Mission, route: TrajectorySource, axes: earth.SceneAxes | N
 def _log(route: TrajectorySource, data: bytes, digest: str) -> Log:
     """Read a log, or take it as it was read before."""
     key = (route.file, route.format, route.week, digest)
-    log = _logs.pop(key, None) or _read_log(route, data)
-    _logs[key] = log  # the last one
-    for old in list(_logs)[:-_LOGS_KEPT]:
-        _logs.pop(old, None)
+    log: Log = _kept(_logs, _LOGS_KEPT, key, lambda: _read_log(route, data))
     return log
 
 
@@ -321,10 +347,16 @@ def _of_place(platform: Platform, axes: earth.SceneAxes, aperture_time_s: float)
         return FlownPath(
             PlatformState(position=axes.place(earth.earth_fixed(place)), velocity=STRAIGHT), "geodetic place"
         )
-    fitted = interpolated(
-        lambda times: axes.places(earth.flown(place, heading, speed, climb, times)), aperture_time_s
-    )
-    return _flown(fitted, "geodetic place, flight along the geodesic")
+
+    def path() -> FlownPath:
+        fitted = interpolated(
+            lambda times: axes.places(earth.flown(place, heading, speed, climb, times)), aperture_time_s
+        )
+        return _flown(fitted, "geodetic place, flight along the geodesic")
+
+    key = (place, heading, speed, climb, axes, aperture_time_s)
+    found: FlownPath = _kept(_paths, _PATHS_KEPT, key, path)
+    return found
 
 
 def _flown(fitted: Fitted, words: str, file: str | None = None, digest: str | None = None) -> FlownPath:

@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING
 
 from bisar_budget import phrases
 from bisar_budget.analysis.allocation import Allocation
-from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.analysis.analysis import Analysis, Model
 from bisar_budget.analysis.together import Together, cubics, quadratics
 from bisar_budget.constants import MAX_DRAWS
-from bisar_budget.effects.effect import PLATFORMS, ErrorSource, ImagePlane
+from bisar_budget.effects.effect import PLATFORMS, ErrorSource
 from bisar_budget.findings.monte_carlo import MonteCarlo, Requirement
 from bisar_budget.mission.model import Mission, Simulation, has_instruments
 from bisar_budget.monte_carlo.draws import HeldSum, Share, Variable, drawing_of, eigensystem, in_turn, joined
@@ -100,7 +100,7 @@ def _distribution(mission: Mission, source: ErrorSource) -> str:
 
 
 def _variables(analysis: Analysis) -> Iterator[Variable]:
-    mission, plane = analysis.mission, analysis.full.plane
+    mission, full = analysis.mission, analysis.full
     factor = mission.allocation.coverage_factor
     left = {source.id: source for source in analysis.stated}
     for group in analysis.groups:
@@ -110,14 +110,14 @@ def _variables(analysis: Analysis) -> Iterator[Variable]:
             # To six decimals a correlation matrix may have an eigenvalue just below zero.
             scale = math.sqrt(max(0.0, value)) / factor
             parts = [(s, (s.declared or 0.0) * vectors[i][index] * scale) for i, s in enumerate(members)]
-            yield _variable(f"{group.id}.{index}", group.id, group.platform, "normal", parts, plane)
+            yield _variable(f"{group.id}.{index}", group.id, group.platform, "normal", parts, full)
     for source in left.values():
         distribution = _distribution(mission, source)
         is_covered = source.owner != "mission" or source.is_common
         size = abs(source.declared or 0.0) / (factor if is_covered else 1.0)
         if distribution == "uniform":
             size /= math.sqrt(3)  # the standard uncertainty of ±a, GUM 4.3.7
-        yield _variable(source.id, source.id, source.owner, distribution, [(source, size)], plane)
+        yield _variable(source.id, source.id, source.owner, distribution, [(source, size)], full)
     for error in analysis.random:
         yield from _of_noise(error, factor)
 
@@ -139,9 +139,9 @@ def _of_noise(error: "RandomError", factor: float) -> Iterator[Variable]:
 
 
 def _variable(
-    id: str, of: str, owner: str, distribution: str, parts: Sequence[tuple[ErrorSource, float]], plane: ImagePlane
+    id: str, of: str, owner: str, distribution: str, parts: Sequence[tuple[ErrorSource, float]], full: Model
 ) -> Variable:
-    moves = [plane.displacement(source.full, size) or (0.0, 0.0) for source, size in parts]
+    moves = [full.displacement(source.full, size) or (0.0, 0.0) for source, size in parts]
     effects = (
         math.fsum(source.full.qpe * size for source, size in parts),
         math.fsum(source.full.cubic * size for source, size in parts),

@@ -112,15 +112,15 @@ class Lanes:
         1 where transmitter, receiver moves, else 0.
     direction : Vectors
         Of the motion; floats or (lanes,).
-    unit : str or (lanes,)
-        Of each; velocity errors turn Doppler.
+    order : int or (lanes,)
+        Power of slow time that a position error grows with, those of velocity turn Doppler; -1 of a clock.
     """
 
     case: Places
     at_nodes: Floats
     moves: tuple[Any, Any] = (0.0, 0.0)
     direction: Vectors = (0.0, 0.0, 0.0)
-    unit: Any = ""
+    order: Any = -1
 
     @property
     def platforms(self) -> list[int]:
@@ -129,10 +129,11 @@ class Lanes:
 
     def of(self, some: Places) -> "Lanes":
         """Some of the lanes."""
-        u, v = (part[some] if np.ndim(part) else part for part in self.moves)
-        x, y, z = (part[some] if np.ndim(part) else part for part in self.direction)
-        unit = self.unit[some] if np.ndim(self.unit) else self.unit
-        return Lanes(self.case[some], self.at_nodes.take(some, axis=1), (u, v), (x, y, z), unit)
+        u, v, x, y, z, order = (
+            part.take(some) if isinstance(part, np.ndarray) else part
+            for part in (*self.moves, *self.direction, self.order)
+        )
+        return Lanes(self.case.take(some), self.at_nodes.take(some, axis=1), (u, v), (x, y, z), order)
 
     def there(self, case: Places) -> "Lanes":
         """The same of lanes, one a case, where cases are chosen anew: errors of `ExactRanges.at`."""
@@ -148,22 +149,6 @@ class Lanes:
         transmitter, receiver = self.moves
         is_clock = 1.0 - np.maximum(transmitter, receiver)
         return self.at_nodes * (size * is_clock) if np.any(is_clock) else np.zeros_like(self.at_nodes)
-
-
-def joined(parts: Sequence[Lanes]) -> Lanes:
-    """Lanes beside each other."""
-    counts = [one.case.size for one in parts]
-    kinds = zip(*((*one.moves, *one.direction, one.unit) for one in parts), strict=True)
-    u, v, x, y, z, unit = (_beside(of_all, counts) for of_all in kinds)
-    case = np.concatenate([one.case for one in parts])
-    return Lanes(case, np.concatenate([one.at_nodes for one in parts], axis=1), (u, v), (x, y, z), unit)
-
-
-def _beside(values: Sequence[Any], counts: Sequence[int]) -> Any:
-    """One value for all lanes where they share it, else one for each."""
-    if all(np.ndim(value) == 0 and value == values[0] for value in values):
-        return values[0]
-    return np.concatenate([np.broadcast_to(value, (count,)) for value, count in zip(values, counts, strict=True)])
 
 
 class SmallErrors(NamedTuple):
@@ -183,14 +168,14 @@ class SmallErrors(NamedTuple):
         """Errors whose lanes are the cases."""
         courses: dict[Any, Floats] = {}
         ways = np.zeros((len(errors), 7, max((np.size(part) for one in errors for part in one.direction), default=1)))
-        for index, (lanes, way) in enumerate(zip(errors, ways, strict=True)):
-            courses[lanes.unit if lanes.platforms else index] = lanes.at_nodes
+        for index, (lanes, way) in enumerate(zip(errors, ways, strict=True), 1):
+            courses[lanes.order if lanes.platforms else -index] = lanes.at_nodes
             for platform in lanes.platforms:
                 for axis, part in enumerate(lanes.direction):
                     way[3 * platform + axis] = part
             way[6] = not lanes.platforms
         names = list(courses)
-        course = [names.index(one.unit if one.platforms else index) for index, one in enumerate(errors)]
+        course = [names.index(one.order if one.platforms else -index) for index, one in enumerate(errors, 1)]
         return cls(np.array(list(courses.values())), np.array(course), ways)
 
     def there(self, case: Places) -> "SmallErrors":
@@ -439,7 +424,7 @@ class ExactRanges:
         """
         shifts = lanes.shifts(size)
         clock = lanes.clock(size)
-        bend = np.abs(size) * np.where(lanes.unit == "m/s", lanes.moves[0] + lanes.moves[1], 0.0)
+        bend = np.abs(size) * np.where(lanes.order == 1, lanes.moves[0] + lanes.moves[1], 0.0)
         return self.settled(clock, shifts, near, bend, lanes.case)
 
     def left_over(self, lanes: Lanes, size: Floats, place: tuple[Any, Any]) -> Floats:
@@ -554,18 +539,11 @@ class ExactRanges:
         """Search with the slopes of the centre: a third of the work, where it settles in a few steps."""
         gradient = _of(self.gradient, of)
         for _ in range(FEW):
-            (a, c, quadratic_east, cubic_east), (b, d, quadratic_north, cubic_north) = gradient
-            determinant = a * d - b * c
-            constant, linear, quadratic, cubic = self.fit @ _left(measured, east, north, room)
-            step_east = (b * linear - d * constant) / determinant
-            step_north = (c * constant - a * linear) / determinant
+            left = self.fit @ _left(measured, east, north, room)
+            _, step_east, step_north, phases = _newton_step(left, *gradient)
             east, north = east + step_east, north + step_north
             (k,) = _of([self.k], of)
             is_done = k * (np.abs(step_east) + np.abs(step_north)) < UNSEEN_RAD / NEAR
-            phases = (
-                k * (quadratic + quadratic_east * step_east + quadratic_north * step_north),
-                k * (cubic + cubic_east * step_east + cubic_north * step_north),
-            )
             self._keep(found, alive, of, is_done, east, north, phases, np.ones(alive.size))
             going = np.flatnonzero(~is_done)
             if not going.size:
@@ -586,21 +564,12 @@ class ExactRanges:
         before = np.full(alive.size, math.inf)
         for _ in range(ITERATIONS):
             seen, nearest = _seen(measured, east, north, room)
-            (constant, linear, quadratic, cubic), by_east, by_north = np.matmul(self.fit, seen)
-            a, c, quadratic_east, cubic_east = by_east  # what a step of a metre adds to what is left
-            b, d, quadratic_north, cubic_north = by_north
-            determinant = a * d - b * c
-            step_east = (b * linear - d * constant) / determinant
-            step_north = (c * constant - a * linear) / determinant
+            determinant, step_east, step_north, phases = _newton_step(*np.matmul(self.fit, seen))
             east, north = east + step_east, north + step_north
             step = step_east * step_east + step_north * step_north
             k, meets, at_centre, half = _of([self.k, self.nearest, self.determinant, self.half], of)
             is_apart = nearest >= MEETS * meets
             is_done = is_apart & (k * step < UNSEEN_RAD * nearest)
-            phases = (
-                k * (quadratic + quadratic_east * step_east + quadratic_north * step_north),
-                k * (cubic + cubic_east * step_east + cubic_north * step_north),
-            )
             is_right = is_done & (determinant * at_centre > 0)
             turn = determinant / (at_centre * half)
             self._keep(found, alive, of, is_right, east, north, phases, turn)
@@ -623,14 +592,31 @@ class ExactRanges:
         phases: tuple[Floats, Floats],
         turn: Floats,
     ) -> None:
-        """Note the lanes that have settled; what is less than rounding leaves is none."""
+        """Note the lanes that have settled, phases in metres; what is less than rounding leaves is none."""
         places = alive[is_done]
         found.is_found[places] = True
         found.east[places], found.north[places], found.turn[places] = east[is_done], north[is_done], turn[is_done]
-        (rounding,) = _of([self.rounding], of[is_done])
+        k, rounding = _of([self.k, self.rounding], of[is_done])
         for kept, phase in zip((found.quadratic, found.cubic), phases, strict=True):
-            one = phase[is_done]
+            one = k * phase[is_done]
             kept[places] = np.where(np.abs(one) > rounding, one, 0.0)
+
+
+def _newton_step(
+    left: Floats, by_east: Floats, by_north: Floats
+) -> tuple[Floats, Floats, Floats, tuple[Floats, Floats]]:
+    """Step east and north after which nothing is left of the constant and the linear part, to first order. [m]
+
+    Parts of what is left (4, lanes) [m], and what a step of a metre adds to them. With the step the determinant of
+    its equations, and the quadratic and cubic part after it. [m]
+    """
+    constant, linear, quadratic, cubic = left
+    (a, c, quadratic_east, cubic_east), (b, d, quadratic_north, cubic_north) = by_east, by_north
+    determinant = a * d - b * c
+    east = (b * linear - d * constant) / determinant
+    north = (c * constant - a * linear) / determinant
+    quadratic = quadratic + quadratic_east * east + quadratic_north * north
+    return determinant, east, north, (quadratic, cubic + cubic_east * east + cubic_north * north)
 
 
 def _weighted(along: Sequence[Any], weight: Any) -> Sequence[Any]:

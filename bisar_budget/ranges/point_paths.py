@@ -2,15 +2,16 @@
 
 The point is followed from no error on. Where range and Doppler gradients become parallel there, its way ends:
 they span less than 2 % of what they span at the centre. No larger error has an image of the point, which counts as a
-limit reached. All lanes take each step together; those that it does not concern are left out of it.
+limit reached. All lanes take each step together, and of a few lanes several points; a search looks at what is known
+after each step and says where to look next.
 """
 
 import math
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from bisar_budget.constants import ROUNDING
 from bisar_budget.ranges.exact_ranges import ExactRanges, Floats, Lanes, Places, Truths
 
 # Of what range and Doppler gradients span at the centre: with less a point has no image, they are parallel there.
@@ -23,42 +24,55 @@ FINEST_STEP = 1e-6  # where the gradients stay apart, the way only turns
 OF_FOLD = 0.8  # of the way to where the gradients seem to become parallel, that one step makes
 SHORT = 0.1  # of the last step, below which that step says little of the way left
 FOLDS = 0.1  # of what the gradients span at the centre; a way that ends at more of it does not end in a fold
+NEAR_FOLD = 0.06  # likewise; nearer, the square of what they span is a straight line
 CLOSE = 1e-5  # of a limit, where a search ends
-ALMOST = 0.002  # of a limit, from where a parabola leads to it
+ALMOST = 0.002  # of a limit, from where a curve leads to it
 CREST = 0.01  # of a limit: so little below it, the crest of a curve through few points may be above
 DEPARTS = 0.5  # of the limit: a value so far from a straight line may have been anywhere in between
 COARSE = 0.02  # of the size: within a shorter interval a curve is trusted
-STEPS = 40
+GROWTH = 1.5  # of a size in a step
+ROUNDS = 100  # of a search; none is known that takes more than 25
+NEWTON = 3  # steps on a cubic
+FEW = 256  # lanes: of so few, several points cost as much as one
+LADDER = np.array((0.25, 0.5, 0.75, 1.0, 1.3))  # of the size that is looked at first, where nothing is known
 
-# Rows of a known point: size, east, north, quadratic, cubic, turn. A limit holds a phase, or the way to the point.
-WAY, QUADRATIC, CUBIC = 1, 3, 4
-_NO_ERROR = (0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+QUADRATIC, CUBIC, WAY = range(3)  # what is held to a limit: a phase, or the way to the point
+# Rows of a known point: size, east, north, quadratic, cubic, turn.
+_PHASES = 3
+_NO_ERROR = np.array((0.0, 0.0, 0.0, 0.0, 0.0, 1.0))
 
 
 class Held(NamedTuple):
-    """Row held to a limit in lanes, WAY, QUADRATIC or CUBIC; the limit; effect of a small unit on the row, signed."""
+    """Searches for the first size at which what is held in lanes reaches a limit, (searches,).
 
-    row: Any  # one of all, or of each (lanes,)
+    `row` is QUADRATIC, CUBIC or WAY, `slope` the effect of a small unit on it, signed. Each looks at `first` first,
+    and ends at `most` or where another of its `group` has found a smaller size; where `is_alone`, of its own row.
+    """
+
+    lane: Places
+    row: Places
     limit: Floats
-    per_unit: Floats
+    slope: Floats
+    first: Floats
+    most: Floats
+    group: Places
+    is_alone: Truths
 
     def of(self, some: Any) -> "Held":
-        """The same for some of the lanes."""
-        return Held(self.row[some] if np.ndim(self.row) else self.row, self.limit[some], self.per_unit[some])
+        """Some of the searches."""
+        return Held(*(part[some] for part in self))
+
+    def turned(self, sign: float) -> "Held":
+        """The same of errors of a sign, whose slope changes with it; a way has none."""
+        return self._replace(slope=np.where(self.row == WAY, 1.0, sign) * self.slope)
 
     def value(self, known: Floats) -> Floats:
-        """Value held to the limit, of known points, (6, lanes): a phase, signed [rad], or a way [m]."""
-        if np.ndim(self.row):
-            phase = np.where(self.row == QUADRATIC, known[QUADRATIC], known[CUBIC])
-            phase = np.where(self.row == WAY, np.hypot(known[1], known[2]), phase)
-        else:
-            phase = np.hypot(known[1], known[2]) if self.row == WAY else known[self.row]
-        return np.asarray(phase)
-
-    def is_reached(self, known: Floats) -> Truths:
-        """Whether a search that meets these points need not look farther."""
-        found: Truths = np.abs(self.value(known)) >= self.limit * (1 - CLOSE)
-        return found
+        """Value over the limit at known points, (6, searches, points): of a phase, signed, or of a way."""
+        row = self.row[:, None]
+        found = np.where(row == QUADRATIC, known[_PHASES + QUADRATIC], known[_PHASES + CUBIC])
+        if (self.row == WAY).any():
+            found = np.where(row == WAY, np.hypot(known[1], known[2]), found)
+        return np.asarray(found / self.limit[:, None])
 
 
 class PointPaths:
@@ -84,111 +98,125 @@ class PointPaths:
         count = lanes.case.size
         self.end = np.full(count, math.inf)
         self._way = per_unit
-        self._known = np.full((count, 2, 6), math.inf)  # by size; infinite where there is none
-        self._known[:, 0] = _NO_ERROR
-        self._sizes = self._known[:, :, 0].copy()
-
-    def _count(self, some: Places, size: Floats) -> Places:
-        """How many known points are no larger than a size."""
-        found: Places = (self._sizes.take(some, axis=0) <= size[:, None]).sum(axis=1)
-        return found
+        self._known = np.full((6, count, 2), math.inf)  # by size; infinite where there is none
+        self._known[:, :, 0] = _NO_ERROR[:, None]
+        self._step = np.full(count, math.inf)  # the longest that is tried
+        self._is_lost = np.zeros(count, dtype=bool)  # whether the last one led nowhere
 
     def _at(self, index: Places, some: Places) -> Floats:
-        """Known points by their places, (6, some); infinite beyond the last."""
-        room = self._known.shape[1]
-        flat = self._known.reshape(-1, 6).take(some * room + np.minimum(index, room - 1), axis=0)
-        found: Floats = np.ascontiguousarray(flat.T)
-        found[:, index >= room] = math.inf
+        """Known points by their places, (6, some)."""
+        found: Floats = self._known[:, some, index]
         return found
 
     def known(self, some: Places, size: Floats) -> Floats:
         """Known points by errors of sizes that `to` was asked for, (6, some); not a number where the way ended."""
-        found = self._at(self._count(some, size) - 1, some)
+        found = self._at((self._known[0, some] <= size[:, None]).sum(axis=1) - 1, some)
         found[:, (found[0] != size) | (size >= self.end[some])] = math.nan
         return found
 
-    def _insert(self, index: Places, some: Places, point: Floats) -> None:
-        """Note a known point before those that an index names."""
-        if np.isfinite(self._sizes[some, -1]).any():  # the first needs few, most need one
-            more = np.full((len(self._sizes), 2 * self._sizes.shape[1], 6), math.inf)
-            self._known = np.concatenate((self._known, more), axis=1)
-            self._sizes = self._known[:, :, 0].copy()
-        moves = np.flatnonzero(self._sizes[some, index] < math.inf)
-        for place in range(self._sizes.shape[1] - 1, int(index[moves].min(initial=self._sizes.shape[1])), -1):
-            later = some[moves[place > index[moves]]]
-            self._known[later, place] = self._known[later, place - 1]
-            self._sizes[later, place] = self._sizes[later, place - 1]
-        self._known[some, index] = point.T
-        self._sizes[some, index] = point[0]
-
+    # ---------------------------------------------------------------- one step
     @np.errstate(all="ignore")
-    def to(self, some: Places, size: Floats, held: Held | None = None) -> None:
-        """Follow the point to a size in some lanes, or to the first size met that reaches what is held."""
-        step, is_first_try = np.full(some.shape, math.inf), np.ones(some.shape, dtype=bool)
+    def to(self, some: Places, size: Floats) -> None:
+        """Follow the point to a size in some lanes."""
         while True:
-            index = self._count(some, size)
-            last = self._at(index - 1, some)
-            going = (last[0] != size) & (size < self.end[some])
+            going = (size < self.end[some]) & (self._known[0, some] != size[:, None]).all(axis=1)
             if not going.any():
                 return
-            some, size, step, is_first_try = some[going], size[going], step[going], is_first_try[going]
-            index, last, held = index[going], last[:, going], held and held.of(going)
-            fold = self._to_fold(index, some, last)
-            to_fold = np.where(fold > FINEST_STEP * last[0], OF_FOLD * fold, math.inf)
-            step = np.minimum(np.minimum(step, size - last[0]), to_fold)
-            ahead = np.where(size - last[0] < 1.2 * step, size, last[0] + step)
-            near, is_straight = self._guess(index, some, last, ahead, is_first_try)
-            found = self.exact.phases(self.lanes.of(some), ahead, near)
-            point = np.array((ahead, *found[1:]))
-            is_on = found.is_found & _is_on_the_way(last, point, near)
-            is_end = is_on & (np.abs(point[5]) < PARALLEL)
-            self.end[some[is_end]] = _parallel_between(last, point)[is_end]
-            is_on &= ~is_end
-            self._insert(index[is_on], some[is_on], point[:, is_on])
+            some, size = some[going], size[going]
+            self._follow(some, size)
 
-            # Where the point is not found, first another guess, then shorter steps.
-            is_again = ~is_on & ~is_end & is_straight
-            is_shorter = ~is_on & ~is_end & ~is_straight
-            step = np.where(is_on, 2 * step, np.where(is_shorter, step / 2, step))
-            is_fold = ~found.is_found & (np.abs(last[5]) < FOLDS) & (fold < LEAST_STEP * ahead)
-            is_over = is_shorter & (is_fold | (step < FINEST_STEP * ahead))
-            self.end[some[is_over]] = (last[0] + np.minimum(step, fold))[is_over]
-            is_first_try = ~is_again
-            if held is not None:
-                more = ~(is_on & held.is_reached(point))
-                some, size, step, is_first_try = some[more], size[more], step[more], is_first_try[more]
-                held = held.of(more)
+    def _follow(self, some: Places, size: Floats) -> None:
+        """Follow the point toward sizes in lanes, that may be there twice: a step from the known one before each."""
+        index = (self._known[0, some] < size[:, None]).sum(axis=1) - 1
+        last = self._at(index, some)
+        fold = self._to_fold(index, some, last)
+        step = np.minimum(self._step[some], np.where(fold > FINEST_STEP * last[0], OF_FOLD * fold, math.inf))
+        is_short = size - last[0] >= 1.2 * step
+        size = np.where(is_short, last[0] + step, size)
+        if some.size < FEW and is_short.any():  # and to half of it
+            size = np.concatenate((size, (last[0] + step / 2)[is_short]))
+            some, index, fold = (np.concatenate((one, one[is_short])) for one in (some, index, fold))
+        order = np.lexsort((size, some))
+        lane, before = some[order], size[order]
+        is_new = np.ones(order.size, dtype=bool)
+        is_new[1:] = (lane[1:] != lane[:-1]) | (before[1:] - before[:-1] > ROUNDING * before[1:])
+        order = order[is_new]
+        some, index, size, fold = some[order], index[order], size[order], fold[order]
+        last = self._at(index, some)
+        near = self._guess(index, some, last, size)
+        found = self.exact.phases(self.lanes.of(some), size, near)
+        point = np.array((size, *found[1:]))
+        is_on = found.is_found & _is_on_the_way(last, point, near)
+        is_end = is_on & (np.abs(point[5]) < PARALLEL)
+
+        # Of several steps from one known point those count that come before the first that leads nowhere.
+        begins = np.ones(some.size, dtype=bool)
+        begins[1:] = (some[1:] != some[:-1]) | (index[1:] != index[:-1])
+        is_bad = ~is_on | is_end
+        missed = np.cumsum(is_bad)
+        missed = missed - (missed - is_bad)[np.maximum.accumulate(np.where(begins, np.arange(some.size), 0))]
+        is_kept, stops = missed == 0, (missed == 1) & is_bad
+        self._step[some] *= 2
+        self._is_lost[some] = False
+        if stops.any():
+            before = np.where(begins, last, np.roll(point, 1, axis=1))
+            fold = np.where(begins & ~found.is_found, fold, math.inf)
+            self._stop(some[stops], point[:, stops], before[:, stops], fold[stops], is_end[stops])
+        self._insert(some[is_kept], point[:, is_kept])
+
+    def _stop(self, some: Places, point: Floats, before: Floats, fold: Floats, is_end: Truths) -> None:
+        """Note ends of ways where a step led nowhere, or go on in shorter ones from the known points before."""
+        end = _parallel_between(before, point)
+        step = np.where(is_end, 0.9 * (end - before[0]), (point[0] - before[0]) / 2)
+        is_fold = (np.abs(before[5]) < FOLDS) & (fold < LEAST_STEP * point[0])
+        is_near = is_end & (np.abs(before[5]) < NEAR_FOLD)
+        is_over = ~is_near & ((is_fold & ~is_end) | (step < FINEST_STEP * point[0]))
+        self.end[some[is_near]] = end[is_near]
+        self.end[some[is_over]] = (before[0] + np.minimum(step, fold))[is_over]
+        self._step[some], self._is_lost[some] = step, True
+
+    def _insert(self, some: Places, point: Floats) -> None:
+        """Note known points, by lane and size."""
+        if not some.size:
+            return
+        lane, first, count = np.unique(some, return_index=True, return_counts=True)
+        before = np.isfinite(self._known[0, lane]).sum(axis=1)
+        width, needed = self._known.shape[2], int((before + count).max())
+        if needed > width:  # the first needs few, most need one
+            more = np.full((6, self.end.size, max(width, needed - width)), math.inf)
+            self._known = np.concatenate((self._known, more), axis=2)
+        self._known[:, some, np.repeat(before - first, count) + np.arange(some.size)] = point
+        if (point[0, first] < self._known[0, lane, before - 1]).any():
+            here = self._known[:, lane, :needed]
+            order = here[0].argsort(axis=1, kind="stable")
+            self._known[:, lane, :needed] = np.take_along_axis(here, order[None], axis=2)
 
     def _to_fold(self, index: Places, some: Places, last: Floats) -> Floats:
-        before = self._at(np.maximum(index - 2, 0), some)
+        before = self._at(np.maximum(index - 1, 0), some)
         square, earlier, step = last[5] ** 2, before[5] ** 2, last[0] - before[0]
         fold = np.where(square < earlier, square * step / (earlier - square), math.inf)
-        return np.where((index > 1) & (fold > SHORT * step), fold, math.inf)
+        return np.where((index > 0) & (fold > SHORT * step), fold, math.inf)
 
-    def _guess(
-        self, index: Places, some: Places, last: Floats, size: Floats, is_first_try: Truths
-    ) -> tuple[tuple[Floats, Floats], Truths]:
+    def _guess(self, index: Places, some: Places, last: Floats, size: Floats) -> tuple[Floats, Floats]:
         """Where known points lead: by a parabola from no error on where the way so far was nearly straight."""
         u, v = self._way[:, some]
         bent = (last[1] - u * last[0], last[2] - v * last[0])
-        part = np.where(last[0] > 0, (size / last[0]) ** 2, 0.0)
-        is_straight = is_first_try & (np.hypot(*bent) <= STRAIGHT * np.hypot(last[1], last[2]))
+        part = np.where(index > 0, (size / last[0]) ** 2, 0.0)
+        is_straight = np.hypot(*bent) <= STRAIGHT * np.hypot(last[1], last[2])
         east, north = u * size + bent[0] * part, v * size + bent[1] * part
-        bends = np.flatnonzero(~is_straight)
+        bends = np.flatnonzero(~is_straight | (self._is_lost[some] & (index > 0)))
         if bends.size:
             east[bends], north[bends] = self._ahead(index[bends], some[bends], last[:, bends], size[bends])
-        return (east, north), is_straight
+        return (east, north)
 
     def _ahead(self, index: Places, some: Places, last: Floats, size: Floats) -> tuple[Floats, Floats]:
         """Where known points lead along the way of the last, which bends as it did."""
-        before = self._at(np.maximum(index - 2, 0), some)
-        (u, v), (p, q) = (self._way_at(some, known) for known in (last, before))
+        before = self._at(np.maximum(index - 1, 0), some)
+        both = self._way_at(np.tile(some, 2), np.concatenate((last, before), axis=1))
+        (u, p), (v, q) = (part.reshape(2, -1) for part in both)
         step = size - last[0]
-        bend = np.where(index > 1, step / (2 * (last[0] - before[0])), 0.0)
-        return (
-            last[1] + (u + np.where(index > 1, bend * (u - p), 0.0)) * step,
-            last[2] + (v + np.where(index > 1, bend * (v - q), 0.0)) * step,
-        )
+        bend = np.where(index > 0, step / (2 * (last[0] - before[0])), 0.0)
+        return last[1] + (u + bend * (u - p)) * step, last[2] + (v + bend * (v - q)) * step
 
     def _way_at(self, some: Places, known: Floats) -> tuple[Floats, Floats]:
         """Where the point goes from known ones. [m/unit]"""
@@ -196,145 +224,147 @@ class PointPaths:
         (u, v), is_first = self._way[:, some], known[0] == 0
         return np.where(is_first, u, east), np.where(is_first, v, north)
 
-    def either_reaching(self, some: Sequence[Places], held: Held, first: Floats, farthest: Floats) -> Floats:
-        """Smallest size, of either sign, at which values reach limits; infinite: none up to the farthest.
-
-        `some` are the lanes of the positive sign, and of the other. The slope of what is held is that of the first.
-        """
-        smallest = np.full(first.shape, math.inf)
-        for lanes, sign in zip(some, (1.0, -1.0), strict=True):
-            slopes = np.where(held.row == WAY, 1.0, sign) * held.per_unit  # a length has no sign
-            found = self.first_reaching(lanes, held._replace(per_unit=slopes), first, farthest)
-            smallest, farthest = np.minimum(found, smallest), np.minimum(found, farthest)
-            first = np.minimum(first, farthest)
-        return smallest
-
+    # ---------------------------------------------------------------- the first size that reaches a limit
     @np.errstate(all="ignore")
-    def first_reaching(self, some: Places, held: Held, first: Floats, farthest: Floats) -> Floats:
-        """First size at which a value reaches a limit in some lanes; infinite: none up to the farthest."""
-        found = np.full(some.shape, math.inf)
-        met = self._at(self._count(some, first), some)[0]
-        size = np.where(met <= (1 + ALMOST) * first, met, first)
-        place = np.arange(some.size)  # of the lanes that still search
-        for _ in range(STEPS):
-            here, of, most = some[place], held.of(place), farthest[place]
-            self.to(here, size, of)
-            crossed = self._crossed(here, of, np.minimum(size, self.end[here]))
-            index = self._count(here, size) - 1
-            last = self._at(index, here)
-            reached = np.abs(of.value(last))
-            ahead = self._just_ahead(index, here, of, last)
-            is_almost = (reached > (1 - ALMOST) * of.limit) & (size < most)
-            ahead = np.where(is_almost, ahead, math.inf)
-            end = self.end[here]
-            ends = np.where(np.isfinite(crossed), crossed, np.where(end <= size, end, ahead))
-            found[place] = np.where(ends <= most, ends, math.inf)
-            going = ~(np.isfinite(ends) | (size >= most))
-            if not going.any():
-                return found
-            place, size, most, reached = place[going], size[going], most[going], reached[going]
-            growth = np.clip(1.02 * of.limit[going] / reached, 1.01, 1.5)
-            size = np.minimum(most, size * growth)
-        found[place] = size
-        return found
-
-    def _just_ahead(self, index: Places, some: Places, held: Held, last: Floats) -> Floats:
-        """Size at which a value does that almost reaches the limit at known points; infinite where none can tell."""
-        before = self._at(np.maximum(index - 1, 0), some)
-        reached = np.abs(held.value(last))
-        slope = (reached - np.abs(held.value(before))) / (last[0] - before[0])
-        ahead = np.where(slope > 0, last[0] + (held.limit - reached) / slope, math.inf)
-        ahead = np.where(index == 1, _on_parabola(held.limit, np.abs(held.per_unit), last[0], reached), ahead)
-        is_sure = (last[0] <= ahead) & (ahead < (1 + 1.5 * ALMOST) * last[0]) & (last[5] > 0.5)
-        return np.where(is_sure, ahead, math.inf)
-
-    def _crossed(self, some: Places, held: Held, upto: Floats) -> Floats:
-        """First size among the known ones, or between them, at which the value reaches the limit; infinite: none."""
-        reaches = np.zeros(some.shape, dtype=int)  # the known point that does
-        place, index = np.arange(some.size), np.ones(some.shape, dtype=int)
-        while place.size:
-            high, of = self._at(index, some[place]), held.of(place)
-            is_known = high[0] <= upto[place]
-            is_enough = is_known & of.is_reached(high)
-            reaches[place[is_enough]] = index[is_enough]
-            going = is_known & ~is_enough
-            place, index, high, of = place[going], index[going], high[:, going], of.of(going)
-            doubtful = self._doubtful(index, some[place], of, high)
-            is_sure = np.isnan(doubtful)
-            self.to(some[place[~is_sure]], doubtful[~is_sure])
-            index = index + is_sure
-            going = is_sure | (doubtful < self.end[some[place]])
-            place, index = place[going], index[going]
-        found, place = np.full(some.shape, math.inf), np.flatnonzero(reaches)
-        found[place] = self._between(some[place], held.of(place), reaches[place])
-        return found
-
-    def _doubtful(self, index: Places, some: Places, held: Held, high: Floats) -> Floats:
-        """Size to look at within intervals whose ends are below the limit; not a number: what lies between is too."""
-        low, after = self._at(index - 1, some), self._at(index + 1, some)
-        a, b, width = held.value(low), held.value(high), high[0] - low[0]
-        before = self._at(np.maximum(index - 2, 0), some)
-        slope = np.where(index == 1, held.per_unit, _slope(held, before, low, high))
-        last = np.where(np.isfinite(after[0]), _slope(held, low, high, after), 2 * (b - a) / width - slope)
-        is_wide = width > COARSE * high[0]
-        near = np.where(is_wide, held.limit * (1 - CREST), held.limit)
-        departs = np.abs(b - a - slope * width)
-        found = np.where(is_wide & (departs > DEPARTS * held.limit), low[0] + width / 2, math.nan)
-        for part in reversed(_crests(slope * width, b - a, last * width)):
-            square, cube = part * part, part * part * part
-            on_curve = a + slope * width * (part - 2 * square + cube) + last * width * (cube - square)
-            on_curve += (b - a) * (3 * square - 2 * cube)
-            is_above = (part > 0.02) & (part < 0.98) & (np.abs(on_curve) >= near)
-            found = np.where(is_above, low[0] + part * width, found)
-        return found
-
-    def _between(self, some: Places, held: Held, index: Places) -> Floats:
-        """Size at which the magnitude reaches the limit, in the intervals that end at known points."""
-        found = np.full(some.shape, math.nan)
-        place, low, high = np.arange(some.size), self._at(index - 1, some), self._at(index, some)
-        for step in range(STEPS):
-            of = held.of(place)
-            a, b = np.abs(of.value(low)), np.abs(of.value(high))
-            chord = (b - a) / (high[0] - low[0])
-            size = low[0] + (of.limit - a) / chord
-            if step % 3 == 2:
-                size = (low[0] + high[0]) / 2
-            is_first = low[0] == 0
-            # A phase grows by a parabola from zero: of the slope there, or through both ends of the interval.
-            through = (a / low[0] * high[0] - b / high[0] * low[0]) / (high[0] - low[0])
-            bent = _on_parabola(of.limit, np.where(is_first, np.abs(of.per_unit), through), high[0], b)
-            is_inside = (bent > low[0]) & (bent < high[0]) & (is_first | (step % 3 < 2))
-            size = np.where(is_inside | (is_first & np.isfinite(bent)), bent, size)
-            is_close = b - of.limit < ALMOST * of.limit
-            chord = chord + (chord - a / low[0]) * (high[0] - low[0]) / high[0]
-            back = np.where(chord > 0, high[0] - (b - of.limit) / chord, 0.0)
-            size = np.where(is_close & ~is_first, back, size)
-            is_narrow = high[0] - low[0] <= CLOSE * high[0]
-            ends = is_narrow | (is_close & (high[0] - size < 2 * ALMOST * high[0]))
-            found[place[ends]] = np.where(is_narrow, low[0], size)[ends]
-            going = ~ends
-            if not going.any():
-                return found
-            place, low, high, size = place[going], low[:, going], high[:, going], size[going]
-            inside = 0.01 * (high[0] - low[0])
-            size = np.minimum(np.maximum(size, low[0] + inside), high[0] - inside)
-            self.to(some[place], size)
-            middle = self.known(some[place], size)
-            is_there = ~np.isnan(middle[0])
-            found[place[~is_there]] = low[0, ~is_there]
-            place, low, high, middle = place[is_there], low[:, is_there], high[:, is_there], middle[:, is_there]
-            is_high = held.of(place).is_reached(middle)
-            low, high = np.where(is_high, low, middle), np.where(is_high, middle, high)
-        found[place] = low[0]
-        return found
+    def first_reaching(self, held: Held, best: Floats) -> None:
+        """Find the first sizes at which values reach limits; the best so far, (3, groups), are by row and group."""
+        tries = np.zeros(held.lane.shape, dtype=int)
+        for _ in range(ROUNDS):
+            others = best[:, held.group]
+            upto = np.where(held.is_alone, np.choose(held.row, others), others.min(axis=0))
+            seen = _SearchState(self, held, np.minimum(held.most, upto), tries)
+            ends = seen.is_sure
+            np.minimum.at(best, (held.row[ends], held.group[ends]), seen.found[ends])
+            going = np.flatnonzero(~ends)
+            if not going.size:
+                return
+            some, size = seen.next(going)
+            self._follow(held.lane[some], size)
+            held, tries, low = held.of(going), tries[going] + seen.is_between[going], seen.low[going]
+        np.minimum.at(best, (held.row, held.group), low)  # which is safe, and no search is known that comes here
 
 
-def _on_parabola(limit: Floats, slope: Floats, size: Floats, value: Floats) -> Floats:
-    """Size at which a parabola from zero, of a slope there and a value at a size, reaches a limit; or infinite."""
-    bend = (value / size - slope) / size
-    root = slope * slope + 4 * bend * limit
-    does = (root >= 0) & (slope + np.sqrt(np.where(root >= 0, root, 0.0)) > 0)
-    return np.where(does, 2 * limit / (slope + np.sqrt(np.where(does, root, 1.0))), math.inf)
+class _SearchState:
+    """What known points tell of searches.
+
+    Attributes
+    ----------
+    found : (searches,)
+        Sizes at which they end; infinite where nothing is reached.
+    is_sure : (searches,)
+        Whether they end there; the others go on.
+    is_between : (searches,)
+        Whether the limit lies between known points.
+    """
+
+    def __init__(self, paths: PointPaths, held: Held, upto: Floats, tries: Places) -> None:
+        self.held, self.upto, self.tries, every = held, upto, tries, np.arange(tries.size)
+        end = paths.end[held.lane]
+        known = paths._known.take(held.lane, axis=1)
+        is_known = known[0] < end[:, None]
+        self.count = is_known.sum(axis=1)
+        width = max(2, int(self.count.max()))
+        known, is_known = known[:, :, :width], is_known[:, :width]
+        self.size = np.where(is_known, known[0], math.nan)
+        self.value = np.where(is_known, held.value(known), math.nan)
+        reaches = np.abs(self.value) >= 1 - CLOSE
+        self.is_between: Truths = np.asarray(reaches.any(axis=1))
+        stop = np.where(self.is_between, reaches.argmax(axis=1), self.count)
+        self._slopes(every)
+        self.doubtful = self._doubtful(stop)
+        low = stop - 1
+        self.low, self.turn = self.size[every, low], known[5, every, low]
+        self.between, is_close = self._between(every, stop)
+        self.ahead, is_ahead = self._ahead(every, low)
+        is_past, ends = self.low >= upto, np.isfinite(end)
+        self.is_sure = np.isnan(self.doubtful).all(axis=1)
+        self.is_sure &= np.where(self.is_between, is_close, ends | is_ahead) | is_past
+        found = np.where(self.is_between, self.between, np.where(ends, end, self.ahead))
+        self.found = np.where((found <= upto) & ~is_past, found, math.inf)
+
+    def _slopes(self, every: Places) -> None:
+        """Slopes at known points of the parabola through each and its neighbours; at the last of the one before."""
+        self.width = self.size[:, 1:] - self.size[:, :-1]
+        chord = (self.value[:, 1:] - self.value[:, :-1]) / self.width
+        self.slope = np.empty(self.size.shape)
+        self.slope[:, 0] = self.held.slope / self.held.limit
+        before, after = self.width[:, :-1], self.width[:, 1:]
+        self.slope[:, 1:-1] = (chord[:, :-1] * after + chord[:, 1:] * before) / (before + after)
+        last = np.maximum(self.count - 1, 1)
+        self.slope[every, last] = 2 * chord[every, last - 1] - self.slope[every, last - 1]
+
+    def _doubtful(self, stop: Places) -> Floats:
+        """Size to look at within each interval whose ends are below the limit; not a number: what lies between is."""
+        low, width = self.size[:, :-1], self.width
+        a, b = self.value[:, :-1], self.value[:, 1:]
+        rise, begins, ends = b - a, self.slope[:, :-1] * width, self.slope[:, 1:] * width
+        is_wide = width > COARSE * self.size[:, 1:]
+        near = np.where(is_wide, 1 - CREST, 1.0)
+        found = np.where(is_wide & (np.abs(rise - begins) > DEPARTS), low + width / 2, math.nan)
+        for part in reversed(_crests(begins, rise, ends)):
+            is_above = (part > 0.02) & (part < 0.98) & (np.abs(_on_cubic(part, a, rise, begins, ends)) >= near)
+            found = np.where(is_above, low + part * width, found)
+        is_before = np.arange(1, self.size.shape[1]) < stop[:, None]
+        return np.where(is_before & (low < self.upto[:, None]), found, math.nan)
+
+    def _between(self, every: Places, stop: Places) -> tuple[Floats, Truths]:
+        """Size at which a cubic between known points reaches the limit, and whether that is close to it."""
+        high = np.minimum(stop, self.size.shape[1] - 1)
+        low = high - 1
+        width, top = self.width[every, low], self.size[every, high]
+        sign = np.sign(self.value[every, high])
+        a, b = sign * self.value[every, low], sign * self.value[every, high]
+        begins, ends = (sign * self.slope[every, one] * width for one in (low, high))
+        part = chord = (1 - a) / (b - a)
+        for _ in range(NEWTON):
+            steep = begins + part * (2 * (3 * (b - a) - 2 * begins - ends) + 3 * part * (begins + ends - 2 * (b - a)))
+            part = part - (_on_cubic(part, a, b - a, begins, ends) - 1) / steep
+            part = np.where((part >= 0) & (part <= 1), part, chord)
+        found = top - (1 - part) * width
+        is_narrow = width <= CLOSE * top
+        is_close = (b - 1 < ALMOST) & (top - found < 2 * ALMOST * top)
+        is_close |= (1 - a < ALMOST) & (found - (top - width) < 2 * ALMOST * top)
+        self.inside = top - (1 - np.where(self.tries % 4 == 3, 0.5, np.minimum(np.maximum(part, 0.01), 0.99))) * width
+        return np.where(is_narrow, top - width, found), is_close | is_narrow
+
+    def _ahead(self, every: Places, last: Places) -> tuple[Floats, Truths]:
+        """Size at which a parabola through the last known points reaches the limit; whether that is close to it."""
+        before = np.maximum(last - 1, 0)
+        slope = self.slope[every, last]
+        bend = np.where(last > 0, (slope - self.slope[every, before]) / self.width[every, before], 0.0)
+        value = self.value[every, last]
+        sign = np.where(value == 0, np.sign(slope), np.sign(value))
+        slope, bend, left = sign * slope, sign * bend, 1 - np.abs(value)
+        root = slope * slope + 2 * bend * left
+        steep = slope + np.sqrt(np.maximum(root, 0.0))
+        ahead = np.where((root >= 0) & (steep > 0), self.low + 2 * left / steep, math.inf)
+        is_sure = (left < ALMOST) & (ahead < (1 + 1.5 * ALMOST) * self.low) & (self.turn > 0.5)
+        return ahead, is_sure
+
+    def next(self, going: Places) -> tuple[Places, Floats]:
+        """Sizes to look at next in the searches that go on: of many one each, and one a lane."""
+        low, upto = self.low[going], self.upto[going]
+        is_few, is_fresh = going.size < FEW, self.count[going] == 1
+        grown = np.minimum(np.maximum(self.ahead[going], 1.01 * low), GROWTH * low)
+        is_before = low < self.held.first[going]
+        ahead = np.where(is_before, self.held.first[going], grown)
+        size = np.where(self.is_between[going], self.inside[going], np.minimum(ahead, upto))
+        doubtful = self.doubtful[going]
+        if not is_few:
+            least = np.where(np.isnan(doubtful), math.inf, doubtful).min(axis=1)
+            size = np.where(np.isfinite(least), least, size)
+            order = np.lexsort((size, self.held.lane[going]))
+            lane = self.held.lane[going][order]
+            order = order[np.append(True, np.diff(lane) > 0)]
+            return going[order], size[order]
+        size = np.where((low < upto) | self.is_between[going], size, math.nan)
+        is_growing = ~is_before & ~self.is_between[going] & (grown >= GROWTH * low)
+        more = np.where(is_growing, GROWTH, math.nan)[:, None] * size[:, None] * np.array((1.0, GROWTH))
+        rungs = np.where(is_fresh[:, None], size[:, None] * LADDER, math.nan)
+        sizes = np.concatenate((size[:, None], doubtful, more, rungs), axis=1)
+        sizes = np.where(self.is_between[going][:, None], sizes, np.minimum(sizes, upto[:, None]))
+        place, column = np.nonzero(np.isfinite(sizes))
+        return going[place], sizes[place, column]
 
 
 def _is_on_the_way(last: Floats, found: Floats, near: tuple[Floats, Floats]) -> Truths:
@@ -352,11 +382,11 @@ def _parallel_between(before: Floats, beyond: Floats) -> Floats:
     return found
 
 
-def _slope(held: Held, before: Floats, at: Floats, after: Floats) -> Floats:
-    """Slope at known points of the parabola through each and its neighbours. [of the value per unit]"""
-    a, b, c = held.value(before), held.value(at), held.value(after)
-    first, second = at[0] - before[0], after[0] - at[0]
-    found: Floats = ((b - a) / first * second + (c - b) / second * first) / (first + second)
+def _on_cubic(part: Floats, start: Floats, rise: Floats, begins: Floats, ends: Floats) -> Floats:
+    """Value at a part of intervals of the cubic that rises so much, with these slopes at both ends."""
+    square, cube = part * part, part * part * part
+    found: Floats = start + begins * (part - 2 * square + cube) + ends * (cube - square)
+    found += rise * (3 * square - 2 * cube)
     return found
 
 

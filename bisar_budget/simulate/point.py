@@ -11,8 +11,7 @@ import numpy as np
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.combined import correlated_errors, likely_error
-from bisar_budget.effects.effect import PLATFORMS
-from bisar_budget.effects.pieces import LinePiece, gradients_of, indicated_point
+from bisar_budget.effects.effect import PLATFORMS, LinePiece, gradients_of, indicated_point
 from bisar_budget.effects.vibration import counted, lines_of
 from bisar_budget.geometry import GroundVector, Vector
 from bisar_budget.mission.model import Mission, Simulation

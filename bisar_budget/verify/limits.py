@@ -15,12 +15,10 @@ from bisar_budget.budget.judged_rows import Judging
 from bisar_budget.budget.pull_in import ROOM
 from bisar_budget.budget.random_rows import RandomRows
 from bisar_budget.budget.verdicts import rows_worth_showing
-from bisar_budget.effects.clocks import spurs_of
 from bisar_budget.effects.declared import QUADRATIC
-from bisar_budget.effects.echoes import SLOWEST
-from bisar_budget.effects.effect import PLATFORMS
-from bisar_budget.effects.subject import Subject, subject
-from bisar_budget.effects.vibration import lines_of
+from bisar_budget.effects.effect import PLATFORMS, Subject, subject
+from bisar_budget.effects.oscillators import spurs_of
+from bisar_budget.effects.vibration import SLOWEST, lines_of
 from bisar_budget.faults import printable
 from bisar_budget.findings.images import FLOOR_DB, ImageEvidence, PointImage, Verdict, VerifiedMission
 from bisar_budget.findings.mission import MissionFindings

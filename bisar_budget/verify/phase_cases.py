@@ -231,7 +231,8 @@ def compare(excess: float, tolerance: float) -> str:
 
 def published_displacement(study: Study, sizes: Sizes, scale: float) -> GroundVector | None:
     """Displacement of errors together by (25); None where it has none."""
-    moves = [study.plane.displacement(source.effect, scale * size) for source, size in sizes]
+    published = study.analysis.published  # (25)
+    moves = [published.displacement(source.effect, scale * size) for source, size in sizes]
     if any(move is None for move in moves):
         return None
     return (math.fsum(m[0] for m in moves if m), math.fsum(m[1] for m in moves if m))
@@ -367,7 +368,7 @@ def location(study: Study, requirement: float) -> Verdict:
     try:
         scale = _scale_of_location(study, sizes, requirement)
         if scale is None:
-            degeneracy = study.plane.degeneracy
+            degeneracy = study.analysis.published.degeneracy
             why = reasons.displacement_degenerates(degeneracy) if degeneracy else reasons.errors_move_nothing(rule)
             return blank._replace(reason=why)
         said = _places(study, sizes, scale)
@@ -432,8 +433,8 @@ def _scale_of_location(study: Study, sizes: Sizes, requirement: float) -> float 
         place = published_displacement(study, sizes, 1.0)
         length = math.hypot(*place) if place else 0.0
         return requirement / length if length else None
-    plane = study.analysis.full.plane
-    moves = [plane.displacement(source.full, size) or (0.0, 0.0) for source, size in sizes]
+    full = study.analysis.full
+    moves = [full.displacement(source.full, size) or (0.0, 0.0) for source, size in sizes]
     length = math.hypot(math.fsum(m[0] for m in moves), math.fsum(m[1] for m in moves))
     if not length:
         return None

@@ -9,8 +9,7 @@ import numpy as np
 from bisar_budget.analysis.analysis import Analysis, Model
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.declared import QUADRATIC
-from bisar_budget.effects.effect import PLATFORMS, ErrorSource
-from bisar_budget.effects.subject import Subject
+from bisar_budget.effects.effect import PLATFORMS, ErrorSource, Subject
 from bisar_budget.findings.images import Verdict
 from bisar_budget.mission.model import Mission
 from bisar_budget.ranges.exact_ranges import FINE, STILL, ExactRanges, followed
@@ -51,7 +50,6 @@ class Study:
         self.geometry, self.sources = self.analysis.geometry, self.analysis.sources
         self.model = mission.gating_model
         self.allocation = self.analysis.allocation
-        self.plane = self.analysis.published.plane  # (25)
         self.collection = PointCollection(mission, self.geometry)
 
     def blank(self, row_id: str, limit: float, unit: str, **known: Any) -> Verdict:

@@ -50,7 +50,7 @@ def swept(mission, cases, columns=(), model=None, jobs=1):
     return {one.name: np.concatenate([part.values[one.name] for part in parts]) for one in found.columns}
 
 
-def assert_as_checked(mission, cases, whole, columns=(), model=None) -> None:
+def assert_as_checked(mission, cases, whole, columns=(), model=None, near=NEAR) -> None:
     """Hold each case to `check_mission` of a mission that has its values."""
     for place in range(cases.count):
         values = {key: float(one[0]) for key, one in cases.values(place, place + 1).items()}
@@ -71,7 +71,7 @@ def assert_as_checked(mission, cases, whole, columns=(), model=None) -> None:
         stands = standing(found, None, breaking("fail"))
         assert got["worst_row"] == (stands.row or ""), values
         use = math.nan if stands.utilization is None else stands.utilization
-        assert got["utilization"] == pytest.approx(use, rel=NEAR, nan_ok=True), values
+        assert got["utilization"] == pytest.approx(use, rel=near, nan_ok=True), values
         assert got["binding_requirement"] == (stands.requirement or "")
         assert got["range_resolution"] == pytest.approx(found.resolution.range, rel=NEAR)
         assert got["cross_range_resolution"] == pytest.approx(found.resolution.cross_range, rel=NEAR)
@@ -86,8 +86,8 @@ def assert_as_checked(mission, cases, whole, columns=(), model=None) -> None:
                 want = math.nan if want is None else want
                 # ISLR holds cubic phases: exact ranges know them to 4e-10 rad, the smallest that counts is 1e-3.
                 holds_cubic = ".islr." in name and case.requirements.cubic_phase_error is None
-                near = 1e-6 if holds_cubic else NEAR
-                assert got[name] == pytest.approx(want, rel=near, nan_ok=True), (values, name)
+                within = 1e-6 if holds_cubic else NEAR
+                assert got[name] == pytest.approx(want, rel=within, nan_ok=True), (values, name)
 
 
 COLUMNS = (
@@ -233,7 +233,8 @@ def test_searches_of_the_full_model_are_held(name, model) -> None:
         axes["platforms__receiver__azimuth"] = [azimuth - 0.4, azimuth, azimuth + 0.9]
     cases = grid(mission, **axes)
     whole = swept(mission, cases, model=model)
-    assert_as_checked(mission, cases, whole, model=model)
+    # Of few lanes several sizes are looked at in each step, of many one: a search ends within 1e-5 of its limit.
+    assert_as_checked(mission, cases, whole, model=model, near=1e-5)
 
 
 @pytest.mark.parametrize("model", ["full", "strictest"])

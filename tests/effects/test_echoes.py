@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bisar_budget.effects.echoes import near_groups, near_lines, worst_phases
+from bisar_budget.effects.vibration import near_groups, near_lines, worst_phases
 
 TIME = (np.arange(1024) + 0.5) / 1024 - 0.5
 

@@ -159,7 +159,7 @@ def test_phases_have_no_rounding_of_the_ranges() -> None:
     analysis = Analysis(parse_mission(family_text("geostationary_drone", 3)))
     source = next(one for one in analysis.sources if one.id == "transmitter.position.x")
     lanes = analysis.errors.lanes(source).of(np.zeros(10, dtype=int))
-    near = analysis.full.plane.displacement(source.full, 1.0)
+    near = analysis.full.displacement(source.full, 1.0)
     found = analysis.exact.phases(lanes, 1 + np.arange(10) * 1e-6, near)
     phases = np.array((found.quadratic, found.cubic)).T
     assert np.abs(phases[0]).max() > 1e-3
@@ -177,6 +177,6 @@ def test_a_point_that_meets_a_platform_has_no_image(part: float, is_found: bool)
         platforms = {"transmitter": still, "receiver": {**moving, "motion_error": {"velocity": 0.01}}}
         analysis = Analysis(parse_mission(mission_text(platforms=platforms)))
         ones = np.ones((len(analysis.exact.times), 1))
-        lanes = Lanes(np.zeros(1, dtype=int), ones, moves=(1.0, 0.0), direction=position, unit="m")
+        lanes = Lanes(np.zeros(1, dtype=int), ones, moves=(1.0, 0.0), direction=position, order=0)
         found = analysis.exact.phases(lanes, np.array([-part]), (0.0, 0.0))
         assert found.is_found[0] == is_found

@@ -12,7 +12,10 @@ from hypothesis import strategies as st
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.effects.declared import CUBIC, FARTHEST, LOCATION, QUADRATIC
 from bisar_budget.mission.load import parse_mission
+from bisar_budget.ranges import point_paths
 from tests.conftest import findings, mission_text, row
+from tests.families import FAMILIES
+from tests.families import mission_text as family_text
 
 C = 299_792_458.0
 SECTION_V = {
@@ -289,6 +292,24 @@ def test_an_error_beyond_a_tenth_of_the_range_is_held_to_its_limit_all_the_same(
     assert found.status == "fail"
     at_limit = row(findings(**{**error, "timing_error__constant": found.allowable}), "timing.constant")
     assert abs(at_limit.qpe_full_rad) == pytest.approx(20 * math.pi / 2, rel=1e-6)  # the receiver's half
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_of_few_lanes_and_of_many_the_same_is_found(family: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a few lanes several sizes are looked at in each step, of many one."""
+
+    def found() -> np.ndarray:
+        analysis = Analysis(parse_mission(family_text(family, 3)))
+        (block,) = analysis.errors.blocks
+        nearest = min(path.slant_range for path in analysis.geometry.both)
+        limits = (np.full((len(block.sources), 1), 0.2), 0.1, 0.01 * nearest)
+        allowed = block.allowed("full", limits, is_whole=True)
+        return np.array((allowed.smallest, allowed.quadratic))
+
+    of_few = found()
+    monkeypatch.setattr(point_paths, "FEW", 0)
+    assert np.isfinite(of_few).sum() > 30
+    assert found() == pytest.approx(of_few, rel=1e-4, nan_ok=True)
 
 
 def test_the_errors_of_a_part_go_as_soon_as_nobody_asks_for_them() -> None:

@@ -133,6 +133,7 @@ class TestEveryKindOfPath:
     def test_a_log_that_has_not_changed_is_read_once(self, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         """`solve` reads its mission some hundred times."""
         monkeypatch.setattr(paths, "_logs", {})
+        monkeypatch.setattr(paths, "_paths", {})
         read, reads = paths.read_csv, []
         monkeypatch.setattr(paths, "read_csv", lambda *given: reads.append(given) or read(*given))
         (folder / "m.yaml").write_text(aircraft())
@@ -506,6 +507,7 @@ def test_a_path_that_cannot_be_read_is_one_line_and_no_report(
 
 def test_a_missing_package_is_named(run: Callable[..., Any], folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (folder / "m.yaml").write_text(satellite())
+    monkeypatch.setattr(paths, "_paths", {})
     monkeypatch.setitem(sys.modules, "sgp4", None)
     monkeypatch.setitem(sys.modules, "sgp4.api", None)
     result = run("check", folder / "m.yaml")

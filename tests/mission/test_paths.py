@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from bisar_budget.budget.file_warnings import free_fall, straight_orbits
 from bisar_budget.faults import MissionError
+from bisar_budget.mission import paths
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import Mission
 from bisar_budget.paths import earth, flight
@@ -129,6 +130,7 @@ class TestLevelFlight:
         assert max(off) == pytest.approx(path.farthest, rel=0.5, abs=2e-9)  # looked at in other places
         assert path.doubts == ()
         monkeypatch.setattr(flight, "_ROUGH_M", 0.0)
+        monkeypatch.setattr(paths, "_paths", {})
         (doubt,) = mission(**fast).platforms.receiver.path.doubts
         assert doubt == f"the polynomial that is flown is up to {path.farthest:.3g} m from the path"
 

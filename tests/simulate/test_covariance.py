@@ -112,7 +112,7 @@ def test_common_errors_are_those_of_exact_ranges() -> None:
         sources = {source.id: source for source in study.sources}
         for index in range(6):
             source = sources[f"common.{('position', 'velocity')[index // 3]}.{'xyz'[index % 3]}"]
-            moved = study.analysis.full.plane.displacement(source.full, 1.0)
+            moved = study.analysis.full.displacement(source.full, 1.0)
             got = np.array([source.full.qpe, source.full.cubic, *moved]) * STEP[index]
             want = gradient[:, index] * STEP[index]
             assert got[0] == pytest.approx(want[0], rel=0.02, abs=1e-4), source.id

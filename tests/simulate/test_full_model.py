@@ -66,12 +66,12 @@ def test_a_horizontal_error_common_to_both_platforms_only_moves_the_image() -> N
     """The whole collection is elsewhere: by first order the effects of both cancel, whatever the geometry."""
     for mission in random_missions(20, seed=8):
         analysis = Analysis(mission)
-        sources, plane = {s.id: s for s in analysis.sources}, analysis.full.plane
+        sources, full = {s.id: s for s in analysis.sources}, analysis.full
         for axis, moved in (("x", (1.0, 0.0)), ("y", (0.0, 1.0))):
             t, r = (sources[f"{name}.position.{axis}"].full for name in ("transmitter", "receiver"))
             assert t.qpe == pytest.approx(-r.qpe, rel=1e-9)
             assert t.cubic == pytest.approx(-r.cubic, rel=1e-9)
-            both = [a + b for a, b in zip(plane.displacement(t, 1.0), plane.displacement(r, 1.0), strict=True)]
+            both = [a + b for a, b in zip(full.displacement(t, 1.0), full.displacement(r, 1.0), strict=True)]
             assert both == pytest.approx(moved, abs=1e-9)
 
 

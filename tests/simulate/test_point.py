@@ -7,7 +7,7 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from bisar_budget.effects.pieces import gradients_of
+from bisar_budget.effects.effect import gradients_of
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.simulate import point as point_module
 from bisar_budget.simulate.autofocus import phase_gradient_autofocus

@@ -13,8 +13,15 @@ from sympy import lambdify
 
 from bisar_budget import evaluators
 from bisar_budget.constants import STANDARD_GRAVITY
-from bisar_budget.effects.spectra import PowerLawPiece, link_parts, parts, synchronized_parts
-from bisar_budget.effects.tones import gauss_markov, held, tone
+from bisar_budget.effects.spectra import (
+    PowerLawPiece,
+    gauss_markov,
+    held,
+    link_parts,
+    parts,
+    synchronized_parts,
+    tone,
+)
 from bisar_budget.report.explain import formulas
 from bisar_budget.theory import random_errors, render
 

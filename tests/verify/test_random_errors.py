@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from bisar_budget.effects.effect import subject
 from bisar_budget.effects.random_errors import RandomError
 from bisar_budget.effects.spectra import PowerLawPiece
-from bisar_budget.effects.subject import subject
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.simulate.point import simulate_point
 from bisar_budget.simulate.realisations import _Tones

@@ -8,8 +8,7 @@ from collections.abc import Iterator, Mapping
 from fnmatch import fnmatchcase
 from typing import Any, NamedTuple
 
-from bisar_budget.effects.effect import PLATFORMS
-from bisar_budget.effects.subject import MOTION
+from bisar_budget.effects.effect import MOTION, PLATFORMS
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.requirement import NAMES
 from bisar_budget.findings.row import Row

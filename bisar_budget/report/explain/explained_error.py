@@ -5,8 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.constants import SPEED_OF_LIGHT
-from bisar_budget.effects.effect import MOTION_UNITS, PLATFORMS, ErrorSource
-from bisar_budget.effects.subject import Subject, subject
+from bisar_budget.effects.effect import MOTION_UNITS, PLATFORMS, ErrorSource, Subject, subject
 from bisar_budget.faults import KeyPath, printable
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.geometry import FRAME_AXES, PlatformState
@@ -222,19 +221,19 @@ def _projected_effect(
 
 def _displacement(analysis: Analysis, source: ErrorSource) -> Iterator[Step]:
     """Where (25) puts the image."""
-    plane, by_table = analysis.published.plane, source.effect
-    if plane.degeneracy or source.declared is None:
+    published, by_table = analysis.published, source.effect
+    if published.degeneracy or source.declared is None:
         return
-    moved = plane.displacement(by_table, source.declared)
+    moved = published.displacement(by_table, source.declared)
     if moved is None or moved == (0.0, 0.0):
         return
     values = {
         "β̃_0": by_table.constant * source.declared,
         "β̃_1": by_table.linear * source.declared,
-        "det Q": plane.determinant,
+        "det Q": published.plane.determinant,
     }
     lines: list[WorkedEquation] = []
-    for symbol, (first, second), result in zip(("x̃", "ỹ"), plane.adjugate, moved, strict=True):
+    for symbol, (first, second), result in zip(("x̃", "ỹ"), published.plane.adjugate, moved, strict=True):
         entries = {"adj_0": first, "adj_1": second}
         lines += equation(symbol, "(adj_0*β̃_0 + adj_1*β̃_1)/(det Q)", values | entries, result, "m")
     yield from step("(25), (30): the image moves east, north by", *lines)

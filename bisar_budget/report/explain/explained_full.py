@@ -27,7 +27,7 @@ class Left:
         full = analysis.full
         self.exact: ExactRanges = analysis.exact
         self.wavelength, self.size = analysis.mission.radar.wavelength, size
-        self.place: GroundVector | None = full.plane.displacement(source.full, size)
+        self.place: GroundVector | None = full.displacement(source.full, size)
         self.is_small = not source.is_motion or full.is_small(source, abs(size))
         if self.is_small:
             self.ranges = full.left_over_small(source, size)

@@ -11,12 +11,11 @@ from bisar_budget.analysis.spread import declared_powers, mainlobe_energy, sprea
 from bisar_budget.analysis.vibration_limits import LARGEST_ECHO, Echo, bessel, highest_echo, tone_limits
 from bisar_budget.budget.random_rows import held_effect, no_effect
 from bisar_budget.constants import STANDARD_GRAVITY
-from bisar_budget.effects.clocks import spurs_of
 from bisar_budget.effects.declared import CUBIC, QUADRATIC
+from bisar_budget.effects.effect import subject
+from bisar_budget.effects.oscillators import spurs_of
 from bisar_budget.effects.random_errors import RandomEffect, RandomError, process_of
-from bisar_budget.effects.spectra import PowerLawPiece, parts, synchronized_parts
-from bisar_budget.effects.subject import subject
-from bisar_budget.effects.tones import gauss_markov
+from bisar_budget.effects.spectra import PowerLawPiece, gauss_markov, parts, synchronized_parts
 from bisar_budget.faults import printable
 from bisar_budget.findings.row import Row
 from bisar_budget.mission.model import Mission

@@ -13,9 +13,8 @@ from bisar_budget.analysis.together import Together, cubics, quadratics
 from bisar_budget.analysis.vibration_limits import amplitude_share, echo_phase, slow_limits
 from bisar_budget.effects.combined import phase_parts
 from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
-from bisar_budget.effects.echoes import near_lines, worst_phases
 from bisar_budget.effects.effect import ErrorSource
-from bisar_budget.effects.vibration import cubic_part, lines_of, quadratic_part, sight_of
+from bisar_budget.effects.vibration import cubic_part, lines_of, near_lines, quadratic_part, sight_of, worst_phases
 from bisar_budget.faults import KeyPath, changes_words, printable
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.requirement import JudgedRequirement
