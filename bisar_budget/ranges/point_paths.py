@@ -131,7 +131,8 @@ class PointPaths:
         last = self._at(index, some)
         fold = self._to_fold(index, some, last)
         step = np.minimum(self._step[some], np.where(fold > FINEST_STEP * last[0], OF_FOLD * fold, math.inf))
-        is_short = size - last[0] >= 1.2 * step
+        # A little beyond a step is one step too; but where that led nowhere, it would again.
+        is_short = size - last[0] >= np.where(self._is_lost[some], 1.0, 1.2) * step
         size = np.where(is_short, last[0] + step, size)
         if some.size < FEW and is_short.any():  # and to half of it
             size = np.concatenate((size, (last[0] + step / 2)[is_short]))

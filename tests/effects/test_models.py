@@ -3,6 +3,7 @@
 import gc
 import math
 import weakref
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,9 +12,10 @@ from hypothesis import strategies as st
 
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.effects.declared import CUBIC, FARTHEST, LOCATION, QUADRATIC
-from bisar_budget.mission.load import parse_mission
+from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.ranges import point_paths
-from tests.conftest import findings, mission_text, row
+from bisar_budget.ranges.point_paths import PointPaths
+from tests.conftest import ROOT, findings, mission_text, row
 from tests.families import FAMILIES
 from tests.families import mission_text as family_text
 
@@ -323,3 +325,24 @@ def test_the_errors_of_a_part_go_as_soon_as_nobody_asks_for_them() -> None:
         assert table() is None
     finally:
         gc.enable()
+
+
+@pytest.mark.parametrize("name", ["drones_same_gnss", "geostationary_direct_path", "sentinel1_fixed_receiver"])
+def test_following_a_point_to_any_size_ends(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A step that led nowhere was tried again for ever where the size lay a little beyond a shorter one."""
+    count, follow = [0], PointPaths._follow
+
+    def counted(self: PointPaths, some: Any, size: Any) -> None:
+        count[0] += 1
+        assert count[0] <= 200, "it goes on and on"
+        follow(self, some, size)
+
+    monkeypatch.setattr(PointPaths, "_follow", counted)
+    analysis = Analysis(load_mission(str(ROOT / "specs" / "missions" / f"{name}.yaml")))
+    sizes = np.random.default_rng(1)
+    for source in analysis.sources:
+        farthest = analysis.full.farthest(source)
+        if source.is_motion and math.isfinite(farthest):
+            for size in (1.0, *(farthest * 10 ** sizes.uniform(-6, 0.3, 6))):
+                count[0] = 0
+                analysis.full.at(source, size)
