@@ -91,14 +91,14 @@ def solve(
     for mission in load_all(files, model, changes):
         try:
             found: Solution | Comparison
-            if is_of_parts:
-                found = compare.compare_parts(mission, key, row=row, target=target, model=model, today=judged_on)
-            else:
-                asked: dict[str, Any] = {"between": between, "target": target, "is_scale": is_scale}
-                with watched_checks(mission.name) as progress:
-                    found = solving.solve(
-                        mission, key, **asked, row=row, model=model, today=judged_on, progress=progress
-                    )
+            with watched_checks(mission.name) as progress:
+                asked: dict[str, Any] = {
+                    "row": row, "target": target, "model": model, "today": judged_on, "progress": progress
+                }  # fmt: skip
+                if is_of_parts:
+                    found = compare.compare_parts(mission, key, **asked)
+                else:
+                    found = solving.solve(mission, key, between=between, is_scale=is_scale, **asked)
         except QuestionError as error:
             fail(f"{mission.file}: {error}")
         found = found._replace(overrides=overrides(mission, from_outside, judged_on))

@@ -20,6 +20,7 @@ from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.parts import FIGURES, Part, PartError, entries, evidence, find_part, folders
+from bisar_budget.workers import Progress, unseen
 
 _KINDS = {"motion_error": ("imu", "gnss"), "oscillator": ("oscillator",)}
 
@@ -106,6 +107,7 @@ def compare_parts(
     target: str = "fail",
     model: str | None = None,
     today: date,
+    progress: Progress = unseen,
 ) -> Comparison:
     """Check a mission with every part of the catalogue that a key can name.
 
@@ -126,6 +128,8 @@ def compare_parts(
         Gating model in place of the mission's own.
     today : date
         Day on which waivers are judged, UTC.
+    progress : callable, optional
+        Is told how many parts are done, and how many there are.
 
     Returns
     -------
@@ -145,7 +149,10 @@ def compare_parts(
         search = _PartSearch(variation, key)
     except PartError as error:
         raise QuestionError(f"{key}: {error}") from None
-    tried = [(one, search.checked(one, today)) for one in search.candidates]
+    tried = []
+    for done, one in enumerate(search.candidates, 1):
+        tried.append((one, search.checked(one, today)))
+        progress(done, len(search.candidates))
     found = [checked.judged for _, checked in tried if checked.judged is not None]
     if not found:
         why = tried[0][1].reason if tried else "the catalogue has none of its kind"
