@@ -140,9 +140,7 @@ class Judging(NamedTuple):
 
     def array(self, value: Any) -> Floats:
         """One number for each case; not a number for None."""
-        number = math.nan if value is None else value
-        found: Floats = np.array(np.broadcast_to(np.asarray(number, dtype=float), (self.cases,)))
-        return found
+        return np.full(self.cases, math.nan if value is None else value, dtype=float)
 
     def row(
         self,
