@@ -154,8 +154,7 @@ def _with_revision(patterns: Sequence[str], base: str, output: str | None, today
     """Compare missions with themselves in a revision; patterns name those of now and of then."""
     from bisar_budget.mission.load import load_mission
     from bisar_budget.mission.revision import Revision, RevisionError, mission_at
-    from bisar_budget.report.change.comparison import ChangeSet
-    from bisar_budget.report.change.loosened import loosened_settings
+    from bisar_budget.report.change.comparison import ChangeSet, loosened_settings
     from bisar_budget.resources import resource
 
     if "-" in patterns:

@@ -137,7 +137,7 @@ def _checked_as_json(checked: "Mapping[str, Entry | PartError]") -> str:
 
 def _as_text(chosen: "list[Entry]") -> str:
     from bisar_budget.mission.parts import evidence
-    from bisar_budget.report.words.layout import wrapped
+    from bisar_budget.report.words.sentences import wrapped
 
     lines: list[str] = []
     for kind, title in _TITLES.items():

@@ -9,7 +9,7 @@ import pytest
 from bisar_budget.budget.check import check_mission
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.mission.model import Mission
-from bisar_budget.report.explain import formulas
+from bisar_budget.report.explain import notation
 from bisar_budget.report.explain.explanation import explain
 from bisar_budget.theory import render
 from tests.conftest import ROOT, TODAY, mission_text
@@ -31,11 +31,11 @@ def cells(table: str) -> list[list[str]]:
 def test_table_1_is_what_the_derivation_prints() -> None:
     rows = [row for row in cells("I") if row[0].isdigit()]
     printed = {cell for row in rows for cell in row[2:] if cell != "-"}
-    ours = {formulas.clock_coefficient(order) for order in range(4)}
+    ours = {notation.clock_coefficient(order) for order in range(4)}
     for platform in ("transmitter", "receiver"):
         for number, row in enumerate([row for row in rows if f"_{platform[0]}(" in row[1]]):
             kind, axis = ("position", "velocity", "acceleration")[number % 3], "xyz"[number // 3]
-            texts = formulas.motion_coefficients(kind, axis, platform)
+            texts = notation.motion_coefficients(kind, axis, platform)
             assert [texts.get(order, "-") for order in range(4)] == row[2:6]
             ours |= set(texts.values())
     assert ours == printed
@@ -44,12 +44,12 @@ def test_table_1_is_what_the_derivation_prints() -> None:
 def test_table_2_is_what_the_derivation_prints() -> None:
     printed = [row[2] for row in cells("II") if row[0].isdigit() or row[0] == "-"]
     ours = [
-        formulas.motion_phase(kind, axis, platform)
+        notation.motion_phase(kind, axis, platform)
         for platform in ("transmitter", "receiver")
         for kind in ("velocity", "acceleration")
         for axis in "xyz"
     ]
-    assert [*ours, formulas.CLOCK_PHASE] == printed
+    assert [*ours, notation.CLOCK_PHASE] == printed
 
 
 def explained_full_model(row_id: str) -> str:
@@ -83,9 +83,9 @@ def test_the_published_model_keeps_the_full_one_as_a_comparison() -> None:
 
 def test_vibration_and_autofocus_are_what_the_derivation_prints() -> None:
     printed, derived = render.derivation("vibration", "text").split("Vibration, first principles")
-    assert [cell for cell in formulas.VIBRATION.values() if cell in printed] == list(formulas.VIBRATION.values())
-    assert formulas.FULL_VIBRATION["islr"] in derived
-    assert f"G = {formulas.AUTOFOCUS_GAIN}" in render.derivation("equations", "text")
+    assert [cell for cell in notation.VIBRATION.values() if cell in printed] == list(notation.VIBRATION.values())
+    assert notation.FULL_VIBRATION["islr"] in derived
+    assert f"G = {notation.AUTOFOCUS_GAIN}" in render.derivation("equations", "text")
 
 
 def evaluated(text: str) -> float:

@@ -20,7 +20,7 @@ from bisar_budget.findings.mission import Report, UnusableMission
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.report import FORMATS, Style, format_of, render
 from bisar_budget.report.formats.github import step_summary
-from bisar_budget.report.words import escapes
+from bisar_budget.report.words import sentences
 from tests.conftest import COMPLIES, ROOT, TODAY, findings, mission_text
 from tests.page import read_page
 
@@ -124,7 +124,7 @@ class TestJunit:
         found = findings(**STATUSES)
         suite = junit(found)[0]
         cases = {case.get("name"): case for case in suite.findall("testcase")}
-        rows = {escapes.printable(row.id): row for row in found.rows}
+        rows = {sentences.printable(row.id): row for row in found.rows}
         rows |= {f"requirement.{one.key}": one for one in found.requirements}
         assert cases.keys() == rows.keys()
         seen = {row.status for row in found.rows}
@@ -151,7 +151,7 @@ class TestJunit:
         assert int(got["line"]) == row.line
         for key in ("declared", "allowable", "utilization", "margin"):
             assert float(got[key]) == getattr(row, key)
-        assert got["evidence"] == escapes.printable(HOSTILE)
+        assert got["evidence"] == sentences.printable(HOSTILE)
         assert "n_pull" in case.find("failure").get("message")
 
     def test_an_unusable_mission_is_a_case_with_an_error(self) -> None:
@@ -247,7 +247,7 @@ class TestSarif:
 
     def test_levels(self) -> None:
         found = findings(**STATUSES)
-        status = {escapes.printable(row.id): row.status for row in found.rows}
+        status = {sentences.printable(row.id): row.status for row in found.rows}
         levels = {"fail": "error", "waived": "error", "not_evaluated": "error", "warn": "warning"}
         results = [r for r in sarif(found)["results"] if r["ruleId"] != "mission_file"]
         assert len(results) == sum(s in levels for s in status.values())
@@ -259,7 +259,7 @@ class TestSarif:
         (result,) = [r for r in sarif(findings(**STATUSES))["results"] if "suppressions" in r]
         (suppression,) = result["suppressions"]
         assert suppression["kind"] == "inSource"
-        assert suppression["justification"] == escapes.printable(f"ECR-17 {HOSTILE}")
+        assert suppression["justification"] == sentences.printable(f"ECR-17 {HOSTILE}")
         lines = mission_text(**STATUSES).splitlines()
         assert "receiver.*" in lines[suppression["location"]["physicalLocation"]["region"]["startLine"] - 1]
 
@@ -356,7 +356,7 @@ class TestGithub:
         for row in rows.values():
             if row.status in levels:
                 key = row.id if row.status != "not_evaluated" else f"EVAL {row.id}"
-                command, properties = titles[escapes.printable(key)]
+                command, properties = titles[sentences.printable(key)]
                 assert command == levels[row.status]
                 assert int(properties["line"]) == row.line
                 assert int(properties["col"]) >= 1
@@ -370,7 +370,7 @@ class TestGithub:
     def test_faults_of_an_unusable_file(self) -> None:
         (_, first, message), (_, second, _) = self.commands(UNUSABLE)
         assert (first["file"], first["line"], first["col"]) == (UNUSABLE.file, "3", "7")
-        assert escapes.printable(HOSTILE) in message
+        assert sentences.printable(HOSTILE) in message
         assert "line" not in second
 
     def test_nothing_to_say_is_no_command(self) -> None:
@@ -481,22 +481,26 @@ ANY_TEXT = st.text(st.characters(), min_size=1, max_size=40)
 
 @given(ANY_TEXT)
 def test_xml_of_any_text_parses_to_it(text: str) -> None:
-    for markup in (f'<a b="{escapes.xml_text(text)}"/>', f"<a>{escapes.xml_text(text)}</a>"):
+    for markup in (f'<a b="{sentences.xml_text(text)}"/>', f"<a>{sentences.xml_text(text)}</a>"):
         element = ElementTree.fromstring(markup.encode())
-        assert (element.get("b") or element.text or "") == escapes.printable(text)
+        assert (element.get("b") or element.text or "") == sentences.printable(text)
 
 
 @given(ANY_TEXT, ANY_TEXT)
 def test_a_command_of_any_text_stays_one_command(title: str, message: str) -> None:
-    line = f"::error title={escapes.command_property(title)},x=1::{escapes.command_text(message)}"
+    line = f"::error title={sentences.command_property(title)},x=1::{sentences.command_text(message)}"
     assert len(line.splitlines()) == 1
-    assert run_command(line) == ("error", {"title": escapes.printable(title), "x": "1"}, escapes.printable(message))
+    assert run_command(line) == (
+        "error",
+        {"title": sentences.printable(title), "x": "1"},
+        sentences.printable(message),
+    )
 
 
 @given(ANY_TEXT)
 def test_markdown_of_any_text_has_no_markup_and_stays_in_its_cell(text: str) -> None:
-    escaped = escapes.markdown_text(text)
-    shown = escapes.printable(text)
+    escaped = sentences.markdown_text(text)
+    shown = sentences.printable(text)
     markdown = MarkdownIt("commonmark").enable(["table", "strikethrough"])
     assert not re.search(
         r"://|www\.|@\w|[<>$]|&(?!#\d+;)\w+;", escaped, re.ASCII

@@ -9,9 +9,9 @@ import pytest
 from bisar_budget.budget.check import check_mission
 from bisar_budget.catalogue import FORMULAS, SYMBOLS
 from bisar_budget.mission.load import load_mission
-from bisar_budget.report.explain import typeset
+from bisar_budget.report.explain import notation
 from bisar_budget.report.explain.explanation import chain, collection_chain
-from bisar_budget.report.explain.formulas import WorkedEquation, filled
+from bisar_budget.report.explain.notation import WorkedEquation, filled
 from tests.conftest import TODAY
 from tests.report.test_report_explanation import MISSIONS
 
@@ -96,7 +96,7 @@ def test_every_kind_of_formula_is_there(equations) -> None:
 def test_numbers_in_mathml_give_the_result(equations) -> None:
     """Six digits are put in and shown."""
     for name, equation in equations:
-        root = ElementTree.fromstring(f"<p>{typeset.as_mathml(equation).numbers}</p>")
+        root = ElementTree.fromstring(f"<p>{notation.as_mathml(equation).numbers}</p>")
         (equals, numbers), (equals_again, result) = (element[0] for element in root)
         assert [equals.text, equals_again.text] == ["=", "="], name
         assert not [symbol.text for symbol in numbers.iter("mi") if symbol.text not in KNOWN], name
@@ -108,7 +108,7 @@ def test_numbers_in_mathml_give_the_result(equations) -> None:
 
 def test_numbers_in_latex_give_the_result(equations) -> None:
     for name, equation in equations:
-        _, numbers, result = typeset.as_latex(equation).numbers.split("= ")
+        _, numbers, result = notation.as_latex(equation).numbers.split("= ")
         want = pytest.approx(equation.result, rel=2e-5, abs=1e-300)
         assert value_of(python_of_latex(numbers)) == want, (name, numbers)
         assert value_of(python_of_latex(result.partition(r"\,")[0])) == want, name
@@ -118,16 +118,16 @@ def test_a_small_number_as_base_of_a_power_stands_in_brackets() -> None:
     formula = "π*T^2*|v_xt*ṽ_xt|/(2*R_t*λ)"
     values = {"T": 2e-5, "v_xt": -7e3, "ṽ_xt": 1e-3, "R_t": 7e5, "λ": 0.03}
     equation = WorkedEquation("QPE", formula, values, math.pi * 4e-10 * 7 / (2 * 7e5 * 0.03), "rad")
-    root = ElementTree.fromstring(f"<p>{typeset.as_mathml(equation).numbers}</p>")
+    root = ElementTree.fromstring(f"<p>{notation.as_mathml(equation).numbers}</p>")
     assert value_of(python_of_mathml(root[0][0][1])) == pytest.approx(equation.result, rel=1e-12)
-    numbers = typeset.as_latex(equation).numbers.split("= ")[1]
+    numbers = notation.as_latex(equation).numbers.split("= ")[1]
     assert value_of(python_of_latex(numbers)) == pytest.approx(equation.result, rel=1e-12)
 
 
 @pytest.mark.parametrize("text", [*FORMULAS, *SYMBOLS])
 def test_the_catalogue_is_well_formed(text: str) -> None:
     latex, mathml = FORMULAS.get(text) or SYMBOLS[text]
-    ElementTree.fromstring(typeset.math(mathml))
+    ElementTree.fromstring(notation.math(mathml))
     assert latex.count("{") == latex.count("}")
     assert "&" not in mathml
 
@@ -160,12 +160,12 @@ def test_formulas_that_no_table_has_are_typeset_from_their_text(formula: str) ->
     text = re.sub(r"\|([^|]*)\|", r"abs(\1)", filled(formula, values)).replace("^", "**").replace("π", "pi")
     want = value_of(text)
     equation = WorkedEquation("x", formula, values, want, "m")
-    assert typeset.is_formula(equation)
+    assert notation.is_formula(equation)
     assert formula not in FORMULAS
-    mathml = typeset.as_mathml(equation)
+    mathml = notation.as_mathml(equation)
     numbers = ElementTree.fromstring(f"<p>{mathml.numbers}</p>")[0][0][1]
     assert value_of(python_of_mathml(numbers)) == pytest.approx(want, rel=1e-12)
-    latex = typeset.as_latex(equation)
+    latex = notation.as_latex(equation)
     assert value_of(python_of_latex(latex.numbers.split("= ")[1])) == pytest.approx(want, rel=1e-12)
     assert "_" not in mathml.formula
     assert not re.search(r"[^\x00-\x7f]", latex.formula)
@@ -173,7 +173,7 @@ def test_formulas_that_no_table_has_are_typeset_from_their_text(formula: str) ->
 
 def test_words_stay_text() -> None:
     for formula in ("total*share*gain", "limit/(QPE/unit)", "min(published, full)", "10^(dB/10)"):
-        assert not typeset.is_formula(WorkedEquation("x", formula, {}, 0.0, ""))
+        assert not notation.is_formula(WorkedEquation("x", formula, {}, 0.0, ""))
 
 
 def test_a_name_with_an_underscore_has_a_subscript() -> None:
@@ -181,5 +181,5 @@ def test_a_name_with_an_underscore_has_a_subscript() -> None:
     equation = WorkedEquation(
         "QPE_full", "φ_turning + φ_displaced", {"φ_turning": 1.0, "φ_displaced": -2.0}, -1.0, "rad"
     )
-    assert typeset.as_latex(equation).formula.startswith(r"\mathrm{QPE}_{\mathrm{full}} &= \phi_{\mathrm{turning}}")
-    assert "<msub><mi>QPE</mi><mi>full</mi></msub>" in typeset.as_mathml(equation).formula
+    assert notation.as_latex(equation).formula.startswith(r"\mathrm{QPE}_{\mathrm{full}} &= \phi_{\mathrm{turning}}")
+    assert "<msub><mi>QPE</mi><mi>full</mi></msub>" in notation.as_mathml(equation).formula

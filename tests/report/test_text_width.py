@@ -8,7 +8,7 @@ from bisar_budget.mission.load import load_mission
 from bisar_budget.report import Style
 from bisar_budget.report.explain.explanation import explain
 from bisar_budget.report.formats.verification import as_text
-from bisar_budget.report.words.layout import WIDTH, table
+from bisar_budget.report.words.sentences import WIDTH, table
 from tests.conftest import ROOT, TODAY, findings, mission_text
 
 NAME = "A mission whose name alone is longer than a line of a terminal was ever meant to be, with aircraft"

@@ -22,7 +22,7 @@ from bisar_budget.effects.spectra import (
     synchronized_parts,
     tone,
 )
-from bisar_budget.report.explain import formulas
+from bisar_budget.report.explain import notation
 from bisar_budget.theory import random_errors, render
 
 T = 5.0
@@ -224,7 +224,7 @@ def test_noise_of_the_link_is_two_thirds_of_each_exchange() -> None:
 
 def test_what_is_explained_is_what_is_derived() -> None:
     printed = render.derivation("random", "text")
-    found = [cell for symbol in ("b", "ψ", "ε", "N", "N_g") for cell in formulas.inertial_phases(symbol) if cell]
+    found = [cell for symbol in ("b", "ψ", "ε", "N", "N_g") for cell in notation.inertial_phases(symbol) if cell]
     assert len(found) == 9
     assert all(cell in printed for cell in found)
 

@@ -1,17 +1,307 @@
-"""Effects of a change on missions: how much of each limit it erodes, what it loosens, what a gate refuses of it."""
+"""Effects of a change on missions: what goes in, what it loosens, how much of each limit it erodes, what is refused."""
 
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from bisar_budget.constants import UTILIZATION_TOLERANCE
+from bisar_budget.effects.effect import MOTION, PLATFORMS
+from bisar_budget.faults import Changed, KeyPath
 from bisar_budget.findings.mission import MissionFindings
+from bisar_budget.findings.requirement import NAMES
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import STATUS
-from bisar_budget.report.change.inputs import Moved, moved_geometry, moved_inputs
-from bisar_budget.report.change.loosened import Loosened, loosenings
+from bisar_budget.mission.changes import parts_of
+from bisar_budget.mission.model import Mission, Requirements, Waiver
+from bisar_budget.mission.parts import figure_text, taken_figures
 from bisar_budget.report.words.sentences import percent
+from bisar_budget.settings import TABLE
 
+
+# ---------------------------------------------------------------------- what goes in
+class Moved(NamedTuple):
+    """A value before and after: of a key as the files write it, or of the geometry; None where there is none."""
+
+    name: str
+    unit: str  # of a number; empty: text
+    before: str | float | None
+    after: str | float | None
+
+
+def moved_inputs(before: Mission, after: Mission) -> Iterator[Moved]:
+    """Keys that the files write differently and mean differently: `31 km` is 31000 m."""
+    old, new = written(before), written(after)
+    for path in {**old, **new}:
+        if old.get(path) == new.get(path):
+            continue
+        meant = [_value(mission, path) for mission in (before, after)]
+        if path in old and path in new and meant[0] is not None and meant[0] == meant[1]:
+            continue
+        yield Moved(dotted(path), "", old.get(path), new.get(path))
+    for name in PLATFORMS:
+        files = [getattr(mission.platforms, name).path for mission in (before, after)]
+        if None not in files and files[0].file == files[1].file and files[0].sha256 != files[1].sha256:
+            contents = [file.sha256 and file.sha256[:12] for file in files]
+            yield Moved(f"platforms.{name}: content of {files[1].file}", "", *contents)
+        stated = [file.accuracy for file in files if file is not None and file.accuracy is not None]
+        if len(stated) == 2 and stated[0][0] == stated[1][0] and stated[0][1] != stated[1][1]:
+            contents = [digest[:12] for _, digest in stated]
+            yield Moved(f"platforms.{name}: content of {stated[1][0]}", "", *contents)
+
+
+def written(mission: Mission) -> dict[KeyPath, str]:
+    """Values as the file writes them, or a part that it names, by path; a list of plain values is one."""
+    texts = {path: event.value for path, event in mission.places.items() if isinstance(_text(event), str)}
+    for taken in taken_figures(mission):
+        texts[tuple(taken.key.split("."))] = f"{figure_text(taken.value)} (part {taken.part})"
+    texts |= dict(_set_values(mission))
+    lists: dict[KeyPath, list[str]] = {}
+    elements = [path for path in texts if isinstance(path[-1], int)]
+    for path in sorted(elements, key=lambda path: int(path[-1])):  # an element that was set stands last
+        lists.setdefault(path[:-1], []).append(texts.pop(path))
+    return texts | {path: f"[{', '.join(items)}]" for path, items in lists.items()}
+
+
+def _set_values(mission: Mission) -> Iterator[tuple[KeyPath, str]]:
+    """Values that options put into it, by path; below a key that is new, by the path that the option named."""
+    changed = {".".join(map(str, path)): path for path, event in mission.places.items() if isinstance(event, Changed)}
+    for change in mission.changes:
+        parts = parts_of(change.key)
+        yield changed.get(".".join(parts), parts), change.text
+
+
+def _text(event: object) -> object:
+    return getattr(event, "value", None)
+
+
+def _value(mission: Mission, path: KeyPath) -> Any:
+    """The value at a path; None where the mission has no such attribute."""
+    value: Any = mission
+    for part in path:
+        if isinstance(value, Mapping):
+            value = value.get(part)
+        elif isinstance(part, int):
+            value = value[part] if isinstance(value, tuple) and part < len(value) else None
+        else:
+            value = getattr(value, part, None)
+    return value
+
+
+def dotted(path: KeyPath) -> str:
+    """Write a path of keys as `--set` takes it."""
+    return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path).lstrip(".")
+
+
+def moved_geometry(before: MissionFindings, after: MissionFindings) -> Iterator[Moved]:
+    """Numbers of the collection that differ by more than rounding."""
+    for (name, unit, old), (_, _, new) in zip(_numbers(before), _numbers(after), strict=True):
+        is_same = old == new or (old is not None and new is not None and math.isclose(old, new, rel_tol=1e-9))
+        if not is_same:
+            yield Moved(name, unit, old, new)
+
+
+def _numbers(found: MissionFindings) -> Iterator[tuple[str, str, float | None]]:
+    geometry = found.geometry
+    for name, state in (("transmitter", geometry.transmitter), ("receiver", geometry.receiver)):
+        yield f"{name} slant range", "m", state.slant_range
+        yield f"{name} azimuth", "deg", math.degrees(state.azimuth)
+        yield f"{name} elevation", "deg", math.degrees(state.elevation)
+        yield f"{name} squint", "deg", None if state.squint is None else math.degrees(state.squint)
+    yield "bistatic angle", "deg", math.degrees(geometry.bistatic_angle)
+    yield "look azimuth", "deg", math.degrees(geometry.look_azimuth)
+    yield "angle between range and Doppler gradients", "deg", math.degrees(geometry.gradient_angle)
+    yield "range resolution", "m", found.resolution.range
+    yield "cross-range resolution", "m", found.resolution.cross_range
+
+
+# ---------------------------------------------------------------------- what is looser
+_SUMS = (*NAMES, "autofocus_pull_in")  # kinds of rows that are no error
+_COMPUTED = ("oscillator", "spatial_variance")  # the file states no such number: a zero is a result
+# Each asks for more than the one before it.
+_RULES = {"combine": ("each", "rss", "sum"), "model": ("published", "full", "strictest")}
+
+_NAMED = ("other", "random")  # kinds of error of which a file may state several, each with a name
+_NUMBERS = (("autofocus", "n_pull", 1), ("allocation", "coverage_factor", -1), ("allocation", "warn_above", 1))
+
+
+class Loosened(NamedTuple):
+    """One thing that holds a mission less than before: its id for `--allow`, and how it was and is.
+
+    The id is a key of the mission file, the id of a row, or the kind of an error.
+    """
+
+    id: str
+    before: str
+    after: str
+
+    @property
+    def words(self) -> str:
+        """The change in words, before and after, for a gate that refuses it."""
+        return f"{self.before} -> {self.after}"
+
+
+def loosenings(before: MissionFindings, after: MissionFindings) -> Iterator[Loosened]:
+    """List what the second of two findings holds less than the first; both carry their mission."""
+    missions = (before.analysed().mission, after.analysed().mission)
+    yield from _looser_requirements(*missions)
+    yield from _declarations(*missions)
+    yield from _rules(before, after)
+    yield from _waivers(*missions)
+    yield from _waived_rows(before, after)
+    yield from _errors(before, after)
+    yield from _sources(before, after)
+
+
+def loosened_settings(before: Mapping[str, Any], after: Mapping[str, Any]) -> Iterator[Loosened]:
+    """List what the settings of a project hold less than before: `strict` that is gone, `exit-zero` that came."""
+    for key, holds in (("strict", True), ("exit-zero", False)):
+        old, new = (values.get(key, False) for values in (before, after))
+        if old is holds and new is not holds:
+            yield Loosened(f"{TABLE}.{key}", *("true" if one else "false" for one in (old, new)))
+
+
+def _looser_requirements(before: Mission, after: Mission) -> Iterator[Loosened]:
+    """Requirements that are gone or larger."""
+    for key in Requirements._fields:
+        old, new = (getattr(mission.requirements, key) for mission in (before, after))
+        if key != "declare" and old is not None and (new is None or _is_above(new, old)):
+            path = ("requirements", key)
+            yield Loosened(dotted(path), _said(before, path, old), _said(after, path, new))
+
+
+def _declarations(before: Mission, after: Mission) -> Iterator[Loosened]:
+    """Errors that the file has to declare no more, by the words that asked for them."""
+    still = {one for asked in after.requirements.declare for one in _owned(asked)}
+    for asked in before.requirements.declare:
+        left = still.intersection(_owned(asked))
+        if len(left) < len(_owned(asked)):
+            yield Loosened(f"requirements.declare.{asked}", asked, ", ".join(sorted(left)) or "none")
+
+
+def _owned(asked: str) -> list[str]:
+    """Kinds that a word of `declare` asks for, with their platform."""
+    return [asked] if "." in asked or asked == "timing" else [f"{name}.{asked}" for name in PLATFORMS]
+
+
+def _rules(before: MissionFindings, after: MissionFindings) -> Iterator[Loosened]:
+    """Autofocus, coverage, reserve, model and combination that ask for less."""
+    missions = (before.analysed().mission, after.analysed().mission)
+    for section, key, sign in _NUMBERS:
+        old, new = (getattr(getattr(mission, section), key) for mission in missions)
+        if new is not None and (old is None or _is_above(sign * new, sign * old)):
+            path = (section, key)
+            yield Loosened(dotted(path), _said(missions[0], path, old), _said(missions[1], path, new))
+    if missions[0].allocation.split != missions[1].allocation.split:
+        yield from _shares(before, after)
+    words = {"combine": (before.combine, after.combine), "model": (before.model, after.model)}
+    for key, (old_rule, new_rule) in words.items():
+        if _RULES[key].index(new_rule) < _RULES[key].index(old_rule):
+            yield Loosened(f"allocation.{key}", old_rule, new_rule)
+
+
+def _shares(before: MissionFindings, after: MissionFindings) -> Iterator[Loosened]:
+    """Reserves that are smaller, and shares that grow by more than their reserve gave."""
+    for metric, key in (("qpe", "quadratic_phase_error"), ("pslr", "pslr"), ("islr", "islr")):
+        old, new = (getattr(found.allocation, metric) for found in (before, after))
+        if _is_above(old.reserve, new.reserve):
+            yield Loosened(f"allocation.split.{key}.reserve", f"{old.reserve:.4g}", f"{new.reserve:.4g}")
+        given = max(0.0, old.reserve - new.reserve)
+        for owner in PLATFORMS if new.clock is None else (*PLATFORMS, "clock"):
+            if _is_above(new.of(owner), old.of(owner) + given):
+                yield Loosened(f"allocation.split.{key}.{owner}", f"{old.of(owner):.4g}", f"{new.of(owner):.4g}")
+
+
+def _waivers(before: Mission, after: Mission) -> Iterator[Loosened]:
+    """Waivers that are new, last longer, or name more rows."""
+    for waiver in after.waivers:
+        covering = [one for one in before.waivers if _names_as_much(one, waiver)]
+        if not any(one.until >= waiver.until for one in covering):
+            was = max((one.until for one in covering), default=None)
+            old = "not waived" if was is None else f"waived until {was.isoformat()}"
+            yield Loosened(waiver.id, old, f"waived until {waiver.until.isoformat()}")
+
+
+def _names_as_much(old: Waiver, new: Waiver) -> bool:
+    """Whether an earlier waiver names every row that one names; of a pattern in brackets nothing is said."""
+    is_one_row = not any(char in new.id for char in "*?[")
+    # A star of the old one takes wildcards of the new one too, and what stands beside the star is in both.
+    is_part = "[" not in new.id and not any(char in old.id for char in "?[")
+    return old.id == new.id or ((is_one_row or is_part) and fnmatchcase(new.id, old.id))
+
+
+def _waived_rows(before: MissionFindings, after: MissionFindings) -> Iterator[Loosened]:
+    """Rows and requirements that a waiver keeps from failing, and did not."""
+    named = {waiver.id for waiver in _waivers(before.analysed().mission, after.analysed().mission)}
+    for of in ("rows", "requirements"):
+        old: Mapping[str, Any] = {one.id: one for one in getattr(before, of)}
+        for one in getattr(after, of):
+            was = old[one.id].status if one.id in old else "none"
+            if one.status == "waived" != was and one.id not in named:
+                yield Loosened(one.id, was.replace("_", " "), "waived")
+
+
+def _errors(before: MissionFindings, after: MissionFindings) -> Iterator[Loosened]:
+    """Errors that the file declares no more, or as zero; of motion along whatever axes."""
+    old, new = _declared(before), _declared(after)
+    for name in dict.fromkeys(_error(row) for row in before.rows if row.declared is not None and row.is_independent):
+        if name.rpartition(".")[2] in _SUMS:
+            continue
+        if name not in new:
+            yield Loosened(name, "declared", "not declared")
+        elif old[name] and not new[name]:
+            yield Loosened(name, "declared", "zero")
+
+
+def _declared(found: MissionFindings) -> dict[str, bool]:
+    """Errors that a file declares, and whether as more than zero along any axis."""
+    declared: dict[str, bool] = {}
+    for row in found.rows:
+        if row.declared is not None:
+            name = _error(row)
+            is_more = row.declared != 0 or row.subject.kind in _COMPUTED
+            declared[name] = declared.get(name, False) or is_more
+    return declared
+
+
+def _error(row: Row) -> str:
+    """Name of the error that a row is about, without its axis."""
+    return row.id.rpartition(".")[0] if row.subject.kind in MOTION else row.id
+
+
+def _sources(before: MissionFindings, after: MissionFindings) -> Iterator[Loosened]:
+    """Kinds of error that state their source no more; of those with a name each by its own."""
+    had = set(before.kinds.declared) - set(before.kinds.without_source)
+    gone = [kind for kind in after.kinds.without_source if kind in had and kind.rpartition(".")[2] not in _NAMED]
+    old, new = (_named_sources(found.analysed().mission) for found in (before, after))
+    gone += [name for name, source in new.items() if old.get(name) and not source]
+    for name in gone:
+        yield Loosened(f"{name}.source", "stated", "none")
+
+
+def _named_sources(mission: Mission) -> dict[str, str | None]:
+    """Source of each error that has a name of its own, by the id of its row."""
+    sources = {f"other.{one.name}": one.source for one in mission.other_errors}
+    for platform in PLATFORMS:
+        error = getattr(mission.platforms, platform).motion_error
+        evidence = error.evidence("random")
+        sources |= {f"{platform}.random.{one.name}": one.source or evidence for one in error.random}
+    return sources
+
+
+def _is_above(one: float, other: float) -> bool:
+    """Whether by more than reading the same value from another unit makes."""
+    return one > other and not math.isclose(one, other, rel_tol=1e-9)
+
+
+def _said(mission: Mission, path: tuple[str, ...], value: float | None) -> str:
+    if value is None:
+        return "none"
+    default = f"{math.degrees(value):g} deg" if path[-1] == "quadratic_phase_error" else f"{value:g}"
+    return written(mission).get(path, f"{default} (default)")
+
+
+# ---------------------------------------------------------------------- what comes out
 SMALL = 0.01  # a row that moves by less than this part tells a reader nothing
 
 

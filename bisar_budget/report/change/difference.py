@@ -8,13 +8,17 @@ from bisar_budget.faults import changes_words, printable
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import STATUS
-from bisar_budget.report.change.comparison import Change, ChangeSet, Gate, MissionChange, Refusal, RequirementMove
-from bisar_budget.report.change.inputs import Moved
-from bisar_budget.report.words.escapes import markdown_text
-from bisar_budget.report.words.layout import table, wrapped
+from bisar_budget.report.change.comparison import (
+    Change,
+    ChangeSet,
+    Gate,
+    MissionChange,
+    Moved,
+    Refusal,
+    RequirementMove,
+)
 from bisar_budget.report.words.requirements import overrides_lines, overrides_words
-from bisar_budget.report.words.sentences import percent
-from bisar_budget.report.words.sizes import row_size
+from bisar_budget.report.words.sentences import markdown_text, percent, row_size, table, wrapped
 from bisar_budget.units import format_quantity
 
 FORMAT = "bisar-budget/diff/1"

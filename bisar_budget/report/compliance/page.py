@@ -55,8 +55,14 @@ from bisar_budget.report.drawing.evidence_drawings import (
 )
 from bisar_budget.report.explain.explanation import chain, collection_chain
 from bisar_budget.report.formats import verification
-from bisar_budget.report.words.identity import source_path
-from bisar_budget.report.words.missions import doubtful_model, head, multiple_of_pi, narrow_gradients, path_words
+from bisar_budget.report.words.identity import (
+    doubtful_model,
+    head,
+    multiple_of_pi,
+    narrow_gradients,
+    path_words,
+    source_path,
+)
 from bisar_budget.report.words.requirements import (
     kind_names,
     requirement_id,
@@ -66,8 +72,16 @@ from bisar_budget.report.words.requirements import (
     unseen,
     verdict,
 )
-from bisar_budget.report.words.sentences import matters, measure, percent
-from bisar_budget.report.words.sizes import phase_limit, phase_unit, requirement_size, row_limit, row_size
+from bisar_budget.report.words.sentences import (
+    matters,
+    measure,
+    percent,
+    phase_limit,
+    phase_unit,
+    requirement_size,
+    row_limit,
+    row_size,
+)
 from bisar_budget.units import format_in, format_quantity
 
 if TYPE_CHECKING:
@@ -361,7 +375,7 @@ def _draws(drawn: "MonteCarlo | None") -> str:
 def _probabilities(drawn: "MonteCarlo | None") -> Iterator[Probability]:
     if drawn is None:
         return
-    from bisar_budget.report.words.probabilities import held
+    from bisar_budget.report.words.requirements import held
 
     for one in drawn.requirements:
         limit = _limit(one.limit, one.unit)

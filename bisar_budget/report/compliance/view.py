@@ -6,7 +6,7 @@ from typing import NamedTuple
 from bisar_budget.findings.mission import Option
 from bisar_budget.findings.requirement import Override
 from bisar_budget.mission.model import Document
-from bisar_budget.report.explain.formulas import Step
+from bisar_budget.report.explain.notation import Step
 from bisar_budget.report.words.requirements import RequirementLine
 
 

@@ -7,8 +7,17 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from bisar_budget.geometry import PlatformState, norm
-from bisar_budget.report.drawing.axes import axis_number, outline, round_step, ticks
-from bisar_budget.report.drawing.svg import Box, Canvas, DrawnLabel, Point, text_width
+from bisar_budget.report.drawing.svg import (
+    Box,
+    Canvas,
+    DrawnLabel,
+    Point,
+    axis_number,
+    outline,
+    round_step,
+    text_width,
+    ticks,
+)
 from bisar_budget.units import format_quantity
 
 Place = tuple[float, float]  # in the plane that is drawn: to the right, up [m]

@@ -6,8 +6,18 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from bisar_budget.findings.images import FLOOR_DB, ImageEvidence, PointImage, Verdict
-from bisar_budget.report.drawing.axes import Scale, axis_number, grid, legend, line_entry, outline, x_axis, y_axis
-from bisar_budget.report.drawing.svg import Box, Canvas
+from bisar_budget.report.drawing.svg import (
+    Box,
+    Canvas,
+    Scale,
+    axis_number,
+    grid,
+    legend,
+    line_entry,
+    outline,
+    x_axis,
+    y_axis,
+)
 from bisar_budget.units import format_limit, format_quantity
 
 _WIDTH, _HEIGHT = 520.0, 190.0  # px, of the drawing and of one panel

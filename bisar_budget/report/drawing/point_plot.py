@@ -15,7 +15,7 @@ from bisar_budget.report.drawing.evidence_drawings import FOCUSED, WITH_ERRORS, 
 from bisar_budget.report.drawing.figure import drawing_file, figure_file, new_figure, paint
 from bisar_budget.report.drawing.point_figures import FLOOR_DB, ImagePanel, Limits, Sheet, rotated_back, sheet
 from bisar_budget.report.drawing.svg import Canvas
-from bisar_budget.report.words.layout import wrapped
+from bisar_budget.report.words.sentences import wrapped
 from bisar_budget.simulate.impulse_response import ImpulseResponse
 from bisar_budget.simulate.phase_history import Floats
 from bisar_budget.simulate.point import PointImages

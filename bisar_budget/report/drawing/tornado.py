@@ -5,9 +5,19 @@ All bars are for the same part: 1 % of a number, of a radian, of a power, of the
 
 from bisar_budget.design.sensitivity import EVEN, Sensitivity, Slope
 from bisar_budget.faults import changes_words, printable
-from bisar_budget.report.drawing.axes import Scale, box_entry, grid, head, legend, short, x_axis
 from bisar_budget.report.drawing.figure import drawing_file
-from bisar_budget.report.drawing.svg import Box, Canvas, text_width
+from bisar_budget.report.drawing.svg import (
+    Box,
+    Canvas,
+    Scale,
+    box_entry,
+    grid,
+    head,
+    legend,
+    short,
+    text_width,
+    x_axis,
+)
 from bisar_budget.report.words.sentences import percent
 
 MOST = 20  # bars

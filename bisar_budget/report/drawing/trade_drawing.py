@@ -18,9 +18,12 @@ from bisar_budget.findings.status import STATUS
 from bisar_budget.findings.trade import Axis, Trade
 from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.model import Mission
-from bisar_budget.report.drawing import status_colours
-from bisar_budget.report.drawing.axes import (
+from bisar_budget.report.drawing import svg
+from bisar_budget.report.drawing.svg import (
+    Box,
+    Canvas,
     LegendLine,
+    Point,
     Scale,
     axis_number,
     box_entry,
@@ -30,10 +33,10 @@ from bisar_budget.report.drawing.axes import (
     line_entry,
     outline,
     short,
+    text_width,
     x_axis,
     y_axis,
 )
-from bisar_budget.report.drawing.svg import Box, Canvas, Point, text_width
 from bisar_budget.report.drawing.trades import borders, level_lines, per_word, regions, runs, thinned
 from bisar_budget.report.words.sentences import percent
 
@@ -111,14 +114,14 @@ def head_of(trade: Trade, mission: Mission, *, is_polar: bool) -> list[str]:
 
 def _style(trade: Trade) -> str:
     """Rules for what only these drawings have."""
-    light, dark = status_colours.light(), status_colours.dark()
+    light, dark = svg.light(), svg.dark()
     rules = []
-    for place, (name, dashes) in enumerate(zip(status_colours.ROWS, _DASHES, strict=True)):
+    for place, (name, dashes) in enumerate(zip(svg.ROWS, _DASHES, strict=True)):
         rules.append(f".row{place}{{fill:none;stroke:var(--{name},{light[name]});stroke-width:1.8")
         rules[-1] += f";stroke-dasharray:{dashes}}}" if dashes else "}"
         rules.append(f".dot{place}{{fill:var(--{name},{light[name]});stroke:var(--paper,#fff);stroke-width:.8}}")
-    for name, strength in status_colours.strengths(trade.statuses, _STRENGTHS).items():
-        tone = status_colours.tone_of(name)
+    for name, strength in svg.strengths(trade.statuses, _STRENGTHS).items():
+        tone = svg.tone_of(name)
         rules.append(
             f".is-{name}{{fill:var(--{tone},{light[tone]});fill-opacity:{strength};shape-rendering:crispEdges}}"
         )
@@ -136,7 +139,7 @@ def _style(trade: Trade) -> str:
     rules.append(".own{fill:var(--paper,#fff);stroke:var(--ink,#222);stroke-width:1.6}")
     rules.append(".frame{fill:none;stroke:var(--muted,#595f66);stroke-width:1}")
     rules.append(".at{fill:none;stroke:var(--ink,#222);stroke-width:1.1;stroke-dasharray:1.5 3}")
-    names = dict.fromkeys((*status_colours.ROWS, "fail"))
+    names = dict.fromkeys((*svg.ROWS, "fail"))
     colours = ";".join(f"--{name}:{dark[name]}" for name in names if name not in ("transmitter", "receiver"))
     scoped = "".join(f"svg.drawing {rule}" for rule in rules)
     return f"{scoped}@media (prefers-color-scheme:dark){{svg:root.drawing{{{colours}}}}}"
@@ -165,7 +168,7 @@ def _value_scale(values: Floats, start: float, end: float, *, is_use: bool) -> S
 
 
 def _swatches(canvas: Canvas, statuses: Sequence[str]) -> list[LegendLine]:
-    return [box_entry(canvas, status_colours.status_words(name), f"is-{name}", "frame") for name in statuses]
+    return [box_entry(canvas, svg.status_words(name), f"is-{name}", "frame") for name in statuses]
 
 
 def _mark(canvas: Canvas, words: str = "this mission", style: str = "own") -> LegendLine:
@@ -269,7 +272,7 @@ def _bars(canvas: Canvas, top: float, trade: Trade, rows: Mapping[str, Floats]) 
     limit = along.at(100.0) if is_use else math.inf
     for place, (status, value) in enumerate(zip(trade.values["status"], values.tolist(), strict=True)):
         y, end = down.at(place), base
-        said = status_colours.status_words(status)
+        said = svg.status_words(status)
         if math.isfinite(value):
             end = max(along.at(max(value, along.low)), frame.left + 2)
             canvas.boxes([Box(min(base, end), y - 7, max(base, end), y + 7)], f"bar is-{status}")
@@ -346,7 +349,7 @@ def _map(canvas: Canvas, top: float, trade: Trade, geometry: BistaticGeometry | 
         plane = _from_above(x, y, frame)
         frame = frame._replace(top=frame.top + 24, bottom=frame.top + 24 + 2 * _RIM)
     columns, lines = _cuts(x, plane.across), _cuts(y, plane.up)
-    statuses = [name for name in trade.statuses if not trade.column or status_colours.has_no_mission(name)]
+    statuses = [name for name in trade.statuses if not trade.column or svg.has_no_mission(name)]
     entries = _swatches(canvas, statuses)
     for name in statuses:
         plane.fill(canvas, _cells(trade.values["status"] == name, columns, lines), f"is-{name}")

@@ -1,18 +1,20 @@
-"""The first half of an explanation: one error, from its line in the mission file to what it does to the image."""
+"""The first half of an explanation: one error, from its line in the file to its phase, its displacement, its share."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
 
+from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.constants import ROUNDING, SPEED_OF_LIGHT
+from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.effect import MOTION_UNITS, PLATFORMS, ErrorSource, Subject, subject
 from bisar_budget.faults import KeyPath, printable
 from bisar_budget.findings.mission import MissionFindings
-from bisar_budget.geometry import FRAME_AXES, PlatformState
+from bisar_budget.geometry import FRAME_AXES, GroundVector, PlatformState
 from bisar_budget.mission.model import Mission
-from bisar_budget.report.explain import formulas
-from bisar_budget.report.explain.explained_full import RATES, for_comparison, full_chain
-from bisar_budget.report.explain.formulas import Step, Sum, WorkedEquation, equation, number, step, with_unit
+from bisar_budget.ranges.exact_ranges import ExactRanges
+from bisar_budget.report.explain import notation
+from bisar_budget.report.explain.notation import Step, Sum, WorkedEquation, equation, number, step, with_unit
 
 
 def declaration(mission: Mission, source: ErrorSource) -> Iterator[Step]:
@@ -28,14 +30,14 @@ def declaration(mission: Mission, source: ErrorSource) -> Iterator[Step]:
     if platform in PLATFORMS:
         error = getattr(mission.platforms, platform).motion_error
         stated = error.stated(kind)
-        if error.frame != "scene" and axis in formulas.AXES:
+        if error.frame != "scene" and axis in notation.AXES:
             yield from _turned(mission, source, axis)
             return
         if error.covariance is not None and error.covariance.is_matrix and kind != "acceleration":
             yield from step("One sigma is the root of the variance")
         own = stated[FRAME_AXES[error.frame].index(axis)]
     elif source.is_common:
-        own = getattr(mission.common_motion_error, kind)[formulas.AXES.index(axis)]
+        own = getattr(mission.common_motion_error, kind)[notation.AXES.index(axis)]
     elif source.owner == "clock":
         own = getattr(mission.timing_error, axis)
     else:
@@ -52,7 +54,7 @@ def _turned(mission: Mission, source: ErrorSource, axis: str) -> Iterator[Step]:
     covariance = error.covariance if kind != "acceleration" else None
     k = mission.allocation.coverage_factor
     parts = [
-        f"{number(k * value)}*{number(direction[formulas.AXES.index(axis)])}"
+        f"{number(k * value)}*{number(direction[notation.AXES.index(axis)])}"
         for value, direction in zip(error.stated(kind), axes, strict=True)
     ]
     if covariance is not None:
@@ -103,14 +105,14 @@ def effect(analysis: Analysis, found: MissionFindings, source: ErrorSource, mode
         yield from step("Published model: a height error moves the image, no quadratic term")
     elif source.owner == "clock":
         yield from _clock_effect(mission, source, signed, each)
-    elif axis in formulas.AXES:
+    elif axis in notation.AXES:
         state = getattr(found.geometry, platform)
         values = _motion_values(mission, state, platform, kind, axis, signed)
-        for order, formula in formulas.motion_coefficients(kind, axis, platform).items():
+        for order, formula in notation.motion_coefficients(kind, axis, platform).items():
             result = signed * _coefficient(mission, source, order)
             title = f"{_table_i(kind, axis)}{each}"
             yield from step(title, *equation(f"β̃_{order}", formula, values, result, RATES[order]))
-        phase = formulas.motion_phase(kind, axis, platform)
+        phase = notation.motion_phase(kind, axis, platform)
         if phase is not None:
             yield from step(f"{source.equation}{each}", *equation("QPE", phase, values, qpe, "rad"))
     else:
@@ -135,14 +137,14 @@ def _coefficient(mission: Mission, source: ErrorSource, order: int) -> float:
 def _motion_values(
     mission: Mission, state: PlatformState, platform: str, kind: str, axis: str, size: float
 ) -> dict[str, float]:
-    index, s = formulas.AXES.index(axis), platform[0]
+    index, s = notation.AXES.index(axis), platform[0]
     return {
         "T": mission.collection.aperture_time,
         "λ": mission.radar.wavelength,
         f"R_{s}": state.slant_range,
         f"{axis}_{s}": state.position[index],
         f"v_{axis}{s}": state.velocity[index],
-        formulas.motion_symbol(kind, axis, platform): size,
+        notation.motion_symbol(kind, axis, platform): size,
     }
 
 
@@ -155,15 +157,15 @@ def _clock_effect(mission: Mission, source: ErrorSource, size: float, each: str)
         f"t̃_{order}": size,
     }
     result = SPEED_OF_LIGHT * size
-    lines = equation(f"β̃_{order}", formulas.clock_coefficient(order), values, result, RATES[order])
+    lines = equation(f"β̃_{order}", notation.clock_coefficient(order), values, result, RATES[order])
     yield from step(f"Table I row 1{each}", *lines)
     if order == 2:
         qpe = abs(source.effect.qpe * size)
-        yield from step(f"{source.equation}{each}", *equation("QPE", formulas.CLOCK_PHASE, values, qpe, "rad"))
+        yield from step(f"{source.equation}{each}", *equation("QPE", notation.CLOCK_PHASE, values, qpe, "rad"))
 
 
 def _table_i(kind: str, axis: str) -> str:
-    return f"Table I row {2 + 3 * formulas.AXES.index(axis) + list(MOTION_UNITS).index(kind)}"
+    return f"Table I row {2 + 3 * notation.AXES.index(axis) + list(MOTION_UNITS).index(kind)}"
 
 
 def _common_effect(
@@ -181,13 +183,13 @@ def _common_effect(
         leg, phase = sources[subject(platform, kind, axis)], f"φ_{platform[0]}"
         values[phase] = leg.effect.qpe * size
         known = _motion_values(mission, getattr(found.geometry, platform), platform, kind, axis, size)
-        for order, formula in formulas.motion_coefficients(kind, axis, platform).items():
+        for order, formula in notation.motion_coefficients(kind, axis, platform).items():
             known[f"β̃_{order}"] = result = size * _coefficient(mission, leg, order)
             title = f"{_table_i(kind, axis)}, {platform}{each}"
             yield from step(title, *equation(f"β̃_{order}", formula, known, result, RATES[order]))
         if kind != "position":
             title = f"Its phase at the aperture edge, {platform}"
-            yield from step(title, *equation(phase, formulas.EDGE_PHASE, known, values[phase], "rad"))
+            yield from step(title, *equation(phase, notation.EDGE_PHASE, known, values[phase], "rad"))
     if kind == "position":
         yield from step(f"Table I: a position error moves the image, no quadratic term{each}")
         return
@@ -207,7 +209,7 @@ def _projected_effect(
     _, platform, kind, axis, frame, _ = source.subject
     state: PlatformState = getattr(found.geometry, platform)
     direction = state.frame(frame)[FRAME_AXES[frame].index(axis)]
-    along = [sources[subject(platform, kind, letter)].effect.qpe for letter in formulas.AXES]
+    along = [sources[subject(platform, kind, letter)].effect.qpe for letter in notation.AXES]
     terms = " + ".join(f"{number(q)}*{number(d)}" for q, d in zip(along, direction, strict=True))
     unit = f"rad per {source.unit}"
     yield from step(
@@ -262,3 +264,209 @@ def as_written(mission: Mission, path: KeyPath) -> str:
 def dotted(path: KeyPath) -> str:
     """Path of keys as it is written in messages."""
     return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path).lstrip(".")
+
+
+RATES = ("m", "m/s", "m/s²", "m/s³")  # units of the range error's coefficients
+_, _, _QUADRATIC, _CUBIC = range(4)  # rows of a fit
+_ALIKE = 1e-6  # of a phase: by less, rounding decides which sign leaves more
+
+
+class Left:
+    """The range error that an error of a signed size leaves at the point that it moves the scene centre to."""
+
+    def __init__(self, analysis: Analysis, source: ErrorSource, size: float) -> None:
+        full = analysis.full
+        self.exact: ExactRanges = analysis.exact
+        self.wavelength, self.size = analysis.mission.radar.wavelength, size
+        self.place: GroundVector | None = full.displacement(source.full, size)
+        self.is_small = not source.is_motion or full.is_small(source, abs(size))
+        if self.is_small:
+            self.ranges = full.left_over_small(source, size)
+            return
+        found = full.at(source, size)
+        if found is None:
+            self.place, self.ranges = None, []
+            return
+        whole = abs(size) * full.largest_range_error(source) + math.hypot(*found.displacement)
+        east, north = _without_rounding(found.displacement, whole)
+        self.place = (east, north)
+        self.ranges = _without_rounding(full.left_over(source, size, found.displacement), whole)
+
+    def phase(self, which: int) -> float:
+        """Quadratic or cubic phase at the aperture edge, signed. [rad]"""
+        weights = self.exact.fit[which].tolist()
+        return float(self.exact.k[0]) * math.fsum(w * m for w, m in zip(weights, self.ranges, strict=True))
+
+    def sum(self, symbol: str, which: int) -> Sum:
+        """The sum that gives a phase."""
+        terms = " + ".join(
+            f"{number(w)}*{number(m)}" for w, m in zip(self.exact.fit[which].tolist(), self.ranges, strict=True)
+        )
+        return Sum(f"{symbol} = 2*π/{number(self.wavelength)}*({terms}) = {with_unit(self.phase(which), 'rad')}")
+
+
+def _without_rounding(values: Sequence[float], whole: float) -> list[float]:
+    """Values with 0 for what rounding leaves of differences of a size."""
+    return [value if abs(value) > ROUNDING * whole else 0.0 for value in values]
+
+
+def worse(analysis: Analysis, source: ErrorSource, size: float, which: int = _QUADRATIC) -> Left:
+    """The range error that is left by the sign that leaves more."""
+    signs = [Left(analysis, source, signed) for signed in (size, -size)]
+    if signs[0].is_small or not signs[1].ranges:
+        return signs[0]
+    stated, other = (abs(left.phase(which)) if left.ranges else math.inf for left in signs)
+    return signs[other > stated * (1 + _ALIKE)]
+
+
+def full_chain(analysis: Analysis, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
+    """From a signed error to its phases by the full model.
+
+    Parameters
+    ----------
+    analysis : Analysis
+        Of the mission.
+    source : ErrorSource
+        The error.
+    size : float
+        With its sign; of what is not declared, one unit. [unit]
+    each : str
+        Said of what is not declared.
+    """
+    each = each.replace(" of ", ", for ")
+    if analysis.errors.is_heard_out(source):
+        yield from step(f"Full model{each}: {analysis.full.no_limit(source)}")
+        return
+    left = worse(analysis, source, size)
+    if not left.ranges:
+        yield from step(f"Full model{each}: no ground point has the range history that this error leaves")
+        return
+    sign = "" if left.is_small or left.size == size else ", with the other sign, which leaves more"
+    yield from step(
+        f"Full model{each}{sign}: the ground point at which nothing is left of P₀ and P₁ over the aperture",
+        *_placed(left),
+    )
+    times = analysis.exact.times[:, 0].tolist()
+    yield from step(
+        f"Range error left there, {_left_of(analysis.exact)}, at the nodes of the fit",
+        *(f"{time:+.6g} s: {metres:.6g} m" for time, metres in zip(times, left.ranges, strict=True)),
+    )
+    yield from step(
+        "Quadratic phase at the aperture edge, 3/2 of P₂: weights of the fit times what is left",
+        left.sum("QPE_full", _QUADRATIC),
+    )
+    if source.is_motion and analysis.mission.requirements.cubic_phase_error is not None:
+        by_cubic = worse(analysis, source, size, _CUBIC)
+        yield from step("Cubic phase there, 5/2 of P₃", by_cubic.sum("cubic_full", _CUBIC))
+
+
+def _left_of(exact: ExactRanges) -> str:
+    if exact.has_direct_path:  # which is the clock
+        return "|r_t| + |r_r| − |r_t − r_r| − (|r̂_t − x̂| + |r̂_r − x̂| − |r̂_t − r̂_r|)"
+    return "|r_t| + |r_r| + c·t̃ − |r̂_t − x̂| − |r̂_r − x̂|"
+
+
+def for_comparison(analysis: Analysis, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
+    """The result of the full model for an error that the published one judges."""
+    left = worse(analysis, source, size)
+    if not left.ranges:
+        yield from step(f"Full model{each}, for comparison: no ground point has the range history")
+        return
+    yield from step(
+        f"Full model{each}, for comparison: weights of the fit times the range error left (--model full lists it)",
+        left.sum("QPE_full", _QUADRATIC),
+    )
+
+
+def at_the_allowable(
+    analysis: Analysis, source: ErrorSource, allowable: float, requirement: str = QUADRATIC
+) -> Iterator[Step]:
+    """Show that an allowable that was searched for is at its limit."""
+    sizes = [Left(analysis, source, signed) for signed in (allowable, -allowable)]
+    if not all(left.ranges for left in sizes):
+        return
+    if requirement == LOCATION:
+        left = max(sizes, key=lambda one: math.hypot(*(one.place or (0.0, 0.0))))
+        x, y = left.place or (0.0, 0.0)
+        moved = Sum(f"moved = sqrt({number(x)}^2 + {number(y)}^2) = {with_unit(math.hypot(x, y), 'm')}")
+    else:
+        which, symbol = (_CUBIC, "cubic_there") if requirement == CUBIC else (_QUADRATIC, "QPE_there")
+        left = max(sizes, key=lambda one: abs(one.phase(which)))
+        moved = left.sum(symbol, which)
+    size = f"{number(left.size)} {source.unit.replace('^2', '²')}"
+    yield from step(f"At {size}, the smallest size of either sign that reaches the limit, exact ranges give", moved)
+
+
+def end_of_the_image(size: float, unit: str) -> Iterator[Step]:
+    """Say what it means that an image ends."""
+    yield from step(
+        "End of the image: no ground point has the range history of a larger error, of one sign or the other",
+        "The point is followed as the error grows, to where range and Doppler gradients become parallel there",
+        f"by_image = {with_unit(size, unit)}, a limit whatever phase or displacement is allowed",
+    )
+
+
+def _placed(left: Left) -> Sequence[str]:
+    if left.place is None or left.place == (0.0, 0.0):
+        return ("the scene centre itself",)
+    east, north = left.place
+    return (f"x̂ = {with_unit(east, 'm')} east", f"ŷ = {with_unit(north, 'm')} north")
+
+
+RULES = {"each": "the largest", "sum": "the sum", "rss": "the root-sum-square"}
+
+
+def limit_steps(allocation: Allocation, owner: str, limit: float) -> Iterator[Step]:
+    """Budget times share times gain."""
+    total, share, gain = allocation.qpe_total, allocation.qpe.of(owner), allocation.autofocus_gain
+    whose = {
+        "clock": "the receiver’s share" if allocation.qpe.clock is None else "the clock’s share",
+        "mission": "all of it: it belongs to no platform",
+    }
+    yield from autofocus_gain(allocation)
+    values = {"total": total, "share": share, "gain": gain}
+    title = f"Budget requirements.quadratic_phase_error, {whose.get(owner, f'the {owner}’s share')}"
+    yield from step(title, *equation("limit", "total*share*gain", values, limit, "rad"))
+
+
+def autofocus_gain(allocation: Allocation) -> Iterator[Step]:
+    """The steps to the gain, the factor by which autofocus multiplies limits."""
+    if allocation.n_pull is None:
+        yield from step("No autofocus (autofocus.n_pull): gain = 1")
+        return
+    if allocation.n_pull_stated != allocation.n_pull:
+        title = f"autofocus.n_pull of {allocation.n_pull_stated:g} counts up to half a range cell of range walk, f0/B"
+        yield from step(title, f"N_pull = {allocation.n_pull:.6g}")
+    values = {"N_pull": allocation.n_pull, "q": allocation.qpe_total}
+    raw = math.pi * allocation.n_pull / allocation.qpe_total
+    lines = equation("gain", notation.AUTOFOCUS_GAIN, values, raw, "")
+    yield from step("Autofocus, Section VI" + (", never below 1" if raw < 1 else ""), *lines)
+
+
+def combined(
+    title: str,
+    rule: str,
+    parts: Sequence[tuple[str, float]],
+    total: float | None,
+    *,
+    symbol: str = "combined",
+    unit: str = "rad",
+) -> Iterator[Step]:
+    """The total of errors by a rule: names and sizes, and the sum written out; `total` None: it has no value."""
+    title = f"{title}, {RULES[rule]}"
+    # What is left of terms that cancel exactly is rounding.
+    largest = max((abs(size) for _, size in parts), default=0.0)
+    members = [(name, abs(size) if abs(size) > ROUNDING * largest else 0.0) for name, size in parts]
+    width = max((len(name) for name, _ in members), default=0)
+    listed = [f"{printable(name):<{width}}  {size:.6g} {unit}" for name, size in members if size] or ["none"]
+    if total is None or not members:
+        yield from step(title, *listed)
+        return
+    sizes = [number(size) for _, size in members if size] or ["0"]
+    if rule == "sum":
+        text = " + ".join(sizes)
+    elif rule == "rss":
+        text = "sqrt(" + " + ".join(f"{size}^2" for size in sizes) + ")"
+    else:
+        text = f"max(0, {', '.join(sizes)})"
+    yield from step(title, *listed, Sum(f"{symbol} = {text} = {total:.6g} {unit}"))

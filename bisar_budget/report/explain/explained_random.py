@@ -19,9 +19,8 @@ from bisar_budget.effects.spectra import PowerLawPiece, gauss_markov, parts, syn
 from bisar_budget.faults import printable
 from bisar_budget.findings.row import Row
 from bisar_budget.mission.model import Mission
-from bisar_budget.report.explain.explained_budget import combined, limit_steps
-from bisar_budget.report.explain.explained_error import as_written, missing, place
-from bisar_budget.report.explain.formulas import (
+from bisar_budget.report.explain.explained_error import as_written, combined, limit_steps, missing, place
+from bisar_budget.report.explain.notation import (
     Step,
     Sum,
     WorkedEquation,

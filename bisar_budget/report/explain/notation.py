@@ -1,4 +1,4 @@
-"""Formulas that an explanation writes itself, set from their text as MathML and as LaTeX.
+"""Steps and formulas that an explanation writes, as text with numbers put in, as MathML and as LaTeX.
 
 The derivation has most formulas in one piece, and `catalogue` has those typeset. What an explanation adds in
 between (a projection on an axis, a sum over both platforms) is plain text in the same notation: + - * / ^,
@@ -6,12 +6,13 @@ brackets, | |, sqrt and log, and symbols such as β̃_2.
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from typing import NamedTuple
 from unicodedata import combining, normalize
 
-from bisar_budget.catalogue import SYMBOLS
+from bisar_budget.catalogue import FORMULAS, SYMBOLS, TEXTS
+from bisar_budget.report.words.sentences import xml_text
 
 _TOKEN = re.compile(r"\s*(\d+(?:\.\d+)?|det Q|[^\W\d_][\w\u0300-\u036f\u20d0-\u20ff]*|[-+*/^()|])")
 _LETTER = re.compile(r"(?:adj|[^\W\d_][\u0300-\u036f\u20d0-\u20ff]*)(?:_\w+)?")
@@ -228,3 +229,269 @@ def _closed(tokens: tuple[str, ...], end: str) -> _Read:
     if tokens[:1] != (end,):
         raise ValueError(f"{end} is missing")
     return inner, tokens[1:]
+
+
+AXES = "xyz"
+_LETTERS = {"position": "p\u0303", "velocity": "ṽ", "acceleration": "ã"}
+EDGE_PHASE = TEXTS["edge phase"]
+CLOCK_PHASE = TEXTS["Table II t̃_2 0"]
+VIBRATION = {"pslr": TEXTS["Vibration A 1"], "islr": TEXTS["Vibration σ 1"]}
+# From first principles; of a sinusoid φ is the phase of the echoes that both platforms may make.
+FULL_VIBRATION = {"pslr": TEXTS["echoes"], "islr": TEXTS["noise"]}
+AUTOFOCUS_GAIN = TEXTS["autofocus gain"]
+SMEAR = (TEXTS["smear east"], TEXTS["smear north"])
+LOOK_AZIMUTH = TEXTS["look azimuth"]
+DETERMINANT = TEXTS["determinant"]
+
+
+def motion_symbol(kind: str, axis: str, platform: str) -> str:
+    """Symbol of one motion error, such as `ã_xt`."""
+    return f"{_LETTERS[kind]}_{axis}{platform[0]}"
+
+
+def motion_coefficients(kind: str, axis: str, platform: str) -> dict[int, str]:
+    """Cells of Table I for one motion error, by order in slow time."""
+    names = {order: f"Table I {motion_symbol(kind, axis, platform)} {order}" for order in range(4)}
+    return {order: TEXTS[name] for order, name in names.items() if name in TEXTS}
+
+
+def motion_phase(kind: str, axis: str, platform: str) -> str | None:
+    """Cell of Table II; None for a position error, which has none."""
+    return TEXTS.get(f"Table II {motion_symbol(kind, axis, platform)} 0")
+
+
+def clock_coefficient(order: int) -> str:
+    """Cell of the first row of Table I."""
+    return TEXTS[f"Table I t̃ {order}"]
+
+
+def inertial_phases(symbol: str) -> tuple[str, ...]:
+    """Quadratic phase, cubic phase and what is left of one unit of a figure of an inertial sensor; empty: none."""
+    return tuple(TEXTS.get(f"Inertial sensors {symbol} {part}", "") for part in range(3))
+
+
+def amplitude_share(platform: str) -> str:
+    """Part of a platform in an amplitude that both make."""
+    return TEXTS[f"amplitude share {platform[0]}"]
+
+
+class WorkedEquation(NamedTuple):
+    """A formula as text, and what it gives for values of its symbols; an empty formula: the result is known."""
+
+    symbol: str
+    formula: str
+    values: Mapping[str, float]
+    result: float
+    unit: str
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """The formula, and under it the same with numbers; their equals signs stand above each other."""
+        if not self.formula:
+            return (f"{self.symbol} = {with_unit(self.result, self.unit)}",)
+        margin = " " * sum(not combining(letter) for letter in self.symbol)
+        numbers = filled(self.formula, self.values)
+        return f"{self.symbol} = {self.formula}", f"{margin} = {numbers} = {with_unit(self.result, self.unit)}"
+
+
+class Sum(str):
+    """Text that is a sum with its numbers, and nothing of the user's own."""
+
+    __slots__ = ()
+
+
+class Step(NamedTuple):
+    """One step of an explanation: what it is or where it stands, and the equations or texts under it."""
+
+    title: str
+    parts: tuple[WorkedEquation | str, ...] = ()
+
+    @property
+    def lines(self) -> Iterator[str]:
+        """The title, what belongs to it indented."""
+        yield self.title
+        for part in self.parts:
+            yield from (f"    {line}" for line in (part.lines if isinstance(part, WorkedEquation) else (part,)))
+
+
+def step(title: str, *parts: WorkedEquation | str) -> Iterator[Step]:
+    """One step of an explanation, to be yielded from."""
+    yield Step(title, parts)
+
+
+def equation(
+    symbol: str, formula: str, values: Mapping[str, float], result: float, unit: str
+) -> tuple[WorkedEquation]:
+    """Make the one part of a step."""
+    return (WorkedEquation(symbol, formula, values, result, unit),)
+
+
+def filled(formula: str, values: Mapping[str, float]) -> str:
+    """Put numbers for the symbols, six digits each; negative ones in brackets."""
+    names = sorted(values, key=len, reverse=True)
+    # A symbol ends where no letter, digit or accent follows: v_x is not the start of v_xt.
+    pattern = re.compile(r"(?<![\w\u0300-\u036f])(?:" + "|".join(map(re.escape, names)) + r")(?![\w\u0300-\u036f])")
+    return pattern.sub(lambda match: number(values[match[0]]), formula)
+
+
+def number(value: float) -> str:
+    """Six digits, so that a reader can repeat the sum."""
+    text = six_digits(value)
+    return f"({text})" if text.startswith("-") else text
+
+
+def six_digits(value: float) -> str:
+    """Six digits; a zero has no sign."""
+    return f"{value + 0.0:.6g}"
+
+
+def with_unit(value: float, unit: str) -> str:
+    """Six digits and the unit."""
+    return f"{six_digits(value)} {unit.replace('^2', '²')}".rstrip()
+
+
+_LATEX, _MATHML = 0, 1
+_MINUS = re.compile("(?<!e)-")  # not the one of a power of ten
+
+
+class Typeset(NamedTuple):
+    """One equation in one language: `symbol = formula`, then `= numbers = result`."""
+
+    formula: str
+    numbers: str
+
+
+def is_formula(equation: WorkedEquation) -> bool:
+    """Whether it is to be set as a formula: one of the derivation, or one in letters."""
+    return not equation.formula or equation.formula in FORMULAS or is_mathematical(equation.formula)
+
+
+def as_text(equation: WorkedEquation) -> Typeset:
+    """For a reader: · between factors, no carets."""
+    if not equation.formula:
+        return Typeset(readable(equation.lines[0]), "")
+    numbers = f"= {filled(equation.formula, equation.values)} = {with_unit(equation.result, equation.unit)}"
+    return Typeset(readable(f"{equation.symbol} = {equation.formula}"), readable(numbers))
+
+
+def readable(text: str) -> str:
+    """Write a sum as people do, not as programs."""
+    return _MINUS.sub("−", text.replace("*", " · ").replace("^2", "²").replace("sqrt(", "√("))
+
+
+def as_mathml(equation: WorkedEquation) -> Typeset:
+    """Three `math` elements, so that a narrow page can break between them."""
+    result = f"<mrow>{mathml_number(equation.result)}{_mathml_unit(equation.unit)}</mrow>"
+    left = symbol(equation.symbol, MATHML)
+    if not equation.formula:
+        return Typeset(math(f"<mrow>{left}<mo>=</mo>{result}</mrow>"), "")
+    if equation.formula in FORMULAS:
+        formula = FORMULAS[equation.formula][_MATHML]
+        values = {SYMBOLS[name][_MATHML]: value for name, value in equation.values.items() if name in SYMBOLS}
+        numbers = _mathml_filled(formula, values)
+    else:
+        formula = written(equation.formula, MATHML)
+        cells = {name: (mathml_number(value), value) for name, value in equation.values.items()}
+        numbers = written(equation.formula, MATHML, _bracketed(cells, MATHML))
+    return Typeset(
+        math(f"<mrow>{left}<mo>=</mo>{formula}</mrow>"),
+        f"{math(f'<mrow><mo>=</mo>{numbers}</mrow>')} {math(f'<mrow><mo>=</mo>{result}</mrow>')}",
+    )
+
+
+def math(content: str) -> str:
+    """Wrap content in a `math` element that stands in a line and is as large as on one of its own."""
+    return f'<math displaystyle="true">{content}</math>'
+
+
+def mathml_of(formula: str) -> str:
+    """MathML of a formula or symbol of the catalogue, without numbers and without the element around it."""
+    return (FORMULAS.get(formula) or SYMBOLS[formula])[_MATHML]
+
+
+def latex_of(formula: str) -> str:
+    """LaTeX of a formula or symbol of the catalogue."""
+    return (FORMULAS.get(formula) or SYMBOLS[formula])[_LATEX]
+
+
+def _mathml_filled(formula: str, values: Mapping[str, float]) -> str:
+    """Put numbers for elements. What is a power's base, or negative, stands in brackets."""
+
+    def written(match: re.Match[str]) -> str:
+        value = values[match[2]]
+        bare = mathml_number(value)
+        needs_brackets = value < 0 or (match[1] and "<msup>" in bare)
+        return match[1] + (f"<mrow><mo>(</mo>{bare}<mo>)</mo></mrow>" if needs_brackets else bare)
+
+    elements = "|".join(re.escape(element) for element in sorted(values, key=len, reverse=True))
+    text = re.sub(f"(<msup>|)({elements})", written, formula) if values else formula
+    return text.replace("<mo>\u2062</mo>", "<mo>·</mo>")
+
+
+def mathml_number(value: float) -> str:
+    """Six digits as one element; large and small ones as a power of ten."""
+    is_negative, digits, exponent = _parts(value)
+    number = f"<mn>{digits}</mn>"
+    if exponent:
+        power = f"<mn>{exponent}</mn>" if exponent > 0 else f"<mrow><mo>−</mo><mn>{-exponent}</mn></mrow>"
+        number = f"<mrow>{number}<mo>·</mo><msup><mn>10</mn>{power}</msup></mrow>"
+    return f"<mrow><mo>−</mo>{number}</mrow>" if is_negative else number
+
+
+def _mathml_unit(unit: str) -> str:
+    if not unit:
+        return ""
+    return f'<mspace width="0.25em"/><mtext>{xml_text(unit.replace("^2", "²"))}</mtext>'
+
+
+def as_latex(equation: WorkedEquation) -> Typeset:
+    """Without delimiters; both parts are aligned at their first `=`."""
+    unit = rf"\,\mathrm{{{equation.unit.replace('^2', '^{2}')}}}" if equation.unit else ""
+    result = f"{latex_number(equation.result)}{unit}"
+    if equation.formula in FORMULAS:
+        formula = FORMULAS[equation.formula][_LATEX]
+        values = {SYMBOLS[name][_LATEX]: value for name, value in equation.values.items() if name in SYMBOLS}
+        numbers = _latex_filled(formula, values)
+    else:
+        formula = written(equation.formula, LATEX)
+        cells = {name: (latex_number(value), value) for name, value in equation.values.items()}
+        numbers = written(equation.formula, LATEX, _bracketed(cells, LATEX))
+    return Typeset(f"{symbol(equation.symbol, LATEX)} &= {formula}", f"&= {numbers} = {result}")
+
+
+def _bracketed(cells: Mapping[str, tuple[str, float]], language: Language) -> dict[str, str]:
+    """Numbers in their language, negative ones in brackets."""
+    return {name: language.brackets % text if value < 0 else text for name, (text, value) in cells.items()}
+
+
+def _latex_filled(formula: str, values: Mapping[str, float]) -> str:
+    def written(match: re.Match[str]) -> str:
+        value = values[match[0]]
+        bare = latex_number(value)
+        is_base = formula[match.end() : match.end() + 1] == "^"
+        needs_brackets = value < 0 or (is_base and "cdot" in bare)
+        return rf"\left({bare}\right)" if needs_brackets else bare
+
+    if values:
+        formula = _latex_symbols(values).sub(written, formula)
+    return formula.replace(r"\,", r"\cdot")
+
+
+def _latex_symbols(values: Mapping[str, float]) -> re.Pattern[str]:
+    """Symbols, each whole: neither a letter of a command nor the start of one."""
+    longest_first = "|".join(re.escape(symbol) for symbol in sorted(values, key=len, reverse=True))
+    return re.compile(rf"(?<![A-Za-z\\])(?:{longest_first})(?![A-Za-z])")
+
+
+def latex_number(value: float) -> str:
+    """Six digits; large and small ones as a power of ten."""
+    is_negative, digits, exponent = _parts(value)
+    number = rf"{digits} \cdot 10^{{{exponent}}}" if exponent else digits
+    return f"-{number}" if is_negative else number
+
+
+def _parts(value: float) -> tuple[bool, str, int]:
+    """Sign, digits and power of ten."""
+    text = six_digits(value)
+    digits, _, exponent = text.removeprefix("-").partition("e")
+    return text.startswith("-"), digits, int(exponent or 0)

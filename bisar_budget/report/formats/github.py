@@ -11,10 +11,9 @@ from bisar_budget.findings.mission import MissionFindings, Report, UnusableMissi
 from bisar_budget.findings.row import worst_first
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
-from bisar_budget.report.words.escapes import command_property, command_text, markdown_text
 from bisar_budget.report.words.identity import source_path
 from bisar_budget.report.words.requirements import overrides_words, requirement_finding, requirement_id, unseen
-from bisar_budget.report.words.sentences import finding, percent
+from bisar_budget.report.words.sentences import command_property, command_text, finding, markdown_text, percent
 
 _ORDER = ("error", "warning", "notice")
 _SHOWN_IN_SUMMARY = 20

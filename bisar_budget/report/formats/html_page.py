@@ -12,9 +12,9 @@ from bisar_budget.findings.mission import Report
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
 from bisar_budget.report.compliance.page import compliance
-from bisar_budget.report.explain import typeset
-from bisar_budget.report.explain.formulas import Sum, WorkedEquation
-from bisar_budget.report.words.missions import document_words
+from bisar_budget.report.explain import notation
+from bisar_budget.report.explain.notation import Sum, WorkedEquation
+from bisar_budget.report.words.identity import document_words
 from bisar_budget.report.words.sentences import dashed, sentence
 from bisar_budget.resources import resource
 
@@ -75,18 +75,18 @@ def _css_string(text: str) -> Markup:
 def _equation(part: WorkedEquation | str) -> Markup:
     """One part of a step: a formula as MathML, words and text as text."""
     if not isinstance(part, WorkedEquation):
-        text = typeset.readable(part) if isinstance(part, Sum) else printable(part)
+        text = notation.readable(part) if isinstance(part, Sum) else printable(part)
         return Markup("<p class=part>{}</p>").format(text)
-    if typeset.is_formula(part):
-        mathml = typeset.as_mathml(part)
+    if notation.is_formula(part):
+        mathml = notation.as_mathml(part)
         return Markup("<p class=part>{} {}</p>").format(Markup(mathml.formula), Markup(mathml.numbers))
-    formula, numbers = typeset.as_text(part)
+    formula, numbers = notation.as_text(part)
     return Markup("<p class=part><span>{}</span> <span>{}</span></p>").format(formula, numbers)
 
 
 def _general(left: str, right: str) -> Markup:
-    content = f"<mrow>{typeset.mathml_of(left)}<mo>=</mo>{typeset.mathml_of(right)}</mrow>"
-    return Markup(typeset.math(content))
+    content = f"<mrow>{notation.mathml_of(left)}<mo>=</mo>{notation.mathml_of(right)}</mrow>"
+    return Markup(notation.math(content))
 
 
 def _data_uri(png: bytes) -> Markup:

@@ -16,7 +16,6 @@ from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
-from bisar_budget.report.words.escapes import xml_text
 from bisar_budget.report.words.identity import Identity, distinct, identities, stem
 from bisar_budget.report.words.requirements import (
     declared_words,
@@ -24,7 +23,7 @@ from bisar_budget.report.words.requirements import (
     requirement_finding,
     requirement_id,
 )
-from bisar_budget.report.words.sentences import cause, measure
+from bisar_budget.report.words.sentences import cause, measure, xml_text
 
 
 def render(report: Report, style: Style) -> str:

@@ -14,11 +14,10 @@ from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
 from bisar_budget.report.compliance.page import compliance, drawings, illustrations, studied
 from bisar_budget.report.compliance.view import Compliance, ShownImage
-from bisar_budget.report.explain import typeset
-from bisar_budget.report.explain.formulas import Sum, WorkedEquation
-from bisar_budget.report.words.escapes import markdown_text, uri
-from bisar_budget.report.words.missions import document_words
-from bisar_budget.report.words.sentences import dashed, sentence
+from bisar_budget.report.explain import notation
+from bisar_budget.report.explain.notation import Sum, WorkedEquation
+from bisar_budget.report.words.identity import document_words
+from bisar_budget.report.words.sentences import dashed, markdown_text, sentence, uri
 from bisar_budget.resources import resource
 
 _BAR = 20  # characters
@@ -89,12 +88,12 @@ def _bar(part: float | None) -> Markup:
 def _equation(part: WorkedEquation | str) -> Markup:
     """One part of a step: a formula as a block of LaTeX, words and text as a line."""
     if not isinstance(part, WorkedEquation):
-        return _sum(typeset.readable(part)) if isinstance(part, Sum) else Markup(f"- {markdown_text(part)}\n")
-    if part.formula and typeset.is_formula(part):
-        formula, numbers = typeset.as_latex(part)
+        return _sum(notation.readable(part)) if isinstance(part, Sum) else Markup(f"- {markdown_text(part)}\n")
+    if part.formula and notation.is_formula(part):
+        formula, numbers = notation.as_latex(part)
         block = f"\\begin{{aligned}}\n{formula} \\\\\n{numbers}\n\\end{{aligned}}"
         return Markup(f"\n{_math(block)}\n\n")
-    formula, numbers = typeset.as_text(part)
+    formula, numbers = notation.as_text(part)
     return _sum(f"{formula} {numbers}".rstrip())
 
 
@@ -117,7 +116,7 @@ def _command(text: str) -> Markup:
 
 
 def _general(left: str, right: str) -> Markup:
-    return Markup(_math(f"{typeset.latex_of(left)} = {typeset.latex_of(right)}"))
+    return Markup(_math(f"{notation.latex_of(left)} = {notation.latex_of(right)}"))
 
 
 def _math(latex: str) -> str:

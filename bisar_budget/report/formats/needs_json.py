@@ -15,10 +15,9 @@ from bisar_budget.findings.mission import MissionFindings, Report, UnusableMissi
 from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.findings.row import Row
 from bisar_budget.report import Style
-from bisar_budget.report.words.escapes import need_text, rst_text
 from bisar_budget.report.words.identity import distinct, identities, stem
 from bisar_budget.report.words.requirements import overrides_words, requirement_finding, requirement_id
-from bisar_budget.report.words.sentences import cause, measure
+from bisar_budget.report.words.sentences import cause, measure, need_text, rst_text
 
 
 def render(report: Report, style: Style) -> str:

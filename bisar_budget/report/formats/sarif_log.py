@@ -15,10 +15,9 @@ from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.findings.row import AppliedWaiver, Row
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
-from bisar_budget.report.words.escapes import uri
 from bisar_budget.report.words.identity import Identity, digest, identities, source_path
 from bisar_budget.report.words.requirements import overrides_words, requirement_finding, requirement_id, unseen
-from bisar_budget.report.words.sentences import finding
+from bisar_budget.report.words.sentences import finding, uri
 
 SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
 SRCROOT = "%SRCROOT%"

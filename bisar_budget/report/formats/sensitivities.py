@@ -10,9 +10,8 @@ from bisar_budget.design.sensitivity import LITTLE, Relaxed, Sensitivity, Slope
 from bisar_budget.faults import changes_words, printable
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
-from bisar_budget.report.words.layout import table, wrapped
 from bisar_budget.report.words.requirements import overrides_lines
-from bisar_budget.report.words.sentences import BINDING_WORDS, percent
+from bisar_budget.report.words.sentences import BINDING_WORDS, percent, table, wrapped
 
 FORMAT = "bisar-budget/sensitivity/1"
 

@@ -11,9 +11,8 @@ from bisar_budget.findings.requirement import NAMES
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
 from bisar_budget.report.formats.json_document import verdict_item
-from bisar_budget.report.words.layout import table, wrapped
 from bisar_budget.report.words.requirements import overrides_lines
-from bisar_budget.report.words.sentences import percent
+from bisar_budget.report.words.sentences import percent, table, wrapped
 from bisar_budget.units import format_quantity
 
 FORMAT = "bisar-budget/solve/1"

@@ -10,8 +10,7 @@ from bisar_budget.findings.mission import MissionFindings, UnusableMission
 from bisar_budget.findings.row import DECLARE, Row, worst_first
 from bisar_budget.findings.status import STATUS, worst
 from bisar_budget.report import Piece, Style
-from bisar_budget.report.words.layout import WIDTH, wrapped, wrapped_counts
-from bisar_budget.report.words.missions import document_words, doubtful_model, head, narrow_gradients
+from bisar_budget.report.words.identity import document_words, doubtful_model, head, narrow_gradients
 from bisar_budget.report.words.requirements import (
     COLUMNS,
     RequirementLine,
@@ -24,8 +23,16 @@ from bisar_budget.report.words.requirements import (
     unjudged_effects,
     verdict,
 )
-from bisar_budget.report.words.sentences import binding_words, matters, percent
-from bisar_budget.report.words.sizes import row_limit, row_size
+from bisar_budget.report.words.sentences import (
+    WIDTH,
+    binding_words,
+    matters,
+    percent,
+    row_limit,
+    row_size,
+    wrapped,
+    wrapped_counts,
+)
 from bisar_budget.units import format_quantity
 
 LINES = 45  # of a report, where its rows can be fewer
@@ -139,7 +146,7 @@ def _after(mission: MissionFindings, style: Style) -> Iterator[str]:
         yield from ("", *details)
     yield from (line for text in _asides(mission, style) for line in wrapped(text, "  "))
     if mission.monte_carlo is not None:
-        from bisar_budget.report.words.probabilities import probabilities
+        from bisar_budget.report.words.requirements import probabilities
 
         yield from ("", *probabilities(mission.monte_carlo))
     if mission.verdicts is not None:

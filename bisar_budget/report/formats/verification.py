@@ -8,8 +8,8 @@ from bisar_budget.faults import changes_words, printable
 from bisar_budget.findings.images import Verdict, VerifiedMission
 from bisar_budget.report import Style
 from bisar_budget.report.formats.json_document import verdict_item
-from bisar_budget.report.words.layout import table, wrapped, wrapped_counts
 from bisar_budget.report.words.requirements import overrides_lines
+from bisar_budget.report.words.sentences import table, wrapped, wrapped_counts
 from bisar_budget.units import format_limit, format_quantity
 
 FORMAT = "bisar-budget/verify/1"

@@ -11,7 +11,7 @@ import numpy as np
 
 from bisar_budget.design.table import Column, Part, Values
 from bisar_budget.report.tables.described import Described
-from bisar_budget.report.words.escapes import spreadsheet_text
+from bisar_budget.report.words.sentences import spreadsheet_text
 
 
 def write(described: Described, parts: Iterable[Part], path: str) -> None:

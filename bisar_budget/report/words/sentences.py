@@ -1,10 +1,16 @@
-"""Words of every format about a row: how much of its limit it uses, what sets the limit, why it stands as it does."""
+"""Words of every format: how much of its limit a row uses and why, sizes of files, widths of lines, escaped texts."""
 
 import math
+import os
+import re
+from collections.abc import Sequence
+from urllib.parse import quote
 
+from bisar_budget.faults import Place, printable
 from bisar_budget.findings.mission import MissionFindings
+from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.findings.row import DECLARE, Row
-from bisar_budget.report.words.sizes import row_limit, row_size
+from bisar_budget.units import format_in, given_unit
 
 # What can set an allowable, in words; of a requirement the terminal has room for the first.
 BINDING_WORDS = {
@@ -85,3 +91,150 @@ def sentence(text: str) -> str:
 def dashed(text: str) -> str:
     """Write the dash of what has no value as a page does."""
     return "–" if text == "-" else text
+
+
+_PHASE_UNIT = "deg"  # of the phase requirement that a file does not state
+_OF_PHASES = ("quadratic_phase_error", "cubic_phase_error", "spatial_variance")  # rows that add phases up
+
+
+def row_size(value: float, row: Row, mission: MissionFindings, rounding: str = "nearest") -> str:
+    """Write a number of a row: in the unit of its value in the file, of phases together in that of their requirement.
+
+    Without a unit there, with a prefix that keeps it readable.
+    """
+    given = _given(row.line, row.unit)
+    if not given and row.unit == "rad" and row.subject.kind in _OF_PHASES:
+        given = phase_unit(mission)
+    return format_in(value, row.unit, given, 3, rounding)
+
+
+def row_limit(value: float, row: Row, mission: MissionFindings) -> str:
+    """Write an allowable of a row, rounded down, so that copied from the page into a file it passes."""
+    return row_size(value, row, mission, "down")
+
+
+def phase_unit(mission: MissionFindings) -> str:
+    """Unit of the quadratic phase requirement."""
+    lines = (one.line for one in mission.requirements if one.key == "quadratic_phase_error")
+    return _given(next(lines, None), "rad") or _PHASE_UNIT
+
+
+def phase_limit(value: float, mission: MissionFindings) -> str:
+    """Write a phase that is allowed, rounded down, in the unit of the quadratic phase requirement. [rad]"""
+    return format_in(value, "rad", phase_unit(mission), 3, "down")
+
+
+def requirement_size(value: float | None, one: JudgedRequirement, rounding: str = "nearest") -> str:
+    """Write a number of a requirement in the unit that the file states it in; a dash where there is none."""
+    if value is None:
+        return "-"
+    given = _given(one.line, one.unit) or (_PHASE_UNIT if one.unit == "rad" else "")
+    return format_in(value, one.unit, given, 3, rounding)
+
+
+def _given(line: int | None, unit: str) -> str:
+    return given_unit(line.text, unit) if isinstance(line, Place) else ""
+
+
+WIDTH = 80
+
+
+def wrapped(text: str, indent: str) -> list[str]:
+    """Break at spaces before 80 columns; a word that is longer stays whole, so that a path can be copied."""
+    lines = []
+    while len(text) > WIDTH:
+        margin = len(text) - len(text.lstrip(" "))
+        space = text.rfind(" ", margin, WIDTH + 1)
+        if space < 0:
+            space = text.find(" ", max(margin, WIDTH + 1))
+        if space < 0:
+            break
+        lines.append(text[:space])
+        text = indent + text[space + 1 :]
+    return [*lines, text]
+
+
+def wrapped_counts(text: str) -> list[str]:
+    """Break `file: 1 FAIL, 2 pass` before 80 columns, after a colon or comma."""
+    joined = text.replace(" ", "\u00a0").replace(",\u00a0", ", ").replace(":\u00a0", ": ").replace(";\u00a0", "; ")
+    return [line.replace("\u00a0", " ") for line in wrapped(joined, "  ")]
+
+
+def table(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Align rows of cells, the header first: names to the left, numbers to the right, the last column to the left.
+
+    A name that would take its line beyond 80 columns gets a line of its own, above its numbers.
+    """
+    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
+    room = WIDTH - sum(widths[1:]) - len(widths) + 1
+    first = max((len(row[0]) for row in rows if len(row[0]) <= room), default=0)
+    lines = []
+    for name, *cells in rows:
+        numbers = " ".join(cell.rjust(width) for cell, width in zip(cells[:-1], widths[1:-1], strict=True))
+        rest = f"{numbers} {cells[-1]}".rstrip()
+        lines += [f"{name:<{first}} {rest}"] if len(name) <= first else [name, f"{'':<{first}} {rest}"]
+    return lines
+
+
+_XML = {"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;", "'": "&apos;"}
+_XML_SPECIAL = re.compile("[&<>\"']")
+# What means something in GitHub's Markdown or in the HTML within it, and only where it does: a report is also read
+# as it is. Within a word an underscore is one, and brackets, escaped, need nothing of the ( and ! beside them.
+_MARKDOWN_SPECIAL = re.compile(
+    r"[\\`*\[\]<>|$~]"
+    r"|(?<![A-Za-z0-9])_|_(?![A-Za-z0-9])"
+    r"|&(?=#|\w+;)|@(?=\w)|#(?=\w)|:(?=//|(?:[\w+-]*[A-Z+-][\w+-]*|100|1234):)|(?<=www)\."
+    r"|^[-+#=](?=[-+#= ]|$)|^ ",
+    re.IGNORECASE | re.ASCII,
+)
+_MARKDOWN_NUMBER = re.compile(r"^(\d{1,9})([.)])(?=\s|$)", re.ASCII)  # of a list
+
+
+def xml_text(text: str) -> str:
+    """Escape for XML, elements and attributes alike; characters that XML does not have cannot occur."""
+    text = printable(text)
+    return _XML_SPECIAL.sub(lambda match: _XML[match[0]], text) if _XML_SPECIAL.search(text) else text
+
+
+def _markdown_escape(match: re.Match[str]) -> str:
+    """A backslash can be read past; what it cannot tame everywhere becomes a character reference."""
+    special = match[0]
+    return f"\\{special}" if special in r"\*_[]~" else f"&#{ord(special)};"
+
+
+def markdown_text(text: str) -> str:
+    """Escape for Markdown, also in a table or at the start of a line."""
+    escaped = _MARKDOWN_SPECIAL.sub(_markdown_escape, printable(text))
+    return _MARKDOWN_NUMBER.sub(lambda match: f"{match[1]}&#{ord(match[2])};", escaped)
+
+
+def command_text(text: str) -> str:
+    """Escape the message of a workflow command of GitHub's runner."""
+    return printable(text).replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
+
+
+def command_property(text: str) -> str:
+    """Escape a property of a workflow command, which also ends at a colon or a comma."""
+    return command_text(text).replace(":", "%3A").replace(",", "%2C")
+
+
+def rst_text(text: str) -> str:
+    """Escape for one line of reStructuredText: any punctuation can mean something there."""
+    return re.sub(r"([!-/:-@\[-`{-~])", r"\\\1", printable(text))
+
+
+def need_text(text: str) -> str:
+    """Keep a field of a need from being run: Sphinx-Needs calls `[[function()]]` and looks up `<<variant>>`."""
+    return printable(text).replace("[[", "[ [").replace("<<", "< <")
+
+
+def uri(path: str) -> str:
+    """Percent-encode a path with forward slashes; an absolute one becomes a `file` URI."""
+    encoded = quote(os.fsencode(path), safe="/")
+    return f"file:///{encoded.lstrip('/')}" if os.path.isabs(path) else encoded
+
+
+def spreadsheet_text(value: str | None) -> str | None:
+    """Keep text of the user's own from being run: a spreadsheet takes what starts like a formula for one."""
+    value = printable(value) if value else value
+    return f"'{value}" if value and value != "-" and value[0] in "=+-@" else value
