@@ -1,4 +1,4 @@
-"""Effects of a change on missions: what goes in, what it loosens, how much of each limit it erodes, what is refused."""
+"""Effects of a change on missions: what goes in, what it loosens, how much of each limit it erodes, and a gate."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence

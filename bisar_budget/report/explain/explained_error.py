@@ -1,4 +1,4 @@
-"""The first half of an explanation: one error, from its line in the file to its phase, its displacement, its share."""
+"""The first half of an explanation: one error, from its line in the file to its phase, displacement and share."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""How a row, or a requirement, comes to its status: from its line in the file through the equations to the verdict."""
+"""How a row, or a requirement, comes to its status: from its line in the file by the equations to the verdict."""
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
