@@ -8,6 +8,7 @@ import numpy as np
 
 from bisar_budget import evaluators
 from bisar_budget.analysis.together import Together
+from bisar_budget.effects.effect import plain
 from bisar_budget.mission.model import MetricSplits, Mission, Shares
 from bisar_budget.ranges.exact_ranges import Floats
 
@@ -63,9 +64,19 @@ class Allocation(NamedTuple):
         """QPE that an owner may use, before autofocus. [rad]"""
         return self.qpe.of(owner) * self.qpe_total
 
+    def of(self, case: int) -> "Allocation":
+        """Those of one of many cases, in plain numbers."""
+        qpe, pslr, islr = (Split._make(_plain(share, case) for share in split) for split in self[1:4])
+        total, n_pull, stated = (_plain(one, case) for one in (self.qpe_total, self.n_pull, self.n_pull_stated))
+        return Allocation(total, qpe, pslr, islr, n_pull, stated)
+
     def n_pull_needed(self, qpe: float, owner: str) -> float:
         """Smallest N_pull that makes a QPE pass."""
         return qpe / (self.qpe.of(owner) * math.pi)
+
+
+def _plain(number: Any, case: int) -> Any:
+    return None if number is None else plain(number, case)
 
 
 def range_walk_cap(mission: Mission) -> float:

@@ -1,7 +1,10 @@
 """The analysis that a mission's checks share: geometry, every error it can have, and what the models say of them."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
 
 from bisar_budget.analysis.allocation import Allocation, allocate
 from bisar_budget.analysis.spread import Tone, tones
@@ -14,9 +17,25 @@ from bisar_budget.effects.sources import exact_ranges
 from bisar_budget.effects.vibration import DeclaredPhase, slow_phases
 from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.model import Mission, has_instruments
-from bisar_budget.ranges.exact_ranges import ExactRanges
+from bisar_budget.mission.stacked import picked
+from bisar_budget.ranges.exact_ranges import ExactRanges, nodes_for
 
 __all__ = ["Analysis", "Model"]
+
+
+def by_nodes(
+    mission: Mission, cases: int, geometry: BistaticGeometry
+) -> Iterator[tuple[int, NDArray[np.intp], Mission, BistaticGeometry]]:
+    """Cases of a mission that need the same number of nodes: the number, their places, mission and geometry."""
+    T = np.broadcast_to(mission.collection.aperture_time, (cases,))
+    counts = np.broadcast_to(nodes_for(geometry, T, has_direct_path=mission.has_direct_path), (cases,))
+    for nodes in np.unique(counts).tolist():
+        same = np.flatnonzero(counts == nodes)
+        if same.size == cases:
+            yield nodes, same, mission, geometry
+        else:
+            part = picked(mission, same)
+            yield nodes, same, part, part.geometry
 
 
 class Analysis:
@@ -34,6 +53,8 @@ class Analysis:
         Of the aperture, that all cases need.
     shown : mapping of str to Subject, optional
         Ids of rows of which the allowable is asked though nothing is declared; omitted: all.
+    is_whole : bool
+        All of each row is asked for, not only what decides; a case is then the same however many there are.
     """
 
     def __init__(
@@ -44,9 +65,10 @@ class Analysis:
         geometry: BistaticGeometry | None = None,
         nodes: int | None = None,
         shown: Mapping[str, Subject] | None = None,
+        is_whole: bool = False,
     ) -> None:
         self.mission, self.cases, self.nodes, self.shown = mission, cases, nodes, shown
-        self.is_by_itself = geometry is None
+        self.is_by_itself, self.is_whole = geometry is None, is_whole
         self.geometry = mission.geometry if geometry is None else geometry
 
     @cached_property
@@ -57,7 +79,7 @@ class Analysis:
     @cached_property
     def errors(self) -> DeclaredErrors:
         """Every error that the cases can have, declared or not, or those that are shown."""
-        return DeclaredErrors(self.mission, self.cases, self.geometry, self.exact, self.shown)
+        return DeclaredErrors(self.mission, self.cases, self.geometry, self.exact, self.shown, is_whole=self.is_whole)
 
     @cached_property
     def sources(self) -> list[ErrorSource]:

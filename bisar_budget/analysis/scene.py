@@ -199,7 +199,8 @@ class ScenePhases:
         lanes = replace(lanes, case=np.tile(place, 2))
         sizes, every = np.tile(np.abs(self.sizes[error, case]), 2), np.arange(2 * count)
         none = np.zeros(2 * count)
-        paths = PointPaths(there, lanes, np.array(there.way(lanes, none, (none, none))))
+        way = np.array(there.way(lanes, none, (none, none)))
+        paths = PointPaths(there, lanes, way, is_alike=self.errors.is_whole)
         paths.to(every, sizes)
         known = paths.known(every, sizes).reshape(6, 2, count)
         np.minimum.at(turns, place, np.nan_to_num(known[5]).min(axis=0))
@@ -633,21 +634,20 @@ class SceneEdge(NamedTuple):
     doubt: Note
 
     @classmethod
-    def of(cls, edges: SceneEdges, geometry: BistaticGeometry, total: float) -> "SceneEdge":
-        """That of the only case."""
-        correction = Correction(edges, 0, total)
-        (size, rim), (difference, azimuth) = (map(float, one.of(0)) for one in (edges.rim, edges.largest))
+    def of(cls, edges: SceneEdges, geometry: BistaticGeometry, total: float, case: int = 0) -> "SceneEdge":
+        """That of one case, with its geometry and the total that it is allowed. [rad]"""
+        correction = Correction(edges, case, total)
+        (size, rim), (difference, azimuth) = (map(float, one.of(case)) for one in (edges.rim, edges.largest))
         radius, searched, nowhere = correction.radius, correction.farthest, (math.nan, 0.0, None)
         if math.isinf(size):
             reason = phrases.no_image_at_the_edge(math.degrees(rim), _degeneracy(geometry, at(radius, rim)))
-            return cls(radius, *nowhere, FARTHEST * float(edges.phases.nearest[0]), reason, NOTHING)
+            return cls(radius, *nowhere, FARTHEST * float(edges.phases.nearest[case]), reason, NOTHING)
         if math.isinf(difference):
             return cls(radius, *nowhere, searched, phrases.no_image(), NOTHING)
-        served, doubt, worst = correction.served(), NOTHING, int(edges.over[:, 0].argmax())
-        if edges.over[worst, 0]:
-            doubt = phrases.over_at_the_edge(
-                edges.names[worst], float(edges.over[worst, 0]), float(edges.limit[worst, 0])
-            )
+        served, doubt, worst = correction.served(), NOTHING, int(edges.over[:, case].argmax())
+        if edges.over[worst, case]:
+            over, limit = float(edges.over[worst, case]), float(edges.limit[worst, case])
+            doubt = phrases.over_at_the_edge(edges.names[worst], over, limit)
         return cls(radius, difference, azimuth, served, searched, NOTHING, doubt)
 
     def notes(self, total: float) -> tuple[Note, ...]:

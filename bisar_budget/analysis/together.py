@@ -119,16 +119,16 @@ class Together:
         """Displacements combined by a rule; not a number where an error has no image to place. [m]"""
         return self.errors.array(combined_displacement(self.moves(rule), rule, self.groups))
 
-    # ---------------------------------------------------------------- of a check, which is one case
-    def phase_parts(self, phases: Phases, rule: str = "") -> list[tuple[str, float]]:
+    # ---------------------------------------------------------------- of one case
+    def phase_parts(self, phases: Phases, rule: str = "", case: int = 0) -> list[tuple[str, float]]:
         """List the parts of phases that the mission's rule, or another, combines, signed. [rad]"""
         parts = phase_parts(phases, rule or self.rule, self.groups)
-        return [(row_id, float(phase[0])) for row_id, phase in parts]
+        return [(row_id, float(phase[case])) for row_id, phase in parts]
 
-    def displacement_parts(self) -> list[tuple[str, GroundVector]]:
+    def displacement_parts(self, case: int = 0) -> list[tuple[str, GroundVector]]:
         """List the parts of displacements that the mission's rule combines: none where one has no image. [m]"""
         found = displacement_parts(self.moves(self.rule), self.rule, self.groups)
-        parts = [(row_id, (float(east[0]), float(north[0]))) for row_id, (east, north) in found]
+        parts = [(row_id, (float(east[case]), float(north[case]))) for row_id, (east, north) in found]
         return [] if any(math.isnan(east) for _, (east, _) in parts) else parts
 
 

@@ -2,8 +2,7 @@
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,11 +10,12 @@ from numpy.typing import NDArray
 
 from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.analysis.case import Case
 from bisar_budget.analysis.scene import SceneEdge, SceneEdges
 from bisar_budget.analysis.spread import noise
 from bisar_budget.analysis.together import Together, cubics, quadratics
 from bisar_budget.budget.judged_requirements import TAKEN_BY, EffectTotal
-from bisar_budget.budget.judged_rows import BOUND, CODE, Floats, Judged, Judging, number, worded
+from bisar_budget.budget.judged_rows import BOUND, CODE, Floats, Judged, Judging, number_of, worded
 from bisar_budget.budget.pull_in import caps, needed_sentence
 from bisar_budget.effects.combined import (
     Phases,
@@ -204,18 +204,18 @@ class Aggregate:
     without_autofocus: Any = 0.0
     is_there: Any = True
 
-    def in_words(self, analysis: Analysis, model: str) -> Row:
-        """The row of the only case, by the model that judges it."""
-        mission, allocation, what = analysis.mission, analysis.allocation, self.judged.subject
-        groups, combine, owner = analysis.groups, mission.allocation.combine, what.owner
-        size, limit = number(self.judged.declared), number(self.judged.allowable)
+    def in_words(self, case: Case, model: str) -> Row:
+        """The row of one case, by the model that judges it."""
+        mission, allocation, what = case.mission, case.allocation, self.judged.subject
+        groups, combine, owner = case.analysis.groups, mission.allocation.combine, what.owner
+        size, limit = number_of(case, self.judged.declared), number_of(case, self.judged.allowable)
         said, over, notes = _said_of(what, self.rule), NOTHING, tuple[Note, ...]()
         if combine != "each" and what.kind != PULL_IN:
             notes = correlation_notes(combine, [group for group in groups if owner in (group.platform, "mission")])
         if size is None:
             over = phrases.no_ground_point()
         elif limit is not None and size > limit * BOUND:
-            over = phrases.aggregate_over(said.what, size, limit, said.unit, *_largest(analysis, model, self))
+            over = phrases.aggregate_over(said.what, size, limit, said.unit, *_largest(case, model, self))
         if what.kind == QUADRATIC:
             if over and size is not None and combine != "each":
                 over = over.then(needed_sentence(allocation.n_pull_needed(size, owner), caps(mission)))
@@ -223,17 +223,17 @@ class Aggregate:
             over = over.then(phrases.no_gain() if what.kind == CUBIC else phrases.one_total())
         doubt = over if what.kind == PULL_IN else NOTHING
         return worded(
-            mission,
+            case,
             self.judged,
             unit=said.unit,
             path=said.path,
             equation=said.equation[model != "published"],
             over=over,
-            doubt=doubt or _doubt(_OTHER[model], self, said, limit),
+            doubt=doubt or _doubt(case, _OTHER[model], self, said, limit),
             no_limit=phrases.no_requirement(),
-            not_evaluated=analysis.errors.degeneracy(model) or phrases.no_image_to_place(),
+            not_evaluated=case.degeneracy(model) or phrases.no_image_to_place(),
             info=phrases.no_requirement(),
-            without_autofocus=float(np.ravel(self.without_autofocus)[0]),
+            without_autofocus=case.number(self.without_autofocus),
             remarks=notes,
         )
 
@@ -318,29 +318,29 @@ def _said_of(what: Subject, rule: str) -> _Words:
     return _Words("QPE", "rad", path, (_EQUATIONS[rule], _EQUATIONS[rule]))
 
 
-def _largest(analysis: Analysis, model: str, one: Aggregate) -> tuple[str, float, Note]:
+def _largest(case: Case, model: str, one: Aggregate) -> tuple[str, float, Note]:
     """Which part is the largest, its size, and what it rests on beside the file."""
-    together, kind = analysis.together(model), one.judged.subject.kind
+    together, kind = case.analysis.together(model), one.judged.subject.kind
     if kind == LOCATION:
-        parts = [(row_id, math.hypot(*move)) for row_id, move in together.displacement_parts()]
+        parts = [(row_id, math.hypot(*move)) for row_id, move in together.displacement_parts(case.place)]
     else:
-        parts = together.phase_parts(one.phases, one.rule)
+        parts = together.phase_parts(one.phases, one.rule, case.place)
     row_id, largest = max(parts, key=lambda part: abs(part[1]))
-    extrapolated = {} if kind in (LOCATION, PULL_IN) else {error.id: error.extrapolated for error in analysis.random}
+    extrapolated = {} if kind in (LOCATION, PULL_IN) else {error.id: error.extrapolated for error in case.random}
     return row_id, largest, extrapolated.get(row_id, NOTHING)
 
 
-def _doubt(other: str, one: Aggregate, said: _Words, limit: float | None) -> Note:
+def _doubt(case: Case, other: str, one: Aggregate, said: _Words, limit: float | None) -> Note:
     """Reason that makes a pass a warning: all errors together, or the model that does not gate."""
     if limit is None:
         return NOTHING
-    if np.any(one.is_over_of_all):
+    if case.number(one.is_over_of_all):
         what = "displacement" if one.judged.subject.kind == LOCATION else said.what
-        return phrases.all_together_over(what, float(one.of_all[0]), limit, said.unit)
-    if not np.any(one.is_over_by_other):
+        return phrases.all_together_over(what, case.number(one.of_all), limit, said.unit)
+    if not case.number(one.is_over_by_other):
         return NOTHING
     phrase = phrases.other_model_is_beyond if one.judged.subject.kind == PULL_IN else phrases.other_model_fails
-    return phrase(other, float(one.by_other[0]), limit, said.unit)
+    return phrase(other, case.number(one.by_other), limit, said.unit)
 
 
 # ---------------------------------------------------------------------- the scene's edge
@@ -350,12 +350,16 @@ class JudgedScene:
 
     analysis: Analysis
     edges: SceneEdges | None
+    _known: dict[int, SceneEdge] = field(default_factory=dict)
 
-    @cached_property
-    def edge(self) -> SceneEdge | None:
-        """The edge of the only case, with how far one autofocus correction serves."""
-        analysis, edges = self.analysis, self.edges
-        return None if edges is None else SceneEdge.of(edges, analysis.geometry, analysis.allocation.qpe_total)
+    def edge(self, case: Case) -> SceneEdge | None:
+        """The edge of one case, with how far one autofocus correction serves."""
+        if self.edges is None:
+            return None
+        if case.place not in self._known:
+            total = case.allocation.qpe_total
+            self._known[case.place] = SceneEdge.of(self.edges, case.geometry, total, case.place)
+        return self._known[case.place]
 
     def row(self, judging: Judging, model: str) -> "SceneRow":
         """Judge the edges by a model; to the published one an error is the same all over the scene."""
@@ -383,9 +387,9 @@ class SceneRow:
     scene: JudgedScene
     is_there: bool = True
 
-    def in_words(self, analysis: Analysis, model: str) -> Row:
-        """The row of the only case, by the model that judges it."""
-        edge, total = self.scene.edge, analysis.allocation.qpe_total
+    def in_words(self, case: Case, model: str) -> Row:
+        """The row of one case, by the model that judges it."""
+        edge, total = self.scene.edge(case), case.allocation.qpe_total
         doubt, degeneracy, notes = NOTHING, NOTHING, tuple[Note, ...]()
         if edge is not None:
             doubt, degeneracy = edge.doubt, edge.degeneracy
@@ -393,7 +397,7 @@ class SceneRow:
             if model == "published" and edge.difference > total * BOUND:
                 doubt = phrases.other_model_fails("full", edge.difference, total, "rad")
         return worded(
-            analysis.mission,
+            case,
             self.judged,
             unit="rad",
             path=("scene", "radius"),

@@ -1,14 +1,17 @@
 """Hold a mission's declared errors to its allocated budget: one row for each, and what the rows add up to."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from datetime import date
 
+import numpy as np
+
 from bisar_budget import phrases
-from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.analysis.analysis import Analysis, by_nodes
+from bisar_budget.analysis.case import Case
 from bisar_budget.budget.doubts import collection_notes, model_doubt
 from bisar_budget.budget.file_warnings import file_warnings
-from bisar_budget.budget.judged_mission import judged_mission
+from bisar_budget.budget.judged_mission import JudgedMission, judged_mission
 from bisar_budget.budget.judged_requirements import declared_kinds
 from bisar_budget.budget.requirement_table import negligible_effects, requirements_in_words, rows_in_words
 from bisar_budget.budget.waivers import NOTHING_OUTSIDE, Outside, apply_waivers, overrides
@@ -17,8 +20,11 @@ from bisar_budget.effects.effect import PLATFORMS, override_notes
 from bisar_budget.findings.mission import MissionFindings, Resolution
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import FlownPath
+from bisar_budget.mission.stacked import picked, stacked
 from bisar_budget.phrases import Note
 from bisar_budget.units import format_quantity
+
+_TOGETHER = 256  # cases: arrays of more do not stay in a cache
 
 
 def check_mission(mission: Mission, today: date, *, outside: Outside = NOTHING_OUTSIDE) -> MissionFindings:
@@ -38,17 +44,42 @@ def check_mission(mission: Mission, today: date, *, outside: Outside = NOTHING_O
     MissionFindings
         Rows in the order of the contract, declared or not.
     """
-    analysis = Analysis(mission)
-    judged = judged_mission(analysis, today, is_whole=True)
-    waived = apply_waivers(list(rows_in_words(judged)), mission, today)
-    rows, requirements = waived.rows, requirements_in_words(judged, waived)
-    geometry = analysis.geometry
+    analysis = Analysis(mission, is_whole=True)
+    return _findings(judged_mission(analysis, today), Case(analysis), today, outside)
+
+
+def check_missions(
+    missions: Sequence[Mission], today: date, *, outside: Outside = NOTHING_OUTSIDE
+) -> Iterator[tuple[int, MissionFindings]]:
+    """Check missions, those of one shape together; each with its place, in any order.
+
+    What is found of a mission is what `check_mission` finds: what others are checked beside it makes no difference.
+    """
+    for alike, places in stacked(missions):
+        for start in range(0, places.size, _TOGETHER):
+            some = places[start : start + _TOGETHER]
+            if some.size == 1:
+                yield some[0], check_mission(missions[some[0]], today, outside=outside)
+                continue
+            part = picked(alike, np.arange(start, start + some.size))
+            for nodes, same, of_same, geometry in by_nodes(part, some.size, part.geometry):
+                analysis = Analysis(of_same, same.size, geometry=geometry, nodes=nodes, is_whole=True)
+                judged = judged_mission(analysis, today)
+                for place, index in enumerate(some[same].tolist()):
+                    yield index, _findings(judged, Case(analysis, missions[index], place), today, outside)
+
+
+def _findings(judged: JudgedMission, case: Case, today: date, outside: Outside) -> MissionFindings:
+    """What is found of one of the judged cases, in words."""
+    mission, geometry = case.mission, case.geometry
+    waived = apply_waivers(list(rows_in_words(judged, case)), mission, today)
+    rows, requirements = waived.rows, requirements_in_words(judged, case, waived)
     resolution = Resolution(
         range=geometry.range_resolution(mission.radar.bandwidth, SPEED_OF_LIGHT),
         cross_range=geometry.cross_range_resolution(mission.radar.wavelength, mission.collection.aperture_time),
     )
     return MissionFindings(
-        analysis=analysis,
+        analysis=case.analysis if case.analysis.is_by_itself else Analysis(mission, is_whole=True),
         file=mission.file,
         name=mission.name,
         model=mission.gating_model,
@@ -59,24 +90,24 @@ def check_mission(mission: Mission, today: date, *, outside: Outside = NOTHING_O
         aperture_time=mission.collection.aperture_time,
         scene_radius=mission.scene.radius,
         resolution=resolution,
-        allocation=analysis.allocation,
+        allocation=case.allocation,
         rows=tuple(rows),
         requirements=requirements,
         kinds=declared_kinds(mission),
         overrides=overrides(mission, outside, today),
-        warnings=file_warnings(analysis, rows, list(waived.unused(requirements)), resolution),
+        warnings=file_warnings(case, rows, list(waived.unused(requirements)), resolution),
         place=_place(mission),
         paths=tuple((name, path) for name, path in _paths(mission) if path.source),
-        scene=None if judged.scene is None else judged.scene.edge,
+        scene=None if judged.scene is None else judged.scene.edge(case),
         notes=(
-            *negligible_effects(judged),
-            *collection_notes(analysis),
+            *negligible_effects(judged, case),
+            *collection_notes(case),
             *_unused_keys(mission),
             *_overridden(mission),
         ),
         document=mission.document,
         changes=mission.changes,
-        model_doubt=model_doubt(analysis, rows),
+        model_doubt=model_doubt(case, rows),
     )
 
 

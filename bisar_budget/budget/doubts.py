@@ -5,10 +5,10 @@ its ephemeris, the residual of its smoothed log. A position error that is smalle
 """
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from bisar_budget import phrases
-from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.analysis.case import Case
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.effect import PLATFORMS, Subject
 from bisar_budget.findings.row import Row
@@ -16,9 +16,6 @@ from bisar_budget.geometry import norm
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import FlownPath, MotionError, Platform
 from bisar_budget.phrases import NOTHING, Note
-
-if TYPE_CHECKING:
-    pass
 
 LEAST_M = 1e-3  # of a doubt; what is less is no story beside any declared error, zero included
 
@@ -77,19 +74,19 @@ def is_in_doubt(what: Subject, owner: str, mission: Mission) -> bool:
 APART = 0.05  # of the full model's allowable; farther from it, the published one does not hold
 
 
-def model_doubt(analysis: Analysis, rows: Sequence[Row]) -> Note:
+def model_doubt(case: Case, rows: Sequence[Row]) -> Note:
     """Say of which declared error the published model, where it decides, does not hold; nothing if it does.
 
     Named is the row of which the two allowables say most differently how much of them is used.
 
     Parameters
     ----------
-    analysis : Analysis
-        Of the mission.
+    case : Case
+        That is judged.
     rows : sequence of Row
         As judged: those that the published model judges are looked at, of errors as stated and not zero.
     """
-    stated = {source.id for source in analysis.stated if source.declared}
+    stated = {source.id for source in case.analysis.errors.stated if case.number(source.declared)}
     apart = [row for row in rows if row.model == "published" and row.id in stated and _is_apart(row)]
     if not apart:
         return NOTHING
@@ -119,10 +116,10 @@ COARSE_CELL_RAD = 1.0  # of phase between points a range cell apart; beyond, a r
 _ABSORBED_RAD = 6.1  # of the same, where the image shows half; measured, uniform window, 8 to 300 MHz
 
 
-def collection_notes(analysis: Analysis) -> Iterator[Note]:
+def collection_notes(case: Case) -> Iterator[Note]:
     """Say where the published model leaves the collection, and where an image shows less than the full one."""
-    mission = analysis.mission
-    for name, state in (("transmitter", analysis.geometry.transmitter), ("receiver", analysis.geometry.receiver)):
+    mission = case.mission
+    for name, state in zip(PLATFORMS, case.geometry.both, strict=True):
         if not state.is_straight:
             yield phrases.path_curves(name)
         turn = norm(state.look_rate) * mission.collection.aperture_time / 2
@@ -130,12 +127,12 @@ def collection_notes(analysis: Analysis) -> Iterator[Note]:
             yield phrases.sight_turns(name, turn)
     if mission.has_direct_path:
         yield phrases.direct_path_is_the_clock()
-    cell = phase_across_a_cell(analysis)
+    cell = phase_across_a_cell(case)
     if cell > COARSE_CELL_RAD:
         yield phrases.range_cells_are_coarse(cell, 100 / (1 + (cell / _ABSORBED_RAD) ** 2))
 
 
-def phase_across_a_cell(analysis: Analysis) -> float:
+def phase_across_a_cell(case: Case) -> float:
     """Quadratic phase between points of the ground a range cell c/B apart. [rad]"""
-    (by_constant, _), _ = analysis.exact.phases_per_term
-    return float(abs(by_constant[0])) * SPEED_OF_LIGHT / analysis.mission.radar.bandwidth
+    (by_constant, _), _ = case.analysis.exact.phases_per_term
+    return abs(case.number(by_constant)) * SPEED_OF_LIGHT / case.mission.radar.bandwidth

@@ -9,7 +9,8 @@ import numpy as np
 
 from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Analysis, Model
-from bisar_budget.budget.judged_rows import BOUND, CODE, REQUIREMENTS, Floats, Judged, Judging, number, worded
+from bisar_budget.analysis.case import Case
+from bisar_budget.budget.judged_rows import BOUND, CODE, REQUIREMENTS, Floats, Judged, Judging, number_of, worded
 from bisar_budget.budget.pull_in import caps, needed_sentence
 from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.effects.declared import CUBIC, END_OF_IMAGE, HELD, LOCATION, QUADRATIC, Declared
@@ -103,30 +104,31 @@ class ErrorRow:
     limit: Floats
     is_there: bool = True
 
-    def in_words(self, analysis: Analysis, gating: str) -> Row:
-        """The row of the only case, by the model that judges it."""
-        mission, row, source, allocation = analysis.mission, self.judged, self.source, analysis.allocation
-        model, other = analysis.models(gating)
-        gain, status, limit = allocation.autofocus_gain, row.status[0], number(self.limit) or 0.0
+    def in_words(self, case: Case, gating: str) -> Row:
+        """The row of one case, by the model that judges it."""
+        mission, row, source = case.mission, self.judged, self.source
+        model, other = case.analysis.models(gating)
+        gain, status = case.allocation.autofocus_gain, row.status[case.place]
+        limit = number_of(case, self.limit) or 0.0
         over = doubt = info = NOTHING
         notes, fields = source.notes, dict[str, Any]()
         qpe = 0.0
         if source.declared is not None:
-            mine = analysis.does(model, source)
+            mine = case.does(model, source)
             qpe = abs(mine.qpe)
             fields = {"displacement_m": mine.displacement}
-            if mine.displacement is None and source.is_motion and model.degeneracy:
-                notes = (*notes, model.degeneracy)
+            if mine.displacement is None and source.is_motion:
+                notes = (*notes, *filter(None, [case.degeneracy(gating)]))
             if status == CODE["fail"]:
-                over = _over(analysis, model, row, source, mine, limit)
+                over = _over(case, model, row, source, mine, limit)
             elif status == CODE["warn"]:
-                doubt = _doubt(analysis, other, source, limit)
+                doubt = _doubt(case, other, source, limit)
             elif not source.is_independent:
-                info = _stated_elsewhere(analysis, source)
+                info = _stated_elsewhere(case, source)
             else:
                 info = phrases.aggregate_decides(mission.allocation.combine)
         return worded(
-            mission,
+            case,
             row,
             unit=source.unit,
             path=source.path,
@@ -139,17 +141,17 @@ class ErrorRow:
             remarks=notes,
             evidence=source.evidence,
             is_independent=source.is_independent,
-            binding_requirement=row.requirement,
+            binding_requirement=row.requirement(case),
             **fields,
         )
 
 
 # ---------------------------------------------------------------------- in words
-def _over(analysis: Analysis, model: Model, row: Judged, source: ErrorSource, mine: Declared, limit: float) -> Note:
+def _over(case: Case, model: Model, row: Judged, source: ErrorSource, mine: Declared, limit: float) -> Note:
     """Say which requirement the declared error breaks."""
-    requirements, binding = analysis.mission.requirements, row.requirement
+    requirements, binding = case.mission.requirements, row.requirement(case)
     if binding == END_OF_IMAGE:
-        return phrases.beyond_the_image(float(row.allowable[0]), source.unit)
+        return phrases.beyond_the_image(case.number(row.allowable), source.unit)
     if binding == CUBIC and requirements.cubic_phase_error is not None:
         return phrases.cubic_phase_over(mine.cubic, requirements.cubic_phase_error, model.equation(source))
     if binding == LOCATION and requirements.location_error is not None:
@@ -160,12 +162,12 @@ def _over(analysis: Analysis, model: Model, row: Judged, source: ErrorSource, mi
     over = phrases.quadratic_phase_over(qpe, limit, model.equation(source))
     if not math.isfinite(qpe):
         return over
-    return over.then(needed_sentence(analysis.allocation.n_pull_needed(qpe, source.owner), caps(analysis.mission)))
+    return over.then(needed_sentence(case.allocation.n_pull_needed(qpe, source.owner), caps(case.mission)))
 
 
-def _doubt(analysis: Analysis, other: Model, source: ErrorSource, limit: float) -> Note:
+def _doubt(case: Case, other: Model, source: ErrorSource, limit: float) -> Note:
     """Say that the model that does not gate fails the declared error, and why it thinks otherwise; else nothing."""
-    requirements, theirs = analysis.mission.requirements, analysis.does(other, source)
+    requirements, theirs = case.mission.requirements, case.does(other, source)
     moved = 0.0 if theirs.farthest is None else math.hypot(*theirs.farthest)
     held = [(abs(theirs.qpe), limit, QUADRATIC)]
     if source.is_motion:
@@ -200,6 +202,6 @@ def _cause(source: ErrorSource) -> Note:
     return phrases.turning_defocuses()
 
 
-def _stated_elsewhere(analysis: Analysis, source: ErrorSource) -> Note:
-    frame = getattr(analysis.mission.platforms, source.owner).motion_error.frame
+def _stated_elsewhere(case: Case, source: ErrorSource) -> Note:
+    frame = getattr(case.mission.platforms, source.owner).motion_error.frame
     return phrases.stated_along_other_axes([axis.replace("_", " ") for axis in FRAME_AXES[frame]])

@@ -8,7 +8,7 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.analysis.case import Case
 from bisar_budget.budget.doubts import input_doubts
 from bisar_budget.budget.pull_in import ROOM, caps, rounded_down
 from bisar_budget.constants import EARTH_GRAVITATIONAL_PARAMETER, EARTH_RADIUS
@@ -37,14 +37,14 @@ class _Warned(NamedTuple):
 
 
 def file_warnings(
-    analysis: Analysis, rows: Sequence[Row], waivers: Sequence[tuple[KeyPath, Note]], resolution: Resolution
+    case: Case, rows: Sequence[Row], waivers: Sequence[tuple[KeyPath, Note]], resolution: Resolution
 ) -> tuple[FileWarning, ...]:
     """Everything about the file of a mission that should not go unsaid.
 
     Parameters
     ----------
-    analysis : Analysis
-        Of the mission.
+    case : Case
+        That is judged.
     rows : sequence of Row
         As judged.
     waivers : sequence of (key, sentence)
@@ -52,14 +52,14 @@ def file_warnings(
     resolution : Resolution
         On the ground.
     """
-    mission = analysis.mission
+    mission = case.mission
     found = (
         *_of_the_whole(mission, rows),
         *(_Warned(*one) for one in waivers),
         *_unused_correlations(mission),
         *straight_orbits(mission),
         *_doubtful_paths(mission),
-        *_of_instruments(analysis),
+        *_of_instruments(case),
         *_of_autofocus(mission, resolution),
         *_nothing_declared(rows),
     )
@@ -206,13 +206,13 @@ def satellite_flies_straight(platform: str, speed: float, acceleration: Sequence
 
 
 # ---------------------------------------------------------------------- how errors are stated
-def _of_instruments(analysis: Analysis) -> Iterator[_Warned]:
+def _of_instruments(case: Case) -> Iterator[_Warned]:
     """Find how sensors and clocks are stated, and errors that are stated twice."""
-    mission, sync = analysis.mission, analysis.mission.synchronization
+    mission, sync = case.mission, case.mission.synchronization
     T = mission.collection.aperture_time
     if sync is not None and not sync.is_direct_path and (sync.interval or 0.0) > T:
         yield _Warned(("synchronization", "interval"), exchanges_are_rare(T))
-    for error in analysis.random:
+    for error in case.random:
         if error.noise is not None and error.noise.misfit > POOR_FIT:
             key = f"platforms.{error.owner}.oscillator"
             yield _Warned(error.path, no_power_law_fits(key, error.noise.misfit))

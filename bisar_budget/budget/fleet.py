@@ -10,11 +10,12 @@ from datetime import date
 from functools import partial
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
-from bisar_budget.budget.check import check_mission
+from bisar_budget.budget.check import check_missions
 from bisar_budget.budget.waivers import NOTHING_OUTSIDE, Outside
 from bisar_budget.faults import MissionError, SetValue
 from bisar_budget.findings.mission import MissionFindings, UnusableMission
 from bisar_budget.mission.load import load_mission
+from bisar_budget.mission.model import Mission
 from bisar_budget.resources import FILES_READ, cores
 
 if TYPE_CHECKING:
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 Found = MissionFindings | UnusableMission
 Kept = TypeVar("Kept")
 
+AT_ONCE = 512  # files that are read before they are checked, those of one shape together
 MANY = 200  # files from which a second process pays: starting one costs what checking fifty does
 
 
@@ -78,18 +80,18 @@ def check_files(
     list
         What `keep` made of each.
     """
-    one = partial(_kept, today=today, model=model, keep=keep, drawn=drawn, changes=changes, outside=outside)
+    of = partial(_kept, today=today, model=model, keep=keep, drawn=drawn, changes=changes, outside=outside)
     count = cores()
     is_shared = drawn is not None and drawn.share is not None
     if len(files) < MANY or count == 1 or "-" in files or keep is whole or is_shared:
-        return _of(files, one)
+        return of(files)
     from bisar_budget.workers import worker_pool
 
     size = -(-len(files) // count)
     own, *others = (files[start : start + size] for start in range(0, len(files), size))
     with worker_pool(len(others)) as pool:
-        waiting = [pool.submit(_with_files_read, part, one) for part in others]
-        kept = _of(own, one)
+        waiting = [pool.submit(_with_files_read, part, of) for part in others]
+        kept = of(own)
         for part in waiting:
             found, files_read = part.result()
             kept += found
@@ -97,31 +99,36 @@ def check_files(
     return kept
 
 
-def _with_files_read(files: Sequence[str], one: Callable[[str], Kept]) -> tuple[list[Kept], set[tuple[int, int]]]:
-    return _of(files, one), FILES_READ
-
-
-def _of(files: Sequence[str], one: Callable[[str], Kept]) -> list[Kept]:
-    # The findings of a thousand missions are 10⁵ tuples without a cycle: nothing to collect.
-    gc.disable()
-    return [one(file) for file in files]
+def _with_files_read(
+    files: Sequence[str], of: Callable[[Sequence[str]], list[Kept]]
+) -> tuple[list[Kept], set[tuple[int, int]]]:
+    return of(files), FILES_READ
 
 
 def _kept(
-    file: str,
+    files: Sequence[str],
     today: date,
     model: str | None,
     keep: Callable[[Found], Kept],
     drawn: Draws | None,
     changes: Sequence[SetValue],
     outside: Outside,
-) -> Kept:
-    try:
-        found = check_mission(load_mission(file, model, changes), today, outside=outside)
-    except MissionError as error:
-        return keep(UnusableMission(file=file, faults=error.faults, data=error.data))
-    if drawn is not None:
-        from bisar_budget.monte_carlo.probability import monte_carlo
+) -> list[Kept]:
+    # The findings of a thousand missions are 10⁵ tuples without a cycle: nothing to collect.
+    gc.disable()
+    kept: dict[int, Kept] = {}
+    for start in range(0, len(files), AT_ONCE):
+        missions: dict[int, Mission] = {}
+        for place, file in enumerate(files[start : start + AT_ONCE], start):
+            try:
+                missions[place] = load_mission(file, model, changes)
+            except MissionError as error:
+                kept[place] = keep(UnusableMission(file=file, faults=error.faults, data=error.data))
+        places = list(missions)
+        for index, found in check_missions(list(missions.values()), today, outside=outside):
+            if drawn is not None:
+                from bisar_budget.monte_carlo.probability import monte_carlo
 
-        found = found._replace(monte_carlo=monte_carlo(found.analysed(), *drawn))
-    return keep(found)
+                found = found._replace(monte_carlo=monte_carlo(found.analysed(), *drawn))
+            kept[places[index]] = keep(found)
+    return [kept[place] for place in range(len(files))]

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.analysis.case import Case
 from bisar_budget.analysis.scene import SceneEdges, scene_edges
 from bisar_budget.analysis.spread import noise
 from bisar_budget.budget.aggregates import Aggregates, JudgedScene, Misplacing, effect_totals, misplacing
@@ -62,8 +63,8 @@ class FamilyRow(Protocol):
     def is_there(self) -> Any:
         """Cases that have it."""
 
-    def in_words(self, analysis: Analysis, model: str) -> Row:
-        """The row of the only case."""
+    def in_words(self, case: Case, model: str) -> Row:
+        """The row of one case."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +103,7 @@ class JudgedMission:
         return np.asarray(np.minimum(worst, self.floor), dtype=np.int8)
 
 
-def judged_mission(analysis: Analysis, today: date, *, is_whole: bool = False) -> JudgedMission:
+def judged_mission(analysis: Analysis, today: date) -> JudgedMission:
     """Judge every row and every requirement.
 
     Parameters
@@ -111,18 +112,16 @@ def judged_mission(analysis: Analysis, today: date, *, is_whole: bool = False) -
         Of cases that need the same number of nodes.
     today : date
         Day on which waivers are judged, UTC.
-    is_whole : bool
-        Find all of each row, not only what decides.
     """
     with np.errstate(all="ignore"):
-        return _Judgement(analysis, today, is_whole).found()
+        return _Judgement(analysis, today).found()
 
 
 class _Judgement:
-    def __init__(self, analysis: Analysis, today: date, is_whole: bool) -> None:
+    def __init__(self, analysis: Analysis, today: date) -> None:
         self.analysis, self.mission, self.today = analysis, analysis.mission, today
         self.cases, self.shown = analysis.cases, analysis.shown
-        self.judging = Judging(self.cases, self.mission.allocation.warn_above, is_whole)
+        self.judging = Judging(self.cases, self.mission.allocation.warn_above, analysis.is_whole)
 
     def found(self) -> JudgedMission:
         analysis, mission = self.analysis, self.mission

@@ -3,19 +3,20 @@
 import math
 from collections.abc import Callable, Sequence
 from enum import IntEnum
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget import phrases
+from bisar_budget.analysis.case import Case
 from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.effects.declared import CUBIC, END_OF_IMAGE, LOCATION, QUADRATIC
 from bisar_budget.effects.effect import Subject
 from bisar_budget.faults import KeyPath
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import RANK, STATUS
-from bisar_budget.mission.model import Mission
 from bisar_budget.phrases import NOTHING, Note
 
 Floats = NDArray[np.float64]
@@ -100,10 +101,10 @@ class Judged(NamedTuple):
         """The row with the requirement that sets its allowable."""
         return self._replace(metric=key, binding=np.full_like(self.binding, REQUIREMENTS.index(key)))
 
-    @property
-    def requirement(self) -> str | None:
-        """The requirement that sets the allowable of the only case; None: its metric does."""
-        return None if self.binding[0] < 0 else REQUIREMENTS[self.binding[0]]
+    def requirement(self, case: Case) -> str | None:
+        """The requirement that sets the allowable in a case; None: its metric does."""
+        place = self.binding[case.place]
+        return None if place < 0 else REQUIREMENTS[place]
 
     @property
     def qpe_exact_rad(self) -> Floats:
@@ -195,7 +196,7 @@ _STATUSES = tuple(STATUS)
 
 
 def worded(
-    mission: Mission,
+    case: Case,
     row: Judged,
     *,
     unit: str,
@@ -209,8 +210,9 @@ def worded(
     without_autofocus: float = 0.0,  # utilization without its gain
     **others: Any,  # further fields of the row
 ) -> Row:
-    """Put a row as judged, of one case, into words: they follow from its status, and decide nothing."""
-    status = _STATUSES[row.status[0]]
+    """Put a row as judged, in one case, into words: they follow from its status, and decide nothing."""
+    mission, number = case.mission, partial(number_of, case)
+    status = _STATUSES[row.status[case.place]]
     declared, allowable, utilization = (number(one) for one in (row.declared, row.allowable, row.utilization))
     reason, remarks = no_limit if allowable is None else NOTHING, tuple[Note, ...](others.pop("remarks", ()))
     if status == "info":
@@ -231,11 +233,11 @@ def worded(
         "allowable_full": number(row.allowable_full),
         "qpe_published_rad": number(row.qpe_published_rad),
         "qpe_full_rad": number(row.qpe_full_rad),
-        "qpe_exact_rad": number(row.qpe_exact_rad),
+        "qpe_exact_rad": number(row.qpe_full_rad) if row.is_of_ranges else None,
         "cubic_rad": number(row.cubic_rad),
         "islr_db": number(row.islr_db),
         "utilization": utilization,
-        "margin": number(row.margin),
+        "margin": 1 / utilization - 1 if utilization else None,
         "line": mission.line(path),
         "reason": reason or None,
         "remarks": remarks,
@@ -245,7 +247,7 @@ def worded(
     return Row.without_numbers(row.subject, row.metric, unit, status, declared=declared, **(fields | others))
 
 
-def number(column: Any) -> float | None:
-    """The number of the only case; None where there is none."""
-    value = column.item() if isinstance(column, np.ndarray) else float(column)
+def number_of(case: Case, column: Any) -> float | None:
+    """The number that a case has in a column; None where there is none."""
+    value = case.number(column)
     return None if math.isnan(value) else value

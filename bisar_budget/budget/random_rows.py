@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from bisar_budget import phrases
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.analysis.case import Case
 from bisar_budget.analysis.spread import (
     CUBIC_POWER,
     SpreadPhase,
@@ -148,7 +149,7 @@ class RandomRows:
         columns = (is_over_other, sizes_of_other.argmin(axis=0), without_autofocus)
         for place, (error, *others) in enumerate(zip(self.errors, *columns, strict=True)):
             row = judged.at(place, error.subject)
-            yield RandomRow(row.in_decibel() if error.unit == "dB" else row, error, *others)
+            yield RandomRow(row.in_decibel() if error.unit == "dB" else row, place, *others)
 
     # ---------------------------------------------------------------- powers together
     def islr_rows(self, model: str) -> Iterator["IslrRow"]:
@@ -194,30 +195,30 @@ class RandomRows:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RandomRow:
-    """The row of one error in many cases.
+    """The row of one error in many cases, by its place among them.
 
     `is_over_other` says that the model that does not gate fails it, `bound_by_other` by which of `HELD`.
     """
 
     judged: Judged
-    error: RandomError
+    place: int
     is_over_other: Truths
     bound_by_other: NDArray[np.intp]
     without_autofocus: Floats
     is_there: bool = True
 
-    def in_words(self, analysis: Analysis, gating: str) -> Row:
-        """The row of the only case, by the model that judges it."""
-        mission, allocation, error = analysis.mission, analysis.allocation, self.error
-        combine, binding, over, doubt = mission.allocation.combine, self.judged.requirement, NOTHING, NOTHING
-        if self.judged.status[0] == CODE["fail"]:
+    def in_words(self, case: Case, gating: str) -> Row:
+        """The row of one case, by the model that judges it."""
+        mission, allocation, error = case.mission, case.allocation, case.random[self.place]
+        combine, binding, over, doubt = mission.allocation.combine, self.judged.requirement(case), NOTHING, NOTHING
+        if self.judged.status[case.place] == CODE["fail"]:
             over = _over(mission, error, gating, binding, allocation).then(error.extrapolated)
-        if self.is_over_other[0]:
+        if self.is_over_other[case.place]:
             limit = float(allocation.qpe_limit(error.owner) * allocation.autofocus_gain)
-            doubt = _doubt(mission, error, gating, HELD[self.bound_by_other[0]], limit)
+            doubt = _doubt(mission, error, gating, HELD[self.bound_by_other[case.place]], limit)
         equation, evidence, notes = _said(mission, error)
         return worded(
-            mission,
+            case,
             self.judged,
             unit=error.unit,
             path=error.path,
@@ -226,7 +227,7 @@ class RandomRow:
             doubt=doubt,
             no_limit=_unlimited(mission, error, error.effect(gating)),
             info=NOTHING if combine == "each" else phrases.aggregate_decides(combine),
-            without_autofocus=float(self.without_autofocus[0]),
+            without_autofocus=case.number(self.without_autofocus),
             evidence=evidence,
             remarks=notes,
             binding_requirement=binding,
@@ -248,21 +249,22 @@ class IslrRow:
     limit: Floats
     limit_of_other: Floats
 
-    def in_words(self, analysis: Analysis, gating: str) -> Row:
-        """The row of the only case, by the model that judges it."""
-        mission, level = analysis.mission, _levels(analysis.mission, gating)
+    def in_words(self, case: Case, gating: str) -> Row:
+        """The row of one case, by the model that judges it."""
+        level = _levels(case.mission, gating)
         other, over, doubt = "full" if gating == "published" else "published", NOTHING, NOTHING
-        variance, limit, by_other = (float(one[0]) for one in (self.variance, self.limit, self.limit_of_other))
+        variance, limit, by_other = map(case.number, (self.variance, self.limit, self.limit_of_other))
         if math.sqrt(variance) > by_other * BOUND:
             doubt = phrases.other_model_allows(other, level(by_other), "dB")
-        if self.judged.status[0] == CODE["fail"]:
-            largest = max(self.members, key=lambda one: np.ravel(one.variance)[0])
-            rms = math.sqrt(np.ravel(largest.variance)[0])
+        if self.judged.status[case.place] == CODE["fail"]:
+            known = [one for one in self.members if not math.isnan(case.number(one.variance))]
+            largest = max(known, key=lambda one: case.number(one.variance))
+            rms = math.sqrt(case.number(largest.variance))
             over = phrases.noise_spreads_too_much(
                 level(math.sqrt(variance)), level(limit), largest.row_id, level(rms)
             )
         return worded(
-            mission,
+            case,
             self.judged,
             unit="dB",
             path=("requirements", "islr"),

@@ -1,10 +1,10 @@
 """Rows and requirements of one mission, as judged, in words: what is asked, what is reached, what decides."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from bisar_budget import phrases
-from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.analysis.case import Case
 from bisar_budget.analysis.spread import islr_db, mainlobe_energy, spread_limit
 from bisar_budget.analysis.vibration_limits import level_of
 from bisar_budget.budget.doubts import input_doubts, is_in_doubt
@@ -30,36 +30,39 @@ _EXAMPLES = {CUBIC: "22.5 deg", "islr": "-20 dB", "pslr": "-30 dB"}
 
 
 # ---------------------------------------------------------------------- rows
-def rows_in_words(judged: JudgedMission) -> Iterator[Row]:
-    """Rows of the only case, before waivers, in the order of the contract."""
+def rows_in_words(judged: JudgedMission, case: Case) -> Iterator[Row]:
+    """Rows of one case, before waivers, in the order of the contract."""
     families: dict[tuple[str, str], FamilyRow] = {
         (model, one.judged.subject.id): one
         for model, found in judged.families.items()
         for one in found
-        if one.is_there is True or one.is_there[0]
+        if one.is_there is True or one.is_there[case.place]
     }
     for one in judged.before:
         if one.metric == DECLARE:
-            yield _declarations(judged, one)
+            yield _declarations(case, one)
             continue
-        model = MODELS[one.model[0]]
-        row = families[model, one.subject.id].in_words(judged.analysis, model)._replace(model=model)
-        status = _STATUSES[one.status[0]]
+        model = MODELS[one.model[case.place]]
+        found = families.get((model, one.subject.id))
+        if found is None:  # only other cases have it
+            continue
+        row = found.in_words(case, model)._replace(model=model)
+        status = _STATUSES[one.status[case.place]]
         if status != row.status and status == "info":
             row = row._replace(utilization=None, margin=None)
         row = row._replace(status=status)
-        yield row if one.why[0] == Why.OWN else row._replace(reason=_why(judged, one, row))
+        yield row if one.why[case.place] == Why.OWN else row._replace(reason=_why(judged, case, one, row))
 
 
-def _declarations(judged: JudgedMission, one: Judged) -> Row:
+def _declarations(case: Case, one: Judged) -> Row:
     """The row that says whether all is declared: of kinds, too, that have no row where nothing is declared."""
-    mission = judged.analysis.mission
+    mission = case.mission
     missing = missing_declarations(mission)
     return Row.without_numbers(
         DECLARATIONS,
         DECLARE,
         "",
-        _STATUSES[one.status[0]],
+        _STATUSES[one.status[case.place]],
         line=mission.line(("requirements", "declare")),
         reason=phrases.declarations_are_missing([one.key for one in missing]) if missing else None,
         equation="requirements.declare",
@@ -68,9 +71,9 @@ def _declarations(judged: JudgedMission, one: Judged) -> Row:
     )
 
 
-def _why(judged: JudgedMission, one: Judged, row: Row) -> Note:
+def _why(judged: JudgedMission, case: Case, one: Judged, row: Row) -> Note:
     """Why a row is not judged by its own numbers."""
-    mission, why = judged.analysis.mission, Why(one.why[0])
+    mission, why = case.mission, Why(one.why[case.place])
     if why is Why.NOT_DECLARED_AS_REQUIRED:
         missing = (each for each in missing_declarations(mission) if is_asked_for(one.subject, each))
         return phrases.not_declared_as_required(next(missing).key)
@@ -78,52 +81,56 @@ def _why(judged: JudgedMission, one: Judged, row: Row) -> Note:
         doubts = (each for each in input_doubts(mission) if is_in_doubt(one.subject, each.owner, mission))
         return next(doubts).note
     if why is Why.NO_PLACE:
-        return unknown_place(judged)
+        return unknown_place(judged, case)
     if why is Why.NOTHING_SPREADS:
         return phrases.nothing_judges("islr")
     said = [row.reason] if row.status == "fail" and row.reason else []  # it is broken, and more of it not judged
     for each in judged.untaken:
-        if row.id in each.makers and each.makers[row.id][0]:
+        if row.id in each.makers and each.makers[row.id][case.place]:
             lines = [f"{key}: {_EXAMPLES[key]}" for key in TAKEN_BY[each.kind]]
-            parts = float(each.parts[row.id][0]), float(each.total[0])
+            parts = case.number(each.parts[row.id]), case.number(each.total)
             said.append(phrases.effect_is_not_judged(each.kind, *parts, lines))
     return said[0].then(*said[1:])
 
 
-def unknown_place(judged: JudgedMission) -> Note:
+def unknown_place(judged: JudgedMission, case: Case) -> Note:
     """Say what displaces the image by an amount that no row holds: a random or slow error, a path in doubt."""
-    at_random, slow = ([row_id for row_id, is_there in kind if is_there[0]] for kind in judged.misplacing)
+    at_random, slow = ([row_id for row_id, is_there in kind if is_there[case.place]] for kind in judged.misplacing)
     if not slow and not at_random:
-        doubts = input_doubts(judged.analysis.mission)
+        doubts = input_doubts(case.mission)
         return doubts[0].note if doubts else NOTHING
     causes = [*(["random errors"] if at_random else []), *(["slow vibration"] if slow else [])]
     cause = f"{' and '.join(causes)} {'move' if at_random else 'moves'}"
     return phrases.place_is_not_known([*at_random, *slow], cause)
 
 
-def negligible_effects(judged: JudgedMission) -> Iterator[Note]:
+def negligible_effects(judged: JudgedMission, case: Case) -> Iterator[Note]:
     """Say which effects no requirement takes, and are too small for one."""
     for one in judged.untaken:
-        if one.is_negligible[0]:
-            yield phrases.effect_is_negligible(one.kind, float(one.total[0]), list(TAKEN_BY[one.kind]))
+        if one.is_negligible[case.place]:
+            yield phrases.effect_is_negligible(one.kind, case.number(one.total), list(TAKEN_BY[one.kind]))
 
 
 # ---------------------------------------------------------------------- requirements
-def requirements_in_words(judged: JudgedMission, waived: Waived) -> tuple[JudgedRequirement, ...]:
-    """How every requirement of the only case stands; `waived` are its rows in words, after waivers."""
-    return tuple(_entry(state, judged, waived) for state in judged.requirements)
+def requirements_in_words(judged: JudgedMission, case: Case, waived: Waived) -> tuple[JudgedRequirement, ...]:
+    """How every requirement of one case stands; `waived` are its rows in words, after waivers."""
+    rows = {row.id: row for row in waived.rows}
+    of_all = [rows.get(one.subject.id) for one in judged.before]  # None: only other cases have it
+    return tuple(_entry(state, judged, case, of_all, waived) for state in judged.requirements)
 
 
-def _entry(state: RequirementState, judged: JudgedMission, waived: Waived) -> JudgedRequirement:
-    mission, key = judged.analysis.mission, state.key
-    rows = waived.rows
+def _entry(
+    state: RequirementState, judged: JudgedMission, case: Case, rows: Sequence[Row | None], waived: Waived
+) -> JudgedRequirement:
+    mission, key = case.mission, state.key
     value = getattr(mission.requirements, key)
-    status = _STATUSES[state.status[0]]
-    decider = rows[state.decider[0]] if state.decider[0] >= 0 else None
-    allowed, reached = _sizes(decider, key, judged.analysis) if decider is not None else (None, None)
+    status = _STATUSES[state.status[case.place]]
+    place = state.decider[case.place]
+    decider = rows[place] if place >= 0 else None
+    allowed, reached = _sizes(decider, key, case) if decider is not None else (None, None)
     reason: Note | None = None
     if status == "not_evaluated" and (decider is None or decider.status != status or key == "islr"):
-        reason = (unknown_place(judged) if key == LOCATION else NOTHING) or phrases.nothing_judges(key)
+        reason = (unknown_place(judged, case) if key == LOCATION else NOTHING) or phrases.nothing_judges(key)
     elif decider is not None and status not in ("pass", "info"):
         reason = decider.reason
     path = ("requirements", key)
@@ -135,18 +142,18 @@ def _entry(state: RequirementState, judged: JudgedMission, waived: Waived) -> Ju
         status=status,
         allowed=allowed,
         reached=reached,
-        utilization=None if decider is None or decider.utilization is None else float(state.utilization[0]),
+        utilization=None if decider is None or decider.utilization is None else case.number(state.utilization),
         row=None if decider is None else decider.id,
-        rows=tuple(row.id for row, judges in zip(rows, state.judges[:, 0], strict=True) if judges),
+        rows=tuple(row.id for row, judges in zip(rows, state.judges[:, case.place], strict=True) if row and judges),
         reason=reason,
         line=mission.line(path),
         waivers=waived.requirements.get(f"mission.{key}", ()),
     )
 
 
-def _sizes(row: Row, key: str, analysis: Analysis) -> tuple[float | None, float | None]:
+def _sizes(row: Row, key: str, case: Case) -> tuple[float | None, float | None]:
     """Size that a row is allowed, and size that it reaches, in the unit of a requirement that it judges."""
-    mission, allocation = analysis.mission, analysis.allocation
+    mission, allocation = case.mission, case.allocation
     if row.declared is None and row.metric != key:
         return None, None
     if row.unit == UNITS[key] and (

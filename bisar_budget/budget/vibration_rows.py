@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.analysis.case import Case
 from bisar_budget.analysis.spread import Tone, islr_of
 from bisar_budget.analysis.vibration_limits import (
     LARGEST_ECHO,
@@ -26,7 +27,7 @@ from bisar_budget.budget.judged_rows import BOUND, REQUIREMENTS, Floats, Judged,
 from bisar_budget.budget.pull_in import caps, needed_sentence
 from bisar_budget.effects.declared import CUBIC, QUADRATIC
 from bisar_budget.effects.effect import PLATFORMS, Subject, override_notes, subject
-from bisar_budget.effects.oscillators import Spur, spurs_of
+from bisar_budget.effects.oscillators import spurs_of
 from bisar_budget.effects.spectra import tone
 from bisar_budget.effects.vibration import (
     NEAR_CYCLES,
@@ -39,7 +40,7 @@ from bisar_budget.effects.vibration import (
 )
 from bisar_budget.findings.row import Row
 from bisar_budget.mission.instruments import Oscillator
-from bisar_budget.mission.model import Mission, has_instruments
+from bisar_budget.mission.model import has_instruments
 from bisar_budget.mission.platforms import MotionError
 from bisar_budget.phrases import NOTHING, Note
 from bisar_budget.units import format_quantity
@@ -263,28 +264,28 @@ class VibrationRow:
     is_over_both: Any = False
     without_autofocus: Any = 0.0
 
-    def in_words(self, analysis: Analysis, model: str) -> Row:
-        """The row of the only case, by the model that judges it."""
-        what, mission = self.judged.subject, analysis.mission
-        error: MotionError = getattr(mission.platforms, what.owner).motion_error
+    def in_words(self, case: Case, model: str) -> Row:
+        """The row of one case, by the model that judges it."""
+        what = self.judged.subject
+        error: MotionError = getattr(case.mission.platforms, what.owner).motion_error
         if self.is_slow:
-            return _slow_row(analysis, self, error)
+            return _slow_row(case, self, error)
         if self.members is not None:
-            members = np.flatnonzero(self.members[:, 0]).tolist()
-            note = _lines_together(error, members, float(self.judged.declared[0]))
-            return _row(mission, self, error, model, ("sinusoidal", members[0], "frequency"), (note,))
+            members = np.flatnonzero(self.members[:, case.place]).tolist()
+            note = _lines_together(error, members, case.number(self.judged.declared))
+            return _row(case, self, error, model, ("sinusoidal", members[0], "frequency"), (note,))
         if what.axis == "wideband":
             wideband = error.vibration.wideband
-            seen = () if wideband is None else _seen(mission, self, error, wideband.rms)
-            return _row(mission, self, error, model, ("wideband", "rms"), seen)
-        return _line_row(analysis, self, error, model)
+            seen = () if wideband is None else _seen(case, self, error, wideband.rms)
+            return _row(case, self, error, model, ("wideband", "rms"), seen)
+        return _line_row(case, self, error, model)
 
 
 def spur_rows(judging: Judging, analysis: Analysis, model: str) -> Iterator["SpurRow"]:
     """Judge the oscillators' tones by a model; they make paired echoes as vibrations do. [dB of echo to response]"""
     mission = analysis.mission
     metric, by_platform = tone_limits(mission, analysis.allocation)
-    for spur in spurs_of(mission) if has_instruments(mission) else ():
+    for place, spur in enumerate(spurs_of(mission) if has_instruments(mission) else ()):
         what, phase = subject(spur.name, "oscillator", "spur", entry=spur.entry), judging.array(spur.phase)
         limits, is_over_other = by_platform.get(spur.name), np.zeros(judging.cases, dtype=bool)
         if limits is None:
@@ -305,32 +306,33 @@ def spur_rows(judging: Judging, analysis: Analysis, model: str) -> Iterator["Spu
         judged = judged.in_decibel().held_to(metric)
         if metric == "islr":
             judged = judged._replace(islr_db=islr_of(mission, phase**2 / 2))
-        yield SpurRow(judged, spur, is_over_other)
+        yield SpurRow(judged, place, is_over_other)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SpurRow:
-    """A tone of an oscillator in many cases, in decibel of an echo to the response; see `VibrationRow`."""
+    """A tone of an oscillator in many cases, by its place, as echo over response in decibel; see `VibrationRow`."""
 
     judged: Judged
-    spur: Spur
+    place: int
     is_over_other: Any = False
     is_there: bool = True
 
-    def in_words(self, analysis: Analysis, model: str) -> Row:
-        """The row of the only case, by the model that judges it."""
-        mission, spur, row, doubt, over = analysis.mission, self.spur, self.judged, NOTHING, NOTHING
+    def in_words(self, case: Case, model: str) -> Row:
+        """The row of one case, by the model that judges it."""
+        mission, row, doubt, over = case.mission, self.judged, NOTHING, NOTHING
+        spur = spurs_of(mission)[self.place]
         oscillator: Oscillator = getattr(mission.platforms, spur.name).oscillator
         cycles, missing = spur.frequency * mission.collection.aperture_time, phrases.no_requirement_of("pslr")
-        if not math.isnan(row.allowable[0]):
-            over = phrases.echoes_over(float(row.declared[0]), float(row.allowable[0]))
-            if self.is_over_other[0]:
+        if not math.isnan(row.allowable[case.place]):
+            over = phrases.echoes_over(case.number(row.declared), case.number(row.allowable))
+            if self.is_over_other[case.place]:
                 other, by_other = (
                     ("published", row.allowable_published) if model == "full" else ("full", row.allowable_full)
                 )
-                doubt = phrases.other_model_allows(other, float(by_other[0]), "dB")
+                doubt = phrases.other_model_allows(other, case.number(by_other), "dB")
         return worded(
-            mission,
+            case,
             row,
             unit="dB",
             path=("platforms", spur.name, "oscillator", "spurs"),
@@ -373,16 +375,16 @@ class PslrRow:
     highest: Echo | None
     is_there: bool = True
 
-    def in_words(self, analysis: Analysis, _: str) -> Row:
-        """The row of the only case."""
-        mission, over = analysis.mission, NOTHING
+    def in_words(self, case: Case, _: str) -> Row:
+        """The row of one case."""
+        over = NOTHING
         if self.highest is not None:
-            makers = [one for one, is_in in zip(self.tones, self.highest.is_of[:, 0], strict=True) if is_in]
-            largest, required = max(makers, key=lambda one: one.phase), mission.requirements.pslr or 0.0
-            level = float(self.judged.declared[0])
+            makers = [one for one, is_in in zip(self.tones, self.highest.is_of[:, case.place], strict=True) if is_in]
+            largest = max(makers, key=lambda one: case.number(one.phase))
+            level, required = case.number(self.judged.declared), case.mission.requirements.pslr or 0.0
             over = phrases.echoes_together_over(level, required, largest.subject.id, len(makers))
         return worded(
-            mission,
+            case,
             self.judged,
             unit="dB",
             path=("requirements", "pslr"),
@@ -393,30 +395,30 @@ class PslrRow:
 
 
 # ---------------------------------------------------------------------- in words
-def _line_row(analysis: Analysis, one: VibrationRow, error: MotionError, model: str) -> Row:
-    mission, allocation = analysis.mission, analysis.allocation
+def _line_row(case: Case, one: VibrationRow, error: MotionError, model: str) -> Row:
+    mission, allocation, place = case.mission, case.allocation, case.place
     owner, index = one.judged.subject.owner, one.judged.subject.entry or 0
     key, lines = ("sinusoidal", index, "amplitude"), error.vibration.sinusoidal
     if not lines:
-        return _row(mission, one, error, model, key)
+        return _row(case, one, error, model, key)
     doubt, more, required = NOTHING, list[Note](), mission.requirements.pslr
-    if required is not None and not math.isnan(one.both[0]):
+    if required is not None and not math.isnan(one.both[place]):
         (other,) = (platform for platform in PLATFORMS if platform != owner)
         note = phrases.both_platforms_vibrate(
-            other, NEAR_CYCLES, float(one.level[0]), bool(one.both[0] > LARGEST_ECHO), required
+            other, NEAR_CYCLES, float(one.level[place]), bool(one.both[place] > LARGEST_ECHO), required
         )
-        more, doubt = [note], note if one.is_over_both[0] else NOTHING
-    if one.cycles[0] < ECHO_CYCLES:
+        more, doubt = [note], note if one.is_over_both[place] else NOTHING
+    if one.cycles[place] < ECHO_CYCLES:
         limit = float(allocation.qpe_limit(owner) * allocation.autofocus_gain)
-        qpe, cubic, allowed = float(one.qpe[0]), float(one.cubic[0]), mission.requirements.cubic_phase_error
-        more.insert(0, phrases.slower_than_three_cycles(float(one.cycles[0]), qpe, limit, cubic, allowed))
-        if one.is_over_phase[0]:
+        qpe, cubic, allowed = float(one.qpe[place]), float(one.cubic[place]), mission.requirements.cubic_phase_error
+        more.insert(0, phrases.slower_than_three_cycles(float(one.cycles[place]), qpe, limit, cubic, allowed))
+        if one.is_over_phase[place]:
             doubt = phrases.phase_of_vibration_over(qpe, limit, cubic, allowed)
-    return _row(mission, one, error, model, key, _seen(mission, one, error, lines[index].amplitude), more, doubt)
+    return _row(case, one, error, model, key, _seen(case, one, error, lines[index].amplitude), more, doubt)
 
 
 def _row(
-    mission: Mission,
+    case: Case,
     one: VibrationRow,
     error: MotionError,
     model: str,
@@ -426,17 +428,18 @@ def _row(
     doubt: Note = NOTHING,
 ) -> Row:
     """A row of echoes or noise: `notes` stand before what is said of its limit, `more` after it."""
-    what, metric, limits = one.judged.subject, one.judged.metric, one.limits
+    what, metric = one.judged.subject, one.judged.metric
     equation = f"Section V, {key[0]}" if model == "published" else "first principles"
     missing, margin = phrases.no_requirement_of(metric), None
-    if limits is not None:
+    if one.limits is not None:
+        limits = VibrationLimits(*map(case.number, one.limits))
         margin = float(limits.margin_db)
         notes = (*notes, phrases.published_rule_is_off(margin))
-        if one.is_over_other[0]:
+        if one.is_over_other[case.place]:
             other = "full" if model == "published" else "published"
             doubt = phrases.other_model_allows(other, float(limits.by(other)), "m")
     return worded(
-        mission,
+        case,
         one.judged,
         unit="m",
         path=("platforms", what.owner, "motion_error", "vibration", *key),
@@ -451,8 +454,8 @@ def _row(
     )
 
 
-def _seen(mission: Mission, one: VibrationRow, error: MotionError, value: Any) -> tuple[Note, ...]:
-    return projected(mission, value, error, float(one.judged.declared[0]))
+def _seen(case: Case, one: VibrationRow, error: MotionError, value: Any) -> tuple[Note, ...]:
+    return projected(case.mission, value, error, case.number(one.judged.declared))
 
 
 def _lines_together(error: MotionError, members: Sequence[int], declared: float) -> Note:
@@ -462,11 +465,11 @@ def _lines_together(error: MotionError, members: Sequence[int], declared: float)
     return phrases.lines_together(shown, " to ".join(dict.fromkeys(ends)), NEAR_CYCLES, declared)
 
 
-def _slow_row(analysis: Analysis, one: VibrationRow, error: MotionError) -> Row:
-    mission, allocation = analysis.mission, analysis.allocation
+def _slow_row(case: Case, one: VibrationRow, error: MotionError) -> Row:
+    mission, allocation = case.mission, case.allocation
     what, combine = one.judged.subject, mission.allocation.combine
-    cycles, qpe, cubic = (float(column[0]) for column in (one.cycles, one.qpe, one.cubic))
-    is_cubic = REQUIREMENTS[one.judged.binding[0]] == CUBIC
+    cycles, qpe, cubic = map(case.number, (one.cycles, one.qpe, one.cubic))
+    is_cubic = one.judged.requirement(case) == CUBIC
     if is_cubic:
         over = phrases.slow_cubic_phase_over(cubic, mission.requirements.cubic_phase_error or 0.0)
     else:
@@ -476,17 +479,17 @@ def _slow_row(analysis: Analysis, one: VibrationRow, error: MotionError) -> Row:
             over = over.then(needed_sentence(allocation.n_pull_needed(qpe, what.owner), caps(mission)))
     entry = what.entry or 0
     return worded(
-        mission,
+        case,
         one.judged,
         unit="m",
         path=("platforms", what.owner, "motion_error", "vibration", "sinusoidal", entry, "amplitude"),
         equation="first principles",
         over=over,
         info=NOTHING if combine == "each" else phrases.aggregate_decides(combine),
-        without_autofocus=float(one.without_autofocus[0]),
+        without_autofocus=case.number(one.without_autofocus),
         evidence=error.source,
         remarks=(
-            *_seen(mission, one, error, error.vibration.sinusoidal[entry].amplitude),
+            *_seen(case, one, error, error.vibration.sinusoidal[entry].amplitude),
             phrases.slower_than_a_cycle(cycles, qpe, cubic),
         ),
         binding_requirement=CUBIC if is_cubic else QUADRATIC,

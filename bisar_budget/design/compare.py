@@ -8,6 +8,7 @@ from datetime import date
 from typing import Any, NamedTuple
 
 from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.analysis.case import Case
 from bisar_budget.budget.judged_mission import JudgedMission, judged_mission
 from bisar_budget.budget.requirement_table import rows_in_words
 from bisar_budget.design.quantities import QuestionError, tree_of
@@ -277,7 +278,7 @@ class _PartSearch:
         texts = {evidence(one.part, figure) for figure in checked.figures}
         own = [
             (each.utilization, each.id)
-            for each in rows_in_words(found)
+            for each in rows_in_words(found, Case(found.analysis))
             if each.owner == self.platform and each.evidence in texts and each.utilization is not None
         ]
         use, own_row = max(own, default=(None, None))

@@ -16,12 +16,12 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.analysis.analysis import Analysis, by_nodes
 from bisar_budget.budget.judged_mission import JudgedMission, field, judged_mission, statuses
 from bisar_budget.budget.judged_rows import REQUIREMENTS, WHOLE, Judged
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.design.quantities import FACTOR, Number, QuestionError, number_of, tree_of
-from bisar_budget.design.varied import is_held, is_image, picked, scaled, stacked, varied
+from bisar_budget.design.varied import is_held, is_image, scaled, varied
 from bisar_budget.faults import MissionError, SetNumber, SetValue
 from bisar_budget.findings.row import unknown_id
 from bisar_budget.findings.status import RANK, STATUS
@@ -29,8 +29,8 @@ from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.load import Named, mission_of
 from bisar_budget.mission.model import Mission
+from bisar_budget.mission.stacked import picked, stacked
 from bisar_budget.mission.tree import Tree, read_tree
-from bisar_budget.ranges.exact_ranges import nodes_for
 from bisar_budget.workers import Progress, unseen
 
 _SOON, _SELDOM = (2, 12), 48  # cases after which it is told how far many are
@@ -425,22 +425,22 @@ class Table:
 
     def _check(self, found: dict[str, Values], some: Places, mission: Mission, geometries: BistaticGeometry) -> None:
         """Judge the cases of a mission together, those that need as many nodes."""
-        T = np.broadcast_to(mission.collection.aperture_time, (some.size,))
-        counts = np.broadcast_to(nodes_for(geometries, T, has_direct_path=mission.has_direct_path), (some.size,))
-        for nodes in np.unique(counts).tolist():
-            if (counts == nodes).all():
-                self._judge(found, some, mission, geometries, nodes)
-                return
-            same = np.flatnonzero(counts == nodes)
-            part = picked(mission, same)
-            self._judge(found, some[same], part, part.geometry, nodes)
+        for nodes, same, part, of_part in by_nodes(mission, some.size, geometries):
+            self._judge(found, some[same], part, of_part, nodes)
 
     def _judge(
         self, found: dict[str, Values], some: Places, mission: Mission, geometries: BistaticGeometry, nodes: int
     ) -> None:
         question, T = self.question, mission.collection.aperture_time
-        analysis = Analysis(mission, some.size, geometry=geometries, nodes=nodes, shown=self.subjects)
-        judged = judged_mission(analysis, question.today, is_whole=self.is_whole)
+        analysis = Analysis(
+            mission,
+            some.size,
+            geometry=geometries,
+            nodes=nodes,
+            shown=self.subjects,
+            is_whole=self.is_whole,
+        )
+        judged = judged_mission(analysis, question.today)
         rows = {row.subject.id: row for row in judged.rows}
         columns = _verdict(judged, rows, question.row, question.breaks)
         with np.errstate(all="ignore"):

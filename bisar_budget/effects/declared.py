@@ -24,9 +24,8 @@ from bisar_budget.effects.sources import ErrorListing
 from bisar_budget.geometry import BistaticGeometry, GroundVector, angle_between_lines
 from bisar_budget.mission.model import Mission
 from bisar_budget.phrases import NOTHING, Note
-from bisar_budget.ranges import point_paths
 from bisar_budget.ranges.exact_ranges import Effect, ExactRanges, Floats, Lanes, Places, Truths
-from bisar_budget.ranges.point_paths import Held, PointPaths
+from bisar_budget.ranges.point_paths import Held, PointPaths, is_few
 
 QUADRATIC, CUBIC, LOCATION = "quadratic_phase_error", "cubic_phase_error", "location_error"
 HELD = (QUADRATIC, CUBIC, LOCATION)  # what an error is held to
@@ -71,14 +70,15 @@ class Declared(NamedTuple):
         (x, y), (u, v) = self.displacement, self.opposite
         return Declared(self.qpe[some], self.cubic[some], (x[some], y[some]), (u[some], v[some]))
 
-    def in_one_case(self) -> "Declared":
-        """The same with plain numbers in the place of arrays of one case."""
-        return Declared(plain(self.qpe), plain(self.cubic), point(self.displacement), point(self.opposite))
+    def in_one_case(self, case: int = 0) -> "Declared":
+        """The same with plain numbers in the place of arrays, those of a case."""
+        moved, opposite = point(self.displacement, case), point(self.opposite, case)
+        return Declared(plain(self.qpe, case), plain(self.cubic, case), moved, opposite)
 
 
-def point(place: tuple[Any, Any]) -> GroundVector | None:
-    """A place of the ground in the only case; None where there is none. [m]"""
-    east, north = map(plain, place)
+def point(place: tuple[Any, Any], case: int = 0) -> GroundVector | None:
+    """A place of the ground in one case; None where there is none. [m]"""
+    east, north = (plain(part, case) for part in place)
     return None if math.isnan(east) else (east, north)
 
 
@@ -264,7 +264,7 @@ class ErrorBlock:
             of_moving = Effect._make(part[self.moves] for part in full)
             moved = np.array(table.planes["full"].displacement(of_moving, 1.0))  # (2, moving, cases)
             per_unit = np.stack((moved, -moved), axis=2).reshape(2, -1)
-            self._follows = PointPaths(self.exact, lanes, per_unit)
+            self._follows = PointPaths(self.exact, lanes, per_unit, is_alike=table.is_whole)
         return self._follows
 
     def forget(self) -> None:
@@ -350,7 +350,8 @@ class ErrorBlock:
         found = np.full(small.shape, math.inf)
         slopes = np.array([self.effects["full"].qpe, self.effects["full"].cubic, self.per_unit("full")[2]])
         per_metre, searches = np.array(self.table.per_metre), list[Held]()
-        is_few = 2 * len(held) * self.declared.size < point_paths.FEW  # then all are searched for together
+        # Few are all searched for together.
+        is_together = is_few(2 * len(held) * self.declared.size, self.table.is_whole)
         for turn in np.array(held)[np.argsort(small[held], axis=0, kind="stable")]:
             of, first, slope = (np.take_along_axis(one, turn[None], axis=0)[0] for one in (limit, small, slopes))
             is_alone = (turn == 0) & is_whole
@@ -365,7 +366,7 @@ class ErrorBlock:
             numbers = of[some], slope[some], first[some], upto[some], np.flatnonzero(some), is_alone[some]
             for lane, sign in zip(self._lanes_of(some), (1.0, -1.0), strict=True):
                 searches.append(Held(lane, turn[some], *numbers).turned(sign))
-                if not is_few:
+                if not is_together:
                     self.paths.first_reaching(searches.pop(), found.reshape(3, -1))
         if searches:
             self.paths.first_reaching(Held(*map(np.concatenate, zip(*searches, strict=True))), found.reshape(3, -1))
@@ -387,6 +388,8 @@ class DeclaredErrors:
         Of the cases.
     shown : container of str, optional
         Ids of rows: of what is not declared, nothing else is listed; omitted: everything is.
+    is_whole : bool
+        All of each row is asked for, and alike whatever the number of cases.
 
     Attributes
     ----------
@@ -401,8 +404,11 @@ class DeclaredErrors:
         geometries: BistaticGeometry,
         exact: ExactRanges,
         shown: Container[str] | None = None,
+        *,
+        is_whole: bool = False,
     ) -> None:
         self.mission, self.cases, self.geometries, self.exact = mission, cases, geometries, exact
+        self.is_whole = is_whole
         self.has_direct_path = mission.has_direct_path
         self.each = np.arange(cases)
         published, self.published_angle_deg = published_planes(geometries)
@@ -500,12 +506,12 @@ class DeclaredErrors:
         """Where a model that does not gate casts a doubt; the published one does not know a direct path."""
         return False if model == "published" and self.has_direct_path else is_over
 
-    def degeneracy(self, model: str) -> Note:
-        """Why a model has no displacement in the first case; nothing where it has one."""
-        degrees = np.ravel(self.published_angle_deg)[0]
+    def degeneracy(self, model: str, case: int = 0) -> Note:
+        """Why a model has no displacement in a case; nothing where it has one."""
+        degrees = plain(self.published_angle_deg, case)
         if model == "full" or degrees >= MIN_GRADIENT_ANGLE_DEG:
             return NOTHING
-        return phrases.no_displacement(float(degrees))
+        return phrases.no_displacement(degrees)
 
 
 class ExactPhases(NamedTuple):

@@ -70,9 +70,11 @@ def override_notes(platform: str, overridden: Sequence["Overridden"], *figures: 
     )
 
 
-def plain(column: Any) -> float:
-    """The number of the only case."""
-    return float(column.item(0) if isinstance(column, np.ndarray) else column)
+def plain(column: Any, place: int = 0) -> float:
+    """The number of a case, by its place; one that all cases have is that of each."""
+    if not isinstance(column, np.ndarray):
+        return float(column)
+    return float(column.item(place if column.size > 1 else 0))
 
 
 class ErrorSource(NamedTuple):

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from bisar_budget import evaluators
 from bisar_budget.constants import ROUNDING, STANDARD_GRAVITY
-from bisar_budget.effects.effect import PLATFORMS, Subject, subject
+from bisar_budget.effects.effect import PLATFORMS, Subject, plain, subject
 from bisar_budget.effects.oscillators import Noise, noise_of
 from bisar_budget.effects.spectra import Floats, gauss_markov, link_parts, parts, synchronized_parts
 from bisar_budget.faults import KeyPath
@@ -99,7 +99,7 @@ def random_errors(mission: Mission, geometry: BistaticGeometry | None = None, ca
     found += [error for name in PLATFORMS for error in _of_position(seen, name)]
     found += [error for name in PLATFORMS for error in _of_oscillator(seen, name)]
     found += _of_link(seen)
-    return [_of_one_case(mission, error) for error in found] if geometry is None else found
+    return [in_one_case(mission, error) for error in found] if geometry is None else found
 
 
 def process_of(mission: Mission, error: RandomError) -> GaussMarkov:
@@ -121,19 +121,16 @@ def displaces_unknown(mission: Mission, error: RandomError) -> Any:
     return (error.declared > 0) & reduce(or_, does)
 
 
-def _of_one_case(mission: Mission, error: RandomError) -> RandomError:
-    """An error of a single case with numbers in the places of its arrays, and the noise of an oscillator."""
-    published, full = (RandomEffect(*map(_number, effect)) for effect in (error.published, error.full))
+def in_one_case(mission: Mission, error: RandomError, case: int = 0) -> RandomError:
+    """An error in plain numbers, those of a case with its mission, and with the noise of an oscillator."""
+    both = error.published, error.full
+    published, full = (RandomEffect(*(plain(part, case) for part in effect)) for effect in both)
     noise = None
     if error.subject.kind == "oscillator":
         oscillator: Oscillator = getattr(mission.platforms, error.owner).oscillator
         noise = noise_of(oscillator, mission.radar.center_frequency, mission.collection.aperture_time)
-    declared = None if error.declared is None else _number(error.declared)
+    declared = None if error.declared is None else plain(error.declared, case)
     return error._replace(declared=declared, published=published, full=full, noise=noise)
-
-
-def _number(value: Any) -> float:
-    return float(np.asarray(value).item())
 
 
 class _Seen:

@@ -75,6 +75,11 @@ class Held(NamedTuple):
         return np.asarray(found / self.limit[:, None])
 
 
+def is_few(lanes: int, is_alike: bool) -> bool:
+    """Whether several points of so many lanes are looked at together."""
+    return is_alike or lanes < FEW
+
+
 class PointPaths:
     """The ways of the point by errors, one a lane.
 
@@ -86,6 +91,9 @@ class PointPaths:
         The errors, each with its sign.
     per_unit : (2, lanes)
         Displacement by a small unit of each. [m/unit]
+    is_alike : bool
+        Look at as many points of each lane as of few lanes, so that what is found of a case does not depend on how
+        many there are.
 
     Attributes
     ----------
@@ -93,8 +101,8 @@ class PointPaths:
         Size from which there is no point; infinite where none is known.
     """
 
-    def __init__(self, exact: ExactRanges, lanes: Lanes, per_unit: Floats) -> None:
-        self.exact, self.lanes = exact, lanes
+    def __init__(self, exact: ExactRanges, lanes: Lanes, per_unit: Floats, *, is_alike: bool = False) -> None:
+        self.exact, self.lanes, self._is_alike = exact, lanes, is_alike
         count = lanes.case.size
         self.end = np.full(count, math.inf)
         self._way = per_unit
@@ -134,7 +142,7 @@ class PointPaths:
         # A little beyond a step is one step too; but where that led nowhere, it would again.
         is_short = size - last[0] >= np.where(self._is_lost[some], 1.0, 1.2) * step
         size = np.where(is_short, last[0] + step, size)
-        if some.size < FEW and is_short.any():  # and to half of it
+        if is_few(some.size, self._is_alike) and is_short.any():  # and to half of it
             size = np.concatenate((size, (last[0] + step / 2)[is_short]))
             some, index, fold = (np.concatenate((one, one[is_short])) for one in (some, index, fold))
         order = np.lexsort((size, some))
@@ -239,7 +247,7 @@ class PointPaths:
             going = np.flatnonzero(~ends)
             if not going.size:
                 return
-            some, size = seen.next(going)
+            some, size = seen.next(going, is_few=is_few(going.size, self._is_alike))
             self._follow(held.lane[some], size)
             held, tries, low = held.of(going), tries[going] + seen.is_between[going], seen.low[going]
         np.minimum.at(best, (held.row, held.group), low)  # which is safe, and no search is known that comes here
@@ -342,10 +350,10 @@ class _SearchState:
         is_sure = (left < ALMOST) & (ahead < (1 + 1.5 * ALMOST) * self.low) & (self.turn > 0.5)
         return ahead, is_sure
 
-    def next(self, going: Places) -> tuple[Places, Floats]:
+    def next(self, going: Places, *, is_few: bool) -> tuple[Places, Floats]:
         """Sizes to look at next in the searches that go on: of many one each, and one a lane."""
         low, upto = self.low[going], self.upto[going]
-        is_few, is_fresh = going.size < FEW, self.count[going] == 1
+        is_fresh = self.count[going] == 1
         grown = np.minimum(np.maximum(self.ahead[going], 1.01 * low), GROWTH * low)
         is_before = low < self.held.first[going]
         ahead = np.where(is_before, self.held.first[going], grown)

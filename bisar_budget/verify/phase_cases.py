@@ -4,6 +4,7 @@ import math
 from typing import Any
 
 from bisar_budget.analysis.allocation import range_walk_cap
+from bisar_budget.analysis.case import Case
 from bisar_budget.analysis.vibration_limits import slow_limits
 from bisar_budget.budget.doubts import COARSE_CELL_RAD, phase_across_a_cell
 from bisar_budget.budget.pull_in import ROOM
@@ -325,7 +326,7 @@ def _remark(study: Study, coverage: float) -> Note | None:
     """Say what of the image is unusual: a smear beyond the patch, or range cells that absorb phase."""
     if coverage < 0.9:
         return reasons.smear_leaves_the_patch(coverage)
-    cell = phase_across_a_cell(study.analysis)
+    cell = phase_across_a_cell(Case(study.analysis))
     if cell > COARSE_CELL_RAD:
         return reasons.range_cells_absorb_phase(cell)
     return None

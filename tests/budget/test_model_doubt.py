@@ -6,6 +6,7 @@ from datetime import date
 
 import pytest
 
+from bisar_budget.analysis.case import Case
 from bisar_budget.budget.check import check_mission
 from bisar_budget.budget.doubts import model_doubt
 from bisar_budget.findings.mission import MissionFindings, Report
@@ -50,13 +51,13 @@ class TestFivePercent:
         """Of the full model's allowable, 100."""
         found = findings(**PLAIN)
         rows = [one._replace(allowable_published=published, allowable_full=100.0) for one in found.rows]
-        assert bool(model_doubt(found.analysed(), rows)) == is_apart
+        assert bool(model_doubt(Case(found.analysed()), rows)) == is_apart
 
     @pytest.mark.parametrize(("full", "is_apart"), [(None, False), (1.0, True)])
     def test_no_limit_by_both_is_no_difference(self, full: float | None, is_apart: bool) -> None:
         found = findings(**PLAIN)
         rows = [one._replace(allowable_published=None, allowable_full=full) for one in found.rows]
-        assert bool(model_doubt(found.analysed(), rows)) == is_apart
+        assert bool(model_doubt(Case(found.analysed()), rows)) == is_apart
 
     def test_both_sides_of_a_squint(self) -> None:
         """The squint at which a velocity's allowables are 5 % apart, by bisection; half a percent to either side."""
