@@ -14,7 +14,7 @@ from bisar_budget.analysis.case import Case
 from bisar_budget.analysis.scene import SceneEdge, SceneEdges
 from bisar_budget.analysis.spread import noise
 from bisar_budget.analysis.together import Together, cubics, quadratics
-from bisar_budget.budget.judged_requirements import TAKEN_BY, EffectTotal
+from bisar_budget.budget.judged_requirements import TAKEN_BY, EffectTotal, first_highest
 from bisar_budget.budget.judged_rows import BOUND, CODE, Floats, Judged, Judging, number_of, worded
 from bisar_budget.budget.pull_in import caps, needed_sentence
 from bisar_budget.effects.combined import (
@@ -325,7 +325,7 @@ def _largest(case: Case, model: str, one: Aggregate) -> tuple[str, float, Note]:
         parts = [(row_id, math.hypot(*move)) for row_id, move in together.displacement_parts(case.place)]
     else:
         parts = together.phase_parts(one.phases, one.rule, case.place)
-    row_id, largest = max(parts, key=lambda part: abs(part[1]))
+    row_id, largest = parts[int(first_highest(np.abs([size for _, size in parts])))]
     extrapolated = {} if kind in (LOCATION, PULL_IN) else {error.id: error.extrapolated for error in case.random}
     return row_id, largest, extrapolated.get(row_id, NOTHING)
 

@@ -26,6 +26,7 @@ from bisar_budget.budget.judged_requirements import (
     KEYS,
     RequirementState,
     UntakenEffect,
+    is_as_high,
     is_asked_for,
     missing_declarations,
     requirement_states,
@@ -386,8 +387,9 @@ def _stricter(full: Mapping[str, Judged], published: Mapping[str, Judged] | None
         use = [np.nan_to_num(row.utilization, nan=0.0) for row in (one, other)]
         size = [np.where(np.isnan(row.allowable), np.inf, row.allowable) for row in (one, other)]
         tie = other.status == one.status
-        is_other = (other.status < one.status) | (tie & (use[1] > use[0]))
-        is_other |= tie & (use[1] == use[0]) & (size[1] < size[0])
+        is_same = is_as_high(use[0], use[1]) & is_as_high(use[1], use[0])
+        is_other = (other.status < one.status) | (tie & ~is_same & (use[1] > use[0]))
+        is_other |= tie & is_same & ~is_as_high(size[1], size[0])
         found.append(one.where(is_other, other))
     return [*found, *others.values()]  # an aggregate that only one of them has
 

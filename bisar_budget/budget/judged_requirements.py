@@ -29,6 +29,7 @@ Truths = NDArray[np.bool_]
 
 KEYS = (QUADRATIC, CUBIC, LOCATION, "pslr", "islr", "declare")
 UNITS = {QUADRATIC: "rad", CUBIC: "rad", LOCATION: "m", "pslr": "dB", "islr": "dB", "declare": ""}
+ALIKE = 1e-9  # of a utilization: what is nearer is the same, but for rounding
 TENTH, SMALL_RAD = 0.1, 0.08  # of the quadratic requirement; and of any image
 # Of the largest part: a row with less does not make an effect up, if all that have less are negligible.
 MAKES_UP = 0.1
@@ -75,6 +76,17 @@ class RequirementState(NamedTuple):
     decider: NDArray[np.intp]
     utilization: Floats
     judges: Truths  # (rows, n)
+
+
+def first_highest(uses: Floats) -> NDArray[np.intp]:
+    """Place of the row that uses most, (cases,); of rows that use as much of it, but for rounding, the first."""
+    return np.asarray(is_as_high(uses, uses.max(axis=0)).argmax(axis=0))
+
+
+def is_as_high(uses: Any, others: Any) -> Truths:
+    """Whether utilizations are as high as others, but for rounding."""
+    with np.errstate(invalid="ignore"):  # one that is endless is as high as itself
+        return np.asarray((uses >= others - ALIKE * np.abs(others)) | (uses == others))
 
 
 def required_keys(mission: Mission) -> tuple[str, ...]:
@@ -172,7 +184,7 @@ def requirement_states(
         else:  # autofocus corrects a quadratic phase alone
             levels = np.where(levels == RANK["pass_with_autofocus"], RANK["pass"], levels)
         worst = levels.min(axis=0)
-        decider = np.where(levels == worst, used, -1.0).argmax(axis=0)
+        decider = first_highest(np.where(levels == worst, used, -1.0))
         utilization = np.take_along_axis(used, decider[None], axis=0)[0]
         is_unjudged = ~mine.any(axis=0)
         decider = np.where(is_unjudged, -1, decider)

@@ -17,9 +17,9 @@ import numpy as np
 
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.budget.judged_mission import JudgedMission, judged_mission
+from bisar_budget.budget.judged_requirements import ALIKE
 from bisar_budget.design.quantities import FACTOR, Number, QuestionError, Range, number_of, range_of, tree_of
 from bisar_budget.design.table import (
-    ALIKE,
     GEOMETRY,
     REASON,
     VERDICT,

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from bisar_budget.analysis.analysis import Analysis, by_nodes
 from bisar_budget.budget.judged_mission import JudgedMission, field, judged_mission, statuses
+from bisar_budget.budget.judged_requirements import first_highest
 from bisar_budget.budget.judged_rows import REQUIREMENTS, WHOLE, Judged
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.design.quantities import FACTOR, Number, QuestionError, number_of, tree_of
@@ -34,7 +35,6 @@ from bisar_budget.mission.tree import Tree, read_tree
 from bisar_budget.workers import Progress, unseen
 
 _SOON, _SELDOM = (2, 12), 48  # cases after which it is told how far many are
-ALIKE = 1e-9  # of a utilization: a common error along x and along y may bind alike, but for rounding
 
 Values = NDArray[np.float64] | NDArray[np.object_]
 Places = NDArray[np.intp]
@@ -135,10 +135,7 @@ def deciding(kinds: Sequence[str], codes: Any, uses: Any, whole: Any, breaks: Co
     decides = may_decide & _IS_JUDGED[codes] & (does_break[codes] | ~does_break[whole])
     decides &= ~np.isnan(uses) | (codes != RANK["not_evaluated"])
     uses = np.where(decides, np.where(np.isnan(uses), -1.0, uses), -2.0)
-    highest = uses.max(axis=0)
-    with np.errstate(invalid="ignore"):  # one that is endless is as high as itself
-        is_highest = (uses >= highest - ALIKE * np.abs(highest)) | (uses == highest)
-    return np.where(decides.any(axis=0), is_highest.argmax(axis=0), -1)
+    return np.where(decides.any(axis=0), first_highest(uses), -1)
 
 
 class Standing(NamedTuple):
