@@ -2,7 +2,8 @@
 
 from collections.abc import Container
 
-from bisar_budget.design.table import ALIKE, Standing
+from bisar_budget.budget.judged_requirements import ALIKE
+from bisar_budget.design.table import Standing
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import STATUS

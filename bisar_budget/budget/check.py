@@ -55,11 +55,14 @@ def check_missions(
 
     What is found of a mission is what `check_mission` finds: what others are checked beside it makes no difference.
     """
+    if len(missions) == 1:
+        yield 0, check_mission(missions[0], today, outside=outside)
+        return
     for alike, places in stacked(missions):
         for start in range(0, places.size, _TOGETHER):
             some = places[start : start + _TOGETHER]
             if some.size == 1:
-                yield some[0], check_mission(missions[some[0]], today, outside=outside)
+                yield int(some[0]), check_mission(missions[some[0]], today, outside=outside)
                 continue
             part = picked(alike, np.arange(start, start + some.size))
             for nodes, same, of_same, geometry in by_nodes(part, some.size, part.geometry):

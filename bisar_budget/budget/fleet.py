@@ -8,6 +8,7 @@ import gc
 from collections.abc import Callable, Sequence
 from datetime import date
 from functools import partial
+from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from bisar_budget.budget.check import check_missions
@@ -24,8 +25,7 @@ if TYPE_CHECKING:
 Found = MissionFindings | UnusableMission
 Kept = TypeVar("Kept")
 
-AT_ONCE = 512  # files that are read before they are checked, those of one shape together
-MANY = 200  # files from which a second process pays: starting one costs what checking fifty does
+AT_ONCE = 300  # files; of more a second process pays, since to start one costs what checking a hundred does
 
 
 class Draws(NamedTuple):
@@ -81,28 +81,37 @@ def check_files(
         What `keep` made of each.
     """
     of = partial(_kept, today=today, model=model, keep=keep, drawn=drawn, changes=changes, outside=outside)
-    count = cores()
+    chunks, count = _chunks(files), cores()
     is_shared = drawn is not None and drawn.share is not None
-    if len(files) < MANY or count == 1 or "-" in files or keep is whole or is_shared:
-        return of(files)
+    if len(chunks) == 1 or count == 1 or "-" in files or keep is whole or is_shared:
+        return [one for chunk in chunks for one in of(chunk)]
     from bisar_budget.workers import worker_pool
 
-    size = -(-len(files) // count)
-    own, *others = (files[start : start + size] for start in range(0, len(files), size))
+    own, *others = (chunks[start::count] for start in range(min(count, len(chunks))))
+    kept: list[list[Kept]] = [[]] * len(chunks)
     with worker_pool(len(others)) as pool:
         waiting = [pool.submit(_with_files_read, part, of) for part in others]
-        kept = of(own)
-        for part in waiting:
-            found, files_read = part.result()
-            kept += found
+        kept[::count] = [of(chunk) for chunk in own]
+        for start, part in enumerate(waiting, 1):
+            kept[start::count], files_read = part.result()
             FILES_READ.update(files_read)
-    return kept
+    return [one for of_chunk in kept for one in of_chunk]
+
+
+def _chunks(files: Sequence[str]) -> list[Sequence[str]]:
+    """Files that are checked together: an even number of parts, for two processes, whatever the number of cores.
+
+    What is found of a mission differs, in its last digits, by what is checked together with it.
+    """
+    count = 1 if len(files) <= AT_ONCE else 2 * -(-len(files) // (2 * AT_ONCE))
+    ends = [place * len(files) // count for place in range(count + 1)]
+    return [files[start:stop] for start, stop in pairwise(ends)]
 
 
 def _with_files_read(
-    files: Sequence[str], of: Callable[[Sequence[str]], list[Kept]]
-) -> tuple[list[Kept], set[tuple[int, int]]]:
-    return of(files), FILES_READ
+    chunks: Sequence[Sequence[str]], of: Callable[[Sequence[str]], list[Kept]]
+) -> tuple[list[list[Kept]], set[tuple[int, int]]]:
+    return [of(chunk) for chunk in chunks], FILES_READ
 
 
 def _kept(
@@ -117,18 +126,17 @@ def _kept(
     # The findings of a thousand missions are 10⁵ tuples without a cycle: nothing to collect.
     gc.disable()
     kept: dict[int, Kept] = {}
-    for start in range(0, len(files), AT_ONCE):
-        missions: dict[int, Mission] = {}
-        for place, file in enumerate(files[start : start + AT_ONCE], start):
-            try:
-                missions[place] = load_mission(file, model, changes)
-            except MissionError as error:
-                kept[place] = keep(UnusableMission(file=file, faults=error.faults, data=error.data))
-        places = list(missions)
-        for index, found in check_missions(list(missions.values()), today, outside=outside):
-            if drawn is not None:
-                from bisar_budget.monte_carlo.probability import monte_carlo
+    missions: dict[int, Mission] = {}
+    for place, file in enumerate(files):
+        try:
+            missions[place] = load_mission(file, model, changes)
+        except MissionError as error:
+            kept[place] = keep(UnusableMission(file=file, faults=error.faults, data=error.data))
+    places = list(missions)
+    for index, found in check_missions(list(missions.values()), today, outside=outside):
+        if drawn is not None:
+            from bisar_budget.monte_carlo.probability import monte_carlo
 
-                found = found._replace(monte_carlo=monte_carlo(found.analysed(), *drawn))
-            kept[places[index]] = keep(found)
+            found = found._replace(monte_carlo=monte_carlo(found.analysed(), *drawn))
+        kept[places[index]] = keep(found)
     return [kept[place] for place in range(len(files))]

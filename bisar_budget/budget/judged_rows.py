@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable, Sequence
 from enum import IntEnum
-from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,6 +26,15 @@ CODE = {name: np.int8(rank) for name, rank in RANK.items()}
 REQUIREMENTS = (QUADRATIC, CUBIC, LOCATION, "pslr", "islr", END_OF_IMAGE)
 
 WHOLE = ("allowable_published", "allowable_full", "qpe_full_rad", "qpe_exact_rad", "islr_db")  # see `Judging`
+NUMBERS = (
+    "declared",
+    "allowable",
+    "utilization",
+    "qpe_published_rad",
+    "cubic_rad",
+    *WHOLE[:3],
+    "islr_db",
+)  # of columns
 _IN_UNIT = ("declared", "allowable", "allowable_published", "allowable_full")  # columns in the unit of their row
 
 
@@ -105,6 +113,11 @@ class Judged(NamedTuple):
         """The requirement that sets the allowable in a case; None: its metric does."""
         place = self.binding[case.place]
         return None if place < 0 else REQUIREMENTS[place]
+
+    def numbers(self, case: int) -> dict[str, float | None]:
+        """Its numbers in a case, by the names of the columns; None where there is none."""
+        found = ((name, getattr(self, name).item(case)) for name in NUMBERS)
+        return {name: None if math.isnan(number) else number for name, number in found}
 
     @property
     def qpe_exact_rad(self) -> Floats:
@@ -211,9 +224,8 @@ def worded(
     **others: Any,  # further fields of the row
 ) -> Row:
     """Put a row as judged, in one case, into words: they follow from its status, and decide nothing."""
-    mission, number = case.mission, partial(number_of, case)
-    status = _STATUSES[row.status[case.place]]
-    declared, allowable, utilization = (number(one) for one in (row.declared, row.allowable, row.utilization))
+    mission, status, numbers = case.mission, _STATUSES[row.status[case.place]], row.numbers(case.place)
+    allowable, utilization, full = numbers["allowable"], numbers["utilization"], numbers["qpe_full_rad"]
     reason, remarks = no_limit if allowable is None else NOTHING, tuple[Note, ...](others.pop("remarks", ()))
     if status == "info":
         reason = reason or info
@@ -227,24 +239,17 @@ def worded(
         reason = phrases.over_the_limit_without_autofocus(without_autofocus)
         if utilization is not None and utilization > mission.allocation.warn_above:
             remarks = (*remarks, phrases.near_the_limit_with_autofocus(utilization))
-    fields: dict[str, Any] = {
-        "allowable": allowable,
-        "allowable_published": number(row.allowable_published),
-        "allowable_full": number(row.allowable_full),
-        "qpe_published_rad": number(row.qpe_published_rad),
-        "qpe_full_rad": number(row.qpe_full_rad),
-        "qpe_exact_rad": number(row.qpe_full_rad) if row.is_of_ranges else None,
-        "cubic_rad": number(row.cubic_rad),
-        "islr_db": number(row.islr_db),
-        "utilization": utilization,
-        "margin": 1 / utilization - 1 if utilization else None,
+    margin = 1 / utilization - 1 if utilization else math.inf
+    fields: dict[str, Any] = numbers | {
+        "qpe_exact_rad": full if row.is_of_ranges else None,
+        "margin": margin if math.isfinite(margin) else None,
         "line": mission.line(path),
         "reason": reason or None,
         "remarks": remarks,
         "equation": equation,
         "requirement_id": mission.requirement_ids.get(row.subject.id),
     }
-    return Row.without_numbers(row.subject, row.metric, unit, status, declared=declared, **(fields | others))
+    return Row.without_numbers(row.subject, row.metric, unit, status, **(fields | others))
 
 
 def number_of(case: Case, column: Any) -> float | None:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 from bisar_budget import phrases
 from bisar_budget.analysis.case import Case
@@ -46,11 +47,11 @@ def rows_in_words(judged: JudgedMission, case: Case) -> Iterator[Row]:
         found = families.get((model, one.subject.id))
         if found is None:  # only other cases have it
             continue
-        row = found.in_words(case, model)._replace(model=model)
-        status = _STATUSES[one.status[case.place]]
+        row, status = found.in_words(case, model), _STATUSES[one.status[case.place]]
+        changes: dict[str, Any] = {"model": model, "status": status}
         if status != row.status and status == "info":
-            row = row._replace(utilization=None, margin=None)
-        row = row._replace(status=status)
+            changes |= {"utilization": None, "margin": None}
+        row = row._replace(**changes)
         yield row if one.why[case.place] == Why.OWN else row._replace(reason=_why(judged, case, one, row))
 
 

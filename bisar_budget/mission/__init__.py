@@ -11,5 +11,6 @@ __all__ = [
     "platforms",
     "readers",
     "revision",
+    "stacked",
     "tree",
 ]

@@ -450,7 +450,7 @@ class TestTargets:
         settings.write_text("[tool.bisar-budget]\n")
         assert run("check", mission.name, "-o", settings.name, cwd=mission.parent).returncode == 2
         assert settings.read_text() == "[tool.bisar-budget]\n"
-        monkeypatch.setattr(fleet, "MANY", 2)
+        monkeypatch.setattr(fleet, "AT_ONCE", 1)
         monkeypatch.setattr(fleet, "cores", lambda: 2)
         part = mission.with_name("part.yaml")
         part.write_text("kind: oscillator\n")  # is read, and is no part
@@ -871,11 +871,11 @@ class TestSystem:
         script = (
             "import warnings, bisar_budget.budget.fleet as fleet\n"
             "from bisar_budget.cli import main\n"
-            "real = fleet.check_mission\n"
-            "def check_mission(*given, **named):\n"
+            "real = fleet.check_missions\n"
+            "def check_missions(*given, **named):\n"
             f"    {statement}\n"
             "    return real(*given, **named)\n"
-            "fleet.check_mission = check_mission\n"
+            "fleet.check_missions = check_missions\n"
             "main()\n"
         )
         environment = {**os.environ, "PYTHONPATH": str(ROOT), **variables}

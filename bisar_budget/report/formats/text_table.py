@@ -1,7 +1,8 @@
 """The report for a terminal: verdict, table of requirements, geometry, the rows that matter with the worst first."""
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from bisect import bisect_left
+from collections.abc import Iterator, Sequence
 from functools import cache
 
 from bisar_budget.effects.declared import END_OF_IMAGE
@@ -172,18 +173,19 @@ def _table(mission: MissionFindings, style: Style, room: int) -> Iterator[str]:
     passing = [row for row in rows if STATUS[row.status].is_met or row.status == "info"]
     passing.sort(key=lambda row: -(row.utilization or 0.0))
     cells = {row.id: _row(row, mission) for row in rows}
-    lines = _table_lines(rows, hidden, cells, style)
-    while is_short and not mission.is_empty and len(lines) > room and passing and len(rows) > _FEWEST:
-        least = passing.pop()
-        hidden, rows = [least, *hidden], [row for row in rows if row is not least]
-        lines = _table_lines(rows, hidden, cells, style)
-    yield from lines
 
+    @cache
+    def lines_without(count: int) -> list[str]:
+        """The table without so many of the rows that pass, those that use least."""
+        left_out = passing[len(passing) - count :]
+        ids = {row.id for row in left_out}
+        shown = [row for row in rows if row.id not in ids]
+        key = wrapped(_table_key(shown, [*left_out, *hidden]), "  ")
+        return [*_lines(shown, [cells[row.id] for row in shown], style), *key]
 
-def _table_lines(
-    rows: Sequence[Row], hidden: Sequence[Row], cells: Mapping[str, Sequence[str]], style: Style
-) -> list[str]:
-    return [*_lines(rows, [cells[row.id] for row in rows], style), *wrapped(_table_key(rows, hidden), "  ")]
+    most = min(len(passing), max(len(rows) - _FEWEST, 0)) if is_short and not mission.is_empty else 0
+    fewest = bisect_left(range(most), True, key=lambda count: len(lines_without(count)) <= room)
+    yield from lines_without(fewest)
 
 
 def _lines(rows: Sequence[Row], cells: Sequence[Sequence[str]], style: Style) -> Iterator[str]:
