@@ -1,6 +1,7 @@
 """The `bisar-budget` command. Everything that costs time to import is imported where it is used."""
 
 import errno
+import gc
 import os
 import signal
 import sys
@@ -150,7 +151,10 @@ def main() -> None:
         asked = getattr(signal, name, None)
         if asked is not None and signal.getsignal(asked) is signal.SIG_DFL:
             signal.signal(asked, _end)
-    cli()
+    try:
+        cli()
+    finally:
+        gc.freeze()  # the process ends: to look through all objects for cycles would take a tenth of a check
 
 
 def _end(number: int, frame: object) -> NoReturn:

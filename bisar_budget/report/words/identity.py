@@ -11,7 +11,6 @@ import math
 import os
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from hashlib import sha256
 from typing import NamedTuple
 
 from bisar_budget.findings.mission import MissionFindings, UnusableMission
@@ -65,6 +64,8 @@ def identities(missions: Sequence[MissionFindings | UnusableMission], style: Sty
 
 def digest(*parts: str) -> str:
     """Digest of a name, the same on every machine, also of half a character, which the name of a file may have."""
+    from hashlib import sha256  # loads OpenSSL: 5 ms, and a check to a terminal does without
+
     return sha256("\0".join(parts).encode(errors="surrogatepass")).hexdigest()
 
 

@@ -4,7 +4,6 @@ import math
 import os
 import re
 from collections.abc import Sequence
-from urllib.parse import quote
 
 from bisar_budget.faults import Place, printable
 from bisar_budget.findings.mission import MissionFindings
@@ -230,6 +229,8 @@ def need_text(text: str) -> str:
 
 def uri(path: str) -> str:
     """Percent-encode a path with forward slashes; an absolute one becomes a `file` URI."""
+    from urllib.parse import quote  # 2 ms, and a check to a terminal does without
+
     encoded = quote(os.fsencode(path), safe="/")
     return f"file:///{encoded.lstrip('/')}" if os.path.isabs(path) else encoded
 
