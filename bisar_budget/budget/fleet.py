@@ -5,6 +5,7 @@ nothing else is kept, or sent from one process to another: that is a quarter of 
 """
 
 import gc
+import math
 from collections.abc import Callable, Sequence
 from datetime import date
 from functools import partial
@@ -25,7 +26,8 @@ if TYPE_CHECKING:
 Found = MissionFindings | UnusableMission
 Kept = TypeVar("Kept")
 
-AT_ONCE = 300  # files; of more a second process pays, since to start one costs what checking a hundred does
+MANY = 200  # files, of which half pay for a second process
+AT_ONCE = 500  # files that are checked together at most
 
 
 class Draws(NamedTuple):
@@ -99,11 +101,11 @@ def check_files(
 
 
 def _chunks(files: Sequence[str]) -> list[Sequence[str]]:
-    """Files that are checked together: an even number of parts, for two processes, whatever the number of cores.
+    """Files that are checked together: of many an even number of parts, whatever the number of cores.
 
     What is found of a mission differs, in its last digits, by what is checked together with it.
     """
-    count = 1 if len(files) <= AT_ONCE else 2 * -(-len(files) // (2 * AT_ONCE))
+    count = 1 if len(files) < MANY else 2 * math.ceil(len(files) / (2 * AT_ONCE))
     ends = [place * len(files) // count for place in range(count + 1)]
     return [files[start:stop] for start, stop in pairwise(ends)]
 

@@ -52,7 +52,7 @@ def rows_in_words(judged: JudgedMission, case: Case) -> Iterator[Row]:
         if status != row.status and status == "info":
             changes |= {"utilization": None, "margin": None}
         row = row._replace(**changes)
-        yield row if one.why[case.place] == Why.OWN else row._replace(reason=_why(judged, case, one, row))
+        yield row._replace(reason=_why(judged, case, one, row)) if one.why[case.place] else row
 
 
 def _declarations(case: Case, one: Judged) -> Row:

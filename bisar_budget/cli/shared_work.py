@@ -117,7 +117,7 @@ def drawn_by(
     if draws is None:
         yield None
         return
-    from bisar_budget.budget.fleet import AT_ONCE, Draws
+    from bisar_budget.budget.fleet import MANY, Draws
     from bisar_budget.monte_carlo.draws import in_turn, shared_out
 
     with workers_of(scheduler, patience) as workers:
@@ -125,7 +125,7 @@ def drawn_by(
             share = partial(shared_out, mapped=workers.mapped)
             yield Draws(draws, seed, _Watched(share, lambda: workers.threads))
         else:  # files that processes share out draw for themselves
-            yield Draws(draws, seed, None if files > AT_ONCE else _Watched(in_turn, lambda: 1))
+            yield Draws(draws, seed, None if files >= MANY else _Watched(in_turn, lambda: 1))
 
 
 class _Watched:

@@ -27,6 +27,7 @@ def files(tmp_path):
 
 @pytest.mark.parametrize("cores", [2, 3, 16])
 def test_every_format_says_the_same_for_any_number_of_processes(files, monkeypatch, cores: int) -> None:
+    monkeypatch.setattr(fleet, "MANY", 2)
     monkeypatch.setattr(fleet, "AT_ONCE", 2)
     monkeypatch.setattr(fleet, "cores", lambda: 1)
     one = fleet.check_files(files, DAY, None, fleet.without_analysis)
@@ -40,14 +41,14 @@ def test_every_format_says_the_same_for_any_number_of_processes(files, monkeypat
 
 
 def test_standard_input_is_read_once_by_one_process(monkeypatch) -> None:
-    monkeypatch.setattr(fleet, "AT_ONCE", 1)
+    monkeypatch.setattr(fleet, "MANY", 1)
     monkeypatch.setattr(fleet, "_kept", lambda files, **_: list(files))
     assert fleet.check_files(["a", "-", "b"], DAY, None, fleet.without_analysis) == ["a", "-", "b"]
 
 
 def test_the_command_checks_a_fleet(run, files, monkeypatch) -> None:
     serial = run("check", "-q", *files)
-    monkeypatch.setattr(fleet, "AT_ONCE", 6)
+    monkeypatch.setattr(fleet, "MANY", 2)
     monkeypatch.setattr(fleet, "cores", lambda: 2)
     parallel = run("check", "-q", *files)
     assert parallel.exit_code == serial.exit_code == 2

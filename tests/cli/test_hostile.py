@@ -450,7 +450,7 @@ class TestTargets:
         settings.write_text("[tool.bisar-budget]\n")
         assert run("check", mission.name, "-o", settings.name, cwd=mission.parent).returncode == 2
         assert settings.read_text() == "[tool.bisar-budget]\n"
-        monkeypatch.setattr(fleet, "AT_ONCE", 1)
+        monkeypatch.setattr(fleet, "MANY", 2)
         monkeypatch.setattr(fleet, "cores", lambda: 2)
         part = mission.with_name("part.yaml")
         part.write_text("kind: oscillator\n")  # is read, and is no part
