@@ -15,7 +15,7 @@ A place is a point of the ground of one of the cases; `of` says of which. Rows o
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -53,6 +53,7 @@ _BOUND = 1 + UTILIZATION_TOLERANCE
 _ARC = math.pi / RIM_POINTS
 _SIDES = np.array([[-1.0], [1.0]])
 HeightAt = Callable[[Floats, Places], Floats]  # heights at azimuths, of some climbers
+SizeAt = Callable[[Floats, Places], Floats]  # sizes at radii, of some cases
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -523,96 +524,154 @@ def _over_at_the_edge(found: SceneEdges, members: Sequence[Sequence[int]], of: P
 
 
 # ---------------------------------------------------------------------- one correction
-class Correction:
-    """How far from the centre of one case one autofocus correction serves: where differences stay inside a total.
+class Corrections:
+    """How far from the centre one autofocus correction serves: where differences stay inside a total. [rad]
 
-    It is searched for as far as `farthest`. [m]
+    Attributes
+    ----------
+    farthest : (cases,)
+        How far it is searched for. [m]
     """
 
-    def __init__(self, edges: SceneEdges, case: int, total: float) -> None:
-        self.phases, self.of, self.total = edges.phases, np.array([case]), total
-        self.radius = float(edges.radius[case])
-        self.rim = edges.rim.of(case)
-        self.farthest = max(FARTHEST * float(self.phases.nearest[case]), self.radius)
-        self.is_large = bool(self.phases.is_large[:, case].any())
+    def __init__(self, edges: SceneEdges, total: Any) -> None:
+        self.edges, self.phases, self.total = edges, edges.phases, edges.phases.errors.array(total)
+        self.farthest = np.maximum(FARTHEST * self.phases.nearest, edges.radius)
 
-    @np.errstate(all="ignore")
-    def served(self) -> float | None:
-        """Radius at which the largest difference reaches the total; None if it does not by `farthest`. [m]"""
-        found = self._served_of_small()
-        if not self.is_large:
-            return found
-        high = self.farthest if found is None else found
-        low, below, size = 0.0, 0.0, self._largest(high)
-        if abs(size - self.total) <= ALIKE * self.total:
-            return found
-        while size <= self.total and high < self.farthest:
-            low, below, high = high, size, self._beyond(high, size)
-            size = self._largest(high)
-        return None if size <= self.total else where(self._largest, self.total, (low, below), (high, size))
+    @cached_property
+    def served(self) -> Floats:
+        """Radius at which the largest difference reaches the total, (cases,); infinite where it does not by then.
 
-    def _served_of_small(self) -> float | None:
+        Not a number where an edge has no image. [m]
+        """
+        found = np.full(self.total.shape, math.nan)
+        cases = np.flatnonzero(np.isfinite(self.edges.rim.height) & np.isfinite(self.edges.difference))
+        with np.errstate(all="ignore"):
+            for start in range(0, cases.size, AT_ONCE):
+                of = cases[start : start + AT_ONCE]
+                found[of] = self._served(of)
+        return found
+
+    def _served(self, of: Places) -> Floats:
+        found, total = self._served_of_small(of), self.total[of]
+        high = np.where(np.isinf(found), self.farthest[of], found)
+        low, below, size = np.zeros(of.size), np.zeros(of.size), np.zeros(of.size)
+        some = np.flatnonzero(self.phases.is_large[:, of].any(axis=0))
+        if not some.size:
+            return found
+
+        def largest(radius: Floats, places: Places) -> Floats:
+            return self._crests(radius, of[places], of_small=False).height
+
+        size[some] = largest(high[some], some)
+        some = some[np.abs(size[some] - total[some]) > ALIKE * total[some]]
+        self._grow(largest, of, some, low, below, high, size)
+        over = some[size[some] > total[some]]
+        found[some] = math.inf
+        found[over] = where(largest, total, over, (low, below), (high, size))
+        return found
+
+    def _served_of_small(self, of: Places) -> Floats:
         """The same, were effects of all errors proportional to them.
 
         Along the worst azimuth, and again where the rim at the radius found has a worse one.
         """
-        (size, azimuth), high, total = map(float, self.rim), self.radius, self.total
-        if not size:
-            return None
+        total, high, found = self.total[of], self.edges.radius[of], np.full(of.size, math.inf)
+        size, azimuth = self.edges.rim.of(of)
+        some = np.flatnonzero(size)
+
+        def along(radius: Floats, places: Places) -> Floats:
+            there = self.phases.places(radius, azimuth[places], of[places])
+            return np.where(there.has_image, there.size, math.inf)
+
         for _ in range(TURNS):
-            size_at = partial(self._size_along, azimuth)
-            low = inside = 0.0
-            while size <= total and high < self.farthest:
-                low, inside, high = high, size, self._beyond(high, size)
-                size = size_at(high)
-            if size > total:
-                high = where(size_at, total, (low, inside), (high, size))
-            around = self._rims(high)
-            if float(around.difference[0]) <= total * (1 + PRECISION):
-                return None if size <= total else high
-            azimuth, size = float(around.azimuth[0]), float(around.difference[0])
-        return where(lambda one: float(self._rims(one).difference[0]), total, (0.0, 0.0), (high, size))
+            if not some.size:
+                return found
+            low, inside = np.zeros(of.size), np.zeros(of.size)
+            self._grow(along, of, some, low, inside, high, size)
+            over = some[size[some] > total[some]]
+            high[over] = where(along, total, over, (low, inside), (high, size))
+            around = self._crests(high[some], of[some])
+            is_inside = around.height <= total[some] * (1 + PRECISION)
+            done = some[is_inside]
+            found[done] = np.where(size[done] <= total[done], math.inf, high[done])
+            size[some], azimuth[some] = around
+            some = some[~is_inside]
 
-    def _beyond(self, radius: float, size: float) -> float:
-        """Radius to look at after one whose difference is inside the total. [m]"""
-        return min(self.farthest, radius * max(1.05, min(4.0, 1.05 * self.total / size)))
+        def rim(radius: Floats, places: Places) -> Floats:
+            return self._crests(radius, of[places]).height
 
-    def _rims(self, radius: float) -> Rims:
-        return self.phases.rims(np.array([radius]), self.of)
+        none = np.zeros(of.size)
+        found[some] = where(rim, total, some, (none, none), (high, size))
+        return found
 
-    def _largest(self, radius: float) -> float:
-        return float(_largest(self.phases, np.array([radius]), self.of, self._rims(radius)).height[0])
+    def _grow(
+        self, size_at: SizeAt, of: Places, some: Places, low: Floats, below: Floats, high: Floats, size: Floats
+    ) -> None:
+        """Look farther out until a size passes the total, or as far as it is searched for."""
+        total, farthest = self.total[of], self.farthest[of]
+        while True:
+            some = some[(size[some] <= total[some]) & (high[some] < farthest[some])]
+            if not some.size:
+                return
+            low[some], below[some] = high[some], size[some]
+            by = np.clip(1.05 * total[some] / size[some], 1.05, 4.0)
+            high[some] = np.minimum(farthest[some], high[some] * by)
+            size[some] = size_at(high[some], some)
 
-    def _size_along(self, azimuth: float, radius: float) -> float:
-        place = self.phases.places(np.array([radius]), np.array([azimuth]), self.of)
-        return float(place.size[0]) if place.has_image[0] else math.inf
+    def _crests(self, radius: Floats, of: Places, *, of_small: bool = True) -> Heights:
+        """Largest differences on circles; of errors of any size, or were all of them small. [rad]"""
+        found, counts = Heights(np.empty(of.size), np.empty(of.size)), self.phases.points(radius, of)
+        for count in np.unique(counts):
+            same = np.flatnonzero(counts == count)
+            rims = self.phases.rims(radius[same], of[same])
+            crests = Heights(rims.difference, rims.azimuth)
+            found.put(same, crests if of_small else _largest(self.phases, radius[same], of[same], rims))
+        return found
 
 
 def where(
-    size_at: Callable[[float], float], total: float, inside: tuple[float, float], outside: tuple[float, float]
-) -> float:
-    """Radius, to a thousandth, up to which a size is inside a total: by secants, drawn near (Illinois)."""
-    (low, below), (high, above) = inside, outside
-    goal = total * (1 - PRECISION / 2)
+    size_at: SizeAt,
+    total: Floats,
+    some: Places,
+    inside: tuple[Floats, Floats],
+    outside: tuple[Floats, Floats],
+) -> Floats:
+    """Radii, to a thousandth, up to which sizes are inside a total: by secants, drawn near (Illinois).
+
+    Parameters
+    ----------
+    size_at : callable
+        Sizes at radii (some,), of places (some,).
+    total : (n,)
+        What the sizes are held to.
+    some : (some,)
+        Places, of n, that are looked at.
+    inside, outside : (radius, size) of (n,)
+        Between these.
+    """
+    (low, below), (high, above) = ([part[some].copy() for part in pair] for pair in (inside, outside))
+    slack = total[some] * PRECISION / 2
+    goal = total[some] - slack
     below, above = below - goal, above - goal
-    if below > 0:  # as near as asked for
-        return low
-    was_inside = None
-    while high - low > PRECISION * high:
-        share = 0.5 if math.isinf(above) else below / (below - above)
-        middle = low + share * (high - low)
-        over = size_at(middle) - goal
-        is_inside = over <= total - goal
-        if is_inside and over > -(total - goal):
-            return middle
-        if is_inside:
-            low, below = middle, over
-            above = above / 2 if was_inside else above  # twice on one side: draw the other nearer
-        else:
-            high, above = middle, over
-            below = below / 2 if was_inside is False else below
-        was_inside = is_inside
-    return low
+    side = np.zeros(some.size)  # of the goal, on which the last one was
+    going = np.flatnonzero(below <= 0)  # others are as near as asked for
+    while True:
+        going = going[high[going] - low[going] > PRECISION * high[going]]
+        if not going.size:
+            return low
+        share = np.where(np.isinf(above[going]), 0.5, below[going] / (below[going] - above[going]))
+        middle = low[going] + share * (high[going] - low[going])
+        over = size_at(middle, some[going]) - goal[going]
+        is_inside = over <= slack[going]
+        is_near = is_inside & (over > -slack[going])
+        ins, outs = going[is_inside], going[~is_inside]
+        low[ins], below[ins] = middle[is_inside], over[is_inside]
+        high[outs], above[outs] = middle[~is_inside], over[~is_inside]
+        # Twice on one side: draw the other nearer.
+        above[ins] = np.where(side[ins] > 0, above[ins] / 2, above[ins])
+        below[outs] = np.where(side[outs] < 0, below[outs] / 2, below[outs])
+        side[ins], side[outs] = 1.0, -1.0
+        going = going[~is_near]
 
 
 # ---------------------------------------------------------------------- in words
@@ -634,21 +693,23 @@ class SceneEdge(NamedTuple):
     doubt: Note
 
     @classmethod
-    def of(cls, edges: SceneEdges, geometry: BistaticGeometry, total: float, case: int = 0) -> "SceneEdge":
-        """That of one case, with its geometry and the total that it is allowed. [rad]"""
-        correction = Correction(edges, case, total)
+    def of(cls, corrections: Corrections, geometry: BistaticGeometry, case: int = 0) -> "SceneEdge":
+        """That of one case, with its geometry."""
+        edges = corrections.edges
         (size, rim), (difference, azimuth) = (map(float, one.of(case)) for one in (edges.rim, edges.largest))
-        radius, searched, nowhere = correction.radius, correction.farthest, (math.nan, 0.0, None)
+        radius, nowhere = float(edges.radius[case]), (math.nan, 0.0, None)
         if math.isinf(size):
             reason = phrases.no_image_at_the_edge(math.degrees(rim), _degeneracy(geometry, at(radius, rim)))
             return cls(radius, *nowhere, FARTHEST * float(edges.phases.nearest[case]), reason, NOTHING)
+        searched = float(corrections.farthest[case])
         if math.isinf(difference):
             return cls(radius, *nowhere, searched, phrases.no_image(), NOTHING)
-        served, doubt, worst = correction.served(), NOTHING, int(edges.over[:, case].argmax())
+        served, doubt, worst = float(corrections.served[case]), NOTHING, int(edges.over[:, case].argmax())
         if edges.over[worst, case]:
             over, limit = float(edges.over[worst, case]), float(edges.limit[worst, case])
             doubt = phrases.over_at_the_edge(edges.names[worst], over, limit)
-        return cls(radius, difference, azimuth, served, searched, NOTHING, doubt)
+        within = None if math.isinf(served) else served
+        return cls(radius, difference, azimuth, within, searched, NOTHING, doubt)
 
     def notes(self, total: float) -> tuple[Note, ...]:
         """Where the difference is largest, and how far one autofocus correction serves."""

@@ -2,7 +2,8 @@
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.case import Case
-from bisar_budget.analysis.scene import SceneEdge, SceneEdges
+from bisar_budget.analysis.scene import Corrections, SceneEdge, SceneEdges
 from bisar_budget.analysis.spread import noise
 from bisar_budget.analysis.together import Together, cubics, quadratics
 from bisar_budget.budget.judged_requirements import TAKEN_BY, EffectTotal, first_highest
@@ -350,16 +351,15 @@ class JudgedScene:
 
     analysis: Analysis
     edges: SceneEdges | None
-    _known: dict[int, SceneEdge] = field(default_factory=dict)
+
+    @cached_property
+    def corrections(self) -> Corrections | None:
+        """How far one autofocus correction serves: only words ask, and a search takes longer than all else."""
+        return None if self.edges is None else Corrections(self.edges, self.analysis.allocation.qpe_total)
 
     def edge(self, case: Case) -> SceneEdge | None:
         """The edge of one case, with how far one autofocus correction serves."""
-        if self.edges is None:
-            return None
-        if case.place not in self._known:
-            total = case.allocation.qpe_total
-            self._known[case.place] = SceneEdge.of(self.edges, case.geometry, total, case.place)
-        return self._known[case.place]
+        return None if self.corrections is None else SceneEdge.of(self.corrections, case.geometry, case.place)
 
     def row(self, judging: Judging, model: str) -> "SceneRow":
         """Judge the edges by a model; to the published one an error is the same all over the scene."""

@@ -192,7 +192,7 @@ def test_how_far_one_correction_serves_is_not_searched(monkeypatch) -> None:
         allocation__model="full",
     )
     mission = parse_mission(text, "m.yaml")
-    monkeypatch.setattr(scene.Correction, "served", lambda *_: pytest.fail("it is searched"))
+    monkeypatch.setattr(scene.Corrections, "_served", lambda *_: pytest.fail("it is searched"))
     assert solving.solve(mission, "platforms.receiver.motion_error.velocity.0", today=DAY).crossings
 
 

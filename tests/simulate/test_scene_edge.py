@@ -1,6 +1,7 @@
 """The scene's edge: the full model there against exact ranges and against images, and what follows for the row."""
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -357,17 +358,25 @@ def test_edge_and_radius_are_those_of_a_circle_of_720_places() -> None:
     assert min(seen.values()) >= 3, seen
 
 
+def radius_where(size_at: Callable, inside: tuple[float, float], outside: tuple[float, float]) -> float:
+    """The second of three places whose sizes pass 1, by `where`, which looks at two of them."""
+    ends = [tuple(np.full(3, part) for part in pair) for pair in (inside, outside)]
+    found = where(lambda radius, places: size_at(radius), np.ones(3), np.array([0, 1]), *ends)
+    assert found[0] == found[1]
+    return float(found[1])
+
+
 @pytest.mark.parametrize("power", [0.3, 1.0, 3.0])
 @pytest.mark.parametrize("start", [0.0, 0.9, 0.99999])
 def test_the_radius_where_a_size_passes_a_total_is_between_its_bounds(power: float, start: float) -> None:
     """Size = radius to a power, which is 1 at 1: to a thousandth of the size, also from just inside the total."""
-    low = where(lambda radius: radius**power, 1.0, (start, start**power), (2.0, 2.0**power))
+    low = radius_where(lambda radius: radius**power, (start, start**power), (2.0, 2.0**power))
     assert start <= low <= 1
     assert low**power >= 1 - 1.1e-3 * max(1.0, power)
 
 
 def test_a_radius_is_found_below_a_place_without_an_image() -> None:
-    low = where(lambda radius: radius if radius < 0.7 else math.inf, 1.0, (0.0, 0.0), (2.0, math.inf))
+    low = radius_where(lambda radius: np.where(radius < 0.7, radius, math.inf), (0.0, 0.0), (2.0, math.inf))
     assert 0.699 <= low < 0.7
 
 
