@@ -166,30 +166,33 @@ def amplitude_share(
 
 def inertial_phases(
     along: float,
-    level: float,
-    gravity: float,
+    turned: float,
+    scaled: float,
     wavelength: float,
     aperture_time: float,
 ) -> tuple[tuple[float, ...], ...]:
     """Phases of one unit of each figure of an inertial sensor, one sigma. [rad/unit]
 
     Columns: quadratic and cubic phase at the aperture edge, what is left after the cubic. Units are
-    m/s², rad, rad/s, m/s/√s, rad/√s. along is the length of the line of sight, 1, level that of its
-    horizontal part; gravity in m/s². Walks start at mid-aperture. Derived here.
+    m/s², 1, rad, rad/s, m/s/√s, rad/√s. along is the length of the line of sight, 1; turned and scaled
+    are what a tilt and a scale factor of 1 add along it. [m/s²] Walks start at mid-aperture. Derived
+    here.
     """
     shared_0 = 3.1415926535897932/wavelength
     shared_1 = along*shared_0
     shared_2 = 0.25*aperture_time**2
-    shared_3 = gravity*level*shared_0
-    shared_4 = aperture_time**1.5*shared_1
-    shared_5 = 27.7488738510232*shared_4
-    shared_6 = aperture_time**2.5*shared_3
+    shared_3 = shared_0*shared_2
+    shared_4 = shared_0*turned
+    shared_5 = aperture_time**1.5*shared_1
+    shared_6 = 27.7488738510232*shared_5
+    shared_7 = aperture_time**2.5*shared_4
     return (
         (shared_1*shared_2, 0.0, 0.0),  # accelerometer bias
-        (shared_2*shared_3, 0.0, 0.0),  # attitude
-        (0.0, (1/24)*aperture_time**3*shared_3, 0.0),  # gyro bias
-        (0.298807152333598*shared_4, (1/132)*shared_5, (1/1155)*shared_5),  # velocity random walk
-        (0.0547864557708448*shared_6, 0.0532241987522154*shared_6, 0.00272029546189516*shared_6),  # angle random walk
+        (scaled*shared_3, 0.0, 0.0),  # accelerometer scale factor
+        (shared_3*turned, 0.0, 0.0),  # attitude
+        (0.0, (1/24)*aperture_time**3*shared_4, 0.0),  # gyro bias
+        (0.298807152333598*shared_5, (1/132)*shared_6, (1/1155)*shared_6),  # velocity random walk
+        (0.0547864557708448*shared_7, 0.0532241987522154*shared_7, 0.00272029546189516*shared_7),  # angle random walk
     )
 
 

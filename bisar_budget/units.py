@@ -178,7 +178,7 @@ _MEANT = {
 _DECIBELS = ("dB", "dBc")
 
 # By the unit that rows are in; a clock's linear term is a ratio of times.
-_OF_SI = {dimension.si: dimension for dimension in reversed(DIMENSIONS) if dimension.si} | {"s/s": RATIO}
+_OF_SI = {dimension.si: dimension for dimension in reversed(DIMENSIONS) if dimension.si} | {"s/s": RATIO, "": RATIO}
 
 
 def parse_quantity(value: object, dimension: Dimension) -> float:

@@ -4,27 +4,23 @@ Most change no verdict; what is in doubt is a warning at least. A finder gives a
 of; the line of the key is looked up here, once.
 """
 
-import math
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from bisar_budget.analysis.case import Case
 from bisar_budget.budget.doubts import input_doubts
 from bisar_budget.budget.pull_in import ROOM, caps, rounded_down
-from bisar_budget.constants import EARTH_GRAVITATIONAL_PARAMETER, EARTH_RADIUS
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.oscillators import POOR_FIT
 from bisar_budget.faults import KeyPath, changes_words
 from bisar_budget.findings.mission import FileWarning, Resolution
 from bisar_budget.findings.row import Row
-from bisar_budget.geometry import PlatformState, Vector, norm
+from bisar_budget.geometry import norm
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import Platform
+from bisar_budget.paths.earth import free_fall
 from bisar_budget.phrases import Note, phrase
 from bisar_budget.units import format_quantity
-
-if TYPE_CHECKING:
-    from bisar_budget.paths.earth import SceneAxes
 
 
 class _Warned(NamedTuple):
@@ -130,45 +126,6 @@ def path_is_doubtful(platform: str, doubt: str) -> str:
 FASTEST_FLIGHT = 3e3  # m/s; no aircraft is as fast, and no satellite in a low orbit as slow
 
 
-def orbital_acceleration(position: Vector) -> Vector:
-    """Acceleration of a circular orbit through a place: μ/r² towards the Earth's centre. [m/s²]
-
-    Parameters
-    ----------
-    position : (3,)
-        East, north, up of the scene centre, which lies on a sphere of the Earth's mean radius. [m]
-
-    Notes
-    -----
-    Derived here, for axes that do not turn. In the scene's axes, which turn with the Earth at ω = 7.3e-5 rad/s, the
-    acceleration is less by 2ω×v + ω×(ω×r): up to 1.1 m/s² at 7.6 km/s, by the latitude and the orbit's inclination.
-    """
-    x, y, up = position
-    from_centre = (x, y, up + EARTH_RADIUS)
-    factor = -EARTH_GRAVITATIONAL_PARAMETER / norm(from_centre) ** 3
-    return (factor * x, factor * y, factor * from_centre[2])
-
-
-def free_fall(axes: "SceneAxes", state: PlatformState) -> Vector:
-    """Acceleration of a satellite in the axes of a scene on the Earth: −μr/r³ − 2ω×v − ω×(ω×r). [m/s²]
-
-    Derived here: r against the stars, written in axes that turn at ω.
-    """
-    from bisar_budget.paths.earth import ROTATION_RATE
-
-    x, y, z = axes.earth_fixed(state.position)
-    u, v, _ = axes.turned_back(state.velocity)
-    factor = -EARTH_GRAVITATIONAL_PARAMETER / math.hypot(x, y, z) ** 3
-    turning = ROTATION_RATE**2
-    return axes.turned(
-        (
-            factor * x + 2 * ROTATION_RATE * v + turning * x,
-            factor * y - 2 * ROTATION_RATE * u + turning * y,
-            factor * z,
-        )
-    )
-
-
 def straight_orbits(mission: Mission) -> Iterator[_Warned]:
     """Doubt each platform that is as fast as a satellite and has no `acceleration`; say what its orbit would have.
 
@@ -181,10 +138,7 @@ def straight_orbits(mission: Mission) -> Iterator[_Warned]:
         if speed <= FASTEST_FLIGHT or platform.acceleration is not None or platform.is_of_the_earth:
             continue
         key = ("platforms", name, "speed" if platform.velocity is None else "velocity")
-        if axes is not None:
-            acceleration = free_fall(axes, platform.state)
-        else:
-            acceleration = orbital_acceleration(platform.state.position)
+        acceleration = free_fall(platform.state.position, platform.state.velocity, axes)
         yield _Warned(key, satellite_flies_straight(name, speed, acceleration, axes is not None), is_doubt=True)
 
 
@@ -193,7 +147,7 @@ def satellite_flies_straight(platform: str, speed: float, acceleration: Sequence
     """Said of a satellite's path without the acceleration of its orbit. [m/s, m/s²]"""
     parts = ", ".join(f"{part + 0.0:.3f} m/s^2" for part in acceleration)
     if has_axes:
-        how = "(gravity of a point mass, less what the Earth's rotation adds)"
+        how = "(gravity of a flattened Earth, less what its rotation adds)"
     else:
         how = (
             "(towards the Earth's centre; the Earth's rotation changes it by up to 1.1 m/s^2, which needs the "

@@ -19,23 +19,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget import evaluators
-from bisar_budget.constants import ROUNDING, STANDARD_GRAVITY
+from bisar_budget.constants import ROUNDING
 from bisar_budget.effects.effect import PLATFORMS, Subject, plain, subject
 from bisar_budget.effects.oscillators import Noise, noise_of
 from bisar_budget.effects.spectra import Floats, gauss_markov, link_parts, parts, synchronized_parts
 from bisar_budget.faults import KeyPath
-from bisar_budget.geometry import BistaticGeometry, PlatformState
+from bisar_budget.geometry import BistaticGeometry, PlatformState, Vector
 from bisar_budget.mission.instruments import IMU_KINDS, GaussMarkov, Oscillator
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
+from bisar_budget.paths.earth import free_fall
 from bisar_budget.phrases import NOTHING, Note
 from bisar_budget.ranges.exact_ranges import ExactRanges
 
-_IMU_UNITS = dict(zip(IMU_KINDS, ("m/s^2", "rad", "rad/s", "m/s/sqrt(s)", "rad/sqrt(s)"), strict=True))
-_BY_GRAVITY = ("attitude", "gyro_bias", "angle_random_walk")
+_IMU_UNITS = dict(zip(IMU_KINDS, ("m/s^2", "", "rad", "rad/s", "m/s/sqrt(s)", "rad/sqrt(s)"), strict=True))
+_TILTS = ("attitude", "gyro_bias", "angle_random_walk")
 _NODES = 16  # a walk has a covariance with an edge, which fewer nodes miss by a percent
 # The covariance of a position error over the aperture grows as this power of the aperture time.
-_GROWS = {"accelerometer_bias": 4, "attitude": 4, "gyro_bias": 6, "velocity_random_walk": 3, "angle_random_walk": 5}
+_GROWS = {
+    "accelerometer_bias": 4,
+    "accelerometer_scale_factor": 4,
+    "attitude": 4,
+    "gyro_bias": 6,
+    "velocity_random_walk": 3,
+    "angle_random_walk": 5,
+}
 _CANCELS = ROUNDING * 1e-2  # of a square: below it, its root is rounding
 
 
@@ -190,15 +198,38 @@ def _parts_of_largest(values: Floats) -> tuple[Floats, Floats]:
 
 
 # ---------------------------------------------------------------------- inertial sensors
+def specific_force(mission: Mission, state: PlatformState) -> Vector:
+    """What the accelerometers of a platform measure, f = a − g, in the axes of the scene. [m/s²]
+
+    Where it falls freely that is nothing. On the Earth g has what its rotation adds (`earth.free_fall`).
+    """
+    x, y, z = state.acceleration
+    u, v, w = free_fall(state.position, state.velocity, mission.scene.axes)
+    return (x - u, y - v, z - w)
+
+
+def acceleration_errors(kind: str, axes: Floats, force: Floats) -> Floats:
+    """Acceleration error by a unit of a figure about, or along, each axis, (axes, 3, ...), of those axes.
+
+    A tilt turns what accelerometers measure, the specific force (3, ...); a scale factor is a part of it. What is an
+    acceleration is one. [m/s²/unit]
+    """
+    if kind in _TILTS:
+        return np.asarray(np.cross(axes, force, axisa=1, axisb=0, axisc=1))
+    if kind == "accelerometer_scale_factor":
+        return np.asarray(axes * (axes * force).sum(axis=1, keepdims=True))
+    return axes
+
+
 def _of_imu(seen: _Seen, name: str) -> Iterator[RandomError]:
     error = seen.error(name)
     if error.imu is None:
         return
     axes = seen.axes(name)
-    leaks = np.stack([axes[:, 1], -axes[:, 0], np.zeros_like(axes[:, 0])], axis=1)  # axis × up, by a tilt about it
+    force = seen.vector(specific_force(seen.mission, getattr(seen.geometry, name)))
     for index, (kind, unit) in enumerate(_IMU_UNITS.items()):
         values, key = getattr(error.imu, kind), error.key_of(kind)
-        directions, declared = leaks if kind in _BY_GRAVITY else axes, None
+        directions, declared = acceleration_errors(kind, axes, force), None
         if values is not None:
             declared, sizes = _parts_of_largest(seen.vector(values))
             directions = directions * sizes[:, None]
@@ -220,7 +251,7 @@ def _of_imu(seen: _Seen, name: str) -> Iterator[RandomError]:
 def _at_mid_aperture(mission: Mission, index: int, along: Any) -> tuple[Any, ...]:
     """Quadratic and cubic phase of a unit, and what is left, along so much of the line of sight. [rad]"""
     wavelength, T = mission.radar.wavelength, mission.collection.aperture_time
-    return evaluators.inertial_phases(along, along, STANDARD_GRAVITY, wavelength, T)[index]
+    return evaluators.inertial_phases(along, along, along, wavelength, T)[index]
 
 
 def _over_aperture(exact: ExactRanges, place: int, kind: str, directions: Floats) -> tuple[Floats, Floats, Floats]:
@@ -234,7 +265,7 @@ def _over_aperture(exact: ExactRanges, place: int, kind: str, directions: Floats
     turned = of_unit @ moved
     squares = (moved * turned).sum(axis=(1, 2))
     sizes = np.square((np.abs(moved) * np.sqrt(np.diagonal(of_unit))[:, None]).sum(axis=2)).sum(axis=1)
-    scale = (STANDARD_GRAVITY if kind in _BY_GRAVITY else 1.0) ** 2 * exact.half**power
+    scale = exact.half**power
     # What is left of terms that cancel exactly is rounding, and would make a limit out of nothing.
     is_real = squares > _CANCELS * sizes
     quadratic, cubic = np.sqrt(np.where(is_real, squares * scale, 0.0))
@@ -243,12 +274,12 @@ def _over_aperture(exact: ExactRanges, place: int, kind: str, directions: Floats
 
 @cache
 def _covariance_at_nodes(kind: str) -> Floats:
-    """Covariance of the position error of a unit at the nodes of 2 s, without gravity: zero at mid-aperture.
+    """Covariance of the position error of a unit acceleration, or its noise, at the nodes of 2 s. [m²/unit²]
 
-    [m²/unit²]
+    The error is zero at mid-aperture.
     """
     times = evaluators.LEGENDRE_FITS[_NODES][0]
-    if kind in ("accelerometer_bias", "attitude", "gyro_bias"):
+    if not kind.endswith("random_walk"):
         order = 3 if kind == "gyro_bias" else 2
         history = np.array(times) ** order / math.factorial(order)
         return np.multiply.outer(history, history)

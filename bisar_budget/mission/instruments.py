@@ -25,12 +25,14 @@ from bisar_budget.mission.readers import (
 
 IMU_KINDS = (
     "accelerometer_bias",
+    "accelerometer_scale_factor",
     "attitude",
     "gyro_bias",
     "velocity_random_walk",
     "angle_random_walk",
 )
 _BIAS = Triple(Quantity(units.ACCELERATION, ge=0, le=1e3), or_scalar=True)
+_SCALE = Triple(Quantity(units.RATIO, ge=0, le=0.1), or_scalar=True)
 _TILT = Triple(Quantity(units.ANGLE, ge=0, le=math.pi / 4), or_scalar=True)
 _DRIFT = Triple(Quantity(units.ANGULAR_RATE, ge=0, le=1e3), or_scalar=True)
 _VELOCITY_WALK = Triple(Quantity(units.VELOCITY_RANDOM_WALK, ge=0, le=1e3), or_scalar=True)
@@ -39,7 +41,8 @@ _ANGLE_WALK = Triple(Quantity(units.ANGLE_RANDOM_WALK, ge=0, le=1e2), or_scalar=
 
 # Figures that a mission states, and a part of the catalogue.
 AccelerometerBias = Annotated[Vector | None, Key(_BIAS, "What is left of it in flight.")]
-Attitude = Annotated[Vector | None, Key(_TILT, "Roll and pitch at mid-aperture, about each axis.")]
+AccelerometerScaleFactor = Annotated[Vector | None, Key(_SCALE, "What each axis measures too much of what it feels.")]
+Attitude = Annotated[Vector | None, Key(_TILT, "Tilt and heading at mid-aperture, about each axis.")]
 GyroBias = Annotated[Vector | None, Key(_DRIFT, "What is left of it in flight.")]
 VelocityRandomWalk = Annotated[Vector | None, Key(_VELOCITY_WALK, "Noise of the accelerometers.")]
 AngleRandomWalk = Annotated[Vector | None, Key(_ANGLE_WALK, "Noise of the gyros.")]
@@ -61,6 +64,7 @@ class Imu(NamedTuple):
     """Figures of an inertial sensor, 1 sigma. A scalar means each axis; three values follow the error's frame."""
 
     accelerometer_bias: AccelerometerBias = None
+    accelerometer_scale_factor: AccelerometerScaleFactor = None
     attitude: Attitude = None
     gyro_bias: GyroBias = None
     velocity_random_walk: VelocityRandomWalk = None

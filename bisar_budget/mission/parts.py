@@ -26,6 +26,7 @@ from bisar_budget.mission.instruments import (
     IMU_KINDS,
     OSCILLATOR,
     AccelerometerBias,
+    AccelerometerScaleFactor,
     AllanDeviation,
     AngleRandomWalk,
     Attitude,
@@ -84,6 +85,7 @@ class ImuPart(NamedTuple):
     name: Annotated[str, _NAME]
     source: Annotated[str | Mapping[str, str], _SOURCES]
     accelerometer_bias: AccelerometerBias = None
+    accelerometer_scale_factor: AccelerometerScaleFactor = None
     attitude: Attitude = None
     gyro_bias: GyroBias = None
     velocity_random_walk: VelocityRandomWalk = None

@@ -545,14 +545,11 @@ _OSCILLATOR = f"{_LEAVE}, and state the noise with it, as phase_noise or spurs"
 _OTHER = f"{_LEAVE}; of an error from elsewhere its quadratic_phase_error counts"
 _LINK = "accepted: method linear with interval and error, or direct_path with error"
 _SPECTRUM = f"{_LEAVE}, and state sinusoidal lines and the rms of wideband"
-_SCALE = f"{_LEAVE}, and state what it does as accelerometer_bias"
 
 # By the name of the section, as its class has it, and the key: what is accepted instead.
 LATER: Mapping[str, Mapping[str, str]] = {
     "MotionError": {"time_tag": _MOTION, "lever_arm": _MOTION},
     "Vibration": {"spectrum": _SPECTRUM, "spectrum_level": _SPECTRUM},
-    "Imu": {"accelerometer_scale_factor": _SCALE},
-    "ImuPart": {"accelerometer_scale_factor": _SCALE},
     "Oscillator": dict.fromkeys(("acceleration_sensitivity", "aging", "vibration", "level"), _OSCILLATOR),
     "OscillatorPart": dict.fromkeys(("acceleration_sensitivity", "aging", "vibration", "level"), _OSCILLATOR),
     "Synchronization": dict.fromkeys(("age", "averaging", "time_error", "frequency_error"), _LINK),

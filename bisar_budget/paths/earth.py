@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from bisar_budget.constants import EARTH_GRAVITATIONAL_PARAMETER, EARTH_RADIUS
 from bisar_budget.geometry import Axes, Vector, cross, dot, unit
 from bisar_budget.paths.flight import PathFileError
 from bisar_budget.paths.instant import DAY, TAI_LESS, Instant, tai
@@ -30,6 +31,10 @@ _ECCENTRICITY_SQUARED = FLATTENING * (2 - FLATTENING)
 _POLAR_RADIUS = EQUATORIAL_RADIUS * (1 - FLATTENING)
 _STEPS = 4
 _SETTLED = 1e-15  # rad; a metre on the ground is 1.6e-7
+
+
+# Gravitation: GM of the same standard, and J₂ = −√5·C̄₂₀ of EGM2008, a thousandth at the equator.
+FLATTENED = 1.08263e-3
 
 
 class Geodetic(NamedTuple):
@@ -85,6 +90,42 @@ class SceneAxes:
         radial = unit(r)
         across = unit(cross(r, against_stars))
         return self.turned(radial), self.turned(cross(across, radial)), self.turned(across)
+
+
+def free_fall(position: Vector, velocity: Vector, axes: SceneAxes | None) -> Vector:
+    """Acceleration of what falls freely, in the axes of a scene. [m/s²]
+
+    Parameters
+    ----------
+    position, velocity : (3,)
+        East, north, up; numbers or arrays (cases,). [m, m/s]
+    axes : SceneAxes or None
+        Those of a scene on the Earth; without them the Earth does not turn, and is a sphere of its mean radius below
+        the scene.
+
+    Notes
+    -----
+    Derived here. On the Earth −∇U − 2ω×v − ω×(ω×r): r against the stars, written in axes that turn at ω, and the
+    potential of a flattened Earth, (μ/r)·[1 − J₂·(a/r)²·(3z²/r² − 1)/2]. Without: −μr/r³.
+    """
+    if axes is None:
+        x, y, up = position
+        z = up + EARTH_RADIUS
+        factor = -EARTH_GRAVITATIONAL_PARAMETER / (x * x + y * y + z * z) ** 1.5
+        return (factor * x, factor * y, factor * z)
+    x, y, z = axes.earth_fixed(position)
+    u, v, _ = axes.turned_back(velocity)
+    square = x * x + y * y + z * z
+    factor = -EARTH_GRAVITATIONAL_PARAMETER / square**1.5
+    flat, polar = 1.5 * FLATTENED * EQUATORIAL_RADIUS**2 / square, z * z / square
+    level = factor * (1 + flat * (1 - 5 * polar)) + ROTATION_RATE**2
+    return axes.turned(
+        (
+            level * x + 2 * ROTATION_RATE * v,
+            level * y - 2 * ROTATION_RATE * u,
+            factor * (1 + flat * (3 - 5 * polar)) * z,
+        )
+    )
 
 
 def earth_fixed_places(latitude: Any, longitude: Any, height: Any) -> Floats:

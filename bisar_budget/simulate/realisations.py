@@ -11,10 +11,10 @@ from typing import NamedTuple
 import numpy as np
 
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.constants import SPEED_OF_LIGHT, STANDARD_GRAVITY
+from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.oscillators import noise_of
-from bisar_budget.effects.random_errors import RandomError, process_of
+from bisar_budget.effects.random_errors import RandomError, acceleration_errors, process_of, specific_force
 from bisar_budget.effects.spectra import PowerLawPiece
 from bisar_budget.mission.instruments import GaussMarkov
 from bisar_budget.mission.model import Mission, Simulation
@@ -56,8 +56,8 @@ def position_courses(
     values = process.sigma if process is not None else getattr(motion.imu, kind) or (1.0, 1.0, 1.0)
     sizes = np.array(values) / max(values) if max(values) else np.ones(3)
     sizes = sizes * (error.declared or 0.0) / factor
-    if kind in ("attitude", "gyro_bias", "angle_random_walk") and process is None:
-        axes = STANDARD_GRAVITY * np.stack([axes[:, 1], -axes[:, 0], 0 * axes[:, 0]], axis=1)  # gravity leaks across
+    if process is None:
+        axes = acceleration_errors(kind, axes, np.array(specific_force(mission, platform.state)))
     draw = _correlated(process) if process is not None else _INERTIAL[kind]
     total = np.zeros((draws, times.size, 3))
     for axis, size in zip(axes, sizes, strict=True):
@@ -137,6 +137,7 @@ def _correlated(process: GaussMarkov) -> Callable[[Floats, int, np.random.Genera
 
 _INERTIAL = {
     "accelerometer_bias": _bias(2),
+    "accelerometer_scale_factor": _bias(2),
     "attitude": _bias(2),
     "gyro_bias": _bias(3),
     "velocity_random_walk": _walk(2),

@@ -220,13 +220,14 @@ def _of_random_errors() -> tuple[Evaluator, ...]:
             name="inertial_phases",
             summary="Phases of one unit of each figure of an inertial sensor, one sigma. [rad/unit]",
             details=(
-                f"{columns}Units are m/s², rad, rad/s, m/s/√s, rad/√s. along is the length of the line of sight, "
-                "1, level that of its horizontal part; gravity in m/s². Walks start at mid-aperture. Derived here."
+                f"{columns}Units are m/s², 1, rad, rad/s, m/s/√s, rad/√s. along is the length of the line of sight, "
+                "1; turned and scaled are what a tilt and a scale factor of 1 add along it. [m/s²] Walks start at "
+                "mid-aperture. Derived here."
             ),
             arguments=(
                 (random_errors.along, "along"),
-                (random_errors.level, "level"),
-                (random_errors.gravity, "gravity"),
+                (random_errors.turned, "turned"),
+                (random_errors.scaled, "scaled"),
                 (wavelength, "wavelength"),
                 (T, "aperture_time"),
             ),

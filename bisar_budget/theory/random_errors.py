@@ -40,9 +40,10 @@ ORDERS = 4  # 0 to 3; what is left of a history after them spreads
 LEADING = (1, 1, Rational(3, 2), Rational(5, 2))  # coefficient of xⁿ in Pₙ: the order's value at the aperture edge
 TERMS = 9  # powers of a series about zero; below 0.5 what is left out is less than 1e-8 of it
 
-gravity = positive("g")
 along = positive("u")  # length of the line of sight; with a size for each axis, the root of Σ(u·σ)²
-level = positive("u_h")  # of its horizontal part
+# Along the line of sight, per unit: the specific force f that a tilt turns into it, |u × f|, and what each axis of a
+# unit scale factor measures of f too much.
+turned, scaled = positive("f_u"), positive("f_s")
 ratio = positive("a")  # T/(2τ_c): half the aperture over the correlation time
 decay = positive("d")  # exp(−2a)
 angle = positive("x")  # πfT
@@ -131,12 +132,13 @@ def inertial() -> tuple[Figure, ...]:
 
     return (
         figure("b", "accelerometer bias", "an acceleration error", constant(2), along, Integer(2)),
-        figure("psi", "attitude", "gravity leaks, g·ψ across it", constant(2), gravity * level, Integer(2)),
-        figure("epsilon", "gyro bias", "attitude drifts: a jerk g·ε", constant(3), gravity * level, Integer(3)),
-        figure("N", "velocity random walk", "white acceleration", walk(2), along, Rational(3, 2)),
         figure(
-            "N_g", "angle random walk", "attitude walks from mid-aperture", walk(3), gravity * level, Rational(5, 2)
+            "kappa", "accelerometer scale factor", "an acceleration κ·f on each axis", constant(2), scaled, Integer(2)
         ),
+        figure("psi", "attitude", "specific force is turned: an acceleration ψ × f", constant(2), turned, Integer(2)),
+        figure("epsilon", "gyro bias", "attitude drifts: a jerk ε × f", constant(3), turned, Integer(3)),
+        figure("N", "velocity random walk", "white acceleration", walk(2), along, Rational(3, 2)),
+        figure("N_g", "angle random walk", "attitude walks from mid-aperture", walk(3), turned, Rational(5, 2)),
     )
 
 
@@ -287,8 +289,10 @@ def table() -> Table:
         columns=("Quadratic phase [rad]", "Cubic phase [rad]", "Left after the cubic, rms [rad]"),
         rows=rows,
         notes=(
-            "Derived here. u is the length of the line of sight, 1, and u_h that of its horizontal part.",
-            "Attitude and gyros act through gravity, which leaks horizontally. Walks start at mid-aperture.",
+            "Derived here. u is the length of the line of sight, 1. Attitude and gyros turn the specific force "
+            "f = a − g, of which f_u = |u × f| then lies along the line of sight: g·cos(elevation) in level flight, "
+            "nothing in free fall. A scale factor has f_s = √Σ(uᵢfᵢ)² of it, i over the sensor's axes. Walks start "
+            "at mid-aperture.",
             "A spectrum of phase S is integrated with the squares of φ₂ and φ₃ of a tone, and with the share left.",
         ),
     )

@@ -4,9 +4,9 @@ import re
 
 import pytest
 
-from bisar_budget.budget.file_warnings import orbital_acceleration
 from bisar_budget.findings.mission import Report
 from bisar_budget.findings.status import exit_code
+from bisar_budget.paths.earth import free_fall
 from bisar_budget.report import FORMATS, Style, render
 from tests.conftest import ROOT, findings
 
@@ -27,11 +27,11 @@ def warned(**changes) -> list[str]:
 
 def test_the_acceleration_points_to_the_centre_and_holds_a_circular_orbit() -> None:
     """Tables have 7.6126 km/s for a height of 500 km over the equator's radius, 6378.137 km; a = v²/r."""
-    a = orbital_acceleration((0.0, 0.0, 6878.137e3 - 6371e3))
+    a = free_fall((0.0, 0.0, 6878.137e3 - 6371e3), (0.0, 7.6e3, 0.0), None)
     assert a[:2] == (0.0, 0.0)
     assert a[2] == pytest.approx(-(7612.6**2) / 6878.137e3, rel=1e-4)
     position = (353.9e3, -120e3, 505.4e3)
-    a = orbital_acceleration(position)
+    a = free_fall(position, (0.0, 7.6e3, 0.0), None)
     ratios = [part / (here - centre) for part, here, centre in zip(a, position, (0, 0, -6371e3), strict=True)]
     assert ratios == pytest.approx([ratios[0]] * 3)
     assert ratios[0] < 0
@@ -49,7 +49,9 @@ def test_what_the_warning_offers_can_be_pasted(satellite: dict) -> None:
     assert not any("satellite" in warning.message for warning in curved.warnings)
     assert curved.status == "pass"
     state = curved.geometry.transmitter
-    assert state.acceleration == pytest.approx(orbital_acceleration(state.position), abs=6e-4)  # three decimals
+    assert state.acceleration == pytest.approx(
+        free_fall(state.position, state.velocity, None), abs=6e-4
+    )  # three decimals
     assert "needs the latitude" in text
 
 

@@ -22,7 +22,12 @@ K = 2 * math.pi / WAVELENGTH
 T = 4.0
 G = 9.80665
 
-# Receiver above the y axis at 30 degrees: the line of sight is (0, cos 30°, sin 30°).
+# Receiver above the y axis at 30 degrees, 30 km away: the line of sight is (0, cos 30°, sin 30°).
+SIGHT = np.array([0, math.cos(math.radians(30)), math.sin(math.radians(30))])
+FROM_CENTRE = 30e3 * SIGHT + np.array([0, 0, 6371e3])
+# Specific force of level flight, and what a tilt turns of it into the line of sight. [m/s²]
+FORCE = 3.986004418e14 * FROM_CENTRE / np.linalg.norm(FROM_CENTRE) ** 3
+TURNED = float(np.linalg.norm(np.cross(SIGHT, FORCE)))
 MISSION: dict[str, Any] = {
     "schema_version": 1,
     "name": "Sensors",
@@ -74,17 +79,19 @@ def row(found: MissionFindings, row_id: str) -> Row:
 
 
 def test_allowables_are_those_of_the_formulas() -> None:
-    """By hand: share π/8, cubic 22.5 deg, half the power of -20 dB; along the line of sight 1, level cos 30°."""
+    """By hand: share π/8, cubic 22.5 deg, half the power of -20 dB; along the line of sight 1, |u × f| of a tilt."""
     found = with_error({"imu": IMU})
-    level = math.cos(math.radians(30))
+    assert pytest.approx(G * math.cos(math.radians(30)), rel=6e-3) == TURNED
+    scaled = float(np.linalg.norm(SIGHT * FORCE))
     half, cubic = math.pi / 8, math.radians(22.5)
     rms = math.sqrt(0.01 / 2)
     expected = {
         "accelerometer_bias": (half / (K * T**2 / 8), "quadratic_phase_error"),
-        "attitude": (half / (K * G * level * T**2 / 8), "quadratic_phase_error"),
-        "gyro_bias": (cubic / (K * G * level * T**3 / 48), "cubic_phase_error"),
+        "accelerometer_scale_factor": (half / (K * scaled * T**2 / 8), "quadratic_phase_error"),
+        "attitude": (half / (K * TURNED * T**2 / 8), "quadratic_phase_error"),
+        "gyro_bias": (cubic / (K * TURNED * T**3 / 48), "cubic_phase_error"),
         "velocity_random_walk": (half / (K * math.sqrt(5 / 224) * T**1.5), "quadratic_phase_error"),
-        "angle_random_walk": (half / (K * G * level * math.sqrt(355 / 473088) * T**2.5), "quadratic_phase_error"),
+        "angle_random_walk": (half / (K * TURNED * math.sqrt(355 / 473088) * T**2.5), "quadratic_phase_error"),
     }
     for kind, (allowable, binding) in expected.items():
         one = row(found, f"receiver.imu.{kind}")
@@ -97,7 +104,7 @@ def test_allowables_are_those_of_the_formulas() -> None:
 
 @pytest.mark.parametrize("model", ["published", "full"])
 @pytest.mark.parametrize(("kind", "unit"), [
-    ("accelerometer_bias", "m/s^2"), ("attitude", "rad"), ("gyro_bias", "rad/s"),
+    ("accelerometer_bias", "m/s^2"), ("accelerometer_scale_factor", ""), ("attitude", "rad"), ("gyro_bias", "rad/s"),
     ("velocity_random_walk", "m/s/sqrt(s)"), ("angle_random_walk", "rad/sqrt(s)"),
 ])  # fmt: skip
 def test_both_sides_of_a_limit(kind: str, unit: str, model: str) -> None:
@@ -124,7 +131,7 @@ def test_three_values_follow_the_axes_of_the_frame() -> None:
     assert qpe("accelerometer_bias", ["50 ug", "0 ug", "0 ug"]) == pytest.approx(bias)
     assert qpe("accelerometer_bias", ["0 ug", "50 ug", "50 ug"]) == pytest.approx(0, abs=1e-9 * bias)
     assert qpe("accelerometer_bias", ["30 ug", "0 ug", "50 ug"]) == pytest.approx(0.6 * bias)
-    leak = math.radians(0.01) * G * K * T**2 / 8 * math.cos(math.radians(30))
+    leak = math.radians(0.01) * TURNED * K * T**2 / 8
     assert qpe("attitude", ["0 deg", "0.01 deg", "0 deg"]) == pytest.approx(leak)  # about the level cross axis
     assert qpe("attitude", ["0.01 deg", "0 deg", "0 deg"]) == pytest.approx(0, abs=1e-9 * leak)
     assert qpe("attitude", ["0 deg", "0 deg", "0.01 deg"]) == pytest.approx(0, abs=1e-9 * leak)
@@ -231,7 +238,7 @@ class TestSums:
             platforms={"receiver": {"motion_error": {"imu": IMU}}, "transmitter": {"oscillator": MASK}},
             allocation={"split": "balanced", "combine": "rss"},
         )
-        receiver = math.hypot(*(one.qpe_published_rad for one in found.rows if one.subject.kind == "imu"))
+        receiver = math.hypot(*(one.qpe_published_rad or 0.0 for one in found.rows if one.subject.kind == "imu"))
         transmitter = row(found, "transmitter.oscillator").qpe_published_rad
         share = transmitter / (transmitter + receiver)
         assert found.allocation.qpe.transmitter == pytest.approx(max(0.05, share), rel=1e-9)

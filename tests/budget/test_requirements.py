@@ -170,13 +170,15 @@ def test_the_cubic_is_judged_by_its_requirement() -> None:
 
 @pytest.mark.parametrize("coverage", [1, 2])
 def test_without_its_requirement_the_cubic_is_power_that_islr_holds(coverage: int) -> None:
-    """(4/175)·φ₃², without the coverage factor; φ₃ of a gyro is k·g·ε·|u_h|·T³/48 (physics: inertial sensors)."""
+    """(4/175)·φ₃², without the coverage factor; φ₃ of a gyro is k·|u × f|·ε·T³/48 (physics: inertial sensors)."""
     rate, rms = math.radians(50) / 3600, 0.02
     changes = {f"{RECEIVER}__imu": {"gyro_bias": "50 deg/h"}, VIBRATION: {"wideband": {"rms": um(rms)}}}
     allocation = {"combine": "rss", "model": "published", "coverage_factor": coverage}
     found = check(requirements={"islr": "-20 dB"}, allocation=allocation, **changes, **SMALL)
-    along = math.hypot(6e3, 6e3) / math.sqrt(2 * 6e3**2 + 2e3**2)
-    cubic = K * 9.80665 * rate * along * T**3 / 48
+    place = np.array(found.geometry.receiver.position)
+    from_centre = place + np.array([0, 0, 6371e3])
+    force = 3.986004418e14 * from_centre / np.linalg.norm(from_centre) ** 3
+    cubic = K * rate * float(np.linalg.norm(np.cross(place / np.linalg.norm(place), force))) * T**3 / 48
     power = 4 / 175 * cubic**2 + rms**2
     use = math.sqrt(power / 1e-2)  # the published rule: the variance is the power
     assert row(found, "mission.islr").utilization == pytest.approx(use, rel=1e-6)

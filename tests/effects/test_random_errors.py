@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.constants import STANDARD_GRAVITY
-from bisar_budget.effects.random_errors import RandomError
+from bisar_budget.design.varied import varied
+from bisar_budget.effects.random_errors import RandomError, in_one_case, random_errors, specific_force
 from bisar_budget.effects.spectra import PowerLawPiece, synchronized_parts
-from bisar_budget.mission.load import parse_mission
+from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.mission.model import Mission
 from bisar_budget.ranges.exact_ranges import FINE, STILL, ExactRanges, Found, aperture_nodes, followed
+from tests.conftest import ROOT
 
 DRAWS = 20_000
 SIGMA = 0.02
@@ -37,6 +38,7 @@ platforms:
       frame: track
       imu:
         accelerometer_bias: 50 ug
+        accelerometer_scale_factor: 300 ppm
         attitude: 0.02 deg
         gyro_bias: 0.5 deg/h
         velocity_random_walk: 0.06 m/s/sqrt(h)
@@ -84,8 +86,8 @@ def from_middle(draw: Callable[[np.ndarray], np.ndarray], times: np.ndarray, hal
 
 
 def history(kind: str, rng: np.random.Generator, times: np.ndarray, half: float) -> np.ndarray:
-    """Position error of a unit along one axis, without gravity, (draws, nodes)."""
-    if kind in ("accelerometer_bias", "attitude"):
+    """Position error by a unit of acceleration, or of its rate or noise, along one axis, (draws, nodes)."""
+    if kind in ("accelerometer_bias", "accelerometer_scale_factor", "attitude"):
         return rng.standard_normal((DRAWS, 1)) * times**2 / 2
     if kind == "gyro_bias":
         return rng.standard_normal((DRAWS, 1)) * times**3 / 6
@@ -101,8 +103,22 @@ def history(kind: str, rng: np.random.Generator, times: np.ndarray, half: float)
     return from_middle(walk, times, half)
 
 
+def falling(position: np.ndarray) -> np.ndarray:
+    """Acceleration towards the centre of a sphere 6371 km below the scene. [m/s²]"""
+    from_centre = position + np.array([0, 0, 6371e3])
+    return -3.986004418e14 * from_centre / np.linalg.norm(from_centre) ** 3
+
+
 @pytest.mark.parametrize(
-    "kind", ["accelerometer_bias", "attitude", "gyro_bias", "velocity_random_walk", "angle_random_walk"]
+    "kind",
+    [
+        "accelerometer_bias",
+        "accelerometer_scale_factor",
+        "attitude",
+        "gyro_bias",
+        "velocity_random_walk",
+        "angle_random_walk",
+    ],
 )
 def test_an_inertial_sensor_does_what_whole_time_series_do(kind: str) -> None:
     analysis = analysed()
@@ -110,8 +126,16 @@ def test_an_inertial_sensor_does_what_whole_time_series_do(kind: str) -> None:
     times = aperture_nodes(mission.collection.aperture_time)
     rng = np.random.default_rng(13)
     moved = np.stack([history(kind, rng, times, 3.0) for _ in range(3)], axis=-1) * error.declared
-    if kind in ("attitude", "gyro_bias", "angle_random_walk"):  # a tilt about x leaks along -y, about y along x
-        moved = STANDARD_GRAVITY * np.stack([moved[..., 1], -moved[..., 0], 0 * moved[..., 0]], axis=-1)
+    # The frame is the track's: along, across to the left, up. The path is straight, so that f = -g.
+    state = mission.platforms.receiver.state
+    force = -falling(np.array(state.position))
+    axes = np.array(state.frame("track"))
+    if kind in ("attitude", "gyro_bias", "angle_random_walk"):
+        moved = np.cross(moved @ axes, force)
+    elif kind == "accelerometer_scale_factor":
+        moved = (moved * (axes @ force)) @ axes
+    else:
+        moved = moved @ axes
     found = through_exact_ranges(mission, moved, times)
     for drawn, computed in ((found.quadratic, error.full.quadratic), (found.cubic, error.full.cubic)):
         computed *= error.declared
@@ -122,6 +146,100 @@ def test_an_inertial_sensor_does_what_whole_time_series_do(kind: str) -> None:
     # A path of 35 m/s past 2 km turns little: the closed form is not far from it.
     largest = max(error.full[:2])
     assert error.published[:2] == pytest.approx(error.full[:2], rel=0.02, abs=0.07 * largest)
+
+
+class TestSpecificForce:
+    """Attitude errors and scale factors act on what accelerometers measure, f = a - g."""
+
+    TURN = """
+schema_version: 1
+name: a turn
+radar: {center_frequency: 10 GHz, bandwidth: 300 MHz}
+collection: {aperture_time: 4 s}
+platforms:
+  transmitter: {position: [-5 km, 8 km, 1.5 km], velocity: [60 m/s, 80 m/s, 0 m/s]}
+  receiver:
+    position: [5 km, 0 km, 1.5 km]
+    velocity: [60 m/s, 80 m/s, 0 m/s]
+    acceleration: [-3.2 m/s^2, 2.4 m/s^2, 0 m/s^2]
+    motion_error: {imu: {IMU}}
+"""
+
+    @pytest.mark.parametrize(
+        ("figures", "expected"),
+        [
+            # |k·T²/8·u·(ψ × f)|, u = [5, 0, 1.5]/5.22, f = [-3.2, 2.4, 9.81], worked out by hand
+            ("attitude: [0.26 mrad, 0 rad, 0 rad]", 0.0751),
+            ("attitude: [0 rad, 0.26 mrad, 0 rad]", 1.124),
+            ("attitude: [0 rad, 0 rad, 5 mrad]", 4.820),
+            ("attitude: [0.26 mrad, 0.26 mrad, 5 mrad]", 4.950),
+            (
+                "accelerometer_scale_factor: [300 ppm, 0, 0]",
+                209.58 * 2 * 300e-6 * (3.2 - 9.8156 * 5 / 6372.5) * 5 / 5.2202,
+            ),
+            ("accelerometer_scale_factor: [0, 0, 300 ppm]", 209.58 * 2 * 300e-6 * 9.81 * 1.5 / 5.2202),
+        ],
+    )
+    def test_a_turn(self, figures: str, expected: float) -> None:
+        analysis = analysed(self.TURN.replace("{IMU}", f"{{{figures}}}"))
+        error = of(analysis, f"receiver.imu.{figures.partition(':')[0]}")
+        assert error.published.quadratic * error.declared == pytest.approx(expected, rel=2e-3)
+        # The line of sight turns, and what the error displaces defocuses.
+        assert error.full.quadratic * error.declared == pytest.approx(expected, rel=1e-2, abs=6e-3)
+
+    def test_heading_counts_where_a_platform_turns_only(self) -> None:
+        heading = "attitude: [0 rad, 0 rad, 5 mrad]"
+        text = self.TURN.replace("{IMU}", f"{{{heading}}}")
+        level = text.replace("[-3.2 m/s^2, 2.4 m/s^2, 0 m/s^2]", "[0 m/s^2, 0 m/s^2, 0 m/s^2]")
+        turning, straight = (of(analysed(one), "receiver.imu.attitude").full.quadratic for one in (text, level))
+        assert straight < 1e-3 * turning  # what is left: the plumb line there is not that of the scene
+
+    def test_a_satellite_in_free_fall_has_none(self) -> None:
+        position = np.array([300e3, -200e3, 510e3])
+        falls = ", ".join(f"{part:.9f} m/s^2" for part in falling(position))
+        text = self.TURN.replace("[5 km, 0 km, 1.5 km]", "[300 km, -200 km, 510 km]")
+        text = text.replace("[60 m/s, 80 m/s, 0 m/s]\n    acceleration: [-3.2 m/s^2, 2.4 m/s^2, 0 m/s^2]",
+                            f"[5 km/s, 5.6 km/s, 0 m/s]\n    acceleration: [{falls}]")  # fmt: skip
+        satellite = analysed(text.replace("{IMU}", "{attitude: 1 mrad, accelerometer_bias: 1 mg}"))
+        assert of(satellite, "receiver.imu.attitude").full.quadratic < 1e-6
+        assert of(satellite, "receiver.imu.accelerometer_bias").full.quadratic > 100
+
+    def test_on_the_earth_it_is_normal_gravity_where_a_platform_stands(self) -> None:
+        """Somigliana's closed formula on the ellipsoid, less 3.086e-6 /s² times the height; straight up there."""
+        text = """
+schema_version: 1
+name: stands
+radar: {center_frequency: 10 GHz, bandwidth: 300 MHz}
+collection: {aperture_time: 4 s}
+scene: {latitude: 47.2 deg, longitude: 6 deg, height: 0 m}
+platforms:
+  transmitter: {position: [-5 km, 8 km, 1.5 km], velocity: [60 m/s, 80 m/s, 0 m/s]}
+  receiver:
+    position: [0 m, 1 m, 1.5 km]
+    velocity: [0 m/s, 0 m/s, 0 m/s]
+    motion_error: {imu: {attitude: 1 mrad}}
+"""
+        mission = parse_mission(text)
+        sine = math.sin(math.radians(47.2)) ** 2
+        normal = 9.7803253359 * (1 + 0.00193185265241 * sine) / math.sqrt(1 - 0.00669437999013 * sine)
+        force = specific_force(mission, mission.platforms.receiver.state)
+        assert force[2] == pytest.approx(normal - 3.086e-6 * 1500, rel=3e-5)
+        assert math.hypot(*force[:2]) < 3e-5 * force[2]
+
+    def test_an_orbit_by_its_elements_falls_freely(self) -> None:
+        """The flattening is in the orbit: without it 0.01 m/s² would be left."""
+        mission = load_mission(str(ROOT / "specs" / "missions" / "sentinel1_elements_besancon.yaml"))
+        assert math.hypot(*specific_force(mission, mission.platforms.transmitter.state)) < 2e-4
+
+    def test_cases_together_are_what_each_is_alone(self) -> None:
+        mission = parse_mission(self.TURN.replace("{IMU}", "{attitude: 1 mrad, accelerometer_scale_factor: 0.1 %}"))
+        sides = np.array([-4.0, 0.0, 2.5])
+        together = varied(mission, "platforms.receiver.acceleration.0", sides)
+        both = random_errors(together, together.geometry, sides.size)
+        for place, side in enumerate(sides.tolist()):
+            alone = random_errors(varied(mission, "platforms.receiver.acceleration.0", side))
+            for one, other in zip(both, alone, strict=True):
+                assert [*in_one_case(mission, one, place).full] == pytest.approx([*other.full], rel=1e-9)
 
 
 def test_gnss_noise_does_what_whole_time_series_do() -> None:

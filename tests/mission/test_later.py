@@ -38,10 +38,6 @@ def faults(**changes: object) -> tuple[Fault, ...]:
         ({f"{ERROR}lever_arm": {"arm": [1, 0, 0]}}, "platforms.receiver.motion_error.lever_arm"),
         ({f"{ERROR}vibration__spectrum": {"20 Hz": "1 g^2/Hz"}}, f"{OF_RECEIVER}motion_error.vibration.spectrum"),
         ({f"{ERROR}vibration__spectrum_level": "3 dB"}, "platforms.receiver.motion_error.vibration.spectrum_level"),
-        (
-            {f"{ERROR}imu__accelerometer_scale_factor": "300 ppm"},
-            "platforms.receiver.motion_error.imu.accelerometer_scale_factor",
-        ),
         *(
             ({f"{RECEIVER}oscillator": NOISE | {key: "1"}}, f"platforms.receiver.oscillator.{key}")
             for key in ("acceleration_sensitivity", "aging", "vibration", "level")

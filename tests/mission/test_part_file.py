@@ -92,7 +92,7 @@ SCHEMA_SEES = {
         "f.yaml:5:1: gyro_bais: is not a known key; accepted: kind, name,",
     ),
     "a key of another kind": (IMU + MASK, "f.yaml:5:1: phase_noise: is not a known key"),
-    "a key that is to come": (IMU + "accelerometer_scale_factor: 1 ppm\n", "is not computed by this version yet"),
+    "a key that is to come": (CLOCK + "aging: 1e-10\n", "is not computed by this version yet"),
     "no kind": (
         IMU.replace("kind: imu\n", ""),
         "f.yaml:1:1: kind: must be one of imu, gnss, oscillator, and is missing. Its figures are those of kind: imu",
@@ -147,6 +147,7 @@ ALL_BROKEN = BROKEN | SCHEMA_SEES
 # Values of each figure that are right, and those that may stand in the place of any value.
 RIGHT = {
     "accelerometer_bias": ["1 mg", "[1 ug, 0, 2 ug]"],
+    "accelerometer_scale_factor": ["300 ppm", "[0.1 %, 0, 1e-4]"],
     "attitude": ["0.1 deg", "[1 mrad, 1 mrad, 0]"],
     "gyro_bias": ["1 deg/h"],
     "velocity_random_walk": ["0.1 m/s/sqrt(h)", "50 ug/sqrt(Hz)"],

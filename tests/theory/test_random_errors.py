@@ -135,8 +135,8 @@ def test_an_oscillator_leaves_what_is_beyond_the_cubic_and_no_more_than_the_cut(
 def test_walks_have_the_moments_of_their_covariance() -> None:
     """√(5/224) of a velocity walk, 0.02739 of an angle walk; 0.020 rms is left after the quadratic."""
     k = 2 * math.pi  # a wavelength of 1 m
-    rows = evaluators.inertial_phases(1.0, 1.0, STANDARD_GRAVITY, 1.0, 1.0)
-    velocity, angle = rows[3], rows[4]
+    rows = evaluators.inertial_phases(1.0, STANDARD_GRAVITY, 1.0, 1.0, 1.0)
+    velocity, angle = rows[4], rows[5]
     assert velocity[0] == pytest.approx(math.sqrt(5 / 224) * k, rel=1e-12)
     assert velocity[0] / k == pytest.approx(0.1494, abs=5e-5)
     assert angle[0] == pytest.approx(0.02739 * k * STANDARD_GRAVITY, rel=2e-4)
@@ -146,24 +146,25 @@ def test_walks_have_the_moments_of_their_covariance() -> None:
 
 
 def test_biases_are_the_taylor_terms() -> None:
-    """k·b·T²/8, k·g·ψ·T²/8 and k·g·ε·T³/48, for T = 6 s and a wavelength of 3 cm."""
+    """k·b·T²/8, k·f_s·κ·T²/8, k·f_u·ψ·T²/8 and k·f_u·ε·T³/48, for T = 6 s and a wavelength of 3 cm."""
     k = 2 * math.pi / 0.03
-    bias, attitude, drift, *_ = evaluators.inertial_phases(1.0, 0.6, STANDARD_GRAVITY, 0.03, 6.0)
+    bias, scale, attitude, drift, *_ = evaluators.inertial_phases(1.0, 5.9, 2.3, 0.03, 6.0)
     assert bias == pytest.approx((k * 36 / 8, 0, 0))
-    assert attitude == pytest.approx((k * STANDARD_GRAVITY * 0.6 * 36 / 8, 0, 0))
-    assert drift == pytest.approx((0, k * STANDARD_GRAVITY * 0.6 * 216 / 48, 0))
+    assert scale == pytest.approx((k * 2.3 * 36 / 8, 0, 0))
+    assert attitude == pytest.approx((k * 5.9 * 36 / 8, 0, 0))
+    assert drift == pytest.approx((0, k * 5.9 * 216 / 48, 0))
 
 
 def test_figures_of_real_units_at_3_cm_and_6_s() -> None:
     """HG9900 0.23 rad by bias and 0.11 by velocity random walk, HG1700 9.2 and 0.15, STIM300 0.46 and 0.46."""
-    rows = evaluators.inertial_phases(1.0, 1.0, STANDARD_GRAVITY, 0.03, 6.0)
+    rows = evaluators.inertial_phases(1.0, STANDARD_GRAVITY, 1.0, 0.03, 6.0)
     for bias_ug, walk, expected in (
         (25, 0.0143, (0.23, 0.11)),
         (1000, 0.0198, (9.2, 0.15)),
         (50, 0.06, (0.46, 0.46)),
     ):
         assert bias_ug * 1e-6 * STANDARD_GRAVITY * rows[0][0] == pytest.approx(expected[0], rel=0.02)
-        assert walk / 60 * rows[3][0] == pytest.approx(expected[1], rel=0.03)
+        assert walk / 60 * rows[4][0] == pytest.approx(expected[1], rel=0.03)
 
 
 @pytest.mark.parametrize("ratio", [0.01, 0.4, 0.499, 0.501, 2.0, 10.0, 300.0])
@@ -224,8 +225,8 @@ def test_noise_of_the_link_is_two_thirds_of_each_exchange() -> None:
 
 def test_what_is_explained_is_what_is_derived() -> None:
     printed = render.derivation("random", "text")
-    found = [cell for symbol in ("b", "ψ", "ε", "N", "N_g") for cell in notation.inertial_phases(symbol) if cell]
-    assert len(found) == 9
+    found = [cell for symbol in ("b", "κ", "ψ", "ε", "N", "N_g") for cell in notation.inertial_phases(symbol) if cell]
+    assert len(found) == 10
     assert all(cell in printed for cell in found)
 
 

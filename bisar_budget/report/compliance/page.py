@@ -656,8 +656,8 @@ def _validity(mission: Mission, found: MissionFindings) -> Iterator[tuple[str, s
         yield (
             "Sensors",
             "one sigma, axes independent. They act from the quadratic phase on: what displaces is the declared "
-            "position and velocity. Attitude and gyros act through gravity, which leaks horizontally. Random walks "
-            "start at mid-aperture",
+            "position and velocity. Attitude and gyros turn the specific force, scale factors add a part of it. "
+            "Random walks start at mid-aperture",
         )
     if any(platform.oscillator for platform in mission.platforms) or mission.synchronization:
         yield (

@@ -10,14 +10,14 @@ from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.spread import declared_powers, mainlobe_energy, spread_phase, tones
 from bisar_budget.analysis.vibration_limits import LARGEST_ECHO, Echo, bessel, highest_echo, tone_limits
 from bisar_budget.budget.random_rows import held_effect, no_effect
-from bisar_budget.constants import STANDARD_GRAVITY
 from bisar_budget.effects.declared import CUBIC, QUADRATIC
 from bisar_budget.effects.effect import subject
 from bisar_budget.effects.oscillators import spurs_of
-from bisar_budget.effects.random_errors import RandomEffect, RandomError, process_of
+from bisar_budget.effects.random_errors import RandomEffect, RandomError, process_of, specific_force
 from bisar_budget.effects.spectra import PowerLawPiece, gauss_markov, parts, synchronized_parts
 from bisar_budget.faults import printable
 from bisar_budget.findings.row import Row
+from bisar_budget.geometry import PlatformState
 from bisar_budget.mission.model import Mission
 from bisar_budget.report.explain.explained_error import as_written, combined, limit_steps, missing, place
 from bisar_budget.report.explain.notation import (
@@ -33,6 +33,7 @@ from bisar_budget.report.explain.notation import (
 
 _SYMBOLS = {
     "accelerometer_bias": "b",
+    "accelerometer_scale_factor": "κ",
     "attitude": "ψ",
     "gyro_bias": "ε",
     "velocity_random_walk": "N",
@@ -79,14 +80,23 @@ def _imu(analysis: Analysis, error: RandomError, model: str) -> Iterator[Step]:
     formulas = inertial_phases(symbol)
     unit = error.published
     wavelength, T = mission.radar.wavelength, mission.collection.aperture_time
-    gravity = STANDARD_GRAVITY
-    # The part of the line of sight is what the published effect has of it.
-    values = {symbol: 1.0, "T": T, "λ": wavelength, "g": gravity, "u": 1.0, "u_h": 1.0}
+    # The part along the line of sight is what the published effect has of it.
+    values = {symbol: 1.0, "T": T, "λ": wavelength}
     which = next(index for index, formula in enumerate(formulas) if formula)
     along = (unit.quadratic, unit.cubic)[which] / (_of_one(kind, which, wavelength, T))
-    is_level = "u_h" in formulas[which]
-    values["u_h" if is_level else "u"] = along
-    name = "the horizontal part of the line of sight, u_h" if is_level else "the line of sight, u"
+    part = next(one for one in ("f_u", "f_s", "u") if one in formulas[which])
+    values[part] = along
+    if part == "u":
+        name = "the line of sight, u"
+    else:
+        state: PlatformState = getattr(mission.platforms, error.owner).state
+        east, north, up = (with_unit(one + 0.0, "m/s^2") for one in specific_force(mission, state))
+        yield from step("Specific force f = a − g, which accelerometers measure", f"f = [{east}, {north}, {up}]")
+        name = (
+            "what a tilt turns of it into the line of sight, f_u = |u × f|"
+            if part == "f_u"
+            else "what scale factors have of it along the line of sight, f_s"
+        )
     yield from step(f"Through {name}, at mid-aperture; of three values the root-sum-square of what each has")
     for index, formula in enumerate(formulas):
         if formula:
@@ -115,7 +125,7 @@ def _of_one(kind: str, which: int, wavelength: float, T: float) -> float:
     """Effect of one unit along a whole line of sight."""
     from bisar_budget import evaluators
 
-    row = evaluators.inertial_phases(1.0, 1.0, STANDARD_GRAVITY, wavelength, T)[list(_SYMBOLS).index(kind)]
+    row = evaluators.inertial_phases(1.0, 1.0, 1.0, wavelength, T)[list(_SYMBOLS).index(kind)]
     return row[which]
 
 
