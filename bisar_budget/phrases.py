@@ -520,6 +520,13 @@ def allan_deviation_ends(time: float) -> str:
 
 
 @phrase
+def mask_is_cut(bandwidth: float, last: float, beyond: float) -> str:
+    """Said of an oscillator whose bandwidth ends below the last point of its mask. [Hz, Hz, rad]"""
+    end, whole = (format_quantity(frequency, "Hz", 4) for frequency in (bandwidth, last))
+    return f"phase noise counts to `bandwidth`, {end}; the mask goes to {whole}, with {beyond:.3g} rad rms beyond"
+
+
+@phrase
 def mask_begins(frequency: float, slope: float) -> str:
     """Said of an oscillator. [Hz]"""
     return f"the mask begins at {frequency:g} Hz; below, it continues as f^-{slope:.3g}"

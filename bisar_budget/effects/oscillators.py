@@ -15,6 +15,7 @@ from bisar_budget.mission.instruments import Oscillator, Points, PowerLaw
 from bisar_budget.mission.model import Mission
 from bisar_budget.phrases import NOTHING, Note
 
+BANDWIDTH = 1e3  # Hz, to which noise counts that is stated without an end
 POOR_FIT = 0.2  # of an Allan deviation, from where a power law does not describe it
 _EXACT, _DESCRIBES = 1e-6, 0.01  # misfits of an Allan deviation: nothing, and so little that no term is added
 _STEEPEST, _LEAST_STEEP = 4.0, 3.0  # slopes of a mask below its first point
@@ -33,10 +34,11 @@ def noise_of(oscillator: Oscillator, center_frequency: float, aperture_time: flo
     """Spectrum of an oscillator's phase, one-sided. [rad²/Hz]"""
     if oscillator.phase_noise is not None:
         return _of_mask(oscillator, center_frequency, aperture_time)
+    bandwidth = BANDWIDTH if oscillator.bandwidth is None else oscillator.bandwidth
     if oscillator.power_law is not None:
-        return Noise(_of_power_law(oscillator.power_law, center_frequency, oscillator.bandwidth))
+        return Noise(_of_power_law(oscillator.power_law, center_frequency, bandwidth))
     points = oscillator.allan_deviation or ()
-    law, misfit = fitted(points, oscillator.bandwidth, aperture_time)
+    law, misfit = fitted(points, bandwidth, aperture_time)
     notes, beyond, last = [], NOTHING, points[-1][0]
     if len(points) == 1:
         notes.append(phrases.one_point_of_allan_deviation())
@@ -46,25 +48,31 @@ def noise_of(oscillator: Oscillator, center_frequency: float, aperture_time: flo
         beyond = phrases.allan_deviation_ends(last)
     if law.flicker_phase:
         notes.append(phrases.flicker_is_assumed())
-    return Noise(_of_power_law(law, center_frequency, oscillator.bandwidth), tuple(notes), beyond, misfit)
+    return Noise(_of_power_law(law, center_frequency, bandwidth), tuple(notes), beyond, misfit)
 
 
 def _of_mask(oscillator: Oscillator, center_frequency: float, aperture_time: float) -> Noise:
     points = oscillator.phase_noise or ()
     scale = 2 * (center_frequency / (oscillator.frequency or center_frequency)) ** 2
     densities = [(f, scale * 10 ** (level / 10)) for f, level in points]
-    pieces = []
+    last, pieces = points[-1][0], []
+    bandwidth = last if oscillator.bandwidth is None else oscillator.bandwidth
     for (f, density), (g, next_density) in pairwise(densities):
         slope = math.log(density / next_density) / math.log(g / f)
-        pieces.append(PowerLawPiece(f, min(g, oscillator.bandwidth), density * f**slope, slope))
+        pieces.append(PowerLawPiece(f, g, density * f**slope, slope))
     first, density = densities[0]
     slope = min(_STEEPEST, max(_LEAST_STEEP, pieces[0].slope))
-    pieces.insert(0, PowerLawPiece(0.0, min(first, oscillator.bandwidth), density * first**slope, slope))
+    pieces.insert(0, PowerLawPiece(0.0, first, density * first**slope, slope))
     # The quadratic phase is made of tones of about a cycle per aperture.
     below = NOTHING
     if first * aperture_time > 0.5:
         below = phrases.mask_begins(first, slope)
-    return Noise(tuple(piece for piece in pieces if piece.low < piece.high), extrapolated=below)
+    notes = []
+    if bandwidth < last:
+        beyond = (piece.integral(max(piece.low, bandwidth), piece.high) for piece in pieces if piece.high > bandwidth)
+        notes.append(phrases.mask_is_cut(bandwidth, last, math.sqrt(math.fsum(beyond))))
+    counted = (piece._replace(high=min(piece.high, bandwidth)) for piece in pieces if piece.low < bandwidth)
+    return Noise(tuple(counted), tuple(notes), below)
 
 
 def _of_power_law(law: PowerLaw, center_frequency: float, bandwidth: float) -> tuple[PowerLawPiece, ...]:

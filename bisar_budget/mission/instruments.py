@@ -224,12 +224,12 @@ class Oscillator(NamedTuple):
     allan_deviation: AllanDeviation = None
     power_law: PowerLawFigures = None
     bandwidth: Annotated[
-        float,
+        float | None,
         Key(
             Quantity(units.FREQUENCY, gt=0, ge=1e-3, le=1e12),
-            "Phase noise counts up to here, of a mask up to its last point if that is lower.",
+            "Phase noise counts up to here; omitted: a mask to its last point, another form to 1 kHz.",
         ),
-    ] = 1e3
+    ] = None
     spurs: Annotated[
         Points,
         Key(

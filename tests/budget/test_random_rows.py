@@ -7,7 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bisar_budget.budget.check import check_mission
+from bisar_budget.budget.check import check_mission, check_missions
+from bisar_budget.constants import MAINLOBE_ENERGY
+from bisar_budget.design.varied import varied
 from bisar_budget.effects.declared import QUADRATIC
 from bisar_budget.effects.spectra import PowerLawPiece, synchronized_parts
 from bisar_budget.faults import MissionError
@@ -21,6 +23,7 @@ WAVELENGTH = 299_792_458.0 / 10e9
 K = 2 * math.pi / WAVELENGTH
 T = 4.0
 G = 9.80665
+E = MAINLOBE_ENERGY["uniform"]
 
 # Receiver above the y axis at 30 degrees, 30 km away: the line of sight is (0, cos 30°, sin 30°).
 SIGHT = np.array([0, math.cos(math.radians(30)), math.sin(math.radians(30))])
@@ -174,6 +177,63 @@ def test_a_power_law_and_its_mask_are_the_same() -> None:
     for form in (law, mask, adev):
         one = row(check(platforms={"receiver": {"oscillator": form}}), "receiver.oscillator")
         assert one.qpe_published_rad == pytest.approx(expected, rel=1e-4)
+
+
+class TestBandwidth:
+    """A mask counts to its last point, or to a `bandwidth` below it, which the row says."""
+
+    LEVELS = {"10 Hz": "-110 dBc/Hz", "100 Hz": "-140 dBc/Hz", "1 MHz": "-150 dBc/Hz"}
+
+    def row_of(self, levels: dict[str, str] = LEVELS, **beside: str) -> Row:
+        oscillator = {"frequency": "10 MHz", "phase_noise": levels, **beside}
+        return row(check(platforms={"receiver": {"oscillator": oscillator}}), "receiver.oscillator")
+
+    def power(self, low: float, high: float) -> float:
+        """Mean square of the phase between two frequencies at 10 GHz, by trapezoids over logarithms. [rad²]"""
+        f = np.geomspace(low, high, 20001)
+        level = np.interp(np.log(f), np.log([10, 100, 1e6]), [-110, -140, -150])
+        return float(np.trapezoid(2 * 1e6 * 10 ** (level / 10), f))
+
+    @pytest.mark.parametrize(("bandwidth", "high"), [(None, 1e6), ("1 MHz", 1e6), ("2 GHz", 1e6), ("5 kHz", 5e3)])
+    def test_what_spreads(self, bandwidth: str | None, high: float) -> None:
+        one = self.row_of(**({} if bandwidth is None else {"bandwidth": bandwidth}))
+        # Of slow noise the aperture's own frequencies are counted apart.
+        slow = self.row_of({"10 Hz": "-110 dBc/Hz", "100 Hz": "-140 dBc/Hz"})
+        variance, of_slow = (math.log1p(10 ** (each.islr_db / 10) * E) for each in (one, slow))
+        assert variance - of_slow == pytest.approx(self.power(100, high), rel=2e-3)
+
+    @pytest.mark.parametrize(("bandwidth", "is_cut"), [("999.9 kHz", True), ("1 MHz", False), ("1.1 MHz", False)])
+    def test_both_sides_of_the_last_point(self, bandwidth: str, is_cut: bool) -> None:
+        notes = [note for note in self.row_of(bandwidth=bandwidth).notes if note.code == "mask-is-cut"]
+        assert len(notes) == is_cut
+
+    def test_the_note_has_both_frequencies_and_what_is_cut_off(self) -> None:
+        (note,) = (note for note in self.row_of(bandwidth="1 kHz").notes if note.code == "mask-is-cut")
+        rms = math.sqrt(self.power(1e3, 1e6))
+        assert (
+            note == f"phase noise counts to `bandwidth`, 1 kHz; the mask goes to 1 MHz, with {rms:.3g} rad rms beyond"
+        )
+
+    def test_a_band_that_ends_below_the_mask_has_what_continues_it(self) -> None:
+        one = self.row_of(bandwidth="5 Hz")
+        assert one.qpe_published_rad == pytest.approx(self.row_of(bandwidth="6 Hz").qpe_published_rad, rel=1e-3)
+
+    def test_other_forms_count_to_1_khz(self) -> None:
+        law = {"h0": 1e-20, "h2": 1e-26}
+        rows = [
+            row(check(platforms={"receiver": {"oscillator": {"power_law": law, **beside}}}), "receiver.oscillator")
+            for beside in ({}, {"bandwidth": "1 kHz"}, {"bandwidth": "2 kHz"})
+        ]
+        levels = [one.islr_db for one in rows]
+        assert levels[0] == levels[1] < levels[2]
+
+    def test_a_sweep_of_what_no_file_states(self) -> None:
+        changes = {"platforms": {"receiver": {"oscillator": {"frequency": "10 MHz", "phase_noise": self.LEVELS}}}}
+        mission = parse_mission(json.dumps(merged(MISSION, changes)))
+        key, bands = "platforms.receiver.oscillator.bandwidth", [2e3, 5e4]
+        both = check_missions([varied(mission, key, band) for band in bands], TODAY)
+        alone = [row(found, "receiver.oscillator").islr_db for _, found in sorted(both, key=lambda one: one[0])]
+        assert alone == pytest.approx([self.row_of(bandwidth=f"{band} Hz").islr_db for band in bands])
 
 
 def test_a_fit_that_is_no_fit_warns() -> None:

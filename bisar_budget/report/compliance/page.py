@@ -662,8 +662,8 @@ def _validity(mission: Mission, found: MissionFindings) -> Iterator[tuple[str, s
     if any(platform.oscillator for platform in mission.platforms) or mission.synchronization:
         yield (
             "Clocks",
-            "spectra of phase are one-sided, and count up to the oscillator’s bandwidth or the mask’s end. The level "
-            "of an oscillator is that of its noise against the noise declared, 0 dB",
+            "spectra of phase are one-sided, and count to the mask’s end or the oscillator’s bandwidth, 1 kHz where "
+            "neither is stated. The level of an oscillator is that of its noise against the noise declared, 0 dB",
         )
     for row in found.rows:
         if row.subject.kind == "oscillator" and row.remarks:
