@@ -28,6 +28,7 @@ _GREEK = {
     "theta": "θ",
     "beta": "β",
     "sigma": "σ",
+    "kappa": "κ",
     "psi": "ψ",
     "epsilon": "ε",
 }
