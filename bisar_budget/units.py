@@ -177,8 +177,8 @@ _MEANT = {
 # Decibels against a carrier have no other unit near them: what is meant where one stands in the place of another.
 _DECIBELS = ("dB", "dBc")
 
-# By the unit that rows are in; a clock's linear term is a ratio of times.
-_OF_SI = {dimension.si: dimension for dimension in reversed(DIMENSIONS) if dimension.si} | {"s/s": RATIO, "": RATIO}
+# By the unit that rows are in; a clock's linear term is a ratio of times, a scale factor one of accelerations.
+_OF_SI = {dimension.si: dimension for dimension in reversed(DIMENSIONS) if dimension.si} | {"s/s": RATIO, "1": RATIO}
 
 
 def parse_quantity(value: object, dimension: Dimension) -> float:
@@ -318,6 +318,7 @@ _SHEETS = {
     "rad/s": (_DEGREE / 3600, " deg/h"),
     "m/s/sqrt(s)": (_ROOT_HOUR, " m/s/√h"),
     "rad/sqrt(s)": (_DEGREE * _ROOT_HOUR, " deg/√h"),
+    "1": (1e-6, " ppm"),
 }
 
 

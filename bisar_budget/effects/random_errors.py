@@ -32,7 +32,7 @@ from bisar_budget.paths.earth import free_fall
 from bisar_budget.phrases import NOTHING, Note
 from bisar_budget.ranges.exact_ranges import ExactRanges
 
-_IMU_UNITS = dict(zip(IMU_KINDS, ("m/s^2", "", "rad", "rad/s", "m/s/sqrt(s)", "rad/sqrt(s)"), strict=True))
+_IMU_UNITS = dict(zip(IMU_KINDS, ("m/s^2", "1", "rad", "rad/s", "m/s/sqrt(s)", "rad/sqrt(s)"), strict=True))
 _TILTS = ("attitude", "gyro_bias", "angle_random_walk")
 _NODES = 16  # a walk has a covariance with an edge, which fewer nodes miss by a percent
 # The covariance of a position error over the aperture grows as this power of the aperture time.

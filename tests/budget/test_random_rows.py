@@ -16,6 +16,10 @@ from bisar_budget.faults import MissionError
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.row import Row
 from bisar_budget.mission.load import parse_mission
+from bisar_budget.mission.model import Mission
+from bisar_budget.report.explain.explanation import explain
+from bisar_budget.report.words.sentences import row_size
+from bisar_budget.units import format_quantity
 from tests.conftest import TODAY
 from tests.responses import energy_within, shown_db
 
@@ -115,6 +119,22 @@ def test_both_sides_of_a_limit(kind: str, unit: str, model: str) -> None:
     for factor, status in ((1 - 1e-6, "warn"), (1 + 1e-6, "fail")):
         found = with_error({"imu": {kind: f"{allowable * factor!r} {unit}"}}, allocation={"model": model})
         assert row(found, f"receiver.imu.{kind}").status == status
+
+
+def test_a_scale_factor_is_said_in_the_unit_of_the_file_else_in_ppm() -> None:
+    found = with_error({"imu": {"accelerometer_scale_factor": "0.03 %"}})
+    one = row(found, "receiver.imu.accelerometer_scale_factor")
+    assert (one.unit, one.declared) == ("1", pytest.approx(3e-4))
+    assert format_quantity(one.declared, one.unit) == "300 ppm"
+    assert row_size(one.declared, one, found) == "0.03 %"
+    text = explain(found.analysed().mission, found, one.id)
+    assert "= 1*|0.0003| = 0.0003\n" in text
+    assert " rad per unit\n" in explain(*_by_the_full_model(found.analysed().mission), one.id)
+
+
+def _by_the_full_model(mission: Mission) -> tuple[Mission, MissionFindings]:
+    full = mission._replace(allocation=mission.allocation._replace(model="full"))
+    return full, check_mission(full, TODAY)
 
 
 def test_a_figure_that_nobody_states_still_has_its_allowable() -> None:

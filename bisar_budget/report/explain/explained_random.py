@@ -110,8 +110,9 @@ def _imu(analysis: Analysis, error: RandomError, model: str) -> Iterator[Step]:
         # What is left turns with the line of sight of mid-aperture; only a direct path changes it.
         count = 3 if full.spread != unit.spread else 2
         factors = (1.0, 1.0, mission.allocation.coverage_factor)
+        per_unit = f"rad per {'unit' if error.unit == '1' else error.unit}"
         lines = [
-            f"{part}/unit = {with_unit(value * factor, f'rad per {error.unit}')}"
+            f"{part}/unit = {with_unit(value * factor, per_unit)}"
             for part, value, factor in zip(_PARTS[:count], full[:count], factors, strict=False)
             if value
         ]

@@ -346,8 +346,8 @@ def six_digits(value: float) -> str:
 
 
 def with_unit(value: float, unit: str) -> str:
-    """Six digits and the unit."""
-    return f"{six_digits(value)} {unit.replace('^2', '²')}".rstrip()
+    """Six digits and the unit; nothing behind what is a ratio."""
+    return f"{six_digits(value)} {'' if unit == '1' else unit.replace('^2', '²')}".rstrip()
 
 
 _LATEX, _MATHML = 0, 1
