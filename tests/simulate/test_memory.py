@@ -1,5 +1,6 @@
 """Memory and time of images are known before they are formed, and held, by compiled kernels as by NumPy."""
 
+import itertools
 import re
 import time
 import tracemalloc
@@ -7,6 +8,7 @@ import tracemalloc
 import numpy as np
 import pytest
 
+from bisar_budget.faults import SetValue
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.simulate import far_field, image_formation
 from bisar_budget.simulate.far_field import far_field_filter
@@ -153,17 +155,29 @@ class TestLimit:
 class TestTime:
     """Nobody was told that a simulation takes hours."""
 
-    def test_it_is_foreseen(self) -> None:
-        """Within a factor of ten on a machine that does other things too; here to within two when it rests."""
-        foreseen = []
-        mission = load_mission(str(SECTION_V))
-        simulate_point(mission)  # compiled, imported
-        begun = []
-        simulate_point(
-            mission, foreseen=lambda seconds: (foreseen.append(seconds), begun.append(time.perf_counter()))
-        )
-        took = time.perf_counter() - begun[0]
-        assert took / 10 < foreseen[0] < 10 * took
+    def test_it_is_foreseen_before_it_begins(self, monkeypatch) -> None:
+        """A few pulses are recorded and imaged by the clock, here one that counts how often it is asked."""
+
+        class BegunError(Exception):
+            pass
+
+        def foreseen(pulses: int) -> float:
+            clock, said = itertools.count(), []
+
+            def told(seconds: float) -> None:
+                said.append(seconds)
+                raise BegunError
+
+            with monkeypatch.context() as patched:
+                patched.setattr(time, "perf_counter", lambda: float(next(clock)))
+                mission = load_mission(str(SECTION_V), None, [SetValue("collection.pulses", str(pulses))])
+                with pytest.raises(BegunError):
+                    simulate_point(mission, foreseen=told, progress=lambda *_: pytest.fail("it has begun"))
+            return said[0]
+
+        # Two times of an image and of its record, with errors and without, and one of the scene's.
+        assert foreseen(4096) == pytest.approx(2 * foreseen(2048))
+        assert foreseen(4096) > 2 * 4096 / 64
 
     def test_a_short_verification_is_not_measured(self) -> None:
         assert seconds_to_verify(load_mission(str(SECTION_V))) == 0.0
