@@ -4,7 +4,6 @@
 __all__ = [
     "allocation",
     "analysis",
-    "case",
     "scene",
     "spread",
     "together",

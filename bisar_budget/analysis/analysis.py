@@ -1,7 +1,11 @@
-"""The analysis that a mission's checks share: geometry, every error it can have, and what the models say of them."""
+"""The analysis that a mission's checks share: geometry, every error it can have, and what the models say of them.
+
+Cases of one shape are analysed together; one of them in plain numbers is put into words.
+"""
 
 from collections.abc import Iterator, Mapping
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,16 +15,17 @@ from bisar_budget.analysis.spread import Tone, tones
 from bisar_budget.analysis.together import Together
 from bisar_budget.effects.combined import Correlated, correlated_errors
 from bisar_budget.effects.declared import Declared, DeclaredErrors, Model
-from bisar_budget.effects.effect import ErrorSource, Subject
-from bisar_budget.effects.random_errors import RandomError, random_errors
+from bisar_budget.effects.effect import ErrorSource, Subject, plain
+from bisar_budget.effects.random_errors import RandomError, in_one_case, random_errors
 from bisar_budget.effects.sources import exact_ranges
 from bisar_budget.effects.vibration import DeclaredPhase, slow_phases
 from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.model import Mission, has_instruments
 from bisar_budget.mission.stacked import picked
+from bisar_budget.phrases import Note
 from bisar_budget.ranges.exact_ranges import ExactRanges, nodes_for
 
-__all__ = ["Analysis", "Model"]
+__all__ = ["Analysis", "Case", "Model", "by_nodes"]
 
 
 def by_nodes(
@@ -154,3 +159,50 @@ class Analysis:
     def allocation(self) -> Allocation:
         """Budgets as divided; `balanced` weighs phases by the gating model, under `strictest` the larger of both."""
         return allocate(self.mission, (self.together(model) for model in self.gates))
+
+
+class Case:
+    """One of the cases that were analysed together.
+
+    Parameters
+    ----------
+    analysis : Analysis
+        Of the cases.
+    mission : Mission, optional
+        That of this case, as loaded; omitted: the analysed one, which is the only case.
+    place : int
+        Of this case among them.
+    """
+
+    def __init__(self, analysis: Analysis, mission: Mission | None = None, place: int = 0) -> None:
+        self.analysis, self.mission, self.place = analysis, mission or analysis.mission, place
+
+    def number(self, column: Any) -> float:
+        """The number that this case has in a column (cases,); a number that all cases have is its own."""
+        return plain(column, self.place)
+
+    @cached_property
+    def geometry(self) -> BistaticGeometry:
+        """Its geometry."""
+        return self.mission.geometry
+
+    @cached_property
+    def allocation(self) -> Allocation:
+        """Its budgets as divided."""
+        allocation = self.analysis.allocation
+        return allocation if self.analysis.is_by_itself else allocation.of(self.place)
+
+    @cached_property
+    def random(self) -> list[RandomError]:
+        """Its errors of sensors and clocks, in the order of the analysis."""
+        if self.analysis.is_by_itself:
+            return self.analysis.random
+        return [in_one_case(self.mission, error, self.place) for error in self.analysis.random]
+
+    def does(self, model: Model, source: ErrorSource) -> Declared:
+        """Effect of a declared error by a model."""
+        return self.analysis.errors.does(model.name, source).in_one_case(self.place)
+
+    def degeneracy(self, model: str) -> Note:
+        """Why a model has no displacement here; nothing where it has one."""
+        return self.analysis.errors.degeneracy(model, self.place)

@@ -5,7 +5,6 @@ __all__ = [
     "aggregates",
     "check",
     "doubts",
-    "fleet",
     "judged_mission",
     "judged_requirements",
     "judged_rows",

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 from bisar_budget import phrases
-from bisar_budget.analysis.case import Case
+from bisar_budget.analysis.analysis import Case
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.effect import PLATFORMS, Subject
 from bisar_budget.findings.row import Row

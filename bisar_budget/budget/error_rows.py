@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from bisar_budget import phrases
-from bisar_budget.analysis.analysis import Analysis, Model
-from bisar_budget.analysis.case import Case
+from bisar_budget.analysis.analysis import Analysis, Case, Model
 from bisar_budget.budget.judged_rows import BOUND, CODE, REQUIREMENTS, Floats, Judged, Judging, number_of, worded
 from bisar_budget.budget.pull_in import caps, needed_sentence
 from bisar_budget.constants import UTILIZATION_TOLERANCE

@@ -7,7 +7,7 @@ of; the line of the key is looked up here, once.
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from bisar_budget.analysis.case import Case
+from bisar_budget.analysis.analysis import Case
 from bisar_budget.budget.doubts import input_doubts
 from bisar_budget.budget.pull_in import ROOM, caps, rounded_down
 from bisar_budget.effects.effect import PLATFORMS

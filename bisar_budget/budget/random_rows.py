@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from bisar_budget import phrases
 from bisar_budget.analysis.allocation import Allocation
-from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.analysis.case import Case
+from bisar_budget.analysis.analysis import Analysis, Case
 from bisar_budget.analysis.spread import (
     CUBIC_POWER,
     SpreadPhase,

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget import phrases
-from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.analysis.case import Case
+from bisar_budget.analysis.analysis import Analysis, Case
 from bisar_budget.analysis.spread import Tone, islr_of
 from bisar_budget.analysis.vibration_limits import (
     LARGEST_ECHO,

@@ -42,7 +42,7 @@ from bisar_budget.faults import closed, fault_words, printable
 from bisar_budget.report import FORMATS
 
 if TYPE_CHECKING:
-    from bisar_budget.budget.fleet import Draws
+    from bisar_budget.budget.check import Draws
     from bisar_budget.budget.waivers import Outside
     from bisar_budget.faults import SetValue
     from bisar_budget.findings.mission import MissionFindings, Option, Report, UnusableMission
@@ -290,7 +290,7 @@ def check(
     )
     says_faults = format_name != "text" or output is not None or quiet or not is_terminal()
     if FORMATS[format_name].is_piecewise and not (written or verifying or draws):
-        from bisar_budget.budget.fleet import check_files
+        from bisar_budget.budget.check import check_files
 
         keep = partial(piece, format_name=format_name, style=style)
         pieces = check_files(files, judged_on, model, keep, changes=changes, outside=from_outside)
@@ -380,7 +380,7 @@ def check_all(
     `drawn` are the draws of a Monte Carlo, `changes` are values in place of the files', and `from_outside` is what
     else bears on the verdicts.
     """
-    from bisar_budget.budget.fleet import check_files, whole, without_analysis
+    from bisar_budget.budget.check import check_files, whole, without_analysis
     from bisar_budget.budget.waivers import NOTHING_OUTSIDE
     from bisar_budget.findings.mission import Report
 
@@ -397,7 +397,7 @@ def _with_images(
     missions: "Sequence[MissionFindings | UnusableMission]", today: date, illustrated: bool
 ) -> "list[MissionFindings | UnusableMission]":
     """Add the verdicts of images, and the images of the rows that decide most."""
-    from bisar_budget.budget.fleet import without_analysis
+    from bisar_budget.budget.check import without_analysis
     from bisar_budget.budget.verdicts import with_verdicts
     from bisar_budget.cli.verify import verify_all
     from bisar_budget.findings.mission import MissionFindings

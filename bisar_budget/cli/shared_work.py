@@ -15,7 +15,7 @@ from bisar_budget.constants import MAX_DRAWS, MAX_DRAWS_HERE
 from bisar_budget.faults import printable
 
 if TYPE_CHECKING:
-    from bisar_budget.budget.fleet import Draws
+    from bisar_budget.budget.check import Draws
     from bisar_budget.cluster.scheduler import Workers
     from bisar_budget.design.sweep import Asked
     from bisar_budget.design.table import Swept
@@ -117,7 +117,7 @@ def drawn_by(
     if draws is None:
         yield None
         return
-    from bisar_budget.budget.fleet import MANY, Draws
+    from bisar_budget.budget.check import MANY, Draws
     from bisar_budget.monte_carlo.draws import in_turn, shared_out
 
     with workers_of(scheduler, patience) as workers:

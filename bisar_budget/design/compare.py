@@ -7,8 +7,7 @@ from collections.abc import Iterator, Sequence
 from datetime import date
 from typing import Any, NamedTuple
 
-from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.analysis.case import Case
+from bisar_budget.analysis.analysis import Analysis, Case
 from bisar_budget.budget.judged_mission import JudgedMission, judged_mission
 from bisar_budget.budget.requirement_table import rows_in_words
 from bisar_budget.design.quantities import QuestionError, tree_of

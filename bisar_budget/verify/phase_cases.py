@@ -4,7 +4,7 @@ import math
 from typing import Any
 
 from bisar_budget.analysis.allocation import range_walk_cap
-from bisar_budget.analysis.case import Case
+from bisar_budget.analysis.analysis import Case
 from bisar_budget.analysis.vibration_limits import slow_limits
 from bisar_budget.budget.doubts import COARSE_CELL_RAD, phase_across_a_cell
 from bisar_budget.budget.pull_in import ROOM

@@ -6,7 +6,7 @@ from datetime import date
 
 import pytest
 
-from bisar_budget.analysis.case import Case
+from bisar_budget.analysis.analysis import Case
 from bisar_budget.budget.check import check_mission
 from bisar_budget.budget.doubts import model_doubt
 from bisar_budget.findings.mission import MissionFindings, Report

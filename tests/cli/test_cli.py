@@ -88,7 +88,7 @@ def test_a_crash_is_3_never_1(run, good, monkeypatch) -> None:
     def crash(*args):
         raise ZeroDivisionError("boom")
 
-    monkeypatch.setattr("bisar_budget.budget.fleet.check_missions", crash)
+    monkeypatch.setattr("bisar_budget.budget.check.check_missions", crash)
     result = run("check", good)
     assert result.exit_code == 3
     assert "fault of the tool" in result.stderr

@@ -23,7 +23,7 @@ import pytest
 from click.testing import CliRunner
 
 from bisar_budget import resources
-from bisar_budget.budget import fleet
+from bisar_budget.budget import check as checking
 from bisar_budget.budget.check import check_mission
 from bisar_budget.cli import _end as end
 from bisar_budget.cli import cli
@@ -450,8 +450,8 @@ class TestTargets:
         settings.write_text("[tool.bisar-budget]\n")
         assert run("check", mission.name, "-o", settings.name, cwd=mission.parent).returncode == 2
         assert settings.read_text() == "[tool.bisar-budget]\n"
-        monkeypatch.setattr(fleet, "MANY", 2)
-        monkeypatch.setattr(fleet, "cores", lambda: 2)
+        monkeypatch.setattr(checking, "MANY", 2)
+        monkeypatch.setattr(checking, "cores", lambda: 2)
         part = mission.with_name("part.yaml")
         part.write_text("kind: oscillator\n")  # is read, and is no part
         named = mission.with_name("n.yaml")
@@ -866,13 +866,13 @@ class TestSystem:
     def while_checking(self, mission, statement: str, **variables: str) -> subprocess.CompletedProcess:
         """Check a mission, with something else going on meanwhile."""
         script = (
-            "import warnings, bisar_budget.budget.fleet as fleet\n"
+            "import warnings, bisar_budget.budget.check as checking\n"
             "from bisar_budget.cli import main\n"
-            "real = fleet.check_missions\n"
+            "real = checking.check_missions\n"
             "def check_missions(*given, **named):\n"
             f"    {statement}\n"
             "    return real(*given, **named)\n"
-            "fleet.check_missions = check_missions\n"
+            "checking.check_missions = check_missions\n"
             "main()\n"
         )
         environment = {**os.environ, "PYTHONPATH": str(ROOT), **variables}

@@ -4,7 +4,7 @@ from datetime import date
 
 import pytest
 
-from bisar_budget.budget import fleet
+from bisar_budget.budget import check
 from bisar_budget.findings.mission import Report
 from bisar_budget.report import Style, render
 from tests.conftest import mission_text
@@ -27,12 +27,12 @@ def files(tmp_path):
 
 @pytest.mark.parametrize("cores", [2, 3, 16])
 def test_every_format_says_the_same_for_any_number_of_processes(files, monkeypatch, cores: int) -> None:
-    monkeypatch.setattr(fleet, "MANY", 2)
-    monkeypatch.setattr(fleet, "AT_ONCE", 2)
-    monkeypatch.setattr(fleet, "cores", lambda: 1)
-    one = fleet.check_files(files, DAY, None, fleet.without_analysis)
-    monkeypatch.setattr(fleet, "cores", lambda: cores)
-    several = fleet.check_files(files, DAY, None, fleet.without_analysis)
+    monkeypatch.setattr(check, "MANY", 2)
+    monkeypatch.setattr(check, "AT_ONCE", 2)
+    monkeypatch.setattr(check, "cores", lambda: 1)
+    one = check.check_files(files, DAY, None, check.without_analysis)
+    monkeypatch.setattr(check, "cores", lambda: cores)
+    several = check.check_files(files, DAY, None, check.without_analysis)
     assert [found.file for found in several] == files
     assert [found.status for found in several].count("error") == 2
     for format_name in ("text", "json", "sarif", "junit", "csv"):  # SARIF knows each value's column
@@ -41,15 +41,15 @@ def test_every_format_says_the_same_for_any_number_of_processes(files, monkeypat
 
 
 def test_standard_input_is_read_once_by_one_process(monkeypatch) -> None:
-    monkeypatch.setattr(fleet, "MANY", 1)
-    monkeypatch.setattr(fleet, "_kept", lambda files, **_: list(files))
-    assert fleet.check_files(["a", "-", "b"], DAY, None, fleet.without_analysis) == ["a", "-", "b"]
+    monkeypatch.setattr(check, "MANY", 1)
+    monkeypatch.setattr(check, "_kept", lambda files, **_: list(files))
+    assert check.check_files(["a", "-", "b"], DAY, None, check.without_analysis) == ["a", "-", "b"]
 
 
 def test_the_command_checks_a_fleet(run, files, monkeypatch) -> None:
     serial = run("check", "-q", *files)
-    monkeypatch.setattr(fleet, "MANY", 2)
-    monkeypatch.setattr(fleet, "cores", lambda: 2)
+    monkeypatch.setattr(check, "MANY", 2)
+    monkeypatch.setattr(check, "cores", lambda: 2)
     parallel = run("check", "-q", *files)
     assert parallel.exit_code == serial.exit_code == 2
     assert parallel.stdout == serial.stdout
