@@ -67,8 +67,8 @@ def check_missions(
 ) -> Iterator[tuple[int, MissionFindings]]:
     """Check missions, those of one shape together; each with its place, in any order.
 
-    What is found of a mission is what `check_mission` finds. Others that are checked beside it change none of its words;
-    they may change digits beyond those that a search settles to, and what cancels to rounding.
+    What is found of a mission is what `check_mission` finds. Others that are checked beside it change none of its
+    words; they may change digits beyond those that a search settles to, and what cancels to rounding.
     """
     if len(missions) == 1:
         yield 0, check_mission(missions[0], today, outside=outside)

@@ -18,7 +18,6 @@ from bisar_budget.findings.row import Row
 from bisar_budget.geometry import norm
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import Platform
-from bisar_budget.paths.earth import free_fall
 from bisar_budget.phrases import Note, phrase
 from bisar_budget.units import format_quantity
 
@@ -138,6 +137,8 @@ def straight_orbits(mission: Mission) -> Iterator[_Warned]:
         if speed <= FASTEST_FLIGHT or platform.acceleration is not None or platform.is_of_the_earth:
             continue
         key = ("platforms", name, "speed" if platform.velocity is None else "velocity")
+        from bisar_budget.paths.earth import free_fall  # 8 ms, and most missions do not come here
+
         acceleration = free_fall(platform.state.position, platform.state.velocity, axes)
         yield _Warned(key, satellite_flies_straight(name, speed, acceleration, axes is not None), is_doubt=True)
 

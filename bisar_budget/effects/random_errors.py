@@ -28,7 +28,6 @@ from bisar_budget.geometry import BistaticGeometry, PlatformState, Vector
 from bisar_budget.mission.instruments import IMU_KINDS, GaussMarkov, Oscillator
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
-from bisar_budget.paths.earth import free_fall
 from bisar_budget.phrases import NOTHING, Note
 from bisar_budget.ranges.exact_ranges import ExactRanges
 
@@ -203,6 +202,8 @@ def specific_force(mission: Mission, state: PlatformState) -> Vector:
 
     Where it falls freely that is nothing. On the Earth g has what its rotation adds (`earth.free_fall`).
     """
+    from bisar_budget.paths.earth import free_fall  # 8 ms, and most missions name no sensor
+
     x, y, z = state.acceleration
     u, v, w = free_fall(state.position, state.velocity, mission.scene.axes)
     return (x - u, y - v, z - w)

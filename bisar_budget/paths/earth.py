@@ -138,8 +138,13 @@ def earth_fixed_places(latitude: Any, longitude: Any, height: Any) -> Floats:
 
 
 def earth_fixed(place: Geodetic) -> Vector:
-    """Earth-fixed coordinates of a geodetic place. [m]"""
-    x, y, z = earth_fixed_places(*place).tolist()
+    """Earth-fixed coordinates of a geodetic place, or of those of many cases. [m]"""
+    return _vector(earth_fixed_places(*np.broadcast_arrays(*place)))
+
+
+def _vector(coordinates: Floats) -> Vector:
+    """Three numbers of coordinates (3,), or three arrays (cases,) of (cases, 3)."""
+    x, y, z = (one if one.ndim else one.item() for one in np.moveaxis(coordinates, -1, 0))
     return (x, y, z)
 
 
@@ -191,8 +196,8 @@ def _directions(latitude: Any, longitude: Any) -> Floats:
 
 
 def axes_at(place: Geodetic) -> SceneAxes:
-    """East, north and up at a place."""
-    east, north, up = map(tuple, _directions(place.latitude, place.longitude).tolist())
+    """East, north and up at a place, or at those of many cases."""
+    east, north, up = map(_vector, _directions(*np.broadcast_arrays(place.latitude, place.longitude)))
     return SceneAxes(earth_fixed(place), (east, north, up))
 
 

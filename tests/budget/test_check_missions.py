@@ -12,6 +12,7 @@ from bisar_budget.budget.check import check_mission, check_missions
 from bisar_budget.design.quantities import QuestionError
 from bisar_budget.design.varied import scaled, varied
 from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.faults import SetValue
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.mission.model import Mission
@@ -98,6 +99,15 @@ def test_what_only_names_a_mission_is_no_part_of_its_shape() -> None:
     assert (ids[0]["transmitter.velocity.x"], ids[1]["transmitter.velocity.x"]) == ("REQ-1", None)
     lines = [[row.line for row in one.rows if row.line is not None] for one in (first, second)]
     assert lines[0] != lines[1]
+
+
+def test_places_of_scenes_on_the_earth_differ() -> None:
+    """Axes there were those of numbers: gravity of many scenes pointed anywhere."""
+    path = str(ROOT / "specs" / "missions" / "sentinel1_aircraft_log.yaml")
+    places = ["48.0866", "48.0876"]
+    missions = [load_mission(path, None, [SetValue("scene.latitude", f"{one} deg")]) for one in places]
+    assert len(list(stacked(missions))) == 1
+    assert_found_alike(missions)
 
 
 def test_a_waiver_holds_for_its_own_mission_only() -> None:
