@@ -88,7 +88,7 @@ def check_missions(
 
 
 def _findings(judged: JudgedMission, case: Case, today: date, outside: Outside) -> MissionFindings:
-    """What is found of one of the judged cases, in words."""
+    """Findings about one of the judged cases, in words."""
     mission, geometry = case.mission, case.geometry
     waived = apply_waivers(list(rows_in_words(judged, case)), mission, today)
     rows, requirements = waived.rows, requirements_in_words(judged, case, waived)

@@ -198,7 +198,7 @@ def _parts_of_largest(values: Floats) -> tuple[Floats, Floats]:
 
 # ---------------------------------------------------------------------- inertial sensors
 def specific_force(mission: Mission, state: PlatformState) -> Vector:
-    """What the accelerometers of a platform measure, f = a − g, in the axes of the scene. [m/s²]
+    """Specific force of a platform, f = a − g, which accelerometers measure, in the axes of the scene. [m/s²]
 
     Where it falls freely that is nothing. On the Earth g has what its rotation adds (`earth.free_fall`).
     """
