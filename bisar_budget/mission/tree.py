@@ -17,6 +17,7 @@ from bisar_budget.mission.readers import INVALID
 
 MAX_BYTES = 1 << 20  # a mission file has a few kilobytes
 MAX_DEPTH = 20  # containers inside each other; the schema needs 9
+TOO_DEEP = f"is nested more than {MAX_DEPTH} deep"
 MAX_VALUES = 100_000  # the longest lists that the schema takes come to a third
 MAX_FAULTS = 200  # nobody mends more at once, and each costs a line of every report
 
@@ -144,7 +145,7 @@ class Tree:
             self.fault(mark, path, "is an alias (*)", accepted="write the value out")
             return INVALID
         elif len(path) >= MAX_DEPTH:
-            self.fault(mark, (), f"is nested more than {MAX_DEPTH} deep")
+            self.fault(mark, (), TOO_DEEP)
             raise UnusableError
         elif kind is yaml.MappingStartEvent:
             value = self._mapping(next_event, path)
@@ -232,6 +233,8 @@ def read_tree(data: bytes | str, file: str, what: str = "mission") -> Tree:
     except yaml.MarkedYAMLError as error:
         place = error.problem_mark or error.context_mark
         problem = f"is not valid YAML: {', '.join(filter(None, (error.context, error.problem)))}"
+        if "maximum nesting depth" in (error.problem or ""):  # of libyaml, which scans ahead of what is read
+            problem = TOO_DEEP
         tree.fault(place, (), problem)
         raise MissionError(file, tuple(tree.faults)) from None
     except yaml.reader.ReaderError as error:
