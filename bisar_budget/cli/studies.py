@@ -17,7 +17,7 @@ from bisar_budget.findings.trade import TradeStudy
 from bisar_budget.mission.model import Mission
 from bisar_budget.report import FORMATS
 from bisar_budget.report.drawing.trades import Gathered, uses_of_rows
-from bisar_budget.report.tables.described import Described
+from bisar_budget.report.tables import Described
 from bisar_budget.resources import cores
 
 MAX_CASES = 40_000  # of a page, which has no room for more

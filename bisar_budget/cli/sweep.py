@@ -250,9 +250,7 @@ class _Run:
 
     def write(self, output: str | None, plot: str | None, plot_column: str | None, is_polar: bool) -> None:
         """Check the cases, write the table as they come, then the plot, and say what was found."""
-        from bisar_budget.report.tables import writer_of
-        from bisar_budget.report.tables.cases_csv import texts
-        from bisar_budget.report.tables.described import Described
+        from bisar_budget.report.tables import Described, texts, writer_of
 
         writer = writer_of(os.path.splitext(output)[1].lower()) if output not in (None, "-") else None
         columns = self.columns
@@ -315,7 +313,7 @@ class _Run:
         from bisar_budget.report.drawing.figure import drawing_file
         from bisar_budget.report.drawing.trade_drawing import head_of, trade_drawing
         from bisar_budget.report.drawing.trades import Gathered, uses_of_rows
-        from bisar_budget.report.tables.described import Described
+        from bisar_budget.report.tables import Described
 
         def again(columns: Sequence[str]) -> Gathered:
             swept = self.swept(self.cases, columns)

@@ -20,10 +20,7 @@ from bisar_budget.faults import SetValue
 from bisar_budget.mission.load import load_mission
 from bisar_budget.mission.tree import read_tree
 from bisar_budget.report import tables
-from bisar_budget.report.tables import TABLES, MissingTablesError, writer_of
-from bisar_budget.report.tables.dataset import dataset
-from bisar_budget.report.tables.described import Described
-from bisar_budget.report.tables.netcdf import slabs
+from bisar_budget.report.tables import TABLES, Described, MissingTablesError, dataset, slabs, writer_of
 from tests.conftest import ROOT
 
 FILE = ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml"
@@ -123,10 +120,10 @@ def test_parquet_has_groups_of_many_rows(tmp_path: Path, monkeypatch: pytest.Mon
     """Not one for each part, which would make a file of a million cases slow to read; nor one for all."""
     import pyarrow.parquet as pq
 
-    from bisar_budget.report.tables import parquet
+    from bisar_budget.report import tables
 
-    monkeypatch.setattr(parquet, "_ROWS", 10)
-    assert [part[-1].stop - part[0].start for part in parquet._groups(swept(TABLE, 4).parts)] == [12, 12]
+    monkeypatch.setattr(tables, "_ROWS", 10)
+    assert [part[-1].stop - part[0].start for part in tables._groups(swept(TABLE, 4).parts)] == [12, 12]
     file = pq.ParquetFile(written(".parquet", TABLE, tmp_path, 4))
     assert [file.metadata.row_group(group).num_rows for group in range(file.metadata.num_row_groups)] == [12, 12]
     assert file.read().column("utilization").to_pylist()[23] == 23 / 7

@@ -34,7 +34,7 @@ from bisar_budget.report.drawing.trades import (
     runs,
     thinned,
 )
-from bisar_budget.report.tables.described import Described
+from bisar_budget.report.tables import Described
 from tests.conftest import ROOT
 from tests.drawing import SVG, Drawing
 

@@ -13,7 +13,7 @@ from bisar_budget.design.table import Part, Values
 from bisar_budget.findings.trade import Axis, Trade
 from bisar_budget.mission.readers import DIRECTION
 from bisar_budget.report.drawing.svg import Point
-from bisar_budget.report.tables.described import Described
+from bisar_budget.report.tables import Described
 
 MAX_CASES = 4_000_000  # of a plot: more than a screen has pixels
 ROWS = 7  # curves, at most
