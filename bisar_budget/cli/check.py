@@ -481,7 +481,7 @@ def _step_summary(format_name: str) -> str | None:
 
 def _append_step_summary(path: str, report: "Report", style: "Style") -> None:
     """Add to the page of the run on GitHub; that it cannot be written changes no exit code."""
-    from bisar_budget.report.formats.github import step_summary
+    from bisar_budget.report.formats.annotations import step_summary
 
     try:
         with open(path, "a", encoding="utf-8", errors="backslashreplace", newline="\n") as file:

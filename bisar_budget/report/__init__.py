@@ -1,8 +1,9 @@
-"""Findings as text: a module per format, found here by name, with one pure function `render(report, style) -> str`.
+"""Findings as text: each format has a module, found here by name, with a pure function of the format's name.
 
-A format that says one mission after the other has two in its stead, `piece(mission, style) -> str` and
-`joined(pieces, version, style) -> str`: a thousand missions can be written where each is checked, and their findings
-forgotten. One that has pictures beside its text has a function `pictures(report, style)` too.
+That of SARIF is `as_sarif(report, style) -> str`. A format that says one mission after the other has two in its
+stead, `piece(mission, style) -> str` and `joined(pieces, version, style) -> str`: a thousand missions can be written
+where each is checked, and their findings forgotten. One that has pictures beside its text has a function
+`pictures(report, style)` too.
 """
 
 from collections.abc import Mapping, Sequence
@@ -33,13 +34,13 @@ _FORMATS = (
     Format("text", "text_table", (".txt",), is_piecewise=True),
     Format("json", "json_document", (".json",), is_piecewise=True),
     Format("csv", "csv_table", (".csv",), is_piecewise=True),
-    Format("junit", "junit_xml", (".xml",), "test cases"),
-    Format("sarif", "sarif_log", (".sarif", ".sarif.json"), "code scanning"),
-    Format("github", "github", (), "annotations of a pull request"),
-    Format("needs", "needs_json", (".needs.json",), "Sphinx-Needs"),
-    Format("html", "html_page", (".html", ".htm"), "a compliance report for a review board", is_illustrated=True),
+    Format("junit", "traceability", (".xml",), "test cases"),
+    Format("sarif", "annotations", (".sarif", ".sarif.json"), "code scanning"),
+    Format("github", "annotations", (), "annotations of a pull request"),
+    Format("needs", "traceability", (".needs.json",), "Sphinx-Needs"),
+    Format("html", "documents", (".html", ".htm"), "a compliance report for a review board", is_illustrated=True),
     Format(
-        "markdown", "markdown_page", (".md", ".markdown"), "the same with its drawings beside it",
+        "markdown", "documents", (".md", ".markdown"), "the same with its drawings beside it",
         is_illustrated=True, has_pictures=True,
     ),
 )  # fmt: skip
@@ -82,7 +83,7 @@ def render(format_name: str, report: "Report", style: Style) -> str:
     if FORMATS[format_name].is_piecewise:
         pieces = [piece(mission, format_name, style) for mission in report.missions]
         return joined(format_name, pieces, report.version, style)
-    text: str = _module(format_name).render(report, style)
+    text: str = getattr(_module(format_name), f"as_{format_name}")(report, style)
     return text
 
 

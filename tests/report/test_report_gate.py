@@ -19,7 +19,7 @@ from bisar_budget.faults import Fault
 from bisar_budget.findings.mission import Report, UnusableMission
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.report import FORMATS, Style, format_of, render
-from bisar_budget.report.formats.github import step_summary
+from bisar_budget.report.formats.annotations import step_summary
 from bisar_budget.report.words import sentences
 from tests.conftest import COMPLIES, ROOT, TODAY, findings, mission_text
 from tests.page import read_page

@@ -1,23 +1,139 @@
-"""Findings that need attention as SARIF 2.1.0: code scanning and editors show them at the value in the mission file.
+"""Findings that need attention, at the value in the mission file: commands of GitHub's runner, and SARIF 2.1.0.
 
-Only findings are results: rows that pass, judge nothing or are not declared are not in it, and a requirement is where
-no row shows how it stands. What is waived is a result with a suppression, a file that cannot be used gives
-notifications of the tool.
+Rows that pass, judge nothing or are not declared are not in them, and a requirement is where no row shows how it
+stands; so is what from outside a file bears on its verdict.
 """
 
 import json
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
 
-from bisar_budget.faults import Fault, Place, printable
-from bisar_budget.findings.mission import FileWarning, MissionFindings, Report, UnusableMission
+from bisar_budget.faults import Fault, Place, Region, changes_words, printable
+from bisar_budget.findings.mission import MissionFindings, Report, UnusableMission
 from bisar_budget.findings.requirement import JudgedRequirement
-from bisar_budget.findings.row import AppliedWaiver, Row
+from bisar_budget.findings.row import AppliedWaiver, Row, worst_first
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
 from bisar_budget.report.words.identity import Identity, digest, identities, source_path
 from bisar_budget.report.words.requirements import overrides_words, requirement_finding, requirement_id, unseen
-from bisar_budget.report.words.sentences import finding, uri
+from bisar_budget.report.words.sentences import (
+    command_property,
+    command_text,
+    finding,
+    markdown_text,
+    percent,
+    uri,
+)
+
+_ORDER = ("error", "warning", "notice")
+_SHOWN_IN_SUMMARY = 20
+
+
+class _Annotation(NamedTuple):
+    command: str
+    file: str
+    region: Region | None
+    title: str
+    message: str
+
+
+def as_github(report: Report, style: Style) -> str:
+    """Write one command per finding; a run without findings says so in a line that is no command.
+
+    The runner shows ten errors and ten warnings of a step, so the worst come first.
+    """
+    annotations = sorted(_annotations(report, style), key=lambda found: _ORDER.index(found.command))
+    lines = [_command(annotation) for annotation in annotations]
+    return "\n".join(lines or [f"bisar-budget: {_counted(report)}, no findings"]) + "\n"
+
+
+def _annotations(report: Report, style: Style) -> Iterator[_Annotation]:
+    for mission in report.missions:
+        file = source_path(mission.file, style)
+        if isinstance(mission, UnusableMission):
+            for fault in mission.faults:
+                yield _Annotation("error", file, _place(fault), "Unusable mission file", str(fault))
+            continue
+        for one in unseen(mission):
+            title = f"{STATUS[one.status].text} {requirement_id(one)}"
+            yield _Annotation(STATUS[one.status].github, file, _region_of(one.line), title, requirement_finding(one))
+        if outside := overrides_words(mission):
+            yield _Annotation("notice", file, None, "From outside the file", outside)
+        for row in worst_first(mission.rows):
+            if command := STATUS[row.status].github:
+                title = f"{STATUS[row.status].text} {row.id}"
+                yield _Annotation(command, file, _region_of(row.line), title, finding(row, mission))
+        for warning in mission.warnings:
+            yield _Annotation("warning", file, _region_of(warning.line), "Mission file", warning.message)
+
+
+def _place(fault: Fault) -> Region | None:
+    return None if fault.line is None else Region(fault.line, fault.column or 1)
+
+
+def _region_of(line: int | None) -> Region | None:
+    if isinstance(line, Place):
+        return line.region
+    return None if line is None else Region(line, 1)
+
+
+def _command(annotation: _Annotation) -> str:
+    properties = {"file": annotation.file} if annotation.file != "-" else {}
+    region = annotation.region
+    if region is not None and properties:  # a line of standard input is no place in a repository
+        properties |= {"line": str(region.line)}
+        if region.end_line is not None and region.end_line != region.line:
+            properties |= {"endLine": str(region.end_line)}  # GitHub takes columns within one line only
+        else:
+            properties |= {"col": str(region.column)}
+            properties |= {"endColumn": str(region.end_column)} if region.end_column is not None else {}
+    properties |= {"title": annotation.title}
+    written = ",".join(f"{key}={command_property(value)}" for key, value in properties.items())
+    return f"::{annotation.command} {written}::{command_text(annotation.message)}"
+
+
+def _counted(report: Report) -> str:
+    count = len(report.missions)
+    return f"{count} mission{'s' if count != 1 else ''}"
+
+
+def step_summary(report: Report, style: Style) -> str:
+    """Write the table that GitHub shows on the page of the run, as Markdown."""
+    lines = [f"### bisar-budget: {STATUS[report.status].text}, {_counted(report)}", ""]
+    lines += ["| status | mission | worst row | use |", "| --- | --- | --- | --- |"]
+    for mission in report.missions:
+        file = markdown_text(source_path(mission.file, style))
+        if isinstance(mission, UnusableMission):
+            fault = markdown_text(str(mission.faults[0]))
+            lines.append(f"| {STATUS['error'].text} | {file} | {fault} | |")
+            continue
+        row, use = worst_first(mission.rows)[0], ""
+        if row.utilization is not None and row.allowable is not None:
+            use = percent(row.utilization)
+        if mission.changes:
+            file += " " + markdown_text(changes_words(mission.changes))
+        if outside := overrides_words(mission, with_changes=False):
+            file += "; from outside the file: " + markdown_text(outside)
+        status = STATUS[mission.status].text + ("; each error alone" if mission.combine == "each" else "")
+        lines.append(f"| {status} | {file} | {markdown_text(row.id)} | {use} |")
+    usable = [mission for mission in report.missions if isinstance(mission, MissionFindings)]
+    broken = [
+        f"- {markdown_text(requirement_finding(one))}"
+        for mission in usable
+        for one in mission.requirements
+        if STATUS[one.status].fails
+    ]
+    broken += [
+        f"- {markdown_text(finding(row, mission))}"
+        for mission in usable
+        for row in mission.rows
+        if STATUS[row.status].fails
+    ]
+    lines += ["", *broken[:_SHOWN_IN_SUMMARY]] if broken else []
+    if len(broken) > _SHOWN_IN_SUMMARY:
+        lines.append(f"- and {len(broken) - _SHOWN_IN_SUMMARY} more")
+    return "\n".join(lines) + "\n\n"
+
 
 SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
 SRCROOT = "%SRCROOT%"
@@ -74,8 +190,11 @@ RULES = {
 _RULE_INDEX = {rule: index for index, rule in enumerate(RULES)}
 
 
-def render(report: Report, style: Style) -> str:
-    """Write one log with one run."""
+def as_sarif(report: Report, style: Style) -> str:
+    """Write one log with one run: code scanning and editors show it.
+
+    What is waived is a result with a suppression, a file that cannot be used gives notifications of the tool.
+    """
     results: list[dict[str, Any]] = []
     notifications = []
     artifacts: dict[str, dict[str, Any]] = {}  # by URI: a file may be named in two ways
@@ -88,7 +207,10 @@ def render(report: Report, style: Style) -> str:
             continue
         results += [_requirement(one, mission, artifact, identity) for one in unseen(mission)]
         results += [_result(row, mission, artifact, identity) for row in mission.rows if STATUS[row.status].sarif]
-        results += [_warning(warning, artifact, identity) for warning in mission.warnings]
+        results += [
+            _located("mission_file", "warning", one.message, one.line, artifact, identity.of(one.message))
+            for one in mission.warnings
+        ]
         if outside := overrides_words(mission):
             said = f"From outside the file: {outside}"
             name = identity.of("from outside the file")
@@ -198,11 +320,6 @@ def _properties(**values: str | float | None) -> dict[str, str | float]:
     }
 
 
-def _warning(warning: FileWarning, artifact: dict[str, Any], identity: Identity) -> dict[str, Any]:
-    name = identity.of(warning.message)
-    return _located("mission_file", "warning", warning.message, warning.line, artifact, name)
-
-
 def _located(
     rule: str, level: str, message: str, line: int | None, artifact: dict[str, Any], name: tuple[str, ...]
 ) -> dict[str, Any]:
@@ -214,20 +331,16 @@ def _located(
         "message": {"text": printable(message)},
         "locations": [
             {
-                "physicalLocation": {"artifactLocation": artifact, "region": _region(line)},
+                "physicalLocation": {"artifactLocation": artifact, "region": _sarif_region(line)},
                 "logicalLocations": [{"fullyQualifiedName": printable(name[-1]), "kind": "member"}],
             }
         ],
         # Code scanning tells an old alert from a new one by this key alone.
-        "partialFingerprints": {"primaryLocationLineHash": _fingerprint(rule, *name)},
+        "partialFingerprints": {"primaryLocationLineHash": digest(rule, *name)[:16] + ":1"},
     }
 
 
-def _fingerprint(*parts: str) -> str:
-    return digest(*parts)[:16] + ":1"
-
-
-def _region(line: int | None) -> dict[str, int]:
+def _sarif_region(line: int | None) -> dict[str, int]:
     if not isinstance(line, Place):
         return {"startLine": 1 if line is None else line}
     start, column, end, end_column = line.region

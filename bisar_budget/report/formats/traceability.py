@@ -1,0 +1,270 @@
+"""Every requirement and row for tools that trace them: test cases of JUnit XML, `needs.json` of Sphinx-Needs."""
+
+import json
+import re
+from collections import Counter
+from collections.abc import Container, Iterable, Iterator, Sequence
+from functools import cache
+from typing import Any
+
+from bisar_budget.faults import changes_words
+from bisar_budget.findings.mission import MissionFindings, Report, UnusableMission
+from bisar_budget.findings.requirement import JudgedRequirement
+from bisar_budget.findings.row import Row
+from bisar_budget.findings.status import STATUS
+from bisar_budget.report import Style
+from bisar_budget.report.words.identity import Identity, distinct, identities, stem
+from bisar_budget.report.words.requirements import (
+    declared_words,
+    overrides_words,
+    requirement_finding,
+    requirement_id,
+)
+from bisar_budget.report.words.sentences import cause, measure, need_text, rst_text, xml_text
+
+
+def as_junit(report: Report, style: Style) -> str:
+    """Write a suite per mission, a case per requirement and row, which GitLab, Jenkins and requirements tools read.
+
+    The shape is that of Jenkins' junit-10, with properties of cases as pytest writes them. What breaks a requirement
+    is a failure, what judges nothing is skipped, a file that cannot be used is an error; a warning passes and says so
+    in its output. There are no times: a report is the same in every run.
+
+    Nothing is indented, and a row without verdict has no properties but its values: a fleet has 10⁵ rows.
+    """
+    counts: Counter[str] = Counter()
+    suites: list[str] = []
+    named = identities(report.missions, style)
+    class_names = distinct([_class_name(one) for one in named], [(one.name,) for one in named])
+    for mission, identity, class_name in zip(report.missions, named, class_names, strict=True):
+        place = xml_text(class_name), identity.path
+        suites += _unusable_suite(mission, *place, counts) if isinstance(mission, UnusableMission) else ()
+        suites += _suite_of(mission, *place, counts) if isinstance(mission, MissionFindings) else ()
+    head = f'<testsuites name="bisar-budget" tests="{counts["tests"]}" failures="{counts["failures"]}"'
+    lines = ['<?xml version="1.0" encoding="UTF-8"?>', f'{head} errors="{counts["errors"]}" time="0">', *suites]
+    return "\n".join([*lines, "</testsuites>"]) + "\n"
+
+
+def _unusable_suite(mission: UnusableMission, class_name: str, file: str, counts: Counter[str]) -> Iterator[str]:
+    counts.update(tests=1, errors=1)
+    yield _suite(file, tests=1, failures=0, errors=1, skipped=0)
+    yield f'<testcase classname="{class_name}" name="mission file" time="0">'
+    count = len(mission.faults)
+    message = f"cannot be used, {count} fault{'s' if count != 1 else ''}: {mission.faults[0]}"
+    places = [f"{file}:{f.line or '-'}:{f.column or '-'}: {f}" for f in mission.faults]
+    text = "\n".join(map(xml_text, places))
+    yield f'<error message="{xml_text(message)}" type="error">{text}</error>'
+    yield "</testcase>"
+    yield "</testsuite>"
+
+
+def _suite_of(mission: MissionFindings, class_name: str, file: str, counts: Counter[str]) -> Iterator[str]:
+    statuses = [*(one.status for one in mission.requirements), *(row.status for row in mission.rows)]
+    outcomes = Counter(STATUS[name].junit for name in statuses)
+    tests, failures = outcomes.total(), outcomes["failure"]
+    counts.update(tests=tests, failures=failures)
+    yield _suite(mission.name, tests=tests, failures=failures, errors=0, skipped=outcomes["skipped"])
+    yield from _properties(
+        (
+            ("file", file),
+            ("model", mission.model),
+            ("combine", mission.combine),
+            ("set", changes_words(mission.changes) or None),
+            ("overrides", overrides_words(mission) or None),
+            ("declared_kinds", declared_words(mission.kinds)),
+            *((f"document_{name}", value) for name, value in mission.document._asdict().items()),
+        )
+    )
+    file = xml_text(file)
+    for one in mission.requirements:
+        yield from _requirement_case(one, class_name, file)
+    for row in mission.rows:
+        yield from _row_case(row, mission, class_name, file)
+    if mission.warnings:
+        texts = "\n".join(f"{file}:{w.line or '-'}: {xml_text(w.message)}" for w in mission.warnings)
+        yield f"<system-out>{texts}</system-out>"
+    yield "</testsuite>"
+
+
+def _suite(name: str, *, tests: int, failures: int, errors: int, skipped: int) -> str:
+    return (
+        f'<testsuite name="{xml_text(name)}" tests="{tests}" failures="{failures}" errors="{errors}" '
+        f'skipped="{skipped}" time="0">'
+    )
+
+
+def _requirement_case(one: JudgedRequirement, class_name: str, file: str) -> Iterator[str]:
+    yield f'<testcase classname="{class_name}" name="{requirement_id(one)}" time="0">'
+    values: tuple[tuple[str, object], ...] = (
+        ("budget_status", one.status),
+        ("unit", one.unit or None),
+        ("value", one.value),
+        ("allowed", one.allowed),
+        ("reached", one.reached),
+        ("utilization", one.utilization),
+        ("decided_by", one.row),
+        ("line", one.line),
+    )
+    yield from _properties(values)
+    said = requirement_finding(one)
+    yield from _outcome(one.status, said, said, one.line, file)
+    yield "</testcase>"
+
+
+def _row_case(row: Row, mission: MissionFindings, class_name: str, file: str) -> Iterator[str]:
+    yield f'<testcase classname="{class_name}" name="{xml_text(row.id)}" time="0">'
+    values: tuple[tuple[str, object], ...] = (
+        ("requirement_id", row.requirement_id),
+        ("unit", row.unit),
+        ("declared", row.declared),
+        ("allowable", row.allowable),
+    )
+    if STATUS[row.status].is_judged:
+        values += (
+            ("budget_status", row.status),
+            ("metric", row.metric),
+            ("binding_requirement", row.binding_requirement),
+            ("utilization", row.utilization),
+            ("margin", row.margin),
+            ("equation", row.equation),
+            ("evidence", row.evidence),
+            ("line", row.line),
+        )
+    yield from _properties(values)
+    why, size = cause(row), measure(row, mission)
+    remark = f"{size}. {why}" if why else size
+    if STATUS[row.status].junit == "failure":
+        yield from _outcome(row.status, remark, f"{size}\n{why}\n{row.equation}", row.line, file)
+    else:
+        yield from _outcome(row.status, why if STATUS[row.status].junit == "skipped" else remark, "", row.line, file)
+    yield "</testcase>"
+
+
+def _outcome(status_name: str, message: str, text: str, line: int | None, file: str) -> Iterator[str]:
+    """Elements of a test case besides its properties; none where it simply passes."""
+    status = STATUS[status_name]
+    if status.junit == "failure":
+        place = f"{file}:{line}: " if line is not None else ""
+        lines = "\n".join(map(xml_text, text.split("\n")))
+        yield f'<failure message="{xml_text(message)}" type="{status.name}">{place}{lines}</failure>'
+    elif status.junit == "skipped":
+        said = f"{status.junit_words}{f': {message}' if message else ''}"
+        yield f'<skipped message="{xml_text(said)}" type="{status.name}"/>'
+    elif status.junit == "remark":
+        yield f"<system-out>{xml_text(f'{status.name}: {message}')}</system-out>"
+
+
+def _properties(values: Iterable[tuple[str, object]]) -> Iterator[str]:
+    """Elements of what has a value."""
+    yield "<properties>"
+    yield from [_property(name, value) for name, value in values if value is not None]
+    yield "</properties>"
+
+
+def _property(name: str, value: object) -> str:
+    text = _escaped(value) if isinstance(value, str) else repr(value)
+    return f'<property name="{name}" value="{text}"/>'
+
+
+@cache
+def _escaped(text: str) -> str:
+    """The same few texts (units, equations, sources) stand in every mission."""
+    return xml_text(text)
+
+
+def _class_name(identity: Identity) -> str:
+    """Dotted name of a mission, as test tools group by: `missions/a.yaml` is missions.a."""
+    return stem(identity.name).strip("/").replace(".", "_").replace("/", ".")
+
+
+def as_needs(report: Report, style: Style) -> str:
+    """Write every requirement and row of every mission; a file that cannot be used is one need, of status `error`.
+
+    Only fields that every project of Sphinx-Needs has are used, so that an import warns of nothing. A project's own
+    requirement id becomes a link; numbers are in the content, which Sphinx reads as reStructuredText.
+    """
+    names: list[tuple[str, ...]] = []
+    found: list[dict[str, Any]] = []
+    for mission, identity in zip(report.missions, identities(report.missions, style), strict=True):
+        if isinstance(mission, UnusableMission):
+            names.append(identity.of("mission"))
+            found.append(_unusable_need(mission, identity.path))
+            continue
+        names += [identity.of(requirement_id(one)) for one in mission.requirements]
+        found += [_requirement_need(one, mission, identity.path) for one in mission.requirements]
+        names += [identity.of(row.id, row.requirement_id) for row in mission.rows]
+        found += [_row_need(row, mission, identity.path) for row in mission.rows]
+    needs: dict[str, dict[str, Any]] = {}
+    for wanted, need in zip(distinct([_identifier(name) for name in names], names), found, strict=True):
+        identifier = _unused(wanted, needs)
+        needs[identifier] = {"id": identifier, **need}
+    version = {
+        "creator": {"program": "bisar-budget", "version": report.version},
+        "needs": needs,
+        "needs_amount": len(needs),
+    }
+    document = {"project": "bisar-budget", "current_version": report.version, "versions": {report.version: version}}
+    return json.dumps(document, indent=1, allow_nan=False) + "\n"
+
+
+def _identifier(name: tuple[str, ...]) -> str:
+    """Spell a name by the default pattern of Sphinx-Needs, `[A-Z0-9_]{5,}`."""
+    return "_".join(["BUDGET", *(re.sub("[^A-Z0-9]+", "_", stem(part).upper()).strip("_") for part in name)])
+
+
+def _unused(identifier: str, needs: Container[str]) -> str:
+    """Number the findings of a file that is named twice."""
+    unique, number = identifier, 2
+    while unique in needs:
+        unique, number = f"{identifier}_{number}", number + 1
+    return unique
+
+
+def _row_need(row: Row, mission: MissionFindings, file: str) -> dict[str, Any]:
+    texts = [measure(row, mission), cause(row), f"From {row.equation}."]
+    texts += [f"Evidence: {row.evidence}"] if row.evidence else []
+    return {
+        "type": "test",
+        "title": need_text(f"{row.id} of {mission.name}"),
+        "status": row.status,
+        "tags": ["bisar-budget", row.metric],
+        "links": [need_text(row.requirement_id)] if row.requirement_id else [],
+        "content": _content([*texts, *_origin(row.line, mission, file)]),
+    }
+
+
+def _requirement_need(one: JudgedRequirement, mission: MissionFindings, file: str) -> dict[str, Any]:
+    return {
+        "type": "test",
+        "title": need_text(f"{one.name} of {mission.name}"),
+        "status": one.status,
+        "tags": ["bisar-budget", "requirement", one.key],
+        "links": [],
+        "content": _content([requirement_finding(one), *_origin(one.line, mission, file)]),
+    }
+
+
+def _origin(line: int | None, mission: MissionFindings, file: str) -> Iterator[str]:
+    """Where a value stands, and what from outside the file bears on the verdict."""
+    yield f"{mission.name}, {file}" + (f":{line}" if line is not None else "")
+    if mission.changes:
+        yield f"Not as the file says: {changes_words(mission.changes)}"
+    if outside := overrides_words(mission, with_changes=False):
+        yield f"From outside the file: {outside}"
+
+
+def _content(texts: Sequence[str]) -> str:
+    return "\n\n".join(rst_text(text) for text in texts if text)
+
+
+def _unusable_need(mission: UnusableMission, file: str) -> dict[str, Any]:
+    return {
+        "type": "test",
+        "title": need_text(f"{file} cannot be used"),
+        "status": mission.status,
+        "tags": ["bisar-budget"],
+        "links": [],
+        "content": "\n\n".join(
+            rst_text(f"{fault.line or '-'}:{fault.column or '-'} {fault}") for fault in mission.faults
+        ),
+    }
