@@ -45,7 +45,7 @@ def sensitivity(
     from bisar_budget.budget.waivers import overrides
     from bisar_budget.design import sensitivity as asking
     from bisar_budget.design.quantities import QuestionError
-    from bisar_budget.report.formats import sensitivities
+    from bisar_budget.report.formats import answers
 
     hold_to_suffixes(plot, (".svg", ".png", ".pdf"))
     files = expand(missions)
@@ -65,4 +65,4 @@ def sensitivity(
         from bisar_budget.report.drawing.tornado import tornado
 
         write_file(plot, tornado(found[0], os.path.splitext(plot)[1][1:].lower()))
-    deliver_found(sensitivities, found, format_name, output)
+    deliver_found(answers, found, format_name, output)

@@ -78,7 +78,7 @@ def solve(
     from bisar_budget.design import compare
     from bisar_budget.design import solve as solving
     from bisar_budget.design.quantities import QuestionError
-    from bisar_budget.report.formats import solutions
+    from bisar_budget.report.formats import answers
 
     is_of_parts = compare.is_of_parts(key)
     if is_of_parts and (between is not None or is_scale):
@@ -103,7 +103,7 @@ def solve(
             fail(f"{mission.file}: {error}")
         found = found._replace(overrides=overrides(mission, from_outside, judged_on))
         solved.append(_imaged(mission, found, model) if is_imaged else found)
-    deliver_found(solutions, solved, format_name, output)
+    deliver_found(answers, solved, format_name, output)
     is_broken = any(one.status == "none" or (one.imaged and one.imaged.is_optimistic) for one in solved)
     sys.exit(EXIT_BROKEN if is_broken else 0)
 

@@ -1,10 +1,13 @@
-"""Results of solving for a number: text for reading, JSON `bisar-budget/solve/1`."""
+"""Answers of solve and sensitivity, as text for reading and as JSON: `solve/1` and `sensitivity/1`."""
 
 import json
+import math
+import re
 from collections.abc import Iterator, Sequence
 from typing import Any
 
 from bisar_budget.design.compare import Comparison, PartState
+from bisar_budget.design.sensitivity import LITTLE, Relaxed, Sensitivity, Slope
 from bisar_budget.design.solve import Crossing, Imaged, Solution, State
 from bisar_budget.faults import changes_words, printable
 from bisar_budget.findings.requirement import NAMES
@@ -12,27 +15,66 @@ from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
 from bisar_budget.report.formats.json_document import verdict_item
 from bisar_budget.report.words.requirements import overrides_lines
-from bisar_budget.report.words.sentences import percent, table, wrapped
+from bisar_budget.report.words.sentences import BINDING_WORDS, percent, table, wrapped
 from bisar_budget.units import format_quantity
 
-FORMAT = "bisar-budget/solve/1"
+_FORMATS = {"solve": "bisar-budget/solve/1", "sensitivity": "bisar-budget/sensitivity/1"}
 _SGR = {"crossing": "32", "all": "32", "some": "32", "none": "1;31"}
 
 
-def as_json(version: str, solutions: Sequence[Solution | Comparison]) -> str:
-    """Write the contract; values in SI, null where there is none."""
-    missions = [_mission(one) if isinstance(one, Solution) else _compared(one) for one in solutions]
-    document = {"format": FORMAT, "version": version, "missions": missions}
+Answer = Solution | Comparison | Sensitivity
+
+
+def as_json(version: str, answers: Sequence[Answer]) -> str:
+    """Write the contract of the command that was asked; values in SI, null where there is none."""
+    command = "sensitivity" if isinstance(answers[0], Sensitivity) else "solve"
+    missions = [_head(one) | _document(one) for one in answers]
+    document = {"format": _FORMATS[command], "version": version, "missions": missions}
     return json.dumps(document, indent=2, allow_nan=False) + "\n"
 
 
-def _mission(solution: Solution) -> dict[str, Any]:
+def _head(found: Answer) -> dict[str, Any]:
+    """The keys that every answer begins with."""
+    return {
+        "file": found.file,
+        "name": found.name,
+        "set": [change._asdict() for change in found.changes],
+        "overrides": [one._asdict() for one in found.overrides],
+    }
+
+
+def _document(found: Answer) -> dict[str, Any]:
+    if isinstance(found, Sensitivity):
+        return _ranked(found)
+    return _solved(found) if isinstance(found, Solution) else _compared(found)
+
+
+def as_text(answers: Sequence[Answer], style: Style) -> str:
+    """Write each answer as lines for a person: crossings, a table of parts, or a table of numbers."""
+    return "\n\n".join("\n".join(_lines(one, style)) for one in answers) + "\n"
+
+
+def _lines(found: Answer, style: Style) -> Iterator[str]:
+    if isinstance(found, Sensitivity):
+        return _lines_of_numbers(found, style)
+    return _lines_of_crossings(found, style) if isinstance(found, Solution) else _lines_of_parts(found, style)
+
+
+def _title(found: Answer, said: str, sgr: str, remark: str, style: Style, *more: str) -> Iterator[str]:
+    """The answer in a sentence, coloured on a terminal, and of which mission it is."""
+    first, *rest = wrapped(said, "  ")
+    yield f"\x1b[{sgr}m{first}\x1b[0m" if style.color else first
+    yield from rest
+    changed = f" {changes_words(found.changes)}" if found.changes else ""
+    named = f"{printable(found.file)}{changed}, {printable(found.name)}{remark}"
+    yield from (line for text in (*more, named) for line in wrapped(text, "  "))
+    yield from overrides_lines(found)
+    yield ""
+
+
+def _solved(solution: Solution) -> dict[str, Any]:
     best = solution.best
     return {
-        "file": solution.file,
-        "name": solution.name,
-        "set": [change._asdict() for change in solution.changes],
-        "overrides": [one._asdict() for one in solution.overrides],
         "key": solution.key,
         "scale": solution.is_scale,
         "unit": solution.unit,
@@ -74,10 +116,6 @@ def _compared(found: Comparison) -> dict[str, Any]:
     """The same keys for parts of the catalogue: there is no value, and no border."""
     best = next(iter(found.complying), None)
     return {
-        "file": found.file,
-        "name": found.name,
-        "set": [change._asdict() for change in found.changes],
-        "overrides": [one._asdict() for one in found.overrides],
         "key": found.key,
         "scale": False,
         "unit": None,
@@ -131,28 +169,13 @@ def _state(state: State) -> dict[str, Any]:
     return {**state._asdict(), "reason": state.reason or None}
 
 
-def as_text(solutions: Sequence[Solution | Comparison], style: Style) -> str:
-    """Write what complies, what binds on both sides of every crossing, and what was checked; of parts, in a table."""
-    texts = [_lines(one, style) if isinstance(one, Solution) else _table_of(one, style) for one in solutions]
-    return "\n\n".join("\n".join(lines) for lines in texts) + "\n"
-
-
-def _table_of(found: Comparison, style: Style) -> Iterator[str]:
+def _lines_of_parts(found: Comparison, style: Style) -> Iterator[str]:
     """Say which parts comply, and how near the others are."""
     count, total = len(found.complying), len(found.parts)
     what = f"row {printable(found.row)} complies" if found.row else "the mission complies"
     said = f"{what} with {count} of {total} parts" if count else f"{what} with none of {total} parts"
-    first, *rest = wrapped(f"{printable(found.key)}: {said}", "  ")
-    yield f"\x1b[{_SGR[found.status]}m{first}\x1b[0m" if style.color else first
-    yield from rest
-    changed = f" {changes_words(found.changes)}" if found.changes else ""
-    yield from wrapped(
-        f"{printable(found.file)}{changed}, {printable(found.name)}; {found.model} model"
-        + (", neither fails nor warns" if found.target == "warn" else ""),
-        "  ",
-    )
-    yield from overrides_lines(found)
-    yield ""
+    remark = f"; {found.model} model{', neither fails nor warns' if found.target == 'warn' else ''}"
+    yield from _title(found, f"{printable(found.key)}: {said}", _SGR[found.status], remark, style)
     is_mixed = len({part.kind for part in found.parts}) > 1
     rows = [["part", *(["kind"] if is_mixed else []), "status", "use", ""]]
     for part in found.parts:
@@ -176,14 +199,9 @@ def _table_of(found: Comparison, style: Style) -> Iterator[str]:
         yield from wrapped(f"Imaged: {_shown(found.imaged)}.", "  ")
 
 
-def _lines(solution: Solution, style: Style) -> Iterator[str]:
-    changed = f" {changes_words(solution.changes)}" if solution.changes else ""
-    first, *rest = wrapped(f"{_subject(solution)}: {_answer(solution)}", "  ")
-    yield f"\x1b[{_SGR[solution.status]}m{first}\x1b[0m" if style.color else first
-    yield from rest
-    yield from wrapped(f"{printable(solution.file)}{changed}, {printable(solution.name)}", "  ")
-    yield from overrides_lines(solution)
-    yield ""
+def _lines_of_crossings(solution: Solution, style: Style) -> Iterator[str]:
+    said = f"{_subject(solution)}: {_answer(solution)}"
+    yield from _title(solution, said, _SGR[solution.status], "", style)
     for name, text in _facts(solution):
         yield from wrapped(f"{name:<12} {text}", " " * 13)
 
@@ -296,3 +314,161 @@ def _resolves(crossing: Crossing) -> str:
         return ""
     sizes = (format_quantity(size, "m") for size in (state.range_resolution_m, state.cross_range_resolution_m))
     return "; resolution {} range, {} cross range".format(*sizes)
+
+
+def _ranked(found: Sensitivity) -> dict[str, Any]:
+    return {
+        "model": found.model,
+        "status": found.status,
+        "worst_row": found.worst_row,
+        "binding_requirement": found.requirement,
+        "utilization": found.utilization,
+        "row": found.row,
+        "row_utilization": found.row_utilization,
+        "numbers": [_slope(slope) | {"to_limit": found.to_limit(slope)} for slope in found.slopes],
+        "without_effect": list(found.unchanging),
+        "skipped": [skipped._asdict() for skipped in found.skipped],
+        "relaxed": [_relaxed(relaxed) for relaxed in found.relaxed] if found.is_balanced else None,
+    }
+
+
+def _slope(slope: Slope) -> dict[str, Any]:
+    return {
+        "key": slope.key,
+        "text": slope.text,
+        "value": slope.value,
+        "unit": slope.unit,
+        "per": slope.per_text,
+        "per_value": slope.per,
+        "step": slope.step,
+        "difference": slope.difference,
+        "utilization_change": slope.change,
+        "row_change": slope.row_change,
+        "worst_row_below": slope.row_below,
+        "worst_row_above": slope.row_above,
+        "is_mixed": slope.is_mixed,
+        "part": slope.part or None,
+    }
+
+
+def _relaxed(relaxed: Relaxed) -> dict[str, Any]:
+    def platform(others: tuple[str, float, float] | None) -> dict[str, Any] | None:
+        return None if others is None else dict(zip(("row", "before", "after"), others, strict=True))
+
+    return {
+        "key": relaxed.key,
+        "share_transmitter": {"before": relaxed.shares_before[0], "after": relaxed.shares_after[0]},
+        "share_receiver": {"before": relaxed.shares_before[1], "after": relaxed.shares_after[1]},
+        "transmitter": platform(relaxed.transmitter),
+        "receiver": platform(relaxed.receiver),
+    }
+
+
+def _lines_of_numbers(found: Sensitivity, style: Style) -> Iterator[str]:
+    """The numbers that change something; first that which has to change least to use up the margin."""
+    status = STATUS[found.status]
+    requirement = BINDING_WORDS.get(found.requirement, found.requirement.replace("_", " "))
+    said = f"worst utilization {percent(found.utilization)}: {printable(found.worst_row)} ({requirement})"
+    row = []
+    if found.row is not None and found.row_utilization is not None:
+        row = [f"row {printable(found.row)}: {percent(found.row_utilization)}"]
+    yield from _title(found, said, status.sgr, f": {status.text}, {found.model} model", style, *row)
+    yield from _table(found)
+    yield from _notes(found)
+    if found.is_balanced:
+        yield ""
+        yield from _balance(found)
+
+
+def _table(found: Sensitivity) -> Iterator[str]:
+    shown = found.shown
+    if not shown:
+        yield "No number of the file changes it."
+        return
+    of_row = [] if found.row is None else ["of the row"]
+    rows = [["key", "value", "to limit", "per", "worst", *of_row, ""]]
+    for slope in shown:
+        in_row = [] if slope.row_change is None else [_points(slope.row_change)]
+        mixed = next((row for row in (slope.row_above, slope.row_below) if row != found.worst_row), "")
+        note = f"({printable(mixed)})" if slope.is_mixed else ""
+        rows.append(
+            [
+                printable(slope.key),
+                printable(slope.given),
+                to_limit(found, slope),
+                slope.per_text,
+                _points(slope.change),
+                *in_row,
+                note,
+            ]
+        )
+    yield from table(rows)
+    yield ""
+    yield from wrapped(
+        "to limit: what a number has to change by, alone, until the utilization is 100 %, if that goes on as it goes "
+        "here; the least stands first. worst: change of the utilization in percentage points, if a number grows by "
+        "what stands under per; a negative number grows away from 0.",
+        "  ",
+    )
+
+
+def to_limit(found: Sensitivity, slope: Slope) -> str:
+    """Write the change that uses up the margin: in percent, from tenfold on as a factor, or in degrees or decibel."""
+    change = found.to_limit(slope)
+    if change is None:
+        return "-"
+    if slope.is_proportional:
+        part = change / slope.value
+        return f"{100 * part:+.3g} %" if -0.99 < part < 9 else f"x {float(f'{1 + part:.3g}'):g}"
+    return f"{change:+.3g} dB" if slope.per_text.endswith("dB") else f"{math.degrees(change):+.3g} deg"
+
+
+def _points(change: float) -> str:
+    return f"{100 * change:+.3g}" if change else "0"
+
+
+def _notes(found: Sensitivity) -> Iterator[str]:
+    shown = found.shown
+    if any(slope.is_mixed for slope in shown):
+        yield from wrapped(
+            "In parentheses: the row that is the worst beside the value. The change is made of the slopes of both.",
+            "  ",
+        )
+    if little := len(found.slopes) - len(shown):
+        yield f"Less than a ten-thousandth of it: {_numbers(little)} (JSON lists them)."
+    if found.unchanging:
+        yield f"Without effect: {_numbers(len(found.unchanging))} (JSON lists them)."
+    if found.skipped:
+        kinds = ", ".join(dict.fromkeys(re.split("[:;]", one.reason)[0].removeprefix("is ") for one in found.skipped))
+        yield from wrapped(f"Left out: {len(found.skipped)} keys ({kinds}).", "  ")
+
+
+def _numbers(count: int) -> str:
+    return f"{count} number{'s' if count != 1 else ''}"
+
+
+def _balance(found: Sensitivity) -> Iterator[str]:
+    moving = [one for one in found.relaxed if one.moves_shares]
+    if not moving:
+        yield "Shares are balanced; no error that is doubled would move them."
+        return
+    yield from wrapped("Shares are balanced. What an error that is doubled costs the others:", "  ")
+    yield ""
+    rows = [["doubled", "shares t/r", "transmitter", "receiver", ""]]
+    for one in moving:
+        shares = ["/".join(f"{100 * share:.3g}" for share in both) for both in (one.shares_before, one.shares_after)]
+        rows.append([printable(one.key), " -> ".join(shares), _then(one.transmitter), _then(one.receiver), ""])
+    yield from table(rows)
+    yield ""
+    yield from wrapped(
+        "Of each platform the worst utilization of what is not doubled, before and after; shares in percent.", "  "
+    )
+    if still := len(found.relaxed) - len(moving):
+        yield f"Doubling moves no share of {still} other{'s' if still != 1 else ''}."
+
+
+def _then(others: tuple[str, float, float] | None) -> str:
+    if others is None:
+        return "-"
+    _, before, after = others
+    return percent(before) if abs(after - before) <= LITTLE * before else f"{percent(before)} -> {percent(after)}"
