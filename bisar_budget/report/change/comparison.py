@@ -15,7 +15,7 @@ from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.model import Mission, Requirements, Waiver
 from bisar_budget.mission.parts import figure_text, taken_figures
-from bisar_budget.report.words.sentences import percent
+from bisar_budget.report.words.sentences import dotted, percent
 from bisar_budget.settings import TABLE
 
 
@@ -86,11 +86,6 @@ def _value(mission: Mission, path: KeyPath) -> Any:
         else:
             value = getattr(value, part, None)
     return value
-
-
-def dotted(path: KeyPath) -> str:
-    """Write a path of keys as `--set` takes it."""
-    return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path).lstrip(".")
 
 
 def moved_geometry(before: MissionFindings, after: MissionFindings) -> Iterator[Moved]:

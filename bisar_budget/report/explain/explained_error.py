@@ -10,32 +10,31 @@ from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.effect import MOTION_UNITS, PLATFORMS, ErrorSource, Subject, subject
 from bisar_budget.faults import KeyPath, printable
 from bisar_budget.findings.mission import MissionFindings
+from bisar_budget.findings.row import Row
 from bisar_budget.geometry import FRAME_AXES, GroundVector, PlatformState
 from bisar_budget.mission.model import Mission
 from bisar_budget.ranges.exact_ranges import ExactRanges
 from bisar_budget.report.explain import notation
 from bisar_budget.report.explain.notation import Step, Sum, WorkedEquation, equation, number, step, with_unit
+from bisar_budget.report.words.sentences import dotted
 
 
 def declaration(mission: Mission, source: ErrorSource) -> Iterator[Step]:
     """From the file to `declared`: where it stands, frame, coverage factor."""
+    yield from stated(mission, source.path, source.declared, source.evidence)
     if source.declared is None:
-        yield Step(missing(mission, source.path))
         return
-    yield from step(f"Declared in {place(mission, source.path)}", as_written(mission, source.path))
-    if source.evidence:
-        yield from step("Evidence", printable(source.evidence))
     platform, kind, axis = source.owner, source.subject.kind, source.subject.axis
     k = mission.allocation.coverage_factor
     if platform in PLATFORMS:
         error = getattr(mission.platforms, platform).motion_error
-        stated = error.stated(kind)
+        values = error.stated(kind)
         if error.frame != "scene" and axis in notation.AXES:
             yield from _turned(mission, source, axis)
             return
         if error.covariance is not None and error.covariance.is_matrix and kind != "acceleration":
             yield from step("One sigma is the root of the variance")
-        own = stated[FRAME_AXES[error.frame].index(axis)]
+        own = values[FRAME_AXES[error.frame].index(axis)]
     elif source.is_common:
         own = getattr(mission.common_motion_error, kind)[notation.AXES.index(axis)]
     elif source.owner == "clock":
@@ -248,6 +247,16 @@ def place(mission: Mission, path: KeyPath) -> str:
     return file if line is None else f"{file}:{line.region.line}:{line.region.column}"
 
 
+def stated(mission: Mission, path: KeyPath, declared: float | None, evidence: str | None) -> Iterator[Step]:
+    """Where a value stands in the file and what shows it; else that the file is silent."""
+    if declared is None:
+        yield Step(missing(mission, path))
+        return
+    yield from step(f"Declared in {place(mission, path)}", as_written(mission, path))
+    if evidence:
+        yield from step("Evidence", printable(evidence))
+
+
 def missing(mission: Mission, path: KeyPath) -> str:
     """Say that the file is silent."""
     return f"Not declared: no {dotted(path)} (the nearest key is at {place(mission, path)})"
@@ -259,11 +268,6 @@ def as_written(mission: Mission, path: KeyPath) -> str:
         path = path[:-1]
     written = getattr(mission.places.get(path), "value", None)
     return f"{dotted(path)}: {printable(written)}" if written is not None else dotted(path)
-
-
-def dotted(path: KeyPath) -> str:
-    """Path of keys as it is written in messages."""
-    return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path).lstrip(".")
 
 
 RATES = ("m", "m/s", "m/s²", "m/s³")  # units of the range error's coefficients
@@ -404,6 +408,24 @@ def end_of_the_image(size: float, unit: str) -> Iterator[Step]:
         "The point is followed as the error grows, to where range and Doppler gradients become parallel there",
         f"by_image = {with_unit(size, unit)}, a limit whatever phase or displacement is allowed",
     )
+
+
+def smallest_size(row: Row, sizes: Mapping[str, float]) -> Iterator[Step]:
+    """The allowable of a row: the smallest of the sizes that its requirements allow, each by its symbol."""
+    if row.allowable is None or not sizes:
+        yield from step("Allowable: no limit", printable(row.reason or "no requirement limits this error"))
+        return
+    found = list(sizes.values())
+    text = f"min({', '.join(map(number, found))})" if len(found) > 1 else number(found[0])
+    title = f"Allowable: the smallest, by {', '.join(sizes)}"
+    if row.unit != "dB":
+        yield from step(title, Sum(f"allowable = {text} = {with_unit(row.allowable, row.unit)}"))
+        return
+    factor = min(found)
+    yield from step(f"{title}: a factor of the noise's amplitude", Sum(f"factor = {text} = {with_unit(factor, '')}"))
+    lines = equation("allowable", "20*log(factor)/log(10)", {"factor": factor}, row.allowable, "dB")
+    yield from step("As a level, against the noise that is declared: it may rise by that much", *lines)
+    yield from step("Utilization", *equation("utilization", "1/factor", {"factor": factor}, 1 / factor, ""))
 
 
 def _placed(left: Left) -> Sequence[str]:

@@ -19,7 +19,7 @@ from bisar_budget.faults import printable
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import PlatformState
 from bisar_budget.mission.model import Mission
-from bisar_budget.report.explain.explained_error import as_written, combined, limit_steps, missing, place
+from bisar_budget.report.explain.explained_error import combined, limit_steps, place, smallest_size, stated
 from bisar_budget.report.explain.notation import (
     Step,
     Sum,
@@ -61,12 +61,9 @@ def explained_random(analysis: Analysis, allocation: Allocation, error: RandomEr
 
 
 def _declared(mission: Mission, error: RandomError, row: Row) -> Iterator[Step]:
+    yield from stated(mission, error.path, error.declared, row.evidence)
     if error.declared is None:
-        yield Step(missing(mission, error.path))
         return
-    yield from step(f"Declared in {place(mission, error.path)}", as_written(mission, error.path))
-    if row.evidence:
-        yield from step("Evidence", printable(row.evidence))
     k = mission.allocation.coverage_factor
     if error.unit != "dB":
         lines = equation("declared", "k*|value|", {"k": k, "value": error.declared / k}, error.declared, error.unit)
@@ -292,21 +289,7 @@ def _allowable(mission: Mission, allocation: Allocation, error: RandomError, row
         formula = f"rms/({spread})" if k == 1 else f"k*rms/({spread})"
         lines = equation("by_ISLR", formula, values, sizes["by_ISLR"], _unit(error))
         yield from step("Allowable by requirements.islr", *lines)
-    if row.allowable is None or not sizes:
-        yield from step("Allowable: no limit", printable(row.reason or "no requirement limits this error"))
-        return
-    smallest = min(sizes.values())
-    text = f"min({', '.join(number(size) for size in sizes.values())})" if len(sizes) > 1 else number(smallest)
-    title = f"Allowable: the smallest, by {', '.join(sizes)}"
-    if error.unit != "dB":
-        yield from step(title, Sum(f"allowable = {text} = {with_unit(row.allowable, row.unit)}"))
-        return
-    yield from step(
-        f"{title}: a factor of the noise's amplitude", Sum(f"factor = {text} = {with_unit(smallest, '')}")
-    )
-    lines = equation("allowable", "20*log(factor)/log(10)", {"factor": smallest}, row.allowable, "dB")
-    yield from step("As a level, against the noise that is declared: it may rise by that much", *lines)
-    yield from step("Utilization", *equation("utilization", "1/factor", {"factor": smallest}, 1 / smallest, ""))
+    yield from smallest_size(row, sizes)
 
 
 def _with_cubic(mission: Mission, error: RandomError, effect: RandomEffect, held: RandomEffect) -> Iterator[Step]:

@@ -46,6 +46,7 @@ from bisar_budget.report.explain.explained_error import (
     limit_steps,
     missing,
     place,
+    smallest_size,
 )
 from bisar_budget.report.explain.notation import Step, Sum, WorkedEquation, equation, number, step, with_unit
 from bisar_budget.report.words.requirements import requirement_finding, requirement_id
@@ -212,14 +213,7 @@ def _budget(analysis: Analysis, source: ErrorSource, row: Row) -> Iterator[Step]
             yield from step(title, *equation(symbol, "limit/(effect/unit)", values, size, row.unit))
     if "by_image" in sizes:
         yield from end_of_the_image(sizes["by_image"], row.unit)
-    if row.allowable is None:
-        yield from step("Allowable: no limit", printable(row.reason or "no requirement limits this error"))
-        return
-    text = f"min({', '.join(number(size) for size in sizes.values())})" if len(sizes) > 1 else number(row.allowable)
-    yield from step(
-        f"Allowable: the smallest, by {', '.join(sizes)}",
-        Sum(f"allowable = {text} = {with_unit(row.allowable, row.unit)}"),
-    )
+    yield from smallest_size(row, sizes)
 
 
 def _vibration(mission: Mission, allocation: Allocation, row: Row) -> Iterator[Step]:

@@ -18,6 +18,7 @@ from bisar_budget.geometry import BistaticGeometry, PlatformState
 from bisar_budget.mission.model import Document
 from bisar_budget.mission.platforms import FlownPath
 from bisar_budget.report import Style
+from bisar_budget.report.words.requirements import RULES
 from bisar_budget.report.words.sentences import phase_limit
 from bisar_budget.units import format_quantity
 
@@ -191,7 +192,6 @@ _MODELS = {
     "full": "full (exact ranges, displacement included)",
     "strictest": "strictest (the stricter of published and full for each row)",
 }
-RULES = {"each": "each error alone", "sum": "worst-case sum", "rss": "root-sum-square"}
 _NARROW_DEG = 30.0  # between range and Doppler gradients; below it the verdict says what that does
 
 

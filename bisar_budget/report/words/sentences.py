@@ -5,7 +5,7 @@ import os
 import re
 from collections.abc import Sequence
 
-from bisar_budget.faults import Place, printable
+from bisar_budget.faults import KeyPath, Place, printable
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.findings.row import DECLARE, Row
@@ -79,6 +79,11 @@ def finding(row: Row, mission: MissionFindings) -> str:
     why = cause(row)
     own_id = f" [{row.requirement_id}]" if row.requirement_id else ""
     return f"{row.id}{own_id}: {measure(row, mission)}{f'. {sentence(why)}' if why else ''}"
+
+
+def dotted(path: KeyPath) -> str:
+    """Write a path of keys as `--set` takes it."""
+    return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path).lstrip(".")
 
 
 def sentence(text: str) -> str:
