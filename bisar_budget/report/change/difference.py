@@ -18,7 +18,7 @@ from bisar_budget.report.change.comparison import (
     RequirementMove,
 )
 from bisar_budget.report.words.requirements import overrides_lines, overrides_words
-from bisar_budget.report.words.sentences import markdown_text, percent, row_size, table, wrapped
+from bisar_budget.report.words.sentences import counted, markdown_text, percent, row_size, table, wrapped
 from bisar_budget.units import format_quantity
 
 FORMAT = "bisar-budget/diff/1"
@@ -128,10 +128,10 @@ def _summary(mission: MissionChange, gate: Gate | None, all_rows: bool) -> str:
     newly = sum(change.is_newly_failing for change in mission.changes)
     hidden = len(mission.changes) - len(_shown(mission, gate, all_rows))
     small = f" ({hidden} by less than 1 %, not shown without --all)" if hidden else ""
-    count = len(mission.changes)
-    text = f"{count} row{'s' if count != 1 else ''} changed{small}, {mission.unchanged} not, {newly} newly failing"
+    rows = counted(len(mission.changes), "row")
+    text = f"{rows} changed{small}, {mission.unchanged} not, {newly} newly failing"
     if unmet := sum(one.is_newly_failing for one in mission.requirements):
-        text += f"; {unmet} requirement{'s' if unmet != 1 else ''} newly failing"
+        text += f"; {counted(unmet, 'requirement')} newly failing"
     if mission.loosened:
         text += f"; {len(mission.loosened)} loosened"
     if gate is not None:

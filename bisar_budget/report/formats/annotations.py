@@ -19,6 +19,7 @@ from bisar_budget.report.words.requirements import overrides_words, requirement_
 from bisar_budget.report.words.sentences import (
     command_property,
     command_text,
+    counted,
     finding,
     markdown_text,
     percent,
@@ -44,7 +45,7 @@ def as_github(report: Report, style: Style) -> str:
     """
     annotations = sorted(_annotations(report, style), key=lambda found: _ORDER.index(found.command))
     lines = [_command(annotation) for annotation in annotations]
-    return "\n".join(lines or [f"bisar-budget: {_counted(report)}, no findings"]) + "\n"
+    return "\n".join(lines or [f"bisar-budget: {counted(len(report.missions), 'mission')}, no findings"]) + "\n"
 
 
 def _annotations(report: Report, style: Style) -> Iterator[_Annotation]:
@@ -92,14 +93,10 @@ def _command(annotation: _Annotation) -> str:
     return f"::{annotation.command} {written}::{command_text(annotation.message)}"
 
 
-def _counted(report: Report) -> str:
-    count = len(report.missions)
-    return f"{count} mission{'s' if count != 1 else ''}"
-
-
 def step_summary(report: Report, style: Style) -> str:
     """Write the table that GitHub shows on the page of the run, as Markdown."""
-    lines = [f"### bisar-budget: {STATUS[report.status].text}, {_counted(report)}", ""]
+    missions = counted(len(report.missions), "mission")
+    lines = [f"### bisar-budget: {STATUS[report.status].text}, {missions}", ""]
     lines += ["| status | mission | worst row | use |", "| --- | --- | --- | --- |"]
     for mission in report.missions:
         file = markdown_text(source_path(mission.file, style))
@@ -117,19 +114,9 @@ def step_summary(report: Report, style: Style) -> str:
         status = STATUS[mission.status].text + ("; each error alone" if mission.combine == "each" else "")
         lines.append(f"| {status} | {file} | {markdown_text(row.id)} | {use} |")
     usable = [mission for mission in report.missions if isinstance(mission, MissionFindings)]
-    broken = [
-        f"- {markdown_text(requirement_finding(one))}"
-        for mission in usable
-        for one in mission.requirements
-        if STATUS[one.status].fails
-    ]
-    broken += [
-        f"- {markdown_text(finding(row, mission))}"
-        for mission in usable
-        for row in mission.rows
-        if STATUS[row.status].fails
-    ]
-    lines += ["", *broken[:_SHOWN_IN_SUMMARY]] if broken else []
+    broken = [requirement_finding(one) for found in usable for one in found.requirements if STATUS[one.status].fails]
+    broken += [finding(row, found) for found in usable for row in found.rows if STATUS[row.status].fails]
+    lines += ["", *(f"- {markdown_text(said)}" for said in broken[:_SHOWN_IN_SUMMARY])] if broken else []
     if len(broken) > _SHOWN_IN_SUMMARY:
         lines.append(f"- and {len(broken) - _SHOWN_IN_SUMMARY} more")
     return "\n".join(lines) + "\n\n"

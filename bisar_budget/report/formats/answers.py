@@ -15,7 +15,7 @@ from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
 from bisar_budget.report.formats.json_document import verdict_item
 from bisar_budget.report.words.requirements import overrides_lines
-from bisar_budget.report.words.sentences import BINDING_WORDS, percent, table, wrapped
+from bisar_budget.report.words.sentences import BINDING_WORDS, counted, percent, table, wrapped
 from bisar_budget.units import format_quantity
 
 _FORMATS = {"solve": "bisar-budget/solve/1", "sensitivity": "bisar-budget/sensitivity/1"}
@@ -435,16 +435,12 @@ def _notes(found: Sensitivity) -> Iterator[str]:
             "  ",
         )
     if little := len(found.slopes) - len(shown):
-        yield f"Less than a ten-thousandth of it: {_numbers(little)} (JSON lists them)."
+        yield f"Less than a ten-thousandth of it: {counted(little, 'number')} (JSON lists them)."
     if found.unchanging:
-        yield f"Without effect: {_numbers(len(found.unchanging))} (JSON lists them)."
+        yield f"Without effect: {counted(len(found.unchanging), 'number')} (JSON lists them)."
     if found.skipped:
         kinds = ", ".join(dict.fromkeys(re.split("[:;]", one.reason)[0].removeprefix("is ") for one in found.skipped))
         yield from wrapped(f"Left out: {len(found.skipped)} keys ({kinds}).", "  ")
-
-
-def _numbers(count: int) -> str:
-    return f"{count} number{'s' if count != 1 else ''}"
 
 
 def _balance(found: Sensitivity) -> Iterator[str]:
@@ -464,7 +460,7 @@ def _balance(found: Sensitivity) -> Iterator[str]:
         "Of each platform the worst utilization of what is not doubled, before and after; shares in percent.", "  "
     )
     if still := len(found.relaxed) - len(moving):
-        yield f"Doubling moves no share of {still} other{'s' if still != 1 else ''}."
+        yield f"Doubling moves no share of {counted(still, 'other')}."
 
 
 def _then(others: tuple[str, float, float] | None) -> str:

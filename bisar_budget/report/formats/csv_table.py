@@ -7,10 +7,12 @@ allowed under `allowable`, and the row that decides under `decided_by`.
 import csv
 import io
 from collections.abc import Iterable, Iterator, Sequence
+from operator import attrgetter
 
 from bisar_budget.faults import changes_words
 from bisar_budget.findings.mission import MissionFindings, UnusableMission
 from bisar_budget.findings.requirement import JudgedRequirement
+from bisar_budget.findings.row import Row
 from bisar_budget.report import Piece, Style
 from bisar_budget.report.words.requirements import overrides_words, requirement_id
 from bisar_budget.report.words.sentences import spreadsheet_text
@@ -49,6 +51,13 @@ COLUMNS = (
     "decided_by",
     "overrides",
 )
+
+
+# Columns that are values of a row; text of the user's own is made harmless below.
+_OF_ROW = tuple(
+    column for column in COLUMNS if column in Row._fields and column not in ("requirement_id", "evidence")
+)
+_values_of = attrgetter(*_OF_ROW)
 
 
 def piece(mission: MissionFindings | UnusableMission, style: Style) -> str:
@@ -90,40 +99,21 @@ def _rows(mission: MissionFindings) -> Iterator[list[object]]:
     verdicts = {verdict.id: verdict.verdict for verdict in mission.verdicts or ()}
     for row in mission.rows:
         x, y = row.displacement_m or (None, None)
-        yield [
-            file,
-            name,
-            spreadsheet_text(row.id),
-            row.status,
-            row.metric,
-            row.unit,
-            row.declared,
-            row.allowable,
-            row.utilization,
-            row.margin,
-            row.allowable_published,
-            row.allowable_full,
-            row.qpe_published_rad,
-            row.qpe_full_rad,
-            x,
-            y,
-            row.line,
-            row.equation,
-            spreadsheet_text(row.requirement_id),
-            row.reason,
-            "; ".join(row.notes),
-            spreadsheet_text(row.evidence),
-            verdicts.get(row.id),
-            row.qpe_exact_rad,
-            row.published_margin_db,
-            row.binding_requirement,
-            row.cubic_rad,
-            row.islr_db,
-            changed,
-            "row",
-            None,
-            outside,
-        ]
+        cells = dict(zip(_OF_ROW, _values_of(row), strict=True)) | {
+            "file": file,
+            "mission": name,
+            "id": spreadsheet_text(row.id),
+            "displacement_x_m": x,
+            "displacement_y_m": y,
+            "requirement_id": spreadsheet_text(row.requirement_id),
+            "notes": "; ".join(row.notes),
+            "evidence": spreadsheet_text(row.evidence),
+            "verdict": verdicts.get(row.id),
+            "set": changed,
+            "kind": "row",
+            "overrides": outside,
+        }
+        yield [cells.get(column) for column in COLUMNS]
 
 
 def _requirement(one: JudgedRequirement) -> dict[str, object]:

@@ -27,6 +27,7 @@ from bisar_budget.report.words.requirements import (
 from bisar_budget.report.words.sentences import (
     WIDTH,
     binding_words,
+    counted,
     matters,
     percent,
     row_limit,
@@ -54,10 +55,8 @@ def joined(pieces: Sequence[Piece], version: str, style: Style) -> str:
 
 
 def _unusable(mission: UnusableMission, style: Style) -> list[str]:
-    count = len(mission.faults)
-    summary = (
-        f"{STATUS['error'].text} {printable(mission.file)}: cannot be used, {count} fault{'s' if count != 1 else ''}"
-    )
+    faults = counted(len(mission.faults), "fault")
+    summary = f"{STATUS['error'].text} {printable(mission.file)}: cannot be used, {faults}"
     if style.verbosity < 0:
         return [_lead(summary, "error", style)]
     places = [f"  {fault.line or '-'}:{fault.column or '-'}  {fault}" for fault in mission.faults]
@@ -69,7 +68,7 @@ def _mission(mission: MissionFindings, style: Style) -> list[str]:
     if style.verbosity < 0:
         count = sum(not warning.is_of_options for warning in mission.warnings)
         said = [_summary(mission, is_brief=True), *_alone(mission)]
-        said += [f"{count} warning{'s' if count != 1 else ''} about the file"] if count else []
+        said += [f"{counted(count, 'warning')} about the file"] if count else []
         if outside := overrides_words(mission, with_changes=False):
             said.append(f"from outside the file: {outside}")
         return [_lead("; ".join(said), mission.status, style)]

@@ -20,7 +20,7 @@ from bisar_budget.report.words.requirements import (
     requirement_finding,
     requirement_id,
 )
-from bisar_budget.report.words.sentences import cause, measure, need_text, rst_text, xml_text
+from bisar_budget.report.words.sentences import cause, counted, measure, need_text, rst_text, xml_text
 
 
 def as_junit(report: Report, style: Style) -> str:
@@ -49,8 +49,7 @@ def _unusable_suite(mission: UnusableMission, class_name: str, file: str, counts
     counts.update(tests=1, errors=1)
     yield _suite(file, tests=1, failures=0, errors=1, skipped=0)
     yield f'<testcase classname="{class_name}" name="mission file" time="0">'
-    count = len(mission.faults)
-    message = f"cannot be used, {count} fault{'s' if count != 1 else ''}: {mission.faults[0]}"
+    message = f"cannot be used, {counted(len(mission.faults), 'fault')}: {mission.faults[0]}"
     places = [f"{file}:{f.line or '-'}:{f.column or '-'}: {f}" for f in mission.faults]
     text = "\n".join(map(xml_text, places))
     yield f'<error message="{xml_text(message)}" type="error">{text}</error>'

@@ -81,6 +81,11 @@ def finding(row: Row, mission: MissionFindings) -> str:
     return f"{row.id}{own_id}: {measure(row, mission)}{f'. {sentence(why)}' if why else ''}"
 
 
+def counted(count: int, noun: str) -> str:
+    """A number of things: `1 fault`, `2 faults`."""
+    return f"{count} {noun}{'s' if count != 1 else ''}"
+
+
 def dotted(path: KeyPath) -> str:
     """Write a path of keys as `--set` takes it."""
     return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path).lstrip(".")
