@@ -200,11 +200,12 @@ def gauss_markov_parts(
     ratio: float,
     decay: float,
 ) -> tuple[tuple[float, ...], ...]:
-    """Mean squares of a Gauss-Markov process of variance 1 over an aperture. [-]
+    """Mean squares and products of a Gauss-Markov process of variance 1 over an aperture. [-]
 
-    Columns: of the quadratic and the cubic phase at the aperture edge, of what is left after the cubic.
-    ratio is the aperture time over twice the correlation time, decay exp(−2·ratio). Terms cancel for a
-    ratio below 0.5. Derived here.
+    Columns: of the quadratic and the cubic phase at the aperture edge, of what is left after the cubic,
+    of the constant and the linear part at the edge; constant times quadratic, linear times cubic. ratio
+    is the aperture time over twice the correlation time, decay exp(−2·ratio). Terms cancel for a ratio
+    below 0.5. Derived here.
     """
     shared_0 = ratio**(-6)
     shared_1 = 253.125*shared_0
@@ -214,14 +215,21 @@ def gauss_markov_parts(
     shared_5 = 1/ratio
     shared_6 = decay/ratio**5
     shared_7 = decay*shared_2
-    shared_8 = decay/ratio**3
-    shared_9 = ratio**(-8)
-    shared_10 = 153.125*shared_3
-    shared_11 = decay/ratio**7
-    shared_12 = decay*shared_0
-    shared_13 = 787.5*shared_9
+    shared_8 = ratio**(-3)
+    shared_9 = decay*shared_8
+    shared_10 = ratio**(-8)
+    shared_11 = 153.125*shared_3
+    shared_12 = decay/ratio**7
+    shared_13 = decay*shared_0
+    shared_14 = 787.5*shared_10
+    shared_15 = 0.5*shared_3
+    shared_16 = 4.5*shared_3
+    shared_17 = 11.25*shared_2
+    shared_18 = 11.25*shared_8
+    shared_19 = 3.75*shared_3
+    shared_20 = 26.25*shared_3
     return (
-        (decay*shared_1 + decay*shared_4 - shared_1 + 84.375*shared_2 - shared_4 + 11.25*shared_5 + 506.25*shared_6 + 421.875*shared_7 + 168.75*shared_8, -decay*shared_10 - 34453.125*decay*shared_9 - 6890.625*shared_0 - shared_10 - 68906.25*shared_11 - 62015.625*shared_12 + 918.75*shared_2 + 43.75*shared_5 - 32156.25*shared_6 - 10106.25*shared_7 - 1837.5*shared_8 + 34453.125*shared_9, decay*shared_13 + 2*decay*shared_3 + 180*shared_0 + 1575*shared_11 + 1395*shared_12 - shared_13 - 30*shared_2 + 8*shared_3 - 4*shared_5 + 690*shared_6 + 195*shared_7 + 30*shared_8 + 1),  # mean squares
+        (decay*shared_1 + decay*shared_4 - shared_1 + 84.375*shared_2 - shared_4 + 11.25*shared_5 + 506.25*shared_6 + 421.875*shared_7 + 168.75*shared_9, -34453.125*decay*shared_10 - decay*shared_11 - 6890.625*shared_0 + 34453.125*shared_10 - shared_11 - 68906.25*shared_12 - 62015.625*shared_13 + 918.75*shared_2 + 43.75*shared_5 - 32156.25*shared_6 - 10106.25*shared_7 - 1837.5*shared_9, decay*shared_14 + 2*decay*shared_3 + 180*shared_0 + 1575*shared_12 + 1395*shared_13 - shared_14 - 30*shared_2 + 8*shared_3 - 4*shared_5 + 690*shared_6 + 195*shared_7 + 30*shared_9 + 1, decay*shared_15 - shared_15 + shared_5, -decay*shared_16 - 4.5*decay*shared_2 - shared_16 + 4.5*shared_2 + 3*shared_5 - 9*shared_9, decay*shared_17 + decay*shared_18 + decay*shared_19 - shared_17 + shared_18 - shared_19, -393.75*decay*shared_0 - decay*shared_20 + 393.75*shared_0 - 236.25*shared_2 - shared_20 - 787.5*shared_6 - 551.25*shared_7 + 131.25*shared_8 - 183.75*shared_9),  # mean squares and products
     )
 
 
@@ -233,13 +241,16 @@ def gauss_markov_parts_slow(
     A series, for less than 0.5. Derived here.
     """
     shared_0 = ratio**3
-    shared_1 = ratio**5
-    shared_2 = ratio**6
-    shared_3 = ratio**7
-    shared_4 = ratio**8
-    shared_5 = ratio**9
+    shared_1 = ratio**4
+    shared_2 = ratio**5
+    shared_3 = ratio**6
+    shared_4 = ratio**7
+    shared_5 = ratio**8
+    shared_6 = ratio**9
+    shared_7 = ratio**2
+    shared_8 = 0.5*ratio
     return (
-        (0.25*ratio**4 + (15/14)*ratio - 5/14*shared_0 - 25/231*shared_1 + (1/28)*shared_2 - 25/2574*shared_3 + (1/441)*shared_4 - 1/2145*shared_5, (35/18)*ratio - 35/198*shared_0 + (175/3861)*shared_1 - 1/36*shared_2 + (245/23166)*shared_3 - 1/324*shared_4 + (49/65637)*shared_5, (8/63)*ratio - 8/3465*shared_0 + (16/135135)*shared_1 - 8/405405*shared_3 + (1/99225)*shared_4 - 16/4922775*shared_5),  # mean squares
+        ((15/14)*ratio - 5/14*shared_0 + 0.25*shared_1 - 25/231*shared_2 + (1/28)*shared_3 - 25/2574*shared_4 + (1/441)*shared_5 - 1/2145*shared_6, (35/18)*ratio - 35/198*shared_0 + (175/3861)*shared_2 - 1/36*shared_3 + (245/23166)*shared_4 - 1/324*shared_5 + (49/65637)*shared_6, (8/63)*ratio - 8/3465*shared_0 + (16/135135)*shared_2 - 8/405405*shared_4 + (1/99225)*shared_5 - 16/4922775*shared_6, -2/3*ratio - 2/15*shared_0 + (2/45)*shared_1 - 4/315*shared_2 + (1/315)*shared_3 - 2/2835*shared_4 + (2/14175)*shared_5 + (1/3)*shared_7 + 1, (6/5)*ratio + (18/35)*shared_0 - 1/5*shared_1 + (4/63)*shared_2 - 3/175*shared_3 + (2/495)*shared_4 - 4/4725*shared_5 + (4/25025)*shared_6 - shared_7, -2/7*shared_0 + (5/42)*shared_1 - 5/126*shared_2 + (1/90)*shared_3 - 4/1485*shared_4 + (2/3465)*shared_5 - 1/9009*shared_6 + 0.5*shared_7 - shared_8, (2/9)*shared_0 - 1/6*shared_1 + (5/66)*shared_2 - 7/270*shared_3 + (28/3861)*shared_4 - 2/1155*shared_5 + (7/19305)*shared_6 - shared_8),  # mean squares and products
     )
 
 
@@ -248,10 +259,11 @@ def tone_parts(
     sine: float,
     cosine: float,
 ) -> tuple[tuple[float, ...], ...]:
-    """Amplitudes of the phases of a tone of amplitude 1, and the share of its power that is left. [-]
+    """Amplitudes of the parts of a tone of amplitude 1, and the share of its power that is left. [-]
 
-    Columns: of the quadratic and the cubic phase at the aperture edge, of what is left after the cubic.
-    angle is πfT, sine and cosine its own. Terms cancel below 0.5. Derived here.
+    Columns: of the quadratic and the cubic phase at the aperture edge, of what is left after the cubic,
+    of the constant and the linear part at the edge. angle is πfT, sine and cosine its own. Terms cancel
+    below 0.5. Derived here.
     """
     shared_0 = angle**(-3)
     shared_1 = angle**(-2)
@@ -263,7 +275,7 @@ def tone_parts(
     shared_7 = shared_1*sine
     shared_8 = cosine*shared_3
     return (
-        (22.5*shared_0*sine - 22.5*shared_2 - 7.5*shared_4, 262.5*shared_5 - 262.5*shared_6 - 105*shared_7 + 17.5*shared_8, -shared_1*sine**2 - 3*(shared_1*sine - shared_8)**2 - 5*(3*shared_0*sine - 3*shared_2 - shared_4)**2 - 7*(15*shared_5 - 15*shared_6 - 6*shared_7 + shared_8)**2 + 1),  # amplitude, amplitude, share of power
+        (22.5*shared_0*sine - 22.5*shared_2 - 7.5*shared_4, 262.5*shared_5 - 262.5*shared_6 - 105*shared_7 + 17.5*shared_8, -shared_1*sine**2 - 3*(shared_1*sine - shared_8)**2 - 5*(3*shared_0*sine - 3*shared_2 - shared_4)**2 - 7*(15*shared_5 - 15*shared_6 - 6*shared_7 + shared_8)**2 + 1, shared_4, 3*shared_1*sine - 3*shared_8),  # two amplitudes, share of power, two amplitudes
     )
 
 
@@ -274,10 +286,17 @@ def tone_parts_slow(
 
     A series, for less than 0.5. Derived here.
     """
-    shared_0 = angle**8
-    shared_1 = angle**10
+    shared_0 = angle**2
+    shared_1 = angle**4
+    shared_2 = angle**6
+    shared_3 = angle**8
+    shared_4 = angle**10
+    shared_5 = angle**3
+    shared_6 = angle**5
+    shared_7 = angle**7
+    shared_8 = angle**9
     return (
-        ((1/1008)*angle**6 - 1/28*angle**4 + 0.5*angle**2 - 1/66528*shared_0 + (1/6918912)*shared_1, (1/44478720)*angle**11 - 1/370656*angle**9 + (1/4752)*angle**7 - 1/108*angle**5 + (1/6)*angle**3, (2/153516738375)*angle**16 - 16/21070924875*angle**14 + (4/127702575)*angle**12 + (1/99225)*shared_0 - 8/9823275*shared_1),  # amplitude, amplitude, share of power
+        (0.5*shared_0 - 1/28*shared_1 + (1/1008)*shared_2 - 1/66528*shared_3 + (1/6918912)*shared_4, (1/44478720)*angle**11 + (1/6)*shared_5 - 1/108*shared_6 + (1/4752)*shared_7 - 1/370656*shared_8, (2/153516738375)*angle**16 - 16/21070924875*angle**14 + (4/127702575)*angle**12 + (1/99225)*shared_3 - 8/9823275*shared_4, -1/6*shared_0 + (1/120)*shared_1 - 1/5040*shared_2 + (1/362880)*shared_3 + 1, angle - 1/10*shared_5 + (1/280)*shared_6 - 1/15120*shared_7 + (1/1330560)*shared_8),  # two amplitudes, share of power, two amplitudes
     )
 
 
@@ -288,14 +307,15 @@ def tone_parts_fast(
     inverse_6: float,
     inverse_8: float,
 ) -> tuple[tuple[float, ...], ...]:
-    """Mean squares of the phases of a fast tone, and the share of its power that is left. [-]
+    """Mean squares and products of the parts of a fast tone, and the share of its power left. [-]
 
-    Columns: of the quadratic and the cubic phase at the aperture edge, of what is left after the cubic.
-    What turns with the angle πfT is averaged. Arguments are the angle's powers 0, −2 … −8; of a
-    spectrum, its integrals with them. Derived here.
+    Columns: of the quadratic and the cubic phase at the aperture edge, of what is left after the cubic,
+    of the constant and the linear part at the edge; constant times quadratic, linear times cubic. What
+    turns with the angle πfT is averaged. Arguments are the angle's powers 0, −2 … −8; of a spectrum,
+    its integrals with them. Derived here.
     """
     return (
-        (28.125*inverse_2 + 84.375*inverse_4 + 253.125*inverse_6, 153.125*inverse_2 + 918.75*inverse_4 + 6890.625*inverse_6 + 34453.125*inverse_8, inverse_0 - 8*inverse_2 - 30*inverse_4 - 180*inverse_6 - 787.5*inverse_8),  # mean squares, share of power
+        (28.125*inverse_2 + 84.375*inverse_4 + 253.125*inverse_6, 153.125*inverse_2 + 918.75*inverse_4 + 6890.625*inverse_6 + 34453.125*inverse_8, inverse_0 - 8*inverse_2 - 30*inverse_4 - 180*inverse_6 - 787.5*inverse_8, 0.5*inverse_2, 4.5*inverse_2 + 4.5*inverse_4, 3.75*inverse_2 - 11.25*inverse_4, 26.25*inverse_2 - 236.25*inverse_4 - 393.75*inverse_6),  # mean squares, share of power, mean squares and products
     )
 
 

@@ -150,9 +150,19 @@ def nothing_judges(key: str) -> str:
 
 
 @phrase
-def place_is_not_known(row_ids: Sequence[str], cause: str) -> str:
-    """Said of the location, beside errors that vary at random, or slowly."""
-    return f"{', '.join(row_ids)}: {cause} the image too, and this version does not compute by how much"
+def place_is_not_known(row_ids: Sequence[str]) -> str:
+    """Said of the location, beside errors that vary slowly."""
+    return f"{', '.join(row_ids)}: slow vibration moves the image too, and this version does not compute by how much"
+
+
+@phrase
+def clocks_are_not_set(row_ids: Sequence[str]) -> str:
+    """Said of the location, beside free oscillators."""
+    return (
+        f"{', '.join(row_ids)}: the image moves by what free oscillators drift since they were set, which the file "
+        "does not say; add timing_error.constant and timing_error.linear, the clock error that is left at "
+        "mid-aperture, or synchronization"
+    )
 
 
 @phrase
@@ -790,6 +800,12 @@ def vibration_is_not_drawn() -> str:
 def mean_power_is_not_drawn() -> str:
     """Said of Monte Carlo."""
     return "what sensors and clocks spread is a mean power: ISLR is not drawn"
+
+
+@phrase
+def unset_clocks_are_not_drawn() -> str:
+    """Said of Monte Carlo, of a location beside free oscillators."""
+    return "the file does not say how the oscillators are set: the location is not drawn"
 
 
 @phrase

@@ -115,9 +115,32 @@ class Together:
         moves = [(row_id, (east, north)) for row_id, (east, north) in zip(does, (ahead - back) / 2, strict=True)]
         return [*moves, ("whatever the signs", (rest[0], rest[1]))] if rest.any() else moves
 
+    @cached_property
+    def random_moves(self) -> Moves:
+        """Sigmas of the displacement of sensors and clocks, as far as they are known. [m]"""
+        found = []
+        for error in self.random:
+            if error.declared is not None:
+                effect = error.effect(self.model)
+                east, north = (np.nan_to_num(self.errors.array(one * error.declared)) for one in effect[3:5])
+                found.append((error.subject.id, (east, north)))
+        return found
+
+    @property
+    def is_placed(self) -> bool:
+        """Whether any declared error can displace the image."""
+        return bool(self.motion or self.random_moves)
+
     def moved(self, rule: str) -> Floats:
-        """Displacements combined by a rule; not a number where an error has no image to place. [m]"""
-        return self.errors.array(combined_displacement(self.moves(rule), rule, self.groups))
+        """Displacements combined by a rule; not a number where an error has no image to place. [m]
+
+        One at random has no direction: to a sum over all signs it adds its length, whatever the others do.
+        """
+        if rule != "sum":
+            moves = [*self.moves(rule), *self.random_moves]
+            return self.errors.array(combined_displacement(moves, rule, self.groups))
+        found = combined_displacement(self.moves(rule), rule, self.groups)
+        return self.errors.array(found + sum(np.hypot(*move) for _, move in self.random_moves))
 
     # ---------------------------------------------------------------- of one case
     def phase_parts(self, phases: Phases, rule: str = "", case: int = 0) -> list[tuple[str, float]]:
@@ -127,7 +150,7 @@ class Together:
 
     def displacement_parts(self, case: int = 0) -> list[tuple[str, GroundVector]]:
         """List the parts of displacements that the mission's rule combines: none where one has no image. [m]"""
-        found = displacement_parts(self.moves(self.rule), self.rule, self.groups)
+        found = displacement_parts([*self.moves(self.rule), *self.random_moves], self.rule, self.groups)
         parts = [(row_id, (float(east[case]), float(north[case]))) for row_id, (east, north) in found]
         return [] if any(math.isnan(east) for _, (east, _) in parts) else parts
 

@@ -106,7 +106,7 @@ class Aggregates:
         limit = self.needs.location_error
         return self._row(
             subject("mission", LOCATION),
-            bool(mine.motion),
+            mine.is_placed,
             (),
             mine.moved(self.combine),
             limit,
@@ -284,7 +284,7 @@ def misplacing(together: Together, place: Floats) -> Misplacing:
     """
     mission, array = together.errors.mission, together.errors.array
     needed = mission.requirements.location_error
-    at_random = [(one.subject.id, array(displaces_unknown(mission, one)) > 0) for one in together.random]
+    at_random = [(one.subject.id, array(displaces_unknown(one)) > 0) for one in together.random]
     slow: list[tuple[str, Truths]] = []
     if needed is not None and together.slow:
         moves = [array(one.moves) for one in together.slow]

@@ -26,35 +26,38 @@ from bisar_budget.analysis.spread import (
 )
 from bisar_budget.budget.judged_rows import BOUND, CODE, REQUIREMENTS, Floats, Judged, Judging, worded
 from bisar_budget.budget.pull_in import caps, needed_sentence
-from bisar_budget.effects.declared import CUBIC, QUADRATIC
+from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.effect import override_notes, subject
 from bisar_budget.effects.oscillators import POOR_FIT
 from bisar_budget.effects.random_errors import RandomEffect, RandomError, process_of
 from bisar_budget.findings.row import Row
+from bisar_budget.geometry import GroundVector
 from bisar_budget.mission.instruments import Oscillator
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
 from bisar_budget.phrases import NOTHING, Note
 
 ISLR = "islr"
-HELD = (QUADRATIC, CUBIC, ISLR)  # requirements, in the order of what an error does
+HELD = (QUADRATIC, CUBIC, ISLR, LOCATION)  # requirements, in the order of what an error does
 _GOOD_FIT = 0.005  # of an Allan deviation, up to which a power law needs no word
 
 Truths = NDArray[np.bool_]
 
 
 class Limits(NamedTuple):
-    """Limits on the errors of an owner, each alone: quadratic and cubic phase, rms of what spreads. [rad]"""
+    """Limits on the errors of an owner, each alone: phases and rms of what spreads [rad], displacement [m]."""
 
     quadratic: Any
     cubic: Any
     spread: Any
+    displacement: Any
 
 
 def limits_for(mission: Mission, allocation: Allocation, owner: str, model: str, gain: Any = 1.0) -> Limits:
     """Limits on the errors of an owner by a model; `gain` is that of autofocus."""
     spread = spread_limit(mission, allocation, owner, model)
-    return Limits(allocation.qpe_limit(owner) * gain, mission.requirements.cubic_phase_error, spread)
+    needs = mission.requirements
+    return Limits(allocation.qpe_limit(owner) * gain, needs.cubic_phase_error, spread, needs.location_error)
 
 
 def held_effect(mission: Mission, effect: RandomEffect) -> RandomEffect:
@@ -70,7 +73,7 @@ def sizes_at(effect: RandomEffect, limits: Limits) -> list[Any]:
     with np.errstate(all="ignore"):
         return [
             math.inf if limit is None else np.where(np.asarray(part) > 0, limit / np.asarray(part), math.inf)
-            for part, limit in zip(effect[:3], limits, strict=True)
+            for part, limit in zip((*effect[:3], effect.displacement), limits, strict=True)
         ]
 
 
@@ -90,7 +93,7 @@ class RandomRows:
 
     def _effects(self, model: str) -> RandomEffect:
         """Effects of a unit of each error, (errors, cases)."""
-        columns = zip(*(error.effect(model)[:3] for error in self.errors), strict=True)
+        columns = zip(*(error.effect(model)[:5] for error in self.errors), strict=True)
         return RandomEffect(*map(self._table, columns))
 
     def _sizes(self, model: str, effects: RandomEffect) -> Floats:
@@ -230,6 +233,7 @@ class RandomRow:
             evidence=evidence,
             remarks=notes,
             binding_requirement=binding,
+            displacement_m=_displacement(error, gating),
         )
 
 
@@ -275,6 +279,14 @@ class IslrRow:
 
 
 # ---------------------------------------------------------------------- in words
+def _displacement(error: RandomError, model: str) -> GroundVector | None:
+    """Sigmas of the displacement east and north, coverage factor included; None where they are not known. [m]"""
+    effect = error.effect(model)
+    if error.declared is None or math.isnan(effect.displacement):
+        return None
+    return effect.east * error.declared, effect.north * error.declared
+
+
 def _said(mission: Mission, error: RandomError) -> tuple[str, str | None, tuple[Note, ...]]:
     """Equation, evidence and notes of an error's row."""
     kind, figure, sync = error.subject.kind, error.subject.axis, mission.synchronization
@@ -306,7 +318,8 @@ def _said_of_oscillator(mission: Mission, error: RandomError) -> tuple[str, str 
 
 def _unlimited(mission: Mission, error: RandomError, effect: RandomEffect) -> Note:
     """Say why nothing limits an error: it does nothing, or what it does is not required."""
-    does = [name for name, size in (("cubic phase", effect.cubic), ("ISLR", effect.spread)) if size]
+    parts = (("cubic phase", effect.cubic), ("ISLR", effect.spread), ("displacement", effect.displacement))
+    does = [name for name, size in parts if size > 0]
     return phrases.no_requirement_limits(does) if does else no_effect(mission, error)
 
 
@@ -324,6 +337,9 @@ def _over(mission: Mission, error: RandomError, model: str, binding: str | None,
     limits = limits_for(mission, allocation, error.owner, model, allocation.autofocus_gain)
     if binding == CUBIC:
         return phrases.cubic_phase_over(effect.cubic * size, limits.cubic)
+    if binding == LOCATION:
+        by = "equation (25)" if model == "published" else "full model"
+        return phrases.location_over(effect.displacement * size, limits.displacement, by)
     if binding == ISLR:
         level = _levels(mission, model)
         return phrases.spreads_too_much(level(effect.spread * size), level(limits.spread))
@@ -340,6 +356,9 @@ def _doubt(mission: Mission, error: RandomError, gating: str, binding: str, limi
         return phrases.other_model_spreads(other, _levels(mission, other)(effect.spread * size))
     if binding == QUADRATIC:
         return phrases.other_model_fails(other, effect.quadratic * size, limit, "rad", "QPE")
+    if binding == LOCATION:
+        needed = mission.requirements.location_error or 0.0
+        return phrases.other_model_fails(other, effect.displacement * size, needed, "m", "displacement")
     allowed = mission.requirements.cubic_phase_error or 0.0
     return phrases.other_model_fails(other, effect.cubic * size, allowed, "rad", "cubic phase")
 

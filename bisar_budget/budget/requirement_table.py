@@ -100,9 +100,9 @@ def unknown_place(judged: JudgedMission, case: Case) -> Note:
     if not slow and not at_random:
         doubts = input_doubts(case.mission)
         return doubts[0].note if doubts else NOTHING
-    causes = [*(["random errors"] if at_random else []), *(["slow vibration"] if slow else [])]
-    cause = f"{' and '.join(causes)} {'move' if at_random else 'moves'}"
-    return phrases.place_is_not_known([*at_random, *slow], cause)
+    said = [phrases.clocks_are_not_set(at_random)] if at_random else []
+    said += [phrases.place_is_not_known(slow)] if slow else []
+    return said[0].then(*said[1:])
 
 
 def negligible_effects(judged: JudgedMission, case: Case) -> Iterator[Note]:

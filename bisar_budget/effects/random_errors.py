@@ -1,18 +1,18 @@
 """Errors of sensors and clocks: what one unit of a figure does to quadratic phase, cubic phase and ISLR, 1 sigma.
 
 Biases of an inertial sensor are one error over the aperture, noise is another at every moment; both have a sigma and
-no sign. They contribute from the quadratic order on: the constant and linear part of a position is what aiding
-leaves, and the mission declares it. To the published model the line of sight is that of mid-aperture
-(`theory.random_errors`); the full model lets it turn, knows a direct path, and counts what the displacement of the
-image adds.
+no sign. Orders 0 and 1 of their range error displace the image by Q⁻¹, from order 2 on it defocuses. Biases and walks
+of an inertial sensor count from mid-aperture on: position and velocity there are what aiding leaves, and the mission
+declares them. A constant phase of a link moves nothing. To the published model the line of sight is that of
+mid-aperture (`theory.random_errors`), and Q that of (25). The full model lets it turn, knows a direct path, and
+counts what the displacement of the image adds.
 
 Numbers of a mission may be arrays (cases,); its geometry then is that of these cases.
 """
 
 import math
 from collections.abc import Iterator, Sequence
-from functools import cache, cached_property, reduce
-from operator import or_
+from functools import cache, cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,9 +20,10 @@ from numpy.typing import NDArray
 
 from bisar_budget import evaluators
 from bisar_budget.constants import ROUNDING
+from bisar_budget.effects.declared import ImagePlane, published_planes
 from bisar_budget.effects.effect import PLATFORMS, Subject, plain, subject
 from bisar_budget.effects.oscillators import Noise, noise_of
-from bisar_budget.effects.spectra import Floats, gauss_markov, link_parts, parts, synchronized_parts
+from bisar_budget.effects.spectra import Floats, Parts, gauss_markov, link_parts, parts, synchronized_parts
 from bisar_budget.faults import KeyPath
 from bisar_budget.geometry import BistaticGeometry, PlatformState, Vector
 from bisar_budget.mission.instruments import IMU_KINDS, GaussMarkov, Oscillator
@@ -44,19 +45,47 @@ _GROWS = {
     "angle_random_walk": 5,
 }
 _CANCELS = ROUNDING * 1e-2  # of a square: below it, its root is rounding
+_LEADING = (1.0, 1.0, 1.5, 2.5)  # coefficient of xⁿ in the Legendre polynomial Pₙ: the order's value at the edge
 
 
 class RandomEffect(NamedTuple):
     """Effect of a unit of an error: quadratic and cubic phase at the aperture edge, rms of what spreads. [rad/unit]
 
-    `spread` is what is left of the phase after the cubic; it is a mean power, and no coverage factor is in it.
-    `covariance` is that of quadratic and cubic phase. [rad²/unit²]
+    `spread` is what is left of the phase after the cubic; it is a mean power, and no coverage factor is in it. `east`
+    and `north` are the sigmas of the displacement [m/unit], not a number where it is not known, as of a free
+    oscillator. `covariance` (4, 4, ...) is that of quadratic and cubic phase and displacement east and north, in the
+    units of their products; no matrix where the published model has only their sizes.
     """
 
     quadratic: Any
     cubic: Any
     spread: Any
-    covariance: Any = 0.0
+    east: Any
+    north: Any
+    covariance: Any = None
+
+    @property
+    def displacement(self) -> Any:
+        """Root-mean-square length of the displacement. [m/unit]"""
+        return np.hypot(self.east, self.north)
+
+    def of(self, case: int) -> "RandomEffect":
+        """That of a case in plain numbers; the covariance as (4, 4)."""
+        covariance = self.covariance
+        if covariance is not None:
+            covariance = covariance[..., case if covariance.shape[-1] > 1 else 0]
+        return RandomEffect._make((*(plain(size, case) for size in self[:5]), covariance))
+
+    def times(self, factor: Any) -> "RandomEffect":
+        """The same with phases and displacement of a coverage factor."""
+        return RandomEffect(
+            self.quadratic * factor,
+            self.cubic * factor,
+            self.spread,
+            self.east * factor,
+            self.north * factor,
+            None if self.covariance is None else self.covariance * factor**2,
+        )
 
 
 class RandomError(NamedTuple):
@@ -115,23 +144,16 @@ def process_of(mission: Mission, error: RandomError) -> GaussMarkov:
     return next(one for one in motion.random if one.name == error.subject.axis)
 
 
-def displaces_unknown(mission: Mission, error: RandomError) -> Any:
-    """Whether an error displaces the image by a random amount, in which cases.
-
-    Both terms of the clock, where the file declares them, stand for what oscillators and a link do to the place.
-    """
-    timing = mission.timing_error
-    is_clock_stated = timing.constant is not None and timing.linear is not None
-    if error.declared is None or (is_clock_stated and error.subject.kind in ("oscillator", "synchronization")):
+def displaces_unknown(error: RandomError) -> Any:
+    """Whether an error displaces the image by an amount that is not known, in which cases."""
+    if error.declared is None:
         return False
-    does = [part > 0 for effect in (error.published, error.full) for part in (effect.quadratic, effect.cubic)]
-    return (error.declared > 0) & reduce(or_, does)
+    return (error.declared > 0) & np.isnan(error.published.displacement + error.full.displacement)
 
 
 def in_one_case(mission: Mission, error: RandomError, case: int = 0) -> RandomError:
     """An error in plain numbers, those of a case with its mission, and with the noise of an oscillator."""
-    both = error.published, error.full
-    published, full = (RandomEffect(*(plain(part, case) for part in effect)) for effect in both)
+    published, full = error.published.of(case), error.full.of(case)
     noise = None
     if error.subject.kind == "oscillator":
         oscillator: Oscillator = getattr(mission.platforms, error.owner).oscillator
@@ -184,6 +206,35 @@ class _Seen:
             self.cases,
             has_direct_path=mission.has_direct_path,
         )
+
+    @cached_property
+    def weights(self) -> Floats:
+        """What a metre of range error at each node does, (4, nodes, cases): two phases [rad], east and north. [m]"""
+        return np.array((*self.exact.phase_weights, *self.exact.place_weights))
+
+    @cached_property
+    def plane(self) -> ImagePlane:
+        """Q⁻¹ of the published model."""
+        return published_planes(self.geometry)[0]
+
+    def moved(self, constant: Any, linear: Any) -> list[Any]:
+        """Sigmas of the displacement by (25), of mean squares of constant and linear part at the edge [m²]. [m]"""
+        (a, b), (c, d) = self.plane.adjugate
+        slope = linear / np.square(self.aperture_time / 2)
+        scale = 1 / np.where(self.plane.is_singular, math.nan, self.plane.determinant)
+        return [np.sqrt(one**2 * constant + other**2 * slope) * np.abs(scale) for one, other in ((a, b), (c, d))]
+
+    def of_orders(self, covariance: Floats, along: Any = 1.0) -> Floats:
+        """Covariance (4, 4, cases) of phases and displacement by orders 0 to 3 of independent range errors.
+
+        `covariance` (4, 4, cases) is that of each at the aperture edge [m²], `along` (errors, nodes, cases) what a
+        metre of it does to the range; higher orders defocus and displace in second order of a turning line of sight.
+        """
+        places = self.exact.sampling.places
+        orders = np.polynomial.legendre.legvander(places, len(_LEADING) - 1) / _LEADING
+        seen = np.broadcast_to(along, (np.shape(along)[0] if np.ndim(along) else 1, places.size, self.cases))
+        effects = np.einsum("fnc,anc,no->afoc", self.weights, seen, orders)
+        return np.asarray(np.einsum("afoc,opc,agpc->fgc", effects, covariance, effects))
 
 
 def _length_along(sight: Floats, directions: Floats) -> Floats:
@@ -238,14 +289,14 @@ def _of_imu(seen: _Seen, name: str) -> Iterator[RandomError]:
         row = heard = _at_mid_aperture(seen.mission, index, along)
         if along_heard is not along:
             heard = _at_mid_aperture(seen.mission, index, along_heard)
-        quadratic, cubic, covariance = _over_aperture(seen.exact, PLATFORMS.index(name), kind, directions)
+        (quadratic, cubic, east, north), covariance = _over_aperture(seen, PLATFORMS.index(name), kind, directions)
         yield RandomError(
             subject=subject(name, "imu", kind),
             unit=unit,
             declared=None if declared is None else declared * seen.factor,
             path=("platforms", name, "motion_error", *(("imu", kind) if key == kind else (key,))),
-            published=RandomEffect(row[0], row[1], row[2] / seen.factor),
-            full=RandomEffect(quadratic, cubic, heard[2] / seen.factor, covariance),
+            published=RandomEffect(row[0], row[1], row[2] / seen.factor, *_moved_by_imu(seen, kind, along)),
+            full=RandomEffect(quadratic, cubic, heard[2] / seen.factor, east, north, covariance),
         )
 
 
@@ -255,22 +306,37 @@ def _at_mid_aperture(mission: Mission, index: int, along: Any) -> tuple[Any, ...
     return evaluators.inertial_phases(along, along, along, wavelength, T)[index]
 
 
-def _over_aperture(exact: ExactRanges, place: int, kind: str, directions: Floats) -> tuple[Floats, Floats, Floats]:
-    """Sigma of quadratic and of cubic phase of a unit over the exact paths [rad], and their covariance. [rad²]
+def _moved_by_imu(seen: _Seen, kind: str, along: Floats) -> list[Any]:
+    """Sigmas of the displacement by a unit along so much of the line of sight of mid-aperture. [m]"""
+    fit = seen.exact.fit[:2]
+    constant, linear = np.diagonal(fit @ _covariance_at_nodes(kind) @ fit.T)
+    scale = along**2 * seen.exact.half ** _GROWS[kind]
+    return seen.moved(constant * scale, linear * scale)
 
-    A covariance over the aperture is that over an aperture of 2 s, times a power of half the aperture time.
+
+def _over_aperture(seen: _Seen, place: int, kind: str, directions: Floats) -> tuple[Floats, Floats]:
+    """Sigmas by a unit over the exact paths: of quadratic and cubic phase [rad], of displacement east and north. [m]
+
+    And their covariance, (4, 4, cases). That over the aperture is that over an aperture of 2 s, times a power of half
+    the aperture time.
     """
     x, y, z = np.moveaxis(directions, 1, 0)[:, :, None]
-    moved = np.array(exact.phase_weights)[:, None] * exact.along(place, (x, y, z))  # (2, axes, nodes, cases)
-    of_unit, power = _covariance_at_nodes(kind), _GROWS[kind]
-    turned = of_unit @ moved
-    squares = (moved * turned).sum(axis=(1, 2))
+    moved = seen.weights[:, None] * seen.exact.along(place, (x, y, z))  # (4, axes, nodes, cases)
+    of_unit, scale = _covariance_at_nodes(kind), seen.exact.half ** _GROWS[kind]
+    covariance = np.einsum("fanc,ganc->fgc", moved, of_unit @ moved)
     sizes = np.square((np.abs(moved) * np.sqrt(np.diagonal(of_unit))[:, None]).sum(axis=2)).sum(axis=1)
-    scale = exact.half**power
-    # What is left of terms that cancel exactly is rounding, and would make a limit out of nothing.
+    return _sigmas(covariance * scale, sizes * scale)
+
+
+def _sigmas(covariance: Floats, sizes: Floats) -> tuple[Floats, Floats]:
+    """Roots of the diagonal of a covariance (4, 4, cases), and that covariance.
+
+    What is left of terms that cancel exactly, of squares of so large `sizes` (4, cases), is rounding, and would make
+    a limit out of nothing.
+    """
+    squares = np.einsum("ffc->fc", covariance)
     is_real = squares > _CANCELS * sizes
-    quadratic, cubic = np.sqrt(np.where(is_real, squares * scale, 0.0))
-    return quadratic, cubic, np.where(is_real.all(axis=0), (moved[0] * turned[1]).sum(axis=(0, 1)) * scale, 0.0)
+    return np.sqrt(np.where(is_real, squares, 0.0)), np.where(is_real & is_real[:, None], covariance, 0.0)
 
 
 @cache
@@ -307,19 +373,32 @@ def _of_position(seen: _Seen, name: str) -> Iterator[RandomError]:
     k, axes, key = 2 * math.pi / seen.mission.radar.wavelength, seen.axes(name), error.key_of("random")
     for index, process in enumerate(error.random):
         largest, sizes = _parts_of_largest(seen.vector(process.sigma))
-        found = np.sqrt(gauss_markov(seen.aperture_time, process.correlation_time))
-        published, full = (
-            RandomEffect(quadratic, cubic, left / seen.factor)
-            for quadratic, cubic, left in (k * along * found for along in seen.along(name, axes * sizes[:, None]))
-        )
+        directions = axes * sizes[:, None]
+        found = gauss_markov(seen.aperture_time, process.correlation_time)
+        along, along_heard = seen.along(name, directions)
+        seen_along = seen.exact.along(PLATFORMS.index(name), tuple(np.moveaxis(directions, 1, 0)[:, :, None]))
+        covariance = seen.of_orders(_of_cases(found.covariance, seen.cases), seen_along)
+        quadratic, cubic, left = (np.sqrt(one) for one in found[:3])
+        (own, own_cubic, east, north), covariance = _sigmas(covariance, np.einsum("ffc->fc", covariance))
         yield RandomError(
             subject=subject(name, "random", process.name),
             unit="m",
             declared=largest * seen.factor,
             path=("platforms", name, "motion_error", *((key, index, "sigma") if key == "random" else (key,))),
-            published=published,
-            full=full,
+            published=RandomEffect(
+                k * along * quadratic,
+                k * along * cubic,
+                k * along * left / seen.factor,
+                *seen.moved(found.constant * along**2, found.linear * along**2),
+            ),
+            full=RandomEffect(own, own_cubic, k * along_heard * left / seen.factor, east, north, covariance),
         )
+
+
+def _of_cases(covariance: Floats, cases: int) -> Floats:
+    """The same as (4, 4, cases)."""
+    whole = covariance if covariance.ndim == 3 else covariance[..., None]
+    return np.broadcast_to(whole, (*whole.shape[:2], cases))
 
 
 # ---------------------------------------------------------------------- oscillators and their link
@@ -328,16 +407,46 @@ def _of_oscillator(seen: _Seen, name: str) -> Iterator[RandomError]:
     oscillator: Oscillator | None = getattr(mission.platforms, name).oscillator
     if oscillator is None:
         return
-    found = np.zeros((3, seen.cases))
+    found = np.zeros((len(Parts._fields), seen.cases))
     if sync is None or not sync.is_direct_path:
         interval = None if sync is None else sync.interval
         for (alike, each), places in _groups_alike((oscillator, interval), seen.cases):
             found[:, places] = _parts_at_1_hz(alike, each, seen.aperture_time[places])
-    quadratic, cubic, spread = np.sqrt(found) * mission.radar.center_frequency
-    effect = RandomEffect(quadratic * seen.factor, cubic * seen.factor, spread)
+    published, full = _of_clock(seen, Parts(*found * mission.radar.center_frequency**2))
     key = ("platforms", name, "oscillator")
     path = key if oscillator.sensor is None else (*key, "sensor")
-    yield RandomError(subject(name, "oscillator"), "dB", 1.0, path, effect, effect)
+    yield RandomError(
+        subject(name, "oscillator"), "dB", 1.0, path, published.times(seen.factor), full.times(seen.factor)
+    )
+
+
+def _of_clock(seen: _Seen, found: Parts) -> tuple[RandomEffect, RandomEffect]:
+    """Effects by both models of a phase with these parts [rad²]; those of orders 0 and 1 where they are known.
+
+    Where the file states both terms of the clock, these stand for what displaces.
+    """
+    k, timing = 2 * math.pi / np.asarray(seen.mission.radar.wavelength), seen.mission.timing_error
+    quadratic, cubic, spread = (np.sqrt(one) for one in found[:3])
+    is_stated = timing.constant is not None and timing.linear is not None
+    is_known = np.isfinite(found.constant + found.linear)
+    nothing = np.where(is_stated | (quadratic + cubic == 0), 0.0, math.nan)
+    counts = is_known & ~np.asarray(is_stated)
+    with np.errstate(invalid="ignore"):
+        square = 1 / k**2
+        covariance = _of_cases(np.where(counts, found.covariance * square, 0.0), seen.cases)
+        east, north = (
+            np.where(counts, one, nothing) for one in seen.moved(found.constant * square, found.linear * square)
+        )
+    published = RandomEffect(quadratic, cubic, spread, east, north)
+    whole = seen.of_orders(covariance)
+    (*phases, east, north), whole = _sigmas(whole, np.einsum("ffc->fc", whole))
+    own = np.zeros_like(whole)
+    own[0, 0], own[1, 1] = quadratic**2, cubic**2
+    quadratic, cubic, east, north = (
+        np.where(counts, *both)
+        for both in zip((*phases, east, north), (quadratic, cubic, nothing, nothing), strict=True)
+    )
+    return published, RandomEffect(quadratic, cubic, spread, east, north, np.where(counts, whole, own))
 
 
 def _parts_at_1_hz(oscillator: Oscillator, interval: float | None, aperture_time: Floats) -> Floats:
@@ -346,7 +455,7 @@ def _parts_at_1_hz(oscillator: Oscillator, interval: float | None, aperture_time
     spectra: dict[Any, list[int]] = {}
     for index, T in enumerate(times.tolist()):  # an Allan deviation may be fitted otherwise over another aperture
         spectra.setdefault(noise_of(oscillator, 1.0, T).pieces, []).append(index)
-    found = np.zeros((3, times.size))
+    found = np.zeros((len(Parts._fields), times.size))
     for pieces, some in spectra.items():
         of_them = times[some]
         found[:, some] = parts(pieces, of_them) if interval is None else synchronized_parts(pieces, of_them, interval)
@@ -358,17 +467,20 @@ def _of_link(seen: _Seen) -> Iterator[RandomError]:
     sync = seen.mission.synchronization
     if sync is None:
         return
-    found = np.zeros((3, seen.cases))
+    found = np.zeros((len(Parts._fields), seen.cases))
     if sync.interval is None:  # from pulse to pulse: all of it spreads
-        found[2] = 1.0
+        found[Parts._fields.index("left")] = 1.0
     else:
         for interval, places in _groups_alike(sync.interval, seen.cases):
             times, place = np.unique(seen.aperture_time[places], return_inverse=True)
             found[:, places] = np.array(link_parts(times, interval))[:, place]
-    quadratic, cubic, spread = np.sqrt(found)
-    effect = RandomEffect(quadratic, cubic, spread / seen.factor)
+    # A constant phase moves nothing.
+    published, full = _of_clock(
+        seen, Parts(*found)._replace(constant=0.0 * found[0], constant_quadratic=0.0 * found[0])
+    )
+    published, full = (one._replace(spread=one.spread / seen.factor) for one in (published, full))
     what = subject("clock", "synchronization")
-    yield RandomError(what, "rad", sync.error * seen.factor, ("synchronization", "error"), effect, effect)
+    yield RandomError(what, "rad", sync.error * seen.factor, ("synchronization", "error"), published, full)
 
 
 def _groups_alike(value: Any, cases: int) -> Iterator[tuple[Any, NDArray[np.intp]]]:

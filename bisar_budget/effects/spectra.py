@@ -23,11 +23,31 @@ SLOW = 0.5  # angle, or ratio, below which terms cancel and a series is exact to
 
 
 class Parts(NamedTuple):
-    """Mean squares of a phase over the aperture [rad²]: quadratic, cubic, and what is left after the cubic."""
+    """Mean squares of a phase over the aperture [rad²]: quadratic, cubic, and what is left after the cubic.
+
+    Then those of the constant and the linear part at the aperture edge, which displace, and the mean products of the
+    constant with the quadratic and of the linear with the cubic part; infinite where slow noise has no bound.
+    """
 
     quadratic: Any
     cubic: Any
     left: Any
+    constant: Any = math.inf
+    linear: Any = math.inf
+    constant_quadratic: Any = -math.inf
+    linear_cubic: Any = -math.inf
+
+    @property
+    def covariance(self) -> Floats:
+        """Of the constant, linear, quadratic and cubic part at the aperture edge, (4, 4, ...)."""
+        one, two, even, odd = self.constant, self.linear, self.constant_quadratic, self.linear_cubic
+        zero = np.zeros(np.shape(self.quadratic))
+        return np.array([
+            [one, zero, even, zero],
+            [zero, two, zero, odd],
+            [even, zero, self.quadratic, zero],
+            [zero, odd, zero, self.cubic],
+        ])  # fmt: skip
 
 
 def gauss_markov(aperture_time: Any, correlation_time: Any) -> Parts:
@@ -42,7 +62,8 @@ def gauss_markov(aperture_time: Any, correlation_time: Any) -> Parts:
 def tone(angle: Any) -> Floats:
     """Amplitudes of the quadratic and the cubic phase of a tone of amplitude 1, in its worst phase, and what is left.
 
-    `angle` is πfT; the last of the three is the share of its power beyond the cubic.
+    `angle` is πfT; the third is the share of its power beyond the cubic. Then the amplitudes of the constant and the
+    linear part.
     """
     angle = np.asarray(angle)
     slow = np.array(*evaluators.tone_parts_slow(np.minimum(angle, SLOW)))  # type: ignore[arg-type]
@@ -114,7 +135,7 @@ def parts(pieces: Sequence[PowerLawPiece], aperture_time: Any) -> Parts:
         [s]
     """
     scale = math.pi * np.atleast_1d(aperture_time)
-    total = np.zeros((3, *scale.shape))
+    total = np.zeros((len(Parts._fields), *scale.shape))
     for piece in pieces:
         to_angle = piece.density * scale ** (piece.slope - 1)
         total += to_angle * _of_power_law(piece.slope, piece.low * scale, piece.high * scale)
@@ -140,14 +161,14 @@ def _of_power_law(slope: float, low: Floats, high: Floats) -> Floats:
 
 @lru_cache(maxsize=256)
 def _between_edges(slope: float) -> Floats:
-    """Parts of x^(−slope) from the first edge to each, (3, edges)."""
+    """Parts of x^(−slope) from the first edge to each, (parts, edges)."""
     panels = _power_panels(slope, _EDGES[:-1], _EDGES[1:])
-    return np.concatenate((np.zeros((3, 1)), np.cumsum(panels, axis=1)), axis=1)
+    return np.concatenate((np.zeros((len(panels), 1)), np.cumsum(panels, axis=1)), axis=1)
 
 
 def _at_an_end(slope: float, low: Floats, high: Floats) -> Floats:
     """Parts of a panel at the end of a piece, which may be slow or fast; nothing of one without length."""
-    found = np.zeros((3, low.size))
+    found = np.zeros((len(Parts._fields), low.size))
     is_slow, is_fast = high <= _FIRST * _SAME, low >= _FAST / _SAME
     for some, of_panel in (
         (is_slow, _slow),
@@ -161,17 +182,15 @@ def _at_an_end(slope: float, low: Floats, high: Floats) -> Floats:
 
 
 def _integral(exponent: float, low: Floats, high: Floats) -> Floats:
-    """Integral of x^exponent; `low` may be zero where it converges."""
+    """Integral of x^exponent; infinite from zero on where it does not converge."""
     power = exponent + 1
-    if abs(power) < 1e-9:
-        return np.asarray(np.log(high / low))
-    lower = np.where(low > 0, np.where(low > 0, low, 1.0) ** power, 0.0)
-    return np.asarray((high**power - lower) / power)
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.log(high / low) if abs(power) < 1e-9 else (high**power - low**power) / power)
 
 
 def _slow(slope: float, low: Floats, high: Floats) -> Floats:
-    """Tones so slow that their parts are their first powers: x²/2, x³/6 and x⁸/99225."""
-    powers = ((4, 4), (6, 36), (8, 99225))
+    """Tones so slow that their parts are their first powers: x²/2, x³/6, x⁸/99225, 1 and x."""
+    powers = ((4, 4), (6, 36), (8, 99225), (0, 1), (2, 1), (2, -2), (4, -6))
     return np.array([_integral(power - slope, low, high) / divisor for power, divisor in powers])
 
 
@@ -190,10 +209,13 @@ def _power_panels(slope: float, low: Floats, high: Floats) -> Floats:
 
 
 def _squares(angle: Floats) -> Floats:
-    """Squares of the amplitudes of a tone, and the share of its power that is left, (3, …)."""
-    found = tone(angle)
-    found[:2] *= found[:2]
-    return found
+    """Mean squares of a tone's parts, the share of its power that is left, and mean products, (parts, …).
+
+    Order n of a tone turns by n quarters: those that are two apart have opposite signs.
+    """
+    quadratic, cubic, left, constant, linear = tone(angle)
+    both = -constant * quadratic, -linear * cubic
+    return np.array((quadratic**2, cubic**2, left, constant**2, linear**2, *both))
 
 
 # ---------------------------------------------------------------------- synchronisation
@@ -236,7 +258,7 @@ def _over_panels(
         for low, top in _panels(0.0, end, of_case)
     ]
     low, top, cases = (np.array(column) for column in zip(*panels, strict=True))
-    total = np.zeros((3, high.size))
+    total = np.zeros((len(Parts._fields), high.size))
     for start in range(0, low.size, _MOST):
         some = slice(start, start + _MOST)
         found = _panels_of(density, low[some], top[some], scale[cases[some]])

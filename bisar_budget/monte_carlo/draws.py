@@ -184,7 +184,8 @@ class Sums:
     """Effects of one block of draws, added up: the quadratic phase by owner, all else for the mission.
 
     By owner, if kept: `motion` is position, velocity and acceleration error of both platforms, (2, 3, 3, draws),
-    `clock` its coefficients (4, draws), `phase_alone` what is stated as a phase, quadratic and cubic (2, draws).
+    `clock` its coefficients (4, draws), `alone` what is known by its effects only: quadratic and cubic phase,
+    displacement east and north (4, draws).
 
     Parameters
     ----------
@@ -203,14 +204,14 @@ class Sums:
         self.totals = {column: np.zeros(size) for column in sorted(wanted - {0})} if adds else {}
         self.motion: dict[str, Floats] = {}
         self.clock: dict[str, Floats] = {}
-        self.phase_alone: dict[str, Floats] = {}
+        self.alone: dict[str, Floats] = {}
         self._exact: dict[tuple[str, ...], Found] = {}
         self._scaled = np.empty(size)
         self._square = np.empty(size)
 
     def clear(self) -> None:
         """Begin another block."""
-        every: list[Mapping[Any, Floats]] = [self.phases, self.totals, self.motion, self.clock, self.phase_alone]
+        every: list[Mapping[Any, Floats]] = [self.phases, self.totals, self.motion, self.clock, self.alone]
         for one in (one for kept in every for one in kept.values()):
             one.fill(0.0)
         self._exact.clear()
@@ -226,7 +227,7 @@ class Sums:
             for source, size in variable.parts:
                 self._add_motion(variable.owner, source, size, drawn)
             if not variable.parts:
-                self._add_phases(variable.owner, variable.effects[:2], drawn)
+                self._add_effects(variable.owner, variable.effects, drawn)
 
     def _add_motion(self, owner: str, source: ErrorSource, size: float, drawn: Floats) -> None:
         if source.is_position:
@@ -239,10 +240,10 @@ class Sums:
         elif source.owner == "clock":
             self._kept(self.clock, owner, (4,))[_CLOCK[source.unit]] += size * drawn
         else:
-            self._add_phases(owner, (size, 0.0), drawn)
+            self._add_effects(owner, (size, 0.0, 0.0, 0.0), drawn)
 
-    def _add_phases(self, owner: str, phases: tuple[float, ...], drawn: Floats) -> None:
-        self._kept(self.phase_alone, owner, (2,))[:] += np.multiply.outer(phases, drawn)
+    def _add_effects(self, owner: str, effects: tuple[float, ...], drawn: Floats) -> None:
+        self._kept(self.alone, owner, (4,))[:] += np.multiply.outer(effects, drawn)
 
     def _kept(self, where: dict[str, Floats], owner: str, shape: tuple[int, ...]) -> Floats:
         if owner not in where:
@@ -272,13 +273,13 @@ class Sums:
         if owners not in self._exact:
             self._exact[owners] = self._by_exact_ranges(owners)
         found = self._exact[owners]
-        quadratic, cubic = _sum(self.phase_alone, owners, np.zeros((2, 1)))
+        quadratic, cubic, east, north = _sum(self.alone, owners, np.zeros((4, 1)))
         if judged.columns == (0,):
             square: Floats = (found.quadratic + quadratic) ** 2
         elif judged.columns == (1,):
             square = (found.cubic + cubic) ** 2
         else:
-            square = found.east**2 + found.north**2
+            square = (found.east + east) ** 2 + (found.north + north) ** 2
         return square
 
     def _by_exact_ranges(self, owners: tuple[str, ...]) -> Found:

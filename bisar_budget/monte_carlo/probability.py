@@ -11,7 +11,8 @@ Vibration is not drawn: its amplitude is declared and its limits are those of ec
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
+
+import numpy as np
 
 from bisar_budget import phrases
 from bisar_budget.analysis.allocation import Allocation
@@ -19,13 +20,11 @@ from bisar_budget.analysis.analysis import Analysis, Model
 from bisar_budget.analysis.together import Together, cubics, quadratics
 from bisar_budget.constants import MAX_DRAWS
 from bisar_budget.effects.effect import PLATFORMS, ErrorSource
+from bisar_budget.effects.random_errors import RandomError, displaces_unknown
 from bisar_budget.findings.monte_carlo import MonteCarlo, Requirement
 from bisar_budget.mission.model import Mission, Simulation, has_instruments
 from bisar_budget.monte_carlo.draws import HeldSum, Share, Variable, drawing_of, eigensystem, in_turn, joined
 from bisar_budget.phrases import Note
-
-if TYPE_CHECKING:
-    from bisar_budget.effects.random_errors import RandomError
 
 CONFIDENCE = 0.95
 DOMINANT = 0.5  # of the variance: beyond, a sum has the shape of that one error, whatever the others are
@@ -34,6 +33,8 @@ _SURE_QUANTILE = 3.2905267314919255  # at 99.95 %: a warning is not to be chance
 _MATERIAL = 0.1  # of the probability to fail: a difference that is sure but smaller changes nobody's mind
 
 _DIGITS = 9  # of sampled sigmas: further ones differ between processors, and mean nothing
+_PARTS = ("", ".cubic", ".east", ".north")  # variables of a random error, beside its quadratic phase
+_NOTHING_LEFT = 1e-12  # of a variance: what rounding leaves of one that others account for
 _ANGLES = 4096  # of a mean over a circle of a smooth function
 
 
@@ -67,7 +68,8 @@ def monte_carlo(
     if seed is None:
         seed = (mission.simulation or Simulation()).seed
     variables = list(_variables(analysis))
-    judged = list(_requirements(mission, analysis.allocation, variables))
+    is_placed = not any(displaces_unknown(error) for error in analysis.random)
+    judged = list(_requirements(mission, analysis.allocation, variables, is_placed=is_placed))
     drawing = drawing_of(analysis, variables, judged, draws, seed)
     counted = joined((tally for _, tally in (share or in_turn)(drawing)), len(judged))
     predictions = _Predictions(analysis, variables)
@@ -86,7 +88,7 @@ def monte_carlo(
         probability_low=low,
         probability_high=high,
         is_exact=drawing.is_exact,
-        notes=tuple(_notes(mission, analysis.stated, drawing.is_exact)),
+        notes=tuple(_notes(mission, analysis.stated, is_exact=drawing.is_exact, is_placed=is_placed)),
     )
 
 
@@ -122,20 +124,22 @@ def _variables(analysis: Analysis) -> Iterator[Variable]:
         yield from _of_noise(error, factor)
 
 
-def _of_noise(error: "RandomError", factor: float) -> Iterator[Variable]:
-    """Two variables of a sensor or a clock: its quadratic phase with the cubic that goes with it, and the rest."""
-    if not error.declared:
+def _of_noise(error: RandomError, factor: float) -> Iterator[Variable]:
+    """Variables of a sensor or a clock: its quadratic phase with all that goes with it, the cubic with what is left…
+
+    They are columns of the Cholesky root of its covariance of phases and displacement.
+    """
+    if not error.declared or error.full.covariance is None:
         return
-    size = error.declared / factor
-    effect = error.full
-    if error.unit == "dB":  # the coverage factor is in its phases
-        size, effect = 1.0, effect._replace(quadratic=effect.quadratic / factor, cubic=effect.cubic / factor)
-    quadratic, cubic = effect.quadratic * size, effect.cubic * size
-    shared = effect.covariance * size**2 / quadratic if quadratic else 0.0
-    alone = math.sqrt(max(0.0, cubic**2 - shared**2))
-    for part, effects in (("", (quadratic, shared, 0.0, 0.0)), (".cubic", (0.0, alone, 0.0, 0.0))):
-        if any(effects):
-            yield Variable(f"{error.id}{part}", error.id, error.owner, "normal", (), effects)
+    size = error.declared / factor  # of an oscillator the coverage factor is in its effects
+    left = np.array(error.full.covariance) * size**2
+    scale = np.diagonal(left).copy()
+    for place, part in enumerate(_PARTS):
+        if left[place, place] <= _NOTHING_LEFT * scale[place]:
+            continue
+        column = left[:, place] / math.sqrt(left[place, place])
+        left = left - np.multiply.outer(column, column)
+        yield Variable(f"{error.id}{part}", error.id, error.owner, "normal", (), tuple(column.tolist()))
 
 
 def _variable(
@@ -151,8 +155,10 @@ def _variable(
     return Variable(id, of, owner, distribution, tuple(parts), effects)
 
 
-def _requirements(mission: Mission, allocation: Allocation, variables: Sequence[Variable]) -> Iterator[HeldSum]:
-    """Those of `check` that declared errors count against."""
+def _requirements(
+    mission: Mission, allocation: Allocation, variables: Sequence[Variable], *, is_placed: bool
+) -> Iterator[HeldSum]:
+    """Those of `check` that declared errors count against; the location where it is known (`is_placed`)."""
     present = {variable.owner for variable in variables}
     every = ("transmitter", "receiver", "clock", "mission")
     wanted = {
@@ -167,9 +173,10 @@ def _requirements(mission: Mission, allocation: Allocation, variables: Sequence[
             yield HeldSum(f"{name}.quadratic_phase_error", "rad", limit, owners, (0,))
     cubic, location = mission.requirements.cubic_phase_error, mission.requirements.location_error
     moves = any(source.is_motion for variable in variables for source, _ in variable.parts)
+    displaces = moves or any(variable.effects[2] or variable.effects[3] for variable in variables)
     if cubic is not None and (moves or any(variable.effects[1] for variable in variables)):
         yield HeldSum("mission.cubic_phase_error", "rad", cubic, every, (1,))
-    if location is not None and moves:
+    if location is not None and displaces and is_placed:
         yield HeldSum("mission.location_error", "m", location, every, (2, 3))
 
 
@@ -293,7 +300,7 @@ def _doubts(found: Requirement, holds: int, draws: int, predictions: _Prediction
         )
 
 
-def _notes(mission: Mission, declared: Sequence[ErrorSource], is_exact: bool) -> Iterator[Note]:
+def _notes(mission: Mission, declared: Sequence[ErrorSource], *, is_exact: bool, is_placed: bool) -> Iterator[Note]:
     """Say what is drawn by a rule of ours, and what is not drawn."""
     if is_exact:
         yield phrases.drawn_through_exact_ranges()
@@ -307,6 +314,8 @@ def _notes(mission: Mission, declared: Sequence[ErrorSource], is_exact: bool) ->
     vibrations = [getattr(mission.platforms, name).motion_error.vibration for name in PLATFORMS]
     if any(one.sinusoidal or one.wideband for one in vibrations):
         yield phrases.vibration_is_not_drawn()
+    if mission.requirements.location_error is not None and not is_placed:
+        yield phrases.unset_clocks_are_not_drawn()
     if mission.requirements.islr is not None and has_instruments(mission):
         yield phrases.mean_power_is_not_drawn()
     if mission.allocation.coverage_factor != 1:

@@ -387,6 +387,16 @@ class ExactRanges:
         )
         return quadratic, cubic
 
+    @cached_property
+    def place_weights(self) -> tuple[Floats, Floats]:
+        """Displacement east and north per metre of range error at each node. [m/m]"""
+        value, slope = (weights[:, None] for weights in self.fit[:2])
+        east, north = (
+            (by_value * value + by_slope / self.half * slope) / self.determinant
+            for by_value, by_slope in self.adjugate
+        )
+        return east, north
+
     def effect(self, range_error: Floats) -> Effect:
         """Effect of range errors at the nodes, (..., nodes, cases), that of the displacement included."""
         constant, linear, own, own_cubic = np.moveaxis(self.fit @ range_error, -2, 0)

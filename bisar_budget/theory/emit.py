@@ -210,7 +210,9 @@ def _of_random_errors() -> tuple[Evaluator, ...]:
     """Evaluators for the effect of noise over an aperture; mean squares where it is a process."""
     figures = random_errors.inertial()
     columns = "Columns: quadratic and cubic phase at the aperture edge, what is left after the cubic. "
-    parts = "Columns: of the quadratic and the cubic phase at the aperture edge, of what is left after the cubic. "
+    parts = "Columns: of the quadratic and the cubic phase at the aperture edge, of what is left after the cubic, "
+    place = f"{parts}of the constant and the linear part at the edge"
+    moments = f"{place}; constant times quadratic, linear times cubic. "
     slow = "A series, for less than 0.5. Derived here."
     ratio = ((random_errors.ratio, "ratio"),)
     angle = ((random_errors.angle, "angle"),)
@@ -236,49 +238,49 @@ def _of_random_errors() -> tuple[Evaluator, ...]:
         ),
         Evaluator(
             name="gauss_markov_parts",
-            summary="Mean squares of a Gauss-Markov process of variance 1 over an aperture. [-]",
+            summary="Mean squares and products of a Gauss-Markov process of variance 1 over an aperture. [-]",
             details=(
-                f"{parts}ratio is the aperture time over twice the correlation time, decay exp(−2·ratio). "
+                f"{moments}ratio is the aperture time over twice the correlation time, decay exp(−2·ratio). "
                 "Terms cancel for a ratio below 0.5. Derived here."
             ),
             arguments=(*ratio, (random_errors.decay, "decay")),
-            rows=(tuple(random_errors.gauss_markov()),),
-            row_names=("mean squares",),
+            rows=((*random_errors.gauss_markov(), *random_errors.gauss_markov_place()),),
+            row_names=("mean squares and products",),
         ),
         Evaluator(
             name="gauss_markov_parts_slow",
             summary="The same for a long correlation time. [-]",
             details=slow,
             arguments=ratio,
-            rows=(tuple(random_errors.gauss_markov_slow()),),
-            row_names=("mean squares",),
+            rows=(random_errors.gauss_markov_slow(),),
+            row_names=("mean squares and products",),
         ),
         Evaluator(
             name="tone_parts",
-            summary="Amplitudes of the phases of a tone of amplitude 1, and the share of its power that is left. [-]",
-            details=f"{parts}angle is πfT, sine and cosine its own. Terms cancel below 0.5. Derived here.",
+            summary="Amplitudes of the parts of a tone of amplitude 1, and the share of its power that is left. [-]",
+            details=f"{place}. angle is πfT, sine and cosine its own. Terms cancel below 0.5. Derived here.",
             arguments=(*angle, *waves),
-            rows=(tuple(random_errors.tone_in_terms()),),
-            row_names=("amplitude, amplitude, share of power",),
+            rows=(random_errors.tone_in_terms(),),
+            row_names=("two amplitudes, share of power, two amplitudes",),
         ),
         Evaluator(
             name="tone_parts_slow",
             summary="The same of a slow tone. [-]",
             details=slow,
             arguments=angle,
-            rows=(tuple(random_errors.tone_slow()),),
-            row_names=("amplitude, amplitude, share of power",),
+            rows=(random_errors.tone_slow(),),
+            row_names=("two amplitudes, share of power, two amplitudes",),
         ),
         Evaluator(
             name="tone_parts_fast",
-            summary="Mean squares of the phases of a fast tone, and the share of its power that is left. [-]",
+            summary="Mean squares and products of the parts of a fast tone, and the share of its power left. [-]",
             details=(
-                f"{parts}What turns with the angle πfT is averaged. Arguments are the angle's powers 0, −2 … −8; "
+                f"{moments}What turns with the angle πfT is averaged. Arguments are the angle's powers 0, −2 … −8; "
                 "of a spectrum, its integrals with them. Derived here."
             ),
             arguments=tuple((symbol, f"inverse_{2 * n}") for n, symbol in enumerate(random_errors.inverse)),
-            rows=(tuple(random_errors.tone_fast()),),
-            row_names=("mean squares, share of power",),
+            rows=(random_errors.tone_fast(),),
+            row_names=("mean squares, share of power, mean squares and products",),
         ),
         Evaluator(
             name="power_law_parts",

@@ -66,6 +66,22 @@ class Moments(NamedTuple):
         return Moments(*(expand(factor * part) for part in self))
 
 
+class PlaceMoments(NamedTuple):
+    """What displaces, beside `Moments`: mean squares of orders 0 and 1, and mean products with what defocuses.
+
+    Of the constant and the linear part at the aperture edge, of constant times quadratic and of linear times cubic
+    part. Over time that runs either way alike even and odd orders know nothing of each other.
+    """
+
+    constant: Expr
+    linear: Expr
+    constant_quadratic: Expr
+    linear_cubic: Expr
+
+
+_PLACE_ORDERS = ((0, 0), (1, 1), (0, 2), (1, 3))  # of `PlaceMoments`
+
+
 def moments(coefficients: tuple[Expr, ...], mean_square: Expr) -> Moments:
     """Sort the mean squares of the coefficients of P₀ … P₃ and that of the whole history."""
     orders = [square / (2 * n + 1) for n, square in enumerate(coefficients)]
@@ -152,24 +168,34 @@ def _with_exponential(polynomial: Poly, rate: Expr) -> Expr:
     return total
 
 
+def _gauss_markov_coefficients(m: int, n: int) -> Expr:
+    """Mean product of the coefficients of Pₘ and Pₙ, both even or both odd, of a process of variance 1."""
+    first, second = (Poly(legendre(order, _x), _x) for order in (m, n))
+    # ∫ Pₙ(t)·exp(−a(s − t)) dt from −1 to s is q(s) − q(−1)·exp(−a(s + 1)); r is that of Pₘ for −a, and integrates
+    # what is left.
+    q, r = _with_exponential(second, ratio), _with_exponential(first, -ratio)
+    both = integrate(expand(first.as_expr() * q), (_x, -1, 1))
+    both -= q.subs(_x, -1) * (r.subs(_x, 1) * decay - r.subs(_x, -1))
+    return expand(Rational((2 * m + 1) * (2 * n + 1), 4) * 2 * both)
+
+
 @cache
 def gauss_markov() -> Moments:
     """Mean squares of a stationary process of variance 1 and correlation exp(−|t|/τ_c), in `ratio` and `decay`."""
-    squares = []
-    for n in range(ORDERS):
-        polynomial = Poly(legendre(n, _x), _x)
-        # ∫ Pₙ(t)·exp(−a(s − t)) dt from −1 to s is q(s) − q(−1)·exp(−a(s + 1)); r is q for −a, and integrates that.
-        q, r = _with_exponential(polynomial, ratio), _with_exponential(polynomial, -ratio)
-        both = integrate(expand(polynomial.as_expr() * q), (_x, -1, 1))
-        both -= q.subs(_x, -1) * (r.subs(_x, 1) * decay - r.subs(_x, -1))
-        squares.append(expand(Rational(2 * n + 1, 2) ** 2 * 2 * both))
-    return moments(tuple(squares), Integer(1))
+    return moments(tuple(_gauss_markov_coefficients(n, n) for n in range(ORDERS)), Integer(1))
 
 
 @cache
-def gauss_markov_slow() -> Moments:
-    """The same where the correlation time is long, as a series in `ratio`."""
-    return Moments(*(_series(part.subs(decay, exp(-2 * ratio)), ratio) for part in gauss_markov()))
+def gauss_markov_place() -> PlaceMoments:
+    """The same of what displaces."""
+    return PlaceMoments(*(LEADING[n] * _gauss_markov_coefficients(m, n) for m, n in _PLACE_ORDERS))
+
+
+@cache
+def gauss_markov_slow() -> tuple[Expr, ...]:
+    """Both where the correlation time is long, as a series in `ratio`."""
+    exact = (*gauss_markov(), *gauss_markov_place())
+    return tuple(_series(part.subs(decay, exp(-2 * ratio)), ratio) for part in exact)
 
 
 def _series(expression: Expr, variable: Symbol) -> Expr:
@@ -206,23 +232,32 @@ def tone() -> Moments:
     return Moments(LEADING[2] * 5 * parts[2], LEADING[3] * 7 * parts[3], left)
 
 
+def tone_place() -> tuple[Expr, Expr]:
+    """Amplitudes of the constant and the linear part of a tone of amplitude 1."""
+    return spherical_bessel(0), 3 * spherical_bessel(1)
+
+
 @cache
-def tone_in_terms() -> Moments:
-    """`tone` in `sine` and `cosine` of `angle`."""
-    return Moments(*(part.subs({sin(angle): sine, cos(angle): cosine}) for part in tone()))
+def tone_in_terms() -> tuple[Expr, ...]:
+    """`tone` and `tone_place` in `sine` and `cosine` of `angle`."""
+    return tuple(part.subs({sin(angle): sine, cos(angle): cosine}) for part in (*tone(), *tone_place()))
 
 
-def tone_slow() -> Moments:
-    """`tone` of a slow tone, as a series in `angle`."""
-    return Moments(*(_series(part, angle) for part in tone()))
+def tone_slow() -> tuple[Expr, ...]:
+    """Both of a slow tone, as a series in `angle`."""
+    return tuple(_series(part, angle) for part in (*tone(), *tone_place()))
 
 
-def tone_fast() -> Moments:
-    """Mean squares of `tone` over a fast tone's angle, sine and cosine averaged, in `inverse` powers of the angle."""
-    quadratic, cubic, left = tone_in_terms()
+def tone_fast() -> tuple[Expr, ...]:
+    """`Moments` and `PlaceMoments` of a fast tone, sine and cosine averaged, in `inverse` powers of the angle.
+
+    Order n of a tone turns by n quarters: those that are two apart have opposite signs.
+    """
+    quadratic, cubic, left, constant, linear = tone_in_terms()
     mean = {sine**2: Rational(1, 2), cosine**2: Rational(1, 2), sine * cosine: Integer(0)}
-    averaged = (Poly(expand(expand(part).subs(mean)), 1 / angle) for part in (quadratic**2, cubic**2, left))
-    return Moments(*(sum(c * inverse[n // 2] for (n,), c in part.terms()) for part in averaged))
+    products = (quadratic**2, cubic**2, left, constant**2, linear**2, -constant * quadratic, -linear * cubic)
+    averaged = (Poly(expand(expand(part).subs(mean)), 1 / angle) for part in products)
+    return tuple(sum(c * inverse[n // 2] for (n,), c in part.terms()) for part in averaged)
 
 
 def power_law_integral(n: int, slope: int) -> Expr:

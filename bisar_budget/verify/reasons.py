@@ -193,10 +193,10 @@ def power_of_both_platforms(common_db: float) -> str:
 
 
 @phrase
-def sigma_of_time_series(draws: int, factor: float, images: int, is_cubic: bool) -> str:
+def sigma_of_time_series(draws: int, factor: float, images: int, bound_by: str) -> str:
     """Said of a random error's limit."""
     times = "" if factor == 1 else f" times the coverage factor {factor:g}"
-    bound = ", bound by the cubic phase" if is_cubic else ""
+    bound = f", bound by the {bound_by}" if bound_by else ""
     known = 196 / math.sqrt(2 * draws)  # of a standard deviation of normal draws
     return f"one sigma of {draws} time series, ± {known:.2g} % at 95 %{times}, {images} of them in images{bound}"
 

@@ -18,7 +18,7 @@ from bisar_budget.analysis.spread import declared_powers, islr_db, mainlobe_ener
 from bisar_budget.analysis.vibration_limits import echo_phase, highest_echo, vibration_limits
 from bisar_budget.budget.random_rows import HELD, ISLR, held_effect, limits_for, sizes_at
 from bisar_budget.constants import SPEED_OF_LIGHT
-from bisar_budget.effects.declared import CUBIC
+from bisar_budget.effects.declared import CUBIC, LOCATION
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.oscillators import Spur
 from bisar_budget.effects.random_errors import RandomError, process_of
@@ -41,7 +41,8 @@ from bisar_budget.simulate.phase_history import (
 )
 from bisar_budget.simulate.realisations import clock_seconds, phase_courses, position_courses
 from bisar_budget.verify import reasons
-from bisar_budget.verify.phase_cases import TOLERANCE, compare
+from bisar_budget.verify.aperture_reading import measured_shift
+from bisar_budget.verify.phase_cases import TOLERANCE, compare, moved
 from bisar_budget.verify.study import Study
 
 TOLERANCE_DB = 0.5
@@ -272,7 +273,7 @@ def verify_pslr(study: Study) -> Verdict:
 
 
 def verify_random(study: Study, error: RandomError) -> Verdict:
-    """Limit of one figure: the smallest of what quadratic phase, cubic phase and ISLR allow, autofocus left out."""
+    """Limit of one figure: the smallest of what its requirements allow, autofocus left out."""
     sizes = limits_of(study, error)
     binding = min(sizes, key=lambda name: sizes[name])
     size = sizes[binding]
@@ -281,6 +282,8 @@ def verify_random(study: Study, error: RandomError) -> Verdict:
     if binding == ISLR:
         is_taken = study.mission.requirements.cubic_phase_error is not None
         return _power(study, blank, [at_limit], error.owner, order=_ORDER if is_taken else _ORDER - 1)
+    if binding == LOCATION:
+        return _place(study, blank, at_limit, _stream(study, error.id))
     return _phase(study, blank, at_limit, binding, _stream(study, error.id))
 
 
@@ -308,11 +311,45 @@ def _phase(study: Study, blank: Verdict, error: RandomError, binding: str, rng: 
     verdict = blank._replace(
         budget_rad=budget,
         verdict=compare(measured / budget - 1, tolerance),
-        reason=reasons.sigma_of_time_series(draws, factor, _IMAGES, is_cubic),
+        reason=reasons.sigma_of_time_series(draws, factor, _IMAGES, "cubic phase" if is_cubic else ""),
     )
     if is_cubic:
         return verdict._replace(measured_cubic_rad=measured, predicted_cubic_rad=predicted)
     return verdict._replace(measured_qpe_rad=measured, predicted_qpe_rad=predicted)
+
+
+def _place(study: Study, blank: Verdict, error: RandomError, rng: np.random.Generator) -> Verdict:
+    """Sigma of the displacement at the limit, coverage factor included, against the requirement."""
+    required = study.mission.requirements.location_error or 0.0
+    factor, draws = study.mission.allocation.coverage_factor, _DRAWS
+    if error.subject.kind in ("imu", "random"):
+        found = study.exact_effects(error.owner, _courses(study, error, rng))
+    else:
+        fit, draws = _fits(study, error, rng)
+        if error.subject.kind == "synchronization":  # a constant phase moves nothing
+            fit[0] = 0.0
+        half = study.collection.aperture_time / 2
+        phases = np.polynomial.legendre.legval(aperture_nodes(study.collection.aperture_time) / half, fit)
+        metres = np.asarray(phases * study.collection.wavelength / (2 * math.pi), float)
+        found = study.exact_effects("clock", metres)
+    east, north = (factor * math.sqrt(np.nanmean(np.square(one))) for one in (found.east, found.north))
+    drawn, seen = list[float](), list[float]()
+    try:
+        for errors in _series(study, error, rng):
+            images = study.images(errors)
+            shift = measured_shift(images.chip, images.reference, study.read(images))
+            drawn += images.effect.displacement
+            seen += moved(images.effect.displacement, shift.displacement)
+    except ValueError as fault:
+        return blank._replace(reason=reasons.no_image_of_a_time_series(str(fault)))
+    shown = float(np.dot(drawn, seen) / np.dot(drawn, drawn))
+    tolerance = TOLERANCE + _SURE_SIGMA / math.sqrt(2 * draws)
+    return blank._replace(
+        displacement_m=(east, north),
+        measured_displacement_m=(east * shown, north * shown),
+        verdict=compare(math.hypot(east, north) * shown / required - 1, tolerance),
+        reason=reasons.sigma_of_time_series(draws, factor, _IMAGES, "displacement"),
+    )
 
 
 def _stream(study: Study, row_id: str) -> np.random.Generator:
@@ -322,19 +359,27 @@ def _stream(study: Study, row_id: str) -> np.random.Generator:
 
 def _sigma(study: Study, error: RandomError, rng: np.random.Generator, is_cubic: bool) -> tuple[float, int]:
     """Standard deviation of a phase over many time series, and their number. [rad]"""
-    mission, nodes = study.mission, aperture_nodes(study.collection.aperture_time)
     if error.subject.kind in ("imu", "random"):
-        is_walk = error.subject.kind == "imu"  # smooth between the nodes; correlated noise may not be
-        courses = (
-            position_courses(mission, error, nodes, _DRAWS, rng) if is_walk else _smooth_noise(study, error, rng)
-        )
-        found = study.exact_phases(error.owner, courses)
-        return float(np.nanstd(found[1] if is_cubic else found[0])), _DRAWS
-    times = _moments(study, 257)
-    draws = _CLOCK_DRAWS if mission.synchronization is None else _SYNCHRONIZED_DRAWS
-    phases = phase_courses(mission, error, times, draws, rng, _TURNS / study.collection.aperture_time)
-    fit = np.polynomial.legendre.legfit(2 * times / study.collection.aperture_time, phases.T, _ORDER)
+        found = study.exact_effects(error.owner, _courses(study, error, rng))
+        return float(np.nanstd(found.cubic if is_cubic else found.quadratic)), _DRAWS
+    fit, draws = _fits(study, error, rng)
     return float(np.std(2.5 * fit[3] if is_cubic else 1.5 * fit[2])), draws
+
+
+def _courses(study: Study, error: RandomError, rng: np.random.Generator) -> Floats:
+    """Position errors of a platform at the nodes of exact ranges, (draws, nodes, 3). [m]"""
+    if error.subject.kind == "random":  # not smooth between the nodes, as what is integrated is
+        return _smooth_noise(study, error, rng)
+    return position_courses(study.mission, error, aperture_nodes(study.collection.aperture_time), _DRAWS, rng)
+
+
+def _fits(study: Study, error: RandomError, rng: np.random.Generator) -> tuple[Floats, int]:
+    """Legendre coefficients of time series of a clock's phase, (4, draws) [rad], and the number of draws."""
+    times = _moments(study, 257)
+    draws = _CLOCK_DRAWS if study.mission.synchronization is None else _SYNCHRONIZED_DRAWS
+    phases = phase_courses(study.mission, error, times, draws, rng, _TURNS / study.collection.aperture_time)
+    found = np.polynomial.legendre.legfit(2 * times / study.collection.aperture_time, phases.T, _ORDER)
+    return np.asarray(found, float), draws
 
 
 def _smooth_noise(study: Study, error: RandomError, rng: np.random.Generator) -> Floats:

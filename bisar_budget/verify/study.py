@@ -12,7 +12,7 @@ from bisar_budget.effects.declared import QUADRATIC
 from bisar_budget.effects.effect import PLATFORMS, ErrorSource, Subject
 from bisar_budget.findings.images import Verdict
 from bisar_budget.mission.model import Mission
-from bisar_budget.ranges.exact_ranges import FINE, STILL, ExactRanges, followed
+from bisar_budget.ranges.exact_ranges import FINE, STILL, ExactRanges, Found, followed
 from bisar_budget.simulate.autofocus import ALGORITHMS
 from bisar_budget.simulate.collection import CELLS, MAX_CELLS, OVERSAMPLING, RANGE_CELLS, Chip, PointCollection
 from bisar_budget.simulate.phase_history import Errors, ExactEffect, Floats, PathError, superposed
@@ -115,18 +115,18 @@ class Study:
         """Effect of several errors by exact ranges."""
         return self.collection.effect(self.together(sizes, scale))
 
-    def exact_phases(self, platform: str, courses: Floats) -> tuple[Floats, Floats]:
-        """Quadratic and cubic phases of many histories of one platform's position error, (draws, nodes, 3). [rad]
+    def exact_effects(self, owner: str, courses: Floats) -> Found:
+        """Effects of many histories: of one platform's position error, (draws, nodes, 3), or of the clock's. [m]
 
-        The nodes are those of `aperture_nodes`.
+        That of the clock is a range error, (draws, nodes). The nodes are those of `aperture_nodes`.
         """
         paths, seen = (self.geometry.transmitter, self.geometry.receiver), self.collection
         is_heard = seen.has_direct_path
         exact = ExactRanges.of(paths, seen.wavelength, seen.aperture_time, FINE, has_direct_path=is_heard)
         moved = np.ascontiguousarray(courses.T)
-        shifts = [moved if name == platform else STILL for name in PLATFORMS]
-        found = followed(exact, np.zeros(moved.shape[1:]), shifts, np.zeros(len(courses), dtype=int))
-        return found.quadratic, found.cubic
+        shifts = [moved if name == owner else STILL for name in PLATFORMS]
+        clock = np.zeros(moved.shape[-2:]) if owner in PLATFORMS else moved
+        return followed(exact, clock, shifts, np.zeros(len(courses), dtype=int))
 
     def worse_sign(self, sizes: Sizes, scale: float) -> float:
         """The scale with the sign that leaves more quadratic phase: a limit has two signs.

@@ -277,7 +277,7 @@ class TestInit:
         (mission,) = json.loads(result.stdout)["missions"]
         stands = {one["key"]: one["status"] for one in mission["requirements"]}
         assert stands.pop("quadratic_phase_error") == "pass_with_autofocus"
-        assert stands.pop("location_error") == "waived"
+        assert stands.pop("location_error") == "pass"
         assert stands.pop("declare") == "not_evaluated"
         assert set(stands.values()) <= {"pass", "warn"}
 

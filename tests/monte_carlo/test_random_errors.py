@@ -35,8 +35,15 @@ def test_sigmas_are_those_of_the_rows_without_the_coverage_factor() -> None:
     assert by_id["receiver.quadratic_phase_error"].rss == pytest.approx(2 * quadratic, rel=1e-9)
     cubic = [one.full.cubic * (1 if one.unit == "dB" else one.declared or 0) / 2 for one in analysis.random]
     assert by_id["mission.cubic_phase_error"].sigma == pytest.approx(math.hypot(*cubic), rel=SIGMA)
-    assert "mission.location_error" not in by_id, "nothing that moves is declared"
     assert any("ISLR is not drawn" in note for note in found.notes)
+    # Nobody says how the oscillator was set: without it the location is that of the sensors.
+    assert "mission.location_error" not in by_id
+    assert any("the location is not drawn" in note for note in found.notes)
+    analysis, by_id, found = drawn(MISSION + REST)
+    moved = math.hypot(*(one.full.displacement * (one.declared or 0) / 2 for one in analysis.random))
+    assert by_id["mission.location_error"].sigma == pytest.approx(moved, rel=SIGMA)
+    assert by_id["mission.location_error"].rss == pytest.approx(2 * moved, rel=1e-9)
+    assert not any("the location is not drawn" in note for note in found.notes)
 
 
 def test_draws_through_exact_ranges_keep_the_phases_of_noise() -> None:
@@ -56,6 +63,9 @@ def test_draws_through_exact_ranges_keep_the_phases_of_noise() -> None:
     row_id = "mission.cubic_phase_error"
     noise = math.hypot(*(one.full.cubic * (one.declared or 0) / 2 for one in analysis.random))
     assert with_noise[row_id].sigma == pytest.approx(math.hypot(without[row_id].sigma, noise), rel=SIGMA)
+    row_id = "mission.location_error"
+    noise = math.hypot(*(one.full.displacement * (one.declared or 0) / 2 for one in analysis.random))
+    assert with_noise[row_id].sigma == pytest.approx(math.hypot(without[row_id].sigma, noise), rel=SIGMA)
 
 
 def test_a_bias_along_one_axis_has_one_draw_for_both_phases() -> None:
@@ -64,6 +74,6 @@ def test_a_bias_along_one_axis_has_one_draw_for_both_phases() -> None:
     for values, is_one in (("[50 ug, 0 ug, 0 ug]", True), ("50 ug", False)):
         analysis = Analysis(parse_mission(f"{head}        accelerometer_bias: {values}\n"))
         error = next(one for one in analysis.random if one.declared)
-        correlation = abs(error.full.covariance) / (error.full.quadratic * error.full.cubic)
-        assert (correlation == pytest.approx(1, abs=1e-9)) is is_one
+        correlation = abs(error.full.covariance[0, 1]) / (error.full.quadratic * error.full.cubic)
+        assert bool(correlation == pytest.approx(1, abs=1e-9)) is is_one
         assert correlation < 1 + 1e-9

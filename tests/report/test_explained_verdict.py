@@ -226,11 +226,11 @@ class TestNotJudged:
         assert doubt == pytest.approx(mission.platforms.receiver.path.doubt_m, rel=1e-5)
         assert "Position errors" not in explained(mission, "receiver.velocity.x")
 
-    def test_a_location_beside_random_errors_names_them_with_their_phases(self) -> None:
+    def test_a_location_beside_free_oscillators_names_them_with_their_phases(self) -> None:
         text = explained(sensors("location_error: 3 m"), "mission.location_error")
-        assert "random errors move the image too" in " ".join(text.split())
-        ((qpe, _),) = re.findall(r"receiver\.imu\.attitude: QPE (\S+) rad, cubic (\S+) rad", text)
-        same = values(explained(sensors("location_error: 3 m"), "receiver.imu.attitude"))
+        assert "the image moves by what free oscillators drift" in " ".join(text.split())
+        ((qpe, _),) = re.findall(r"receiver\.oscillator: QPE (\S+) rad, cubic (\S+) rad", text)
+        same = values(explained(sensors("location_error: 3 m"), "receiver.oscillator"))
         assert float(qpe) == pytest.approx(same["QPE_full"], rel=1e-5)
 
 

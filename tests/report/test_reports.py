@@ -283,7 +283,7 @@ def test_a_cubic_phase_without_requirement_is_not_called_none(run, tmp_path) -> 
     text = run("check", mission, "--model", "published", "--format", "json").stdout
     (row,) = [row for row in json.loads(text)["missions"][0]["rows"] if row["id"] == "receiver.imu.gyro_bias"]
     assert row["allowable"] is None
-    assert row["reason"] == "no requirement limits its cubic phase"
+    assert row["reason"] == "no requirement limits its cubic phase and displacement"
 
 
 def test_a_file_that_declares_nothing_shows_its_allowables() -> None:

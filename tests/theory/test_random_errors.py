@@ -46,7 +46,9 @@ def spherical(x: np.ndarray) -> list[np.ndarray]:
 @pytest.mark.parametrize("angle", [0.01, 0.1, 0.49, 0.5, 0.51, 1, 3, 10, 100])
 def test_parts_of_a_tone_are_spherical_bessel_functions(angle: float) -> None:
     """On both sides of the series' end, to the 1e-8 that it leaves out."""
-    quadratic, cubic, left = tone(angle)
+    quadratic, cubic, left, constant, linear = tone(angle)
+    assert constant == pytest.approx(float(bessel(0, angle)), rel=2e-8, abs=1e-15)
+    assert linear == pytest.approx(float(3 * bessel(1, angle)), rel=2e-8, abs=1e-15)
     assert quadratic == pytest.approx(float(7.5 * bessel(2, angle)), rel=2e-8)
     assert cubic == pytest.approx(float(17.5 * bessel(3, angle)), rel=2e-8)
     rest = mpmath.nsum(lambda n: (2 * n + 1) * bessel(int(n), angle) ** 2, [4, int(angle) + 60])
@@ -85,7 +87,10 @@ def test_a_piece_of_a_mask_is_integrated_to_1e_4(low: float, high: float, slope:
     density = 2 * f**-slope
     expected = [
         np.trapezoid(density * weight, f)
-        for weight in ((7.5 * j[2]) ** 2, (17.5 * j[3]) ** 2, 1 - sum((2 * n + 1) * j[n] ** 2 for n in range(4)))
+        for weight in (
+            *((7.5 * j[2]) ** 2, (17.5 * j[3]) ** 2, 1 - sum((2 * n + 1) * j[n] ** 2 for n in range(4))),
+            *(j[0] ** 2, (3 * j[1]) ** 2, -7.5 * j[0] * j[2], -52.5 * j[1] * j[3]),
+        )
     ]
     assert found == pytest.approx(expected, rel=1e-4)
 

@@ -34,9 +34,7 @@ def of(one: Study, row_id: str) -> RandomError:
 def off(error: RandomError, factor: float) -> RandomError:
     """An error whose formulas say so much less than is true."""
     effect = error.full
-    wrong = effect._replace(
-        quadratic=effect.quadratic * factor, cubic=effect.cubic * factor, spread=effect.spread * factor
-    )
+    wrong = type(effect)._make((*(part * factor for part in effect[:5]), effect.covariance))
     return error._replace(full=wrong, published=wrong)
 
 
@@ -51,6 +49,22 @@ def test_a_limit_of_an_inertial_sensor_is_confirmed_and_a_wrong_one_is_not(row_i
     assert measured == pytest.approx(right.budget_rad, rel=0.05)
     assert verify_random(one, off(of(one, row_id), 0.8)).verdict == "optimistic"
     assert verify_random(one, off(of(one, row_id), 1.25)).verdict == "conservative"
+
+
+# Of a link fewer time series are drawn.
+@pytest.mark.parametrize("row_id", ["receiver.random.GNSS", "receiver.imu.gyro_bias", "timing.synchronization"])
+def test_a_limit_by_the_location_is_confirmed_and_a_wrong_one_is_not(row_id: str) -> None:
+    """What displaces is flown: slow wander of a position, a bias, errors of a link."""
+    needs = "requirements: {quadratic_phase_error: 170 deg, location_error: 1 cm}\n"
+    link = "synchronization: {interval: 2 s, error: 6 deg}\n"
+    text = MISSION.replace("1.5 s}", "600 s}") + needs + link + "allocation: {model: full, coverage_factor: 2}\n"
+    one = study(text)
+    right = verify_random(one, of(one, row_id))
+    assert (right.verdict, right.budget_rad) == ("confirmed", None)
+    sure, much = (0.12, 1.5) if row_id == "timing.synchronization" else (0.06, 1.25)
+    assert math.hypot(*right.measured_displacement_m) == pytest.approx(0.01, rel=sure)
+    assert verify_random(one, off(of(one, row_id), 1 / much)).verdict == "optimistic"
+    assert verify_random(one, off(of(one, row_id), much)).verdict == "conservative"
 
 
 def test_the_power_that_noise_spreads_is_confirmed_within_half_a_decibel() -> None:

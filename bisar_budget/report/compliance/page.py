@@ -15,6 +15,7 @@ from bisar_budget.catalogue import EQUATIONS
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.declared import END_OF_IMAGE
 from bisar_budget.effects.effect import MOTION_UNITS, ErrorSource, Subject
+from bisar_budget.effects.random_errors import RandomError
 from bisar_budget.faults import KeyPath, changes_words
 from bisar_budget.findings.images import PointImage
 from bisar_budget.findings.mission import MissionFindings, Report, UnusableMission
@@ -281,7 +282,7 @@ def _page(found: MissionFindings, style: Style, anchor: str) -> MissionPage:
         shares=tuple(_shares(found)),
         power_shares=tuple(_power_shares(mission, allocation)),
         contributions=_contributions(analysis, found),
-        moves=_moves(found, analysis.stated),
+        moves=_moves(found, [*analysis.stated, *(one for one in analysis.random if one.declared is not None)]),
         validity=tuple(_validity(mission, found)),
         inputs=tuple(_inputs(mission, found, file)),
         undeclared=tuple(
@@ -579,7 +580,7 @@ def _contributions(analysis: Analysis, found: MissionFindings) -> tuple[Contribu
     return tuple(result)
 
 
-def _moves(found: MissionFindings, stated: Iterable[ErrorSource]) -> tuple[Move, ...]:
+def _moves(found: MissionFindings, stated: Iterable[ErrorSource | RandomError]) -> tuple[Move, ...]:
     """Errors as the file states them, the largest displacement of the image first."""
     rows = {row.id: row.displacement_m for row in found.rows}
     known = [(source, rows.get(source.id)) for source in stated]

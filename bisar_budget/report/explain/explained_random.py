@@ -10,7 +10,7 @@ from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.spread import declared_powers, mainlobe_energy, spread_phase, tones
 from bisar_budget.analysis.vibration_limits import LARGEST_ECHO, Echo, bessel, highest_echo, tone_limits
 from bisar_budget.budget.random_rows import held_effect, no_effect
-from bisar_budget.effects.declared import CUBIC, QUADRATIC
+from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.effect import subject
 from bisar_budget.effects.oscillators import spurs_of
 from bisar_budget.effects.random_errors import RandomEffect, RandomError, process_of, specific_force
@@ -49,13 +49,16 @@ def explained_random(analysis: Analysis, allocation: Allocation, error: RandomEr
     model = row.model or "published"
     yield from _declared(mission, error, row)
     if kind == "imu":
-        yield from _imu(analysis, error, model)
+        yield from _imu(analysis, error)
     elif kind == "random":
-        yield from _position(analysis, error, model)
+        yield from _position(analysis, error)
     elif kind == "oscillator":
         yield from _oscillator(mission, error)
     else:
         yield from _link(mission, error)
+    if model == "full":
+        yield from _by_exact_ranges(mission, error)
+    yield from _moved(error, model)
     yield from _phases(mission, error, model)
     yield from _allowable(mission, allocation, error, row, model)
 
@@ -70,8 +73,8 @@ def _declared(mission: Mission, error: RandomError, row: Row) -> Iterator[Step]:
         yield from step("Coverage factor allocation.coverage_factor; of three axes the largest value", *lines)
 
 
-def _imu(analysis: Analysis, error: RandomError, model: str) -> Iterator[Step]:
-    """The formulas of an inertial sensor with the line of sight at mid-aperture, then over exact ranges."""
+def _imu(analysis: Analysis, error: RandomError) -> Iterator[Step]:
+    """The formulas of an inertial sensor with the line of sight at mid-aperture."""
     mission, kind = analysis.mission, error.subject.axis
     symbol = _SYMBOLS[kind]
     formulas = inertial_phases(symbol)
@@ -102,21 +105,43 @@ def _imu(analysis: Analysis, error: RandomError, model: str) -> Iterator[Step]:
             yield from step(
                 f"Derived: {_WHAT[index]}, of one unit", *equation(_PARTS[index], formula, values, result, "rad")
             )
-    if model == "full":
-        full = error.full
-        # What is left turns with the line of sight of mid-aperture; only a direct path changes it.
-        count = 3 if full.spread != unit.spread else 2
-        factors = (1.0, 1.0, mission.allocation.coverage_factor)
-        per_unit = f"rad per {'unit' if error.unit == '1' else error.unit}"
-        lines = [
-            f"{part}/unit = {with_unit(value * factor, per_unit)}"
-            for part, value, factor in zip(_PARTS[:count], full[:count], factors, strict=False)
-            if value
-        ]
-        yield from step(
-            "Full model: the same over exact ranges, the line of sight turning, displacement of the image included",
-            *lines,
-        )
+
+
+def _by_exact_ranges(mission: Mission, error: RandomError) -> Iterator[Step]:
+    """What the full model makes of a unit, where that differs."""
+    unit, full = error.published, error.full
+    if full[:3] == unit[:3]:
+        return
+    # What is left turns with the line of sight of mid-aperture; only a direct path changes it.
+    count = 3 if full.spread != unit.spread else 2
+    factors = (1.0, 1.0, _covered(mission, error))
+    lines = [
+        f"{part}/unit = {with_unit(value * factor, _per_unit('rad', error))}"
+        for part, value, factor in zip(_PARTS[:count], full[:count], factors, strict=False)
+        if value
+    ]
+    yield from step(
+        "Full model: the same over exact ranges, the line of sight turning, displacement of the image included",
+        *lines,
+    )
+
+
+def _moved(error: RandomError, model: str) -> Iterator[Step]:
+    """The displacement by a unit."""
+    effect = error.effect(model)
+    if not effect.displacement > 0:
+        return
+    values, unit = {"east/unit": effect.east, "north/unit": effect.north}, _per_unit("m", error)
+    yield from step(
+        f"Orders 0 and 1 displace the image, by {'(25)' if model == 'published' else 'exact ranges'}; rms length",
+        *(f"{symbol} = {with_unit(value, unit)}" for symbol, value in values.items()),
+        *equation("moved/unit", "sqrt((east/unit)^2 + (north/unit)^2)", values, effect.displacement, unit),
+    )
+
+
+def _per_unit(unit: str, error: RandomError) -> str:
+    """The unit of what a unit of an error does; one of an oscillator is its noise as declared."""
+    return unit if error.unit == "dB" else f"{unit} per {'unit' if error.unit == '1' else error.unit}"
 
 
 def _of_one(kind: str, which: int, wavelength: float, T: float) -> float:
@@ -127,8 +152,8 @@ def _of_one(kind: str, which: int, wavelength: float, T: float) -> float:
     return row[which]
 
 
-def _position(analysis: Analysis, error: RandomError, model: str) -> Iterator[Step]:
-    mission, effect = analysis.mission, error.effect(model)
+def _position(analysis: Analysis, error: RandomError) -> Iterator[Step]:
+    mission, effect = analysis.mission, error.published
     process = process_of(mission, error)
     T, tau = mission.collection.aperture_time, process.correlation_time
     yield from step(
@@ -136,22 +161,16 @@ def _position(analysis: Analysis, error: RandomError, model: str) -> Iterator[St
         *equation("a", "T/(2*τ_c)", {"T": T, "τ_c": tau}, T / (2 * tau), ""),
     )
     found = gauss_markov(T, tau)
-    words = ("quadratic", "cubic", "left after the cubic")
+    words = ("quadratic", "cubic", "left after the cubic", "constant", "linear")
     yield from step(
         "Mean squares of a process of variance 1 with the spectrum 4·τ_c/(1 + (2πf·τ_c)²)",
-        *(f"{word} = {number(value)}" for word, value in zip(words, found, strict=True)),
+        *(f"{word} = {number(value)}" for word, value in zip(words, found, strict=False)),
     )
     k = 2 * math.pi / mission.radar.wavelength
     values = {"λ": mission.radar.wavelength, "u": effect.quadratic / (k * math.sqrt(found.quadratic)),
               "q": found.quadratic}  # fmt: skip
     lines = equation("QPE/unit", "2*π*u*sqrt(q)/λ", values, effect.quadratic, "rad per m")
-    sight = "the line of sight less that of the direct path" if _has_direct(mission, model) else "the line of sight"
-    yield from step(f"Along {sight}, u; of three values the root-sum-square of what each has", *lines)
-
-
-def _has_direct(mission: Mission, model: str) -> bool:
-    """Does the direct path cancel a part of what a platform moves? The published model does not know of it."""
-    return mission.has_direct_path and model == "full"
+    yield from step("Along the line of sight at mid-aperture, u; of three values the root-sum-square of each", *lines)
 
 
 def _oscillator(mission: Mission, error: RandomError) -> Iterator[Step]:
@@ -225,7 +244,7 @@ def _phases(mission: Mission, error: RandomError, model: str) -> Iterator[Step]:
     if error.declared is None:
         return
     other = "full" if model == "published" else "published"
-    is_same = error.published[:3] == error.full[:3]
+    is_same = error.published[:5] == error.full[:5]
     is_left_same = error.published.spread == error.full.spread
     for name in (model,) if is_same else (model, other):
         effect, k = error.effect(name), _covered(mission, error)
@@ -244,6 +263,10 @@ def _phases(mission: Mission, error: RandomError, model: str) -> Iterator[Step]:
             if symbol == "QPE" and is_same:
                 lines += equation("QPE_full", "QPE", {"QPE": result}, result, "rad")
         by = "both models" if is_same else f"the {name} model{'' if name == model else ', for comparison'}"
+        if effect.displacement > 0:
+            values = {"moved/unit": effect.displacement, "declared": error.declared}
+            result = effect.displacement * error.declared
+            lines += equation(f"moved{mark}", "moved/unit*declared", values, result, "m")
         if lines:
             yield from step(f"Of what is declared, by {by}", *lines)
 
@@ -289,6 +312,11 @@ def _allowable(mission: Mission, allocation: Allocation, error: RandomError, row
         formula = f"rms/({spread})" if k == 1 else f"k*rms/({spread})"
         lines = equation("by_ISLR", formula, values, sizes["by_ISLR"], _unit(error))
         yield from step("Allowable by requirements.islr", *lines)
+    if effect.displacement > 0 and required.location_error is not None:
+        sizes["by_location"] = required.location_error / effect.displacement
+        values = {"limit": required.location_error, "moved/unit": effect.displacement}
+        lines = equation("by_location", "limit/(moved/unit)", values, sizes["by_location"], _unit(error))
+        yield from step(f"Allowable by requirements.{LOCATION}, without share and gain", *lines)
     yield from smallest_size(row, sizes)
 
 

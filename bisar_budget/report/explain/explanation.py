@@ -24,6 +24,7 @@ from bisar_budget.budget.judged_requirements import (
 from bisar_budget.effects.combined import phase_parts
 from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.effect import ErrorSource
+from bisar_budget.effects.random_errors import displaces_unknown
 from bisar_budget.effects.vibration import cubic_part, lines_of, near_lines, quadratic_part, sight_of, worst_phases
 from bisar_budget.faults import KeyPath, changes_words, printable
 from bisar_budget.findings.mission import MissionFindings
@@ -412,8 +413,12 @@ def _location_aggregate(mission: Mission, together: Together, found: MissionFind
     parts = together.displacement_parts()
     title = "(25), (30)" if row.model == "published" else "Full model, each by the sign that moves farther"
     if found.combine == "sum":
+        wander = dict(together.random_moves)
         vectors = [
-            f"{printable(name)}: {with_unit(x, 'm')} east, {with_unit(y, 'm')} north" for name, (x, y) in parts
+            f"{printable(name)}: {with_unit(math.hypot(x, y), 'm')} whichever way"
+            if name in wander
+            else f"{printable(name)}: {with_unit(x, 'm')} east, {with_unit(y, 'm')} north"
+            for name, (x, y) in parts
         ]
         longest = [] if row.declared is None else [f"combined = {row.declared:.6g} m"]
         yield from step(f"{title}: displacements, {rule}", *(vectors or ["none"]), *longest)
@@ -480,7 +485,7 @@ def not_judged(found: MissionFindings, row: Row) -> Iterator[Step]:
         yield from _asked_for(mission)
     elif code == "input-in-doubt":
         yield from _path_in_doubt(mission, row)
-    elif code == "place-is-not-known":
+    elif code in ("place-is-not-known", "clocks-are-not-set"):
         yield from _displacing(analysis, row, reason)
     else:
         for one in untaken_effects(mission, effect_totals(analysis)):
@@ -548,11 +553,11 @@ def _path_in_doubt(mission: Mission, row: Row) -> Iterator[Step]:
 def _displacing(analysis: Analysis, row: Row, reason: Note) -> Iterator[Step]:
     """Phases of the errors that move the image by an amount that is not computed."""
     model = row.model or "published"
-    names, lines = reason.values[0], []
+    said, lines = reason.values[0], []
+    names = {error.id for error in analysis.random if displaces_unknown(error)}
+    names |= set(said) if isinstance(said, list | tuple) else set()
     for one in analysis.together(model).own:
-        if isinstance(names, list | tuple) and one.row_id in names:
+        if one.row_id in names:
             qpe, cubic = (with_unit(float(phase[0]), "rad") for phase in (one.qpe_rad, one.cubic_rad))
             lines.append(f"{printable(one.row_id)}: QPE {qpe}, cubic {cubic}")
-    yield from step(
-        f"Not in the displacement, by an amount that is not computed: {reason.values[1]} the image too", *lines
-    )
+    yield from step("Not in the displacement, by an amount that is not computed", *lines)
