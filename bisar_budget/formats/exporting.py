@@ -24,12 +24,13 @@ from bisar_budget.faults import printable
 from bisar_budget.formats.containers import MissingExtraError
 from bisar_budget.formats.file_errors import ADDED, KINDS, correlated
 from bisar_budget.geometry import Axes, PlatformState, Vector
-from bisar_budget.mission.model import Mission, Simulation
+from bisar_budget.mission.model import Mission, Simulation, has_instruments
 from bisar_budget.paths.earth import Geodetic, SceneAxes, axes_at, geodetic
 from bisar_budget.paths.instant import Instant, parse_instant
 from bisar_budget.simulate.collection import PointCollection
 from bisar_budget.simulate.phase_history import Errors, Flight, phase_history
 from bisar_budget.simulate.point import SimulationError, declared_errors, pulses_for
+from bisar_budget.simulate.realisations import has_unset_clocks
 from bisar_budget.simulate.targets import Targets
 
 Floats = NDArray[np.float64]
@@ -146,6 +147,11 @@ def export_phase_history(mission: Mission, targets: Targets) -> Exported:
         remarks.append(f"the mission has no collection.center_time: the collection is put at {UNDATED}")
         middle = parse_instant(UNDATED)
         assert middle is not None
+    if has_instruments(mission) and has_unset_clocks(mission):
+        remarks.append(
+            "the mission does not say how its oscillators are set (timing_error.constant and linear, or "
+            "synchronization): they are flown without mean and slope"
+        )
     axes = axes_at(place)
     vectors, offset = _vectors(mission, slow_time, flown, collection.flight(errors.smooth(), slow_time), axes, plan)
     tree = _document(mission, targets, plan, axes, vectors, middle.after(-offset), offset, remarks)

@@ -14,7 +14,14 @@ from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.oscillators import noise_of
-from bisar_budget.effects.random_errors import RandomError, acceleration_errors, process_of, specific_force
+from bisar_budget.effects.random_errors import (
+    RandomError,
+    acceleration_errors,
+    displaces_unknown,
+    process_of,
+    random_errors,
+    specific_force,
+)
 from bisar_budget.effects.spectra import PowerLawPiece
 from bisar_budget.mission.instruments import GaussMarkov
 from bisar_budget.mission.model import Mission, Simulation
@@ -66,8 +73,17 @@ def position_courses(
     return total
 
 
+def has_unset_clocks(mission: Mission) -> bool:
+    """Whether oscillators are flown without mean and slope: the file does not say how they are set."""
+    return any(displaces_unknown(error) for error in random_errors(mission))
+
+
 def drawn_errors(analysis: Analysis) -> Errors:
-    """One time series of each declared error of sensors and clocks, with the coverage factor, by the file's seed."""
+    """One time series of each declared error of sensors and clocks, with the coverage factor, by the file's seed.
+
+    A clock is flown as it is set. What setting leaves, `timing_error` has, so that an oscillator beside it is flown
+    without mean and slope; and so is a free one of which the file does not say how it is set.
+    """
     mission = analysis.mission
     seed, factor = (mission.simulation or Simulation()).seed, mission.allocation.coverage_factor
     half = mission.collection.aperture_time / 2
@@ -82,7 +98,8 @@ def drawn_errors(analysis: Analysis) -> Errors:
             drawn = factor * position_courses(mission, error, times, 1, rng)[0]
             moved[error.owner] = moved.get(error.owner, 0.0) + drawn
         elif error.published.spread:
-            phase = phase + factor * phase_courses(mission, error, times, 1, rng)[0]
+            drawn = factor * phase_courses(mission, error, times, 1, rng)[0]
+            phase = phase + (drawn if error.full.displacement > 0 else drawn - Course(times, drawn).smooth(1).values)
     transmitter, receiver = (
         PathError(course=Course(times, moved[name]) if name in moved else None) for name in PLATFORMS
     )

@@ -9,6 +9,7 @@ from bisar_budget.effects.effect import subject
 from bisar_budget.effects.random_errors import RandomError
 from bisar_budget.effects.spectra import PowerLawPiece
 from bisar_budget.mission.load import load_mission, parse_mission
+from bisar_budget.report.drawing import point_plot
 from bisar_budget.simulate.point import simulate_point
 from bisar_budget.simulate.realisations import _Tones
 from bisar_budget.verify.limits import verify_mission
@@ -115,6 +116,27 @@ def test_one_time_series_is_flown_and_a_seed_names_it() -> None:
     sigma = math.hypot(*(e.full.quadratic * (e.declared or 0) for e in one.analysis.random))
     assert 0 < abs(phases[0]) < 5 * sigma
     assert np.isfinite(phases).all()
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_an_oscillator_is_flown_as_it_is_set(seed: int) -> None:
+    """Free, nobody says when it was set: tones slower than an aperture moved the image by 200 m either way."""
+    head = MISSION[: MISSION.index("    motion_error")]
+    text = f"{head.rstrip()}{OSCILLATORS}simulation: {{seed: {seed}}}\n"
+    clock, link = (
+        "timing_error: {constant: 10 ns, linear: 1e-10}\n",
+        "synchronization: {interval: 0.5 s, error: 0 deg}\n",
+    )
+    missions = [parse_mission(one) for one in (text, text + clock, head + clock, text + link)]
+    free, stated, quiet, linked = map(simulate_point, missions)
+    said = [" ".join(point_plot.summary(*one).split()) for one in ((free, missions[0]), (stated, missions[1]))]
+    assert ["without mean and slope" in one for one in said] == [True, False]
+    cell = 1.0  # m of range, at 150 MHz: what is left of a clock's quadratic phase moves the image by less
+    assert math.hypot(*free.effect.displacement) < cell
+    assert math.hypot(*quiet.effect.displacement) > cell
+    assert math.dist(stated.effect.displacement, quiet.effect.displacement) < cell
+    assert abs(free.effect.quadratic) > 0.01  # and defocuses as before
+    assert 0 < math.hypot(*linked.effect.displacement) < cell
 
 
 def test_an_oscillator_that_a_direct_path_cancels_is_not_in_the_images_of_islr() -> None:

@@ -19,6 +19,7 @@ from bisar_budget.report.words.sentences import wrapped
 from bisar_budget.simulate.impulse_response import ImpulseResponse
 from bisar_budget.simulate.phase_history import Floats
 from bisar_budget.simulate.point import PointImages
+from bisar_budget.simulate.realisations import has_unset_clocks
 
 _RESTORED_DB = 1.0  # below the error-free peak; a focused response is within a fraction of it
 _EQUAL = 8.0  # an image that is not longer for its width than this has equal scales
@@ -108,6 +109,8 @@ def _flown(mission: Mission) -> str:
     drawn = f"; of sensors and clocks one time series each, seed {seed}" if has_instruments(mission) else ""
     if any(platform.oscillator and platform.oscillator.spurs for platform in mission.platforms):
         drawn += "; tones of oscillators are left out"
+    if has_instruments(mission) and has_unset_clocks(mission):
+        drawn += "; of oscillators without mean and slope, since the file does not say how they are set"
     return (
         f"the declared ones together, with the signs of the file{times}{likely}{drawn}. Some may cancel: the worst "
         "case is that of check"
