@@ -17,7 +17,7 @@ from bisar_budget.effects.combined import (
     phase_parts,
 )
 from bisar_budget.effects.declared import DeclaredErrors
-from bisar_budget.effects.random_errors import RandomError
+from bisar_budget.effects.random_errors import RandomError, displaces_unknown
 from bisar_budget.effects.vibration import DeclaredPhase
 from bisar_budget.geometry import GroundVector
 from bisar_budget.ranges.exact_ranges import Floats
@@ -117,12 +117,14 @@ class Together:
 
     @cached_property
     def random_moves(self) -> Moves:
-        """Sigmas of the displacement of sensors and clocks, as far as they are known. [m]"""
+        """Sigmas of the displacement of sensors and clocks, none of one that the file leaves open. [m]"""
         found = []
         for error in self.random:
             if error.declared is not None:
                 effect = error.effect(self.model)
-                east, north = (np.nan_to_num(self.errors.array(one * error.declared)) for one in effect[3:5])
+                is_open = self.errors.array(displaces_unknown(error)) > 0
+                moved = (self.errors.array(one * error.declared) for one in effect[3:5])
+                east, north = (np.where(is_open, 0.0, one) for one in moved)
                 found.append((error.subject.id, (east, north)))
         return found
 

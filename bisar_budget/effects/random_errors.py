@@ -145,10 +145,8 @@ def process_of(mission: Mission, error: RandomError) -> GaussMarkov:
 
 
 def displaces_unknown(error: RandomError) -> Any:
-    """Whether an error displaces the image by an amount that is not known, in which cases."""
-    if error.declared is None:
-        return False
-    return (error.declared > 0) & np.isnan(error.published.displacement + error.full.displacement)
+    """Whether an error displaces the image by an amount that the file leaves open, in which cases."""
+    return False if error.declared is None else (error.declared > 0) & np.isnan(error.full.displacement)
 
 
 def in_one_case(mission: Mission, error: RandomError, case: int = 0) -> RandomError:

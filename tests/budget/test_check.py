@@ -544,6 +544,25 @@ def test_singular_q_with_the_range_held_constant_leaves_displacement_open() -> N
     assert row(found, "transmitter.velocity.y").allowable is not None
 
 
+@pytest.mark.parametrize("rule", ["each", "rss", "sum"])
+def test_singular_q_leaves_the_place_of_random_errors_open_too(rule: str) -> None:
+    """By the published model; the reason named free oscillators, and there are none."""
+    wander = {"random": [{"name": "GNSS", "sigma": "1 mm", "correlation_time": "600 s"}]}
+    changes = {
+        "requirements__location_error": 5,
+        "allocation__combine": rule,
+        "platforms": {
+            "transmitter": {"position": ["9 km", 0, 0], "velocity": [100, 100, 0], "motion_error": wander},
+            "receiver": {"position": [0, "9 km", 0], "velocity": [0, 0, 0]},
+        },
+    }
+    found = findings(**changes, allocation__model="published")
+    assert row(found, "transmitter.random.GNSS").displacement_m is None
+    assert row(found, "mission.location_error").status == "not_evaluated"
+    assert "parallel" in str(row(found, "mission.location_error").reason)
+    assert row(findings(**changes, allocation__model="full"), "mission.location_error").status == "pass"
+
+
 def test_a_vanishing_error_has_no_infinite_margin() -> None:
     found = row(findings(**{f"{ERROR}__velocity": [0, 1e-320, 0]}), "transmitter.velocity.y")
     assert found.margin is None
