@@ -16,7 +16,8 @@ from bisar_budget.analysis.together import Together
 from bisar_budget.effects.combined import Correlated, correlated_errors
 from bisar_budget.effects.declared import Declared, DeclaredErrors, Model
 from bisar_budget.effects.effect import ErrorSource, Subject, plain
-from bisar_budget.effects.random_errors import RandomError, in_one_case, random_errors
+from bisar_budget.effects.random_effect import RandomError
+from bisar_budget.effects.random_errors import in_one_case, random_errors
 from bisar_budget.effects.sources import exact_ranges
 from bisar_budget.effects.vibration import DeclaredPhase, slow_phases
 from bisar_budget.geometry import BistaticGeometry

@@ -17,7 +17,7 @@ from bisar_budget.effects.combined import (
     phase_parts,
 )
 from bisar_budget.effects.declared import DeclaredErrors
-from bisar_budget.effects.random_errors import RandomError, displaces_unknown
+from bisar_budget.effects.random_effect import RandomError
 from bisar_budget.effects.vibration import DeclaredPhase
 from bisar_budget.geometry import GroundVector
 from bisar_budget.ranges.exact_ranges import Floats
@@ -122,7 +122,7 @@ class Together:
         for error in self.random:
             if error.declared is not None:
                 effect = error.effect(self.model)
-                is_open = self.errors.array(displaces_unknown(error)) > 0
+                is_open = self.errors.array(error.displaces_unknown) > 0
                 moved = (self.errors.array(one * error.declared) for one in effect[3:5])
                 east, north = (np.where(is_open, 0.0, one) for one in moved)
                 found.append((error.subject.id, (east, north)))

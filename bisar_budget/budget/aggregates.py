@@ -24,7 +24,6 @@ from bisar_budget.effects.combined import (
 )
 from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.effect import Subject, subject
-from bisar_budget.effects.random_errors import displaces_unknown
 from bisar_budget.effects.vibration import DeclaredPhase
 from bisar_budget.faults import KeyPath
 from bisar_budget.findings.row import Row
@@ -284,7 +283,7 @@ def misplacing(together: Together, place: Floats) -> Misplacing:
     """
     mission, array = together.errors.mission, together.errors.array
     needed = mission.requirements.location_error
-    at_random = [(one.subject.id, array(displaces_unknown(one)) > 0) for one in together.random]
+    at_random = [(one.subject.id, array(one.displaces_unknown) > 0) for one in together.random]
     slow: list[tuple[str, Truths]] = []
     if needed is not None and together.slow:
         moves = [array(one.moves) for one in together.slow]

@@ -28,8 +28,9 @@ from bisar_budget.budget.judged_rows import BOUND, CODE, REQUIREMENTS, Floats, J
 from bisar_budget.budget.pull_in import caps, needed_sentence
 from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.effect import override_notes, subject
+from bisar_budget.effects.navigation_errors import process_of
 from bisar_budget.effects.oscillators import POOR_FIT
-from bisar_budget.effects.random_errors import RandomEffect, RandomError, process_of
+from bisar_budget.effects.random_effect import RandomEffect, RandomError
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import GroundVector
 from bisar_budget.mission.instruments import Oscillator

@@ -20,7 +20,7 @@ from bisar_budget.analysis.analysis import Analysis, Model
 from bisar_budget.analysis.together import Together, cubics, quadratics
 from bisar_budget.constants import MAX_DRAWS
 from bisar_budget.effects.effect import PLATFORMS, ErrorSource
-from bisar_budget.effects.random_errors import RandomError, displaces_unknown
+from bisar_budget.effects.random_effect import RandomError
 from bisar_budget.findings.monte_carlo import MonteCarlo, Requirement
 from bisar_budget.mission.model import Mission, Simulation, has_instruments
 from bisar_budget.monte_carlo.draws import HeldSum, Share, Variable, drawing_of, eigensystem, in_turn, joined
@@ -68,7 +68,7 @@ def monte_carlo(
     if seed is None:
         seed = (mission.simulation or Simulation()).seed
     variables = list(_variables(analysis))
-    is_placed = not any(displaces_unknown(error) for error in analysis.random)
+    is_placed = not any(error.displaces_unknown for error in analysis.random)
     judged = list(_requirements(mission, analysis.allocation, variables, is_placed=is_placed))
     drawing = drawing_of(analysis, variables, judged, draws, seed)
     counted = joined((tally for _, tally in (share or in_turn)(drawing)), len(judged))

@@ -13,15 +13,10 @@ import numpy as np
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.effects.navigation_errors import acceleration_errors, process_of, specific_force
 from bisar_budget.effects.oscillators import noise_of
-from bisar_budget.effects.random_errors import (
-    RandomError,
-    acceleration_errors,
-    displaces_unknown,
-    process_of,
-    random_errors,
-    specific_force,
-)
+from bisar_budget.effects.random_effect import RandomError
+from bisar_budget.effects.random_errors import random_errors
 from bisar_budget.effects.spectra import PowerLawPiece
 from bisar_budget.mission.instruments import GaussMarkov
 from bisar_budget.mission.model import Mission, Simulation
@@ -75,7 +70,7 @@ def position_courses(
 
 def has_unset_clocks(mission: Mission) -> bool:
     """Whether oscillators are flown without mean and slope: the file does not say how they are set."""
-    return any(displaces_unknown(error) for error in random_errors(mission))
+    return any(error.displaces_unknown for error in random_errors(mission))
 
 
 def drawn_errors(analysis: Analysis) -> Errors:

@@ -11,7 +11,9 @@ import pytest
 
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.design.varied import varied
-from bisar_budget.effects.random_errors import RandomError, in_one_case, random_errors, specific_force
+from bisar_budget.effects.navigation_errors import specific_force
+from bisar_budget.effects.random_effect import RandomError
+from bisar_budget.effects.random_errors import in_one_case, random_errors
 from bisar_budget.effects.spectra import PowerLawPiece, synchronized_parts
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.mission.model import Mission

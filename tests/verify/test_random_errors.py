@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bisar_budget.effects.effect import subject
-from bisar_budget.effects.random_errors import RandomError
+from bisar_budget.effects.random_effect import RandomError
 from bisar_budget.effects.spectra import PowerLawPiece
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.report.drawing import point_plot

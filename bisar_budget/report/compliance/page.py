@@ -15,7 +15,7 @@ from bisar_budget.catalogue import EQUATIONS
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.declared import END_OF_IMAGE
 from bisar_budget.effects.effect import MOTION_UNITS, ErrorSource, Subject
-from bisar_budget.effects.random_errors import RandomError
+from bisar_budget.effects.random_effect import RandomError
 from bisar_budget.faults import KeyPath, changes_words
 from bisar_budget.findings.images import PointImage
 from bisar_budget.findings.mission import MissionFindings, Report, UnusableMission

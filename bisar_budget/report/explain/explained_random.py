@@ -12,8 +12,9 @@ from bisar_budget.analysis.vibration_limits import LARGEST_ECHO, Echo, bessel, h
 from bisar_budget.budget.random_rows import held_effect, no_effect
 from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.effect import subject
+from bisar_budget.effects.navigation_errors import process_of, specific_force
 from bisar_budget.effects.oscillators import spurs_of
-from bisar_budget.effects.random_errors import RandomEffect, RandomError, process_of, specific_force
+from bisar_budget.effects.random_effect import RandomEffect, RandomError
 from bisar_budget.effects.spectra import PowerLawPiece, gauss_markov, parts, synchronized_parts
 from bisar_budget.faults import printable
 from bisar_budget.findings.row import Row

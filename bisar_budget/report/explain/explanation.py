@@ -24,7 +24,6 @@ from bisar_budget.budget.judged_requirements import (
 from bisar_budget.effects.combined import phase_parts
 from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.effect import ErrorSource
-from bisar_budget.effects.random_errors import displaces_unknown
 from bisar_budget.effects.vibration import cubic_part, lines_of, near_lines, quadratic_part, sight_of, worst_phases
 from bisar_budget.faults import KeyPath, changes_words, printable
 from bisar_budget.findings.mission import MissionFindings
@@ -554,7 +553,7 @@ def _displacing(analysis: Analysis, row: Row, reason: Note) -> Iterator[Step]:
     """Phases of the errors that move the image by an amount that is not computed."""
     model = row.model or "published"
     said, lines = reason.values[0], []
-    names = {error.id for error in analysis.random if displaces_unknown(error)}
+    names = {error.id for error in analysis.random if error.displaces_unknown}
     names |= set(said) if isinstance(said, list | tuple) else set()
     for one in analysis.together(model).own:
         if one.row_id in names:

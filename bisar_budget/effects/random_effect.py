@@ -1,0 +1,232 @@
+"""Effects of random errors on the image: what a unit of each does, 1 sigma, and the cases in which it does so.
+
+An error at random has a sigma and no sign. Orders 0 and 1 of its range error displace the image by Q⁻¹, from order 2
+on it defocuses. To the published model the line of sight is that of mid-aperture (`theory.random_errors`), and Q that
+of (25). The full model lets it turn, knows a direct path, and counts what the displacement of the image adds.
+
+Numbers of a mission may be arrays (cases,); its geometry then is that of these cases.
+"""
+
+import math
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from bisar_budget.constants import ROUNDING
+from bisar_budget.effects.declared import ImagePlane, published_planes
+from bisar_budget.effects.effect import PLATFORMS, Subject, plain
+from bisar_budget.effects.oscillators import Noise
+from bisar_budget.effects.spectra import Floats
+from bisar_budget.faults import KeyPath
+from bisar_budget.geometry import BistaticGeometry, PlatformState
+from bisar_budget.mission.model import Mission
+from bisar_budget.mission.platforms import MotionError
+from bisar_budget.phrases import NOTHING, Note
+from bisar_budget.ranges.exact_ranges import ExactRanges
+
+NODES = 16  # a walk has a covariance with an edge, which fewer nodes miss by a percent
+_CANCELS = ROUNDING * 1e-2  # of a square: below it, its root is rounding
+_LEADING = (1.0, 1.0, 1.5, 2.5)  # coefficient of xⁿ in the Legendre polynomial Pₙ: the order's value at the edge
+
+
+class RandomEffect(NamedTuple):
+    """Effect of a unit of an error: quadratic and cubic phase at the aperture edge, rms of what spreads. [rad/unit]
+
+    `spread` is what is left of the phase after the cubic; it is a mean power, and no coverage factor is in it. `east`
+    and `north` are the sigmas of the displacement [m/unit], not a number where it is not known, as of a free
+    oscillator. `covariance` (4, 4, ...) is that of quadratic and cubic phase and displacement east and north, in the
+    units of their products; no matrix where the published model has only their sizes.
+    """
+
+    quadratic: Any
+    cubic: Any
+    spread: Any
+    east: Any
+    north: Any
+    covariance: Any = None
+
+    @property
+    def displacement(self) -> Any:
+        """Root-mean-square length of the displacement. [m/unit]"""
+        return np.hypot(self.east, self.north)
+
+    def of(self, case: int) -> "RandomEffect":
+        """That of a case in plain numbers; the covariance as (4, 4)."""
+        covariance = self.covariance
+        if covariance is not None:
+            covariance = covariance[..., case if covariance.shape[-1] > 1 else 0]
+        return RandomEffect._make((*(plain(size, case) for size in self[:5]), covariance))
+
+    def times(self, factor: Any) -> "RandomEffect":
+        """The same with phases and displacement of a coverage factor."""
+        return RandomEffect(
+            self.quadratic * factor,
+            self.cubic * factor,
+            self.spread,
+            self.east * factor,
+            self.north * factor,
+            None if self.covariance is None else self.covariance * factor**2,
+        )
+
+
+class RandomError(NamedTuple):
+    """One error of a sensor or a clock: what it is, how large it is declared, what one unit of it does.
+
+    `declared` is the largest of the axes, coverage factor included, and all axes grow with it; None where the file is
+    silent. The unit of an oscillator is `dB`: its noise as a factor of amplitude, declared 1. `noise` is the spectrum
+    of an oscillator; not of many cases.
+    """
+
+    subject: Subject
+    unit: str
+    declared: Any
+    path: KeyPath
+    published: RandomEffect
+    full: RandomEffect
+    noise: Noise | None = None
+
+    @property
+    def id(self) -> str:
+        """That of its row."""
+        return self.subject.id
+
+    @property
+    def owner(self) -> str:
+        """Whose share it counts against: transmitter, receiver or clock."""
+        return self.subject.owner
+
+    @property
+    def extrapolated(self) -> Note:
+        """How the noise of an oscillator goes on beyond what the file states."""
+        return NOTHING if self.noise is None else self.noise.extrapolated
+
+    @property
+    def displaces_unknown(self) -> Any:
+        """Whether it displaces the image by an amount that the file leaves open, in which cases."""
+        return False if self.declared is None else (self.declared > 0) & np.isnan(self.full.displacement)
+
+    def effect(self, model: str) -> RandomEffect:
+        """Effect of a unit by a model."""
+        return self.full if model == "full" else self.published
+
+
+class SensorCases:
+    """Cases as their sensors and clocks see them: numbers are arrays (…, cases)."""
+
+    def __init__(self, mission: Mission, geometry: BistaticGeometry, cases: int) -> None:
+        self.mission, self.geometry, self.cases = mission, geometry, cases
+        self.sights = geometry.sights(has_direct_path=mission.has_direct_path)
+        self.factor = mission.allocation.coverage_factor
+        self.aperture_time = np.broadcast_to(np.asarray(mission.collection.aperture_time), (cases,))
+
+    def vector(self, values: Sequence[Any]) -> Floats:
+        """Three numbers for each case, (3, cases)."""
+        found = np.empty((3, self.cases))
+        for row, value in zip(found, values, strict=True):
+            row[:] = value
+        return found
+
+    def error(self, name: str) -> MotionError:
+        """The motion error of a platform."""
+        found: MotionError = getattr(self.mission.platforms, name).motion_error
+        return found
+
+    def axes(self, name: str) -> Floats:
+        """Axes of a platform's errors, (axes, 3, cases)."""
+        path: PlatformState = getattr(self.geometry, name)
+        return np.array([self.vector(axis) for axis in path.frame(self.error(name).frame)])
+
+    def along(self, name: str, directions: Floats) -> tuple[Floats, Floats]:
+        """Root-sum-square of what directions (axes, 3, cases) have of the line of sight, and of what data hear."""
+        look, sight = getattr(self.geometry, name).look, self.sights[PLATFORMS.index(name)]
+        seen = _length_along(self.vector(look), directions)
+        return seen, seen if sight is look else _length_along(self.vector(sight), directions)
+
+    @cached_property
+    def exact(self) -> ExactRanges:
+        """Exact ranges at as many nodes as walks need."""
+        mission = self.mission
+        return ExactRanges.of(
+            self.geometry.both,
+            mission.radar.wavelength,
+            mission.collection.aperture_time,
+            NODES,
+            self.cases,
+            has_direct_path=mission.has_direct_path,
+        )
+
+    @cached_property
+    def weights(self) -> Floats:
+        """What a metre of range error at each node does, (4, nodes, cases): two phases [rad], east and north. [m]"""
+        return np.array((*self.exact.phase_weights, *self.exact.place_weights))
+
+    @cached_property
+    def plane(self) -> ImagePlane:
+        """Q⁻¹ of the published model."""
+        return published_planes(self.geometry)[0]
+
+    def of_courses(self, courses: Floats, held: Floats) -> tuple["RandomEffect", "RandomEffect"]:
+        """Effects by both models of independent range errors of one course each, of 1 sigma of a unit. [m/unit]
+
+        Parameters
+        ----------
+        courses : (errors, nodes, cases)
+            With the line of sight as it turns, and as data hear it.
+        held : (errors, nodes, cases)
+            The same with the line of sight held at mid-aperture, for the published model.
+        """
+        constant, linear, quadratic, cubic = np.square(np.einsum("fn,enc->fec", self.exact.fit, held)).sum(axis=1)
+        k = self.exact.k
+        published = RandomEffect(k * np.sqrt(quadratic), k * np.sqrt(cubic), 0.0 * k, *self.moved(constant, linear))
+        weighted = self.weights[:, None] * courses
+        effects, sizes = weighted.sum(axis=2), np.square(np.abs(weighted).sum(axis=2)).sum(axis=1)
+        (qpe, edge, east, north), covariance = sigmas(np.einsum("fec,gec->fgc", effects, effects), sizes)
+        return published, RandomEffect(qpe, edge, 0.0 * k, east, north, covariance)
+
+    def moved(self, constant: Any, linear: Any) -> list[Any]:
+        """Sigmas of the displacement by (25), of mean squares of constant and linear part at the edge [m²]. [m]"""
+        (a, b), (c, d) = self.plane.adjugate
+        slope = linear / np.square(self.aperture_time / 2)
+        scale = 1 / np.where(self.plane.is_singular, math.nan, self.plane.determinant)
+        return [np.sqrt(one**2 * constant + other**2 * slope) * np.abs(scale) for one, other in ((a, b), (c, d))]
+
+    def of_orders(self, covariance: Floats, along: Any = 1.0) -> Floats:
+        """Covariance (4, 4, cases) of phases and displacement by orders 0 to 3 of independent range errors.
+
+        `covariance` (4, 4, cases) is that of each at the aperture edge [m²], `along` (errors, nodes, cases) what a
+        metre of it does to the range; higher orders defocus and displace in second order of a turning line of sight.
+        """
+        places = self.exact.sampling.places
+        orders = np.polynomial.legendre.legvander(places, len(_LEADING) - 1) / _LEADING
+        seen = np.broadcast_to(along, (np.shape(along)[0] if np.ndim(along) else 1, places.size, self.cases))
+        effects = np.einsum("fnc,anc,no->afoc", self.weights, seen, orders)
+        return np.asarray(np.einsum("afoc,opc,agpc->fgc", effects, covariance, effects))
+
+
+def _length_along(sight: Floats, directions: Floats) -> Floats:
+    return np.asarray(np.sqrt(np.square((directions * sight).sum(axis=1)).sum(axis=0)))
+
+
+def parts_of_largest(values: Floats) -> tuple[Floats, Floats]:
+    """The largest of values (axes, cases), and each over it; 1 where there is none."""
+    largest = values.max(axis=0)
+    return largest, np.divide(values, largest, out=np.ones_like(values), where=largest > 0)
+
+
+def sigmas(covariance: Floats, sizes: Floats) -> tuple[Floats, Floats]:
+    """Roots of the diagonal of a covariance (4, 4, cases), and that covariance.
+
+    What is left of terms that cancel exactly, of squares of so large `sizes` (4, cases), is rounding, and would make
+    a limit out of nothing.
+    """
+    squares = np.einsum("ffc->fc", covariance)
+    is_real = squares > _CANCELS * sizes
+    return np.sqrt(np.where(is_real, squares, 0.0)), np.where(is_real & is_real[:, None], covariance, 0.0)
+
+
+def of_cases(covariance: Floats, cases: int) -> Floats:
+    """The same as (4, 4, cases)."""
+    whole = covariance if covariance.ndim == 3 else covariance[..., None]
+    return np.broadcast_to(whole, (*whole.shape[:2], cases))
