@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG, MIN_GROUND_GRADIENT, ROUNDING
+from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG, MIN_GROUND_GRADIENT, ROUNDING, SPEED_OF_LIGHT
 
 Vector = tuple[float, float, float]
 Vectors = tuple[Any, Any, Any]  # three components, each an array or a float
@@ -281,6 +281,12 @@ class BistaticGeometry:
             acceleration=_minus(t.acceleration, r.acceleration),
             bends=tuple(_minus(*pair) for pair in zip_longest(t.bends, r.bends, fillvalue=STRAIGHT)),
         )
+
+    @property
+    def echo_delay(self) -> Any:
+        """Time by which the echo of the scene centre comes after the direct path, at mid-aperture. [s]"""
+        t, r = self.both
+        return (t.slant_range + r.slant_range - self.apart.slant_range) / SPEED_OF_LIGHT
 
     def sights(self, *, has_direct_path: bool) -> tuple[Vectors, Vectors]:
         """The range at mid-aperture that a metre of the transmitter's motion, and of the receiver's, takes away. [-]

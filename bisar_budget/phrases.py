@@ -160,8 +160,8 @@ def clocks_are_not_set(row_ids: Sequence[str]) -> str:
     """Said of the location, beside free oscillators."""
     return (
         f"{', '.join(row_ids)}: the image moves by what free oscillators drift since they were set, which the file "
-        "does not say; add timing_error.constant and timing_error.linear, the clock error that is left at "
-        "mid-aperture, or synchronization"
+        "does not say; add synchronization.method holdover with age and averaging, or timing_error.constant and "
+        "timing_error.linear, the clock error that is left at mid-aperture"
     )
 
 
@@ -357,6 +357,18 @@ def no_quadratic_term_of_clock(term: str) -> str:
 
 
 @phrase
+def no_quadratic_term_of_setting(kind: str) -> str:
+    """Said of the time or the frequency that setting a clock left, by the published model."""
+    return f"no quadratic term: a {kind} between the clocks moves the image (Table I row 1)"
+
+
+@phrase
+def aging_is_followed() -> str:
+    """Said of the aging of an oscillator that a link or the direct path follows."""
+    return "the clocks are synchronised: aging has no effect"
+
+
+@phrase
 def no_quadratic_term_of_height() -> str:
     """Said of the terrain, by the published model."""
     return "no quadratic term: to the published model a height error moves the image"
@@ -383,7 +395,7 @@ def clock_is_heard() -> str:
 @phrase
 def oscillators_drop_out() -> str:
     """Said of an oscillator under a direct path."""
-    return "the direct path is the receiver's clock: oscillators drop out"
+    return "the direct path is the receiver's clock: the transmitter's oscillator drops out"
 
 
 @phrase
@@ -552,6 +564,21 @@ def power_law_fits(misfit: float) -> str:
 def left_by_exchanges(interval: float) -> str:
     """Said of an oscillator. [s]"""
     return f"only what synchronisation every {format_quantity(interval, 's')} leaves of it counts"
+
+
+@phrase
+def left_since_setting(age: float, averaging: float) -> str:
+    """Said of an oscillator in holdover. [s]"""
+    return (
+        f"counts from its setting on, {format_quantity(age, 's')} before mid-aperture, by a line over "
+        f"{format_quantity(averaging, 's')}"
+    )
+
+
+@phrase
+def heard_twice(delay: float) -> str:
+    """Said of a receiver's oscillator under a direct path. [s]"""
+    return f"only what it changes by in the {format_quantity(delay, 's')} from the direct path to the echo counts"
 
 
 @phrase

@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 
 CUBIC_POWER = 4 / 175  # of a cubic phase φ₃ at the edge: its Legendre part 2/5·φ₃, whose mean square is (4/25)/7·φ₃²
 SMALLEST_CUBIC_RAD = 1e-3  # a power of -76 dB, which no image shows
-NOISE = ("velocity_random_walk", "angle_random_walk")  # figures of an inertial sensor that spread
 
 
 class Tone(NamedTuple):
@@ -113,7 +112,7 @@ def tones(mission: Mission, geometry: Any = None) -> list[Tone]:
                 what = subject(name, "vibration", "sinusoidal", entry=index)
                 found.append(Tone(what, phase, cycles, is_there))
     if has_instruments(mission):
-        for spur in spurs_of(mission):
+        for spur in spurs_of(mission, geometry):
             what = subject(spur.name, "oscillator", "spur", entry=spur.entry)
             found.append(Tone(what, spur.phase, spur.frequency * T))
     return found
@@ -135,7 +134,7 @@ def noise(analysis: "Analysis", model: str) -> list[SpreadPhase]:
     """List what spreads beyond the cubic: wideband vibration, noise of sensors, phase noise, links."""
     found = wideband_noise(analysis.mission, analysis.geometry)
     for one in analysis.random:
-        if one.declared is not None and (one.subject.kind != "imu" or one.subject.axis in NOISE):
+        if one.declared is not None and one.spreads:
             found.append(SpreadPhase(one.id, one.owner, (one.effect(model).spread * one.declared) ** 2))
     return found
 

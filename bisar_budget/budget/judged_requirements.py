@@ -244,8 +244,7 @@ def declared_kinds(mission: Mission) -> DeclaredKinds:
             elif name not in still or kind in ("position", "oscillator"):
                 missing.append(f"{name}.{kind}")
     if not mission.has_direct_path:
-        has_clock = any(term is not None for term in mission.timing_error)
-        (declared if has_clock else missing).append("timing")
+        (declared if _states_clock(mission) else missing).append("timing")
     common, link, others = mission.common_motion_error, mission.synchronization, mission.other_errors
     if mission.scene.height_error is not None:
         declared.append("terrain")
@@ -258,6 +257,13 @@ def declared_kinds(mission: Mission) -> DeclaredKinds:
             declared.append(kind)
             without_source += [] if has_source else [kind]
     return DeclaredKinds(tuple(declared), tuple(missing), tuple(without_source))
+
+
+def _states_clock(mission: Mission) -> bool:
+    """Whether the file says what the clock is wrong by: any of its terms, or what setting it left."""
+    sync = mission.synchronization
+    setting = () if sync is None else (sync.time_error, sync.frequency_error)
+    return any(term is not None for term in (*mission.timing_error, *setting))
 
 
 def _has_source(platform: Platform, kind: str) -> bool:
@@ -304,7 +310,7 @@ def _missing(mission: Mission, still: Container[str]) -> Iterator[Missing]:
     for asked in mission.requirements.declare:
         owner, dot, kind = asked.rpartition(".")
         if kind == "timing":
-            if all(term is None for term in mission.timing_error):
+            if not _states_clock(mission):
                 yield Missing("clock", kind, "timing_error")
             continue
         key, declares = _DECLARES[kind]

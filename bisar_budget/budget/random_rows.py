@@ -33,7 +33,7 @@ from bisar_budget.effects.oscillators import POOR_FIT
 from bisar_budget.effects.random_effect import RandomEffect, RandomError
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import GroundVector
-from bisar_budget.mission.instruments import Oscillator
+from bisar_budget.mission.instruments import Oscillator, Synchronization
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
 from bisar_budget.phrases import NOTHING, Note
@@ -308,13 +308,25 @@ def _said_of_oscillator(mission: Mission, error: RandomError) -> tuple[str, str 
     oscillator: Oscillator = getattr(mission.platforms, error.owner).oscillator
     own, sync = error.noise, mission.synchronization
     notes = [*override_notes(error.owner, oscillator.overridden)]
-    if own is not None and not mission.has_direct_path:
+    is_heard = not mission.has_direct_path or error.owner == "receiver"
+    if own is not None and is_heard:
         notes += [note for note in (own.extrapolated, *own.notes) if note]
-        if sync is not None and sync.interval is not None:
-            notes.append(phrases.left_by_exchanges(sync.interval))
+        notes += _kept_by(mission, sync)
     if own is not None and _GOOD_FIT < own.misfit <= POOR_FIT:
         notes.append(phrases.power_law_fits(own.misfit))
     return "phase noise", oscillator.source, tuple(notes)
+
+
+def _kept_by(mission: Mission, sync: Synchronization | None) -> Iterator[Note]:
+    """Say what is left of an oscillator by how the clocks are kept together; nothing of a free one."""
+    if sync is None:
+        return
+    if sync.interval is not None:
+        yield phrases.left_by_exchanges(sync.interval)
+    elif sync.age is not None and sync.averaging is not None:
+        yield phrases.left_since_setting(sync.age, sync.averaging)
+    else:
+        yield phrases.heard_twice(mission.geometry.echo_delay)
 
 
 def _unlimited(mission: Mission, error: RandomError, effect: RandomEffect) -> Note:

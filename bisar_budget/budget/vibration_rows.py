@@ -284,7 +284,7 @@ def spur_rows(judging: Judging, analysis: Analysis, model: str) -> Iterator["Spu
     """Judge the oscillators' tones by a model; they make paired echoes as vibrations do. [dB of echo to response]"""
     mission = analysis.mission
     metric, by_platform = tone_limits(mission, analysis.allocation)
-    for place, spur in enumerate(spurs_of(mission) if has_instruments(mission) else ()):
+    for place, spur in enumerate(spurs_of(mission, analysis.geometry) if has_instruments(mission) else ()):
         what, phase = subject(spur.name, "oscillator", "spur", entry=spur.entry), judging.array(spur.phase)
         limits, is_over_other = by_platform.get(spur.name), np.zeros(judging.cases, dtype=bool)
         if limits is None:

@@ -27,6 +27,7 @@ from bisar_budget.mission.model import (
     Shares,
     Simulation,
     flies_on_earth,
+    least_age,
 )
 from bisar_budget.mission.platforms import (
     FARTHEST_BY,
@@ -183,8 +184,11 @@ def _has_baseline(apart: PlatformState, half: Floats) -> NDArray[np.bool_]:
 
 
 def _has_possible_figures(mission: Mission, cases: int) -> NDArray[np.bool_]:
-    """Whether numbers that a file holds to each other fit, with room to spare: shares, masks and correlations."""
+    """Whether numbers that a file holds to each other fit, with room to spare: shares, masks, correlations, ages."""
     is_one = np.ones(cases, dtype=bool)
+    sync = mission.synchronization
+    if sync is not None and sync.is_holdover:
+        is_one &= np.asarray(sync.age) > SAFE * least_age(sync.averaging, mission.collection.aperture_time)
     split = mission.allocation.split
     for shares in split if isinstance(split, MetricSplits) else (split,):
         if isinstance(shares, Shares):

@@ -1,10 +1,7 @@
-"""Errors of clocks at random: phase noise of oscillators, and what a link that synchronises them leaves.
-
-A constant phase of a link moves nothing.
-"""
+"""Errors of clocks at random: phase noise of oscillators, and what a link that synchronises them leaves."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,21 +10,26 @@ from numpy.typing import NDArray
 from bisar_budget.effects.effect import subject
 from bisar_budget.effects.oscillators import noise_of
 from bisar_budget.effects.random_effect import RandomEffect, RandomError, SensorCases, of_cases, sigmas
-from bisar_budget.effects.spectra import Floats, Parts, link_parts, parts, synchronized_parts
+from bisar_budget.effects.spectra import (
+    Floats,
+    Parts,
+    PowerLawPiece,
+    heard_parts,
+    link_parts,
+    parts,
+    set_parts,
+    synchronized_parts,
+)
 from bisar_budget.mission.instruments import Oscillator
 
 
 def oscillator_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
     """Phase noise of a platform's oscillator, or what exchanged pulses leave of it."""
-    mission, sync = seen.mission, seen.mission.synchronization
+    mission = seen.mission
     oscillator: Oscillator | None = getattr(mission.platforms, name).oscillator
     if oscillator is None:
         return
-    found = np.zeros((len(Parts._fields), seen.cases))
-    if sync is None or not sync.is_direct_path:
-        interval = None if sync is None else sync.interval
-        for (alike, each), places in _groups_alike((oscillator, interval), seen.cases):
-            found[:, places] = _parts_at_1_hz(alike, each, seen.aperture_time[places])
+    found = _left_at_1_hz(seen, name, oscillator)
     published, full = _of_clock(seen, Parts(*found * mission.radar.center_frequency**2))
     key = ("platforms", name, "oscillator")
     path = key if oscillator.sensor is None else (*key, "sensor")
@@ -39,11 +41,11 @@ def oscillator_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
 def _of_clock(seen: SensorCases, found: Parts) -> tuple[RandomEffect, RandomEffect]:
     """Effects by both models of a phase with these parts [rad²]; those of orders 0 and 1 where they are known.
 
-    Where the file states both terms of the clock, these stand for what displaces.
+    Where the file states both terms of the clock, these stand for what a free oscillator displaces.
     """
     k, timing = 2 * math.pi / np.asarray(seen.mission.radar.wavelength), seen.mission.timing_error
     quadratic, cubic, spread = (np.sqrt(one) for one in found[:3])
-    is_stated = timing.constant is not None and timing.linear is not None
+    is_stated = not seen.mission.has_direct_path and timing.constant is not None and timing.linear is not None
     is_known = np.isfinite(found.constant + found.linear)
     nothing = np.where(is_stated | (quadratic + cubic == 0), 0.0, math.nan)
     counts = is_known & ~np.asarray(is_stated)
@@ -51,7 +53,8 @@ def _of_clock(seen: SensorCases, found: Parts) -> tuple[RandomEffect, RandomEffe
         square = 1 / k**2
         covariance = of_cases(np.where(counts, found.covariance * square, 0.0), seen.cases)
         east, north = (
-            np.where(counts, one, nothing) for one in seen.moved(found.constant * square, found.linear * square)
+            np.where(counts, one, nothing)
+            for one in seen.moved(found.constant * square, found.linear * square, found.constant_linear * square)
         )
     published = RandomEffect(quadratic, cubic, spread, east, north)
     whole = seen.of_orders(covariance)
@@ -65,23 +68,63 @@ def _of_clock(seen: SensorCases, found: Parts) -> tuple[RandomEffect, RandomEffe
     return published, RandomEffect(quadratic, cubic, spread, east, north, np.where(counts, whole, own))
 
 
-def _parts_at_1_hz(oscillator: Oscillator, interval: float | None, aperture_time: Floats) -> Floats:
-    """Parts of the phase of an oscillator at 1 Hz, or of what exchanged pulses leave of it: they grow as f₀²."""
-    times, place = np.unique(aperture_time, return_inverse=True)
-    spectra: dict[Any, list[int]] = {}
-    for index, T in enumerate(times.tolist()):  # an Allan deviation may be fitted otherwise over another aperture
-        spectra.setdefault(noise_of(oscillator, 1.0, T).pieces, []).append(index)
-    found = np.zeros((len(Parts._fields), times.size))
-    for pieces, some in spectra.items():
-        of_them = times[some]
-        found[:, some] = parts(pieces, of_them) if interval is None else synchronized_parts(pieces, of_them, interval)
-    return found[:, place]
+def _left_at_1_hz(seen: SensorCases, name: str, oscillator: Oscillator) -> Floats:
+    """Parts of the phase at 1 Hz that an oscillator leaves over the aperture, (parts, cases); they grow as f₀².
+
+    It depends on how the clocks are kept together: all of its noise, what exchanged pulses leave, what has come since
+    the clocks were set, or what a receiver that hears the transmitter has between direct path and echo.
+    """
+    sync, times = seen.mission.synchronization, seen.aperture_time
+    each = [np.broadcast_to(np.asarray(one), (seen.cases,)) for one in _kept_by(seen)]
+    found = np.zeros((len(Parts._fields), seen.cases))
+    if sync is not None and sync.is_direct_path and name == "transmitter":
+        return found
+    interval = None if sync is None else sync.interval
+    for (alike, exchanged), places in _groups_alike((oscillator._replace(aging=None), interval), seen.cases):
+        spectra: dict[Any, list[int]] = {}
+        for place in places.tolist():  # an Allan deviation may be fitted otherwise over another aperture
+            spectra.setdefault(noise_of(alike, 1.0, float(times[place])).pieces, []).append(place)
+        for pieces, some in spectra.items():
+            found[:, some] = _rows(_left_of(pieces, seen, exchanged, times[some], *(one[some] for one in each)))
+    return found
+
+
+def _kept_by(seen: SensorCases) -> tuple[Any, ...]:
+    """Times that say what setting the clocks, or hearing them, leaves: age and averaging, or the echo's delay. [s]"""
+    sync = seen.mission.synchronization
+    if sync is None or sync.interval is not None:
+        return ()
+    return (sync.age, sync.averaging) if sync.is_holdover else (seen.geometry.echo_delay,)
+
+
+def _left_of(
+    pieces: Sequence[PowerLawPiece], seen: SensorCases, interval: float | None, aperture_time: Floats, *kept: Floats
+) -> Parts:
+    """Parts of what is left of a spectrum over apertures (cases,)."""
+    if not kept:
+        times, place = np.unique(aperture_time, return_inverse=True)
+        found = parts(pieces, times) if interval is None else synchronized_parts(pieces, times, interval)
+        return Parts(*_rows(found)[:, place])
+    if len(kept) == 2:
+        return set_parts(pieces, aperture_time, *kept)
+    # The constant phase between direct path and echo moves nothing.
+    return _without_constant(heard_parts(pieces, aperture_time, *kept))
+
+
+def _without_constant(found: Parts) -> Parts:
+    nothing = 0.0 * found.quadratic
+    return found._replace(constant=nothing, constant_quadratic=nothing)
+
+
+def _rows(found: Parts) -> Floats:
+    """All parts as (parts, cases)."""
+    return np.array(np.broadcast_arrays(*found))
 
 
 def link_noise(seen: SensorCases) -> Iterator[RandomError]:
     """Each exchange is wrong by an error of its own, and straight lines join them."""
     sync = seen.mission.synchronization
-    if sync is None:
+    if sync is None or sync.error is None:
         return
     found = np.zeros((len(Parts._fields), seen.cases))
     if sync.interval is None:  # from pulse to pulse: all of it spreads
@@ -89,11 +132,8 @@ def link_noise(seen: SensorCases) -> Iterator[RandomError]:
     else:
         for interval, places in _groups_alike(sync.interval, seen.cases):
             times, place = np.unique(seen.aperture_time[places], return_inverse=True)
-            found[:, places] = np.array(link_parts(times, interval))[:, place]
-    # A constant phase moves nothing.
-    published, full = _of_clock(
-        seen, Parts(*found)._replace(constant=0.0 * found[0], constant_quadratic=0.0 * found[0])
-    )
+            found[:, places] = _rows(link_parts(times, interval))[:, place]
+    published, full = _of_clock(seen, _without_constant(Parts(*found)))  # a constant phase moves nothing
     published, full = (one._replace(spread=one.spread / seen.factor) for one in (published, full))
     what = subject("clock", "synchronization")
     yield RandomError(what, "rad", sync.error * seen.factor, ("synchronization", "error"), published, full)

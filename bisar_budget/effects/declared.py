@@ -296,7 +296,7 @@ class ErrorBlock:
                 nearer = np.minimum(*reached) if len(reached) > 1 else reached[0]
                 found[place] = FARTHEST * nearer / self.edge[place]
             else:
-                course = self.exact.clock_course(source.unit)
+                course = self.exact.clock_course(source.clock or ())
                 found[place] = FARTHEST * np.minimum(*slant) / np.abs(course).max(axis=0)
         return found
 
@@ -438,11 +438,7 @@ class DeclaredErrors:
 
     def displaces(self, error: ErrorSource) -> bool:
         """Whether an error moves platforms or a clock that is listened to: what only is a phase displaces nothing."""
-        return error.is_motion and not self.is_heard_out(error)
-
-    def is_heard_out(self, error: ErrorSource) -> bool:
-        """Whether an error is one of a clock that the direct path stands in for."""
-        return error.owner == "clock" and self.has_direct_path
+        return error.is_motion and error.is_heard
 
     def lanes(self, *errors: ErrorSource, signs: Sequence[float] = (1.0,)) -> Lanes:
         """A unit of errors, of each sign, in each case; by error, sign and case."""
@@ -461,8 +457,8 @@ class DeclaredErrors:
         exact = self.exact
         if order >= 0:
             return exact.powers[error.unit]
-        if error.is_motion:
-            return exact.clock_course(error.unit)
+        if error.clock is not None:
+            return exact.clock_course(error.clock)
         # A phase as such: a quadratic that displaces nothing.
         return np.asarray(((exact.times / exact.half) ** 2 - 1 / 3) / exact.k)
 
@@ -549,10 +545,8 @@ class Model:
 
     def no_limit(self, source: ErrorSource) -> Note:
         """Say why an error has no limit from its quadratic phase."""
-        if self.is_published:
+        if self.is_published or not source.is_heard:
             return source.no_limit
-        if self.errors.is_heard_out(source):
-            return phrases.clock_is_heard()
         return phrases.no_size_reaches_the_limit() if source.is_motion else phrases.no_quadratic_phase()
 
     def does(self, source: ErrorSource, size: float) -> Declared:

@@ -57,7 +57,7 @@ def subject(owner: str, kind: str, axis: str = "", frame: str = "scene", entry: 
 
 PLATFORMS = ("transmitter", "receiver")
 MOTION_UNITS = dict(zip(MOTION, ("m", "m/s", "m/s^2"), strict=True))
-CLOCK_UNITS = {"constant": "s", "linear": "s/s", "quadratic": "1/s", "cubic": "1/s^2"}
+CLOCK_UNITS = {"constant": "s", "linear": "s/s", "quadratic": "1/s", "cubic": "1/s^2"}  # t̃₀ … t̃₃ of (1)
 NOWHERE: Vector = (0.0, 0.0, 0.0)  # direction of what is no motion
 
 
@@ -84,7 +84,8 @@ class ErrorSource(NamedTuple):
     coverage factor; None where the file is silent. `is_independent` marks the errors as the file states
     them: sums and root-sum-squares run over these alone, so that an error stated along the track is not
     counted again by its components along the scene's axes. `direction` is a unit vector of the scene, zero for
-    what is no motion; of the mission's own it is that of both platforms.
+    what is no motion; of the mission's own it is that of both platforms. `clock` are t̃₀ … t̃₃ of a unit of an error of
+    the clock, zeros where nothing of it is heard; None for any other error.
     """
 
     subject: Subject
@@ -99,6 +100,7 @@ class ErrorSource(NamedTuple):
     evidence: str | None = None
     is_independent: bool = True
     notes: tuple[Note, ...] = ()
+    clock: tuple[Any, ...] | None = None
 
     @property
     def id(self) -> str:
@@ -109,7 +111,9 @@ class ErrorSource(NamedTuple):
         """The same with plain numbers in the place of arrays of one case."""
         effect, full = (Effect._make(map(plain, one)) for one in (self.effect, self.full))
         declared = None if self.declared is None else plain(self.declared)
-        return self._replace(declared=declared, effect=effect, full=full, direction=tuple(map(plain, self.direction)))
+        clock = None if self.clock is None else tuple(map(plain, self.clock))
+        direction = tuple(map(plain, self.direction))
+        return self._replace(declared=declared, effect=effect, full=full, direction=direction, clock=clock)
 
     @property
     def owner(self) -> str:
@@ -124,12 +128,17 @@ class ErrorSource(NamedTuple):
     @property
     def is_covered(self) -> bool:
         """Whether the coverage factor is in what is declared: not of the terrain, and not of what only is a phase."""
-        return self.subject.kind in (*MOTION, "timing")
+        return self.subject.kind in MOTION or self.clock is not None
+
+    @property
+    def is_heard(self) -> bool:
+        """Whether data have it: of a clock, whether what synchronises it leaves any."""
+        return self.clock is None or any(map(np.any, self.clock))
 
     @property
     def is_position(self) -> bool:
         """Whether it is an error of a platform's measured path, or of both."""
-        return self.is_motion and self.owner != "clock"
+        return self.is_motion and self.clock is None
 
     @property
     def platforms(self) -> tuple[int, ...]:

@@ -29,6 +29,7 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
 
 _IMU_UNITS = dict(zip(IMU_KINDS, ("m/s^2", "1", "rad", "rad/s", "m/s/sqrt(s)", "rad/sqrt(s)"), strict=True))
+NOISE = ("velocity_random_walk", "angle_random_walk")  # figures of an inertial sensor that spread
 _TILTS = ("attitude", "gyro_bias", "angle_random_walk")
 # The covariance of a position error over the aperture grows as this power of the aperture time.
 _GROWS = {
@@ -98,6 +99,7 @@ def inertial_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
             path=("platforms", name, "motion_error", *(("imu", kind) if key == kind else (key,))),
             published=RandomEffect(row[0], row[1], row[2] / seen.factor, *_moved_by_imu(seen, kind, along)),
             full=RandomEffect(quadratic, cubic, heard[2] / seen.factor, east, north, covariance),
+            spreads=kind in NOISE,
         )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from bisar_budget import evaluators, phrases
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.spectra import PowerLawPiece, held
+from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.instruments import Oscillator, Points, PowerLaw
 from bisar_budget.mission.model import Mission
 from bisar_budget.phrases import NOTHING, Note
@@ -186,24 +187,30 @@ class Spur(NamedTuple):
     left: Any
 
 
-def spurs_of(mission: Mission) -> list[Spur]:
-    """Tones that reach the image: none where the direct path is the receiver's clock."""
-    if mission.has_direct_path:
-        return []
+def spurs_of(mission: Mission, geometry: BistaticGeometry | None = None) -> list[Spur]:
+    """Tones that reach the image: with a direct path as clock those of the receiver alone, heard twice.
+
+    `geometry` is that of many cases, where numbers of the mission are arrays.
+    """
     found = []
-    for name in PLATFORMS:
+    for name in PLATFORMS[mission.has_direct_path :]:
         oscillator = getattr(mission.platforms, name).oscillator
         for index, (frequency, level) in enumerate(oscillator.spurs if oscillator is not None else ()):
             scale = mission.radar.center_frequency / oscillator.frequency
-            left = _left_of(frequency, mission)
+            left = _left_of(frequency, mission, geometry or mission.geometry)
             # A sideband of a phase φ has the amplitude φ/2 of the carrier.
             found.append(Spur(name, index, frequency, 2 * 10 ** (level / 20) * scale * left, left))
     return found
 
 
-def _left_of(frequency: float, mission: Mission) -> Any:
-    """Largest part of a tone that exchanged pulses leave, at its own frequency or at one that it is folded to."""
+def _left_of(frequency: float, mission: Mission, geometry: BistaticGeometry) -> Any:
+    """Largest part of a tone that exchanged pulses leave, at its own frequency or at one that it is folded to.
+
+    A receiver that hears the transmitter has 2|sin(πfΔt)| of its own.
+    """
     sync = mission.synchronization
+    if mission.has_direct_path:
+        return 2 * np.abs(np.sin(math.pi * frequency * geometry.echo_delay))
     if sync is None or sync.interval is None:
         return 1.0
     turns = frequency * np.asarray(sync.interval)

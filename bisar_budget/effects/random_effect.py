@@ -76,7 +76,7 @@ class RandomError(NamedTuple):
 
     `declared` is the largest of the axes, coverage factor included, and all axes grow with it; None where the file is
     silent. The unit of an oscillator is `dB`: its noise as a factor of amplitude, declared 1. `noise` is the spectrum
-    of an oscillator; not of many cases.
+    of an oscillator; not of many cases. `spreads` tells noise from what changes within the aperture by a few orders.
     """
 
     subject: Subject
@@ -86,6 +86,7 @@ class RandomError(NamedTuple):
     published: RandomEffect
     full: RandomEffect
     noise: Noise | None = None
+    spreads: bool = True
 
     @property
     def id(self) -> str:
@@ -177,20 +178,29 @@ class SensorCases:
         held : (errors, nodes, cases)
             The same with the line of sight held at mid-aperture, for the published model.
         """
-        constant, linear, quadratic, cubic = np.square(np.einsum("fn,enc->fec", self.exact.fit, held)).sum(axis=1)
-        k = self.exact.k
-        published = RandomEffect(k * np.sqrt(quadratic), k * np.sqrt(cubic), 0.0 * k, *self.moved(constant, linear))
+        fits = np.einsum("fn,enc->fec", self.exact.fit, held)
+        constant, linear, quadratic, cubic = np.square(fits).sum(axis=1)
+        k, both = self.exact.k, (fits[0] * fits[1]).sum(axis=0)
+        published = RandomEffect(
+            k * np.sqrt(quadratic), k * np.sqrt(cubic), 0.0 * k, *self.moved(constant, linear, both)
+        )
         weighted = self.weights[:, None] * courses
         effects, sizes = weighted.sum(axis=2), np.square(np.abs(weighted).sum(axis=2)).sum(axis=1)
         (qpe, edge, east, north), covariance = sigmas(np.einsum("fec,gec->fgc", effects, effects), sizes)
         return published, RandomEffect(qpe, edge, 0.0 * k, east, north, covariance)
 
-    def moved(self, constant: Any, linear: Any) -> list[Any]:
-        """Sigmas of the displacement by (25), of mean squares of constant and linear part at the edge [m²]. [m]"""
-        (a, b), (c, d) = self.plane.adjugate
-        slope = linear / np.square(self.aperture_time / 2)
-        scale = 1 / np.where(self.plane.is_singular, math.nan, self.plane.determinant)
-        return [np.sqrt(one**2 * constant + other**2 * slope) * np.abs(scale) for one, other in ((a, b), (c, d))]
+    def moved(self, constant: Any, linear: Any, both: Any = 0.0) -> list[Any]:
+        """Sigmas of the displacement by (25). [m]
+
+        Of the mean squares of constant and linear part at the edge, and of their mean product. [m²]
+        """
+        half = self.aperture_time / 2
+        slope, product = linear / half**2, 2 * both / half
+        scale = np.abs(1 / np.where(self.plane.is_singular, math.nan, self.plane.determinant))
+        return [
+            np.sqrt(np.maximum(a**2 * constant + a * b * product + b**2 * slope, 0.0)) * scale
+            for a, b in self.plane.adjugate
+        ]
 
     def of_orders(self, covariance: Floats, along: Any = 1.0) -> Floats:
         """Covariance (4, 4, cases) of phases and displacement by orders 0 to 3 of independent range errors.

@@ -159,22 +159,99 @@ class ErrorListing:
             )
 
     def _of_clock(self) -> Iterator[ErrorSource]:
+        """Terms of the clock error, which a direct path takes away; what setting the clocks left; and their aging."""
+        sync, is_heard = self.mission.synchronization, not self.mission.has_direct_path
+        is_set = sync is not None and sync.is_holdover
+        for power, (term, unit) in enumerate(CLOCK_UNITS.items()):
+            value, what = getattr(self.mission.timing_error, term), subject("clock", "timing", term)
+            if self._is_listed(what, value) and not (is_set and power < 2):  # which setting states
+                terms = tuple(float(power == place) for place in range(4))
+                no_limit = phrases.no_quadratic_term_of_clock(term) if is_heard else phrases.clock_is_heard()
+                equation = "Table I row 1, step of Table II" if term == "quadratic" else "Table I row 1"
+                path = ("timing_error", term)
+                yield self._of_terms(what, unit, value, path, terms, no_limit, equation, is_heard=is_heard)
+        yield from self._of_setting()
+        for name in PLATFORMS:
+            yield from self._of_aging(name)
+
+    def _of_terms(
+        self,
+        what: Subject,
+        unit: str,
+        value: Any,
+        path: KeyPath,
+        terms: tuple[Any, ...],
+        no_limit: Note,
+        equation: str = "Table I row 1",
+        evidence: str | None = None,
+        is_heard: bool = True,
+    ) -> ErrorSource:
+        """An error of the clock, a unit of which has these terms t̃₀ … t̃₃; the published model always hears it."""
+        clock = terms if is_heard else (0.0,) * 4
         wavelength, T = self.mission.radar.wavelength, self.mission.collection.aperture_time
         rows = evaluators.published_clock(SPEED_OF_LIGHT, wavelength, T)
-        for (term, unit), row in zip(CLOCK_UNITS.items(), rows, strict=True):
-            value, what = getattr(self.mission.timing_error, term), subject("clock", "timing", term)
-            if self._is_listed(what, value):
-                yield ErrorSource(
-                    subject=what,
-                    unit=unit,
-                    declared=None if value is None else value * self.factor,
-                    path=("timing_error", term),
-                    effect=Effect._make(row),
-                    full=self.exact.effect(self.exact.clock_course(unit)),
-                    direction=NOWHERE,
-                    equation="Table I row 1, step of Table II" if term == "quadratic" else "Table I row 1",
-                    no_limit=phrases.no_quadratic_term_of_clock(term),
-                )
+        of_terms = ([term * part for part in row] for term, row in zip(terms, rows, strict=True) if np.any(term))
+        return ErrorSource(
+            subject=what,
+            unit=unit,
+            declared=None if value is None else value * self.factor,
+            path=path,
+            effect=Effect._make(map(sum, zip((0.0,) * 4, *of_terms, strict=True))),
+            full=self.exact.effect(self.exact.clock_course(clock)),
+            direction=NOWHERE,
+            equation=equation,
+            no_limit=no_limit,
+            evidence=evidence,
+            clock=clock,
+        )
+
+    def _of_setting(self) -> Iterator[ErrorSource]:
+        """Time and frequency that setting the clocks left between them; in holdover also what is not declared."""
+        sync = self.mission.synchronization
+        if sync is None:
+            return
+        frequency: tuple[Any, ...] = (sync.age if sync.is_holdover else 0.0, 1.0, 0.0, 0.0)
+        if sync.is_direct_path:
+            frequency = self._delay_of_the_echo
+        for kind, unit, value, terms in (
+            ("time", "s", sync.time_error, (1.0, 0.0, 0.0, 0.0)),
+            ("frequency", "s/s", sync.frequency_error, frequency),
+        ):
+            what = subject("clock", kind)
+            if value is not None or (sync.is_holdover and self._is_listed(what, value)):
+                path, no_limit = ("synchronization", f"{kind}_error"), phrases.no_quadratic_term_of_setting(kind)
+                yield self._of_terms(what, unit, value, path, terms, no_limit, evidence=sync.source)
+
+    @property
+    def _delay_of_the_echo(self) -> tuple[Any, ...]:
+        """Terms of the time by which the echo comes after the direct path: a wrong clock measures it wrong. [s]"""
+        exact = self.exact
+        seconds = (sum(exact.ranges) - exact.baselines) / SPEED_OF_LIGHT
+        powers = np.vander(exact.sampling.places, 4, increasing=True)
+        return tuple(
+            part / exact.half**power for power, part in enumerate(np.linalg.lstsq(powers, seconds, rcond=None)[0])
+        )
+
+    def _of_aging(self, name: str) -> Iterator[ErrorSource]:
+        """Drift of an oscillator's frequency since the clocks were set, D: a time of D·(H + τ)²/2.
+
+        Without an age only the quadratic term is known, and the location is not judged; a link takes all of it away.
+        """
+        oscillator, sync = getattr(self.mission.platforms, name).oscillator, self.mission.synchronization
+        if oscillator is None:
+            return
+        what, value = subject(name, "oscillator", "aging"), oscillator.aging
+        is_set, age = sync is not None and sync.is_holdover, 0.0 if sync is None or sync.age is None else sync.age
+        if value is None and not (is_set and self._is_listed(what, value)):
+            return
+        path = ("platforms", name, "oscillator", "aging")
+        terms: tuple[Any, ...] = (0.0, 0.0, 0.5 * (sync is None), 0.0)
+        if is_set:
+            terms = (age**2 / 2, age, 0.5, 0.0)
+        no_limit = (
+            phrases.aging_is_followed() if sync is not None else phrases.no_quadratic_term_of_clock("quadratic")
+        )
+        yield self._of_terms(what, "1/s", value, path, terms, no_limit, evidence=oscillator.source)
 
     def _of_both_platforms(self) -> Iterator[ErrorSource]:
         """ErrorListing that both platforms have in common: the effects of both legs add with their signs.

@@ -8,7 +8,7 @@ between two of them: only the ends of a piece are integrated one by one.
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from functools import lru_cache
+from functools import lru_cache, partial
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -26,7 +26,9 @@ class Parts(NamedTuple):
     """Mean squares of a phase over the aperture [rad²]: quadratic, cubic, and what is left after the cubic.
 
     Then those of the constant and the linear part at the aperture edge, which displace, and the mean products of the
-    constant with the quadratic and of the linear with the cubic part; infinite where slow noise has no bound.
+    constant with the quadratic and of the linear with the cubic part; infinite where slow noise has no bound. A phase
+    that was set before the aperture has other mean products too; in any other even and odd orders know nothing of
+    each other.
     """
 
     quadratic: Any
@@ -36,17 +38,22 @@ class Parts(NamedTuple):
     linear: Any = math.inf
     constant_quadratic: Any = -math.inf
     linear_cubic: Any = -math.inf
+    constant_linear: Any = 0.0
+    constant_cubic: Any = 0.0
+    linear_quadratic: Any = 0.0
 
     @property
     def covariance(self) -> Floats:
         """Of the constant, linear, quadratic and cubic part at the aperture edge, (4, 4, ...)."""
-        one, two, even, odd = self.constant, self.linear, self.constant_quadratic, self.linear_cubic
         zero = np.zeros(np.shape(self.quadratic))
+        both, to_cubic, to_quadratic = (
+            part + zero for part in (self.constant_linear, self.constant_cubic, self.linear_quadratic)
+        )
         return np.array([
-            [one, zero, even, zero],
-            [zero, two, zero, odd],
-            [even, zero, self.quadratic, zero],
-            [zero, odd, zero, self.cubic],
+            [self.constant, both, self.constant_quadratic, to_cubic],
+            [both, self.linear, to_quadratic, self.linear_cubic],
+            [self.constant_quadratic, to_quadratic, self.quadratic, zero],
+            [to_cubic, self.linear_cubic, zero, self.cubic],
         ])  # fmt: skip
 
 
@@ -77,6 +84,7 @@ def held(step: Any) -> Any:
     return np.sinc(step / (2 * math.pi)) ** 4
 
 
+_INTEGRALS = 7  # parts of any spectrum, in their order
 _TURNS = 24  # half turns of a tone within the aperture that are followed one by one
 _FAST = _TURNS * math.pi  # angle from which what turns with a tone is averaged
 _FIRST = 0.1  # angle below which a tone's parts are their first powers, to 4e-4 of the 3 % that lie there
@@ -124,7 +132,7 @@ class PowerLawPiece(NamedTuple):
         return float(self.density * (high**exponent - (low**exponent if low else 0.0)) / exponent)
 
 
-def parts(pieces: Sequence[PowerLawPiece], aperture_time: Any) -> Parts:
+def parts(pieces: Sequence[PowerLawPiece], aperture_time: Any, above: Any = 0.0) -> Parts:
     """Integrate a spectrum with the parts of a tone, to 1e-4.
 
     Parameters
@@ -133,12 +141,15 @@ def parts(pieces: Sequence[PowerLawPiece], aperture_time: Any) -> Parts:
         Of a one-sided spectrum. [rad²/Hz]
     aperture_time : float or (cases,)
         [s]
+    above : float or (cases,)
+        Frequency from which on the spectrum counts. [Hz]
     """
     scale = math.pi * np.atleast_1d(aperture_time)
-    total = np.zeros((len(Parts._fields), *scale.shape))
+    total = np.zeros((_INTEGRALS, *scale.shape))
     for piece in pieces:
         to_angle = piece.density * scale ** (piece.slope - 1)
-        total += to_angle * _of_power_law(piece.slope, piece.low * scale, piece.high * scale)
+        low = np.minimum(np.maximum(piece.low, above), piece.high)
+        total += to_angle * _of_power_law(piece.slope, low * scale, piece.high * scale)
     return _like(total, aperture_time)
 
 
@@ -168,7 +179,7 @@ def _between_edges(slope: float) -> Floats:
 
 def _at_an_end(slope: float, low: Floats, high: Floats) -> Floats:
     """Parts of a panel at the end of a piece, which may be slow or fast; nothing of one without length."""
-    found = np.zeros((len(Parts._fields), low.size))
+    found = np.zeros((_INTEGRALS, low.size))
     is_slow, is_fast = high <= _FIRST * _SAME, low >= _FAST / _SAME
     for some, of_panel in (
         (is_slow, _slow),
@@ -218,6 +229,103 @@ def _squares(angle: Floats) -> Floats:
     return np.array((quadratic**2, cubic**2, left, constant**2, linear**2, *both))
 
 
+# ---------------------------------------------------------------------- clocks that were set
+_RESOLVED = 24.0  # cycles within the age of the setting up to which aperture and setting are followed together
+_AGES = np.concatenate((np.geomspace(1e-6, 0.125, 18), np.arange(0.25, _RESOLVED + 0.1, 0.25)))  # edges, in cycles
+
+
+def set_parts(pieces: Sequence[PowerLawPiece], aperture_time: Floats, age: Floats, averaging: Floats) -> Parts:
+    """Integrate what a clock that was set before the aperture has of a spectrum, (cases,).
+
+    A line fitted to its phase over the averaging, `age` before mid-aperture, is taken off: a tone is left with
+    A₀ = j₀(x) − e^(−iθ)·[j₀(y) + H·(6i/t_c)·j₁(y)] and A₁ = 3i·j₁(x) − (T/2)·e^(−iθ)·(6i/t_c)·j₁(y) of orders 0 and 1
+    at the aperture edge, x = πfT, y = πft_c, θ = 2πfH. Higher orders are those of the free clock. Derived here;
+    bounded for slopes to f⁻⁴. Beyond 24 cycles within the age setting and aperture know nothing of each other.
+
+    Parameters
+    ----------
+    pieces : sequence of PowerLawPiece
+        Of a one-sided spectrum. [rad²/Hz]
+    aperture_time, age, averaging : (cases,)
+        T, H from the middle of the averaging to mid-aperture, at least (t_c + T)/2, and t_c. [s]
+    """
+    beyond = _RESOLVED / age
+    times, above = (aperture_time, aperture_time, averaging), (0.0 * beyond, beyond, beyond)
+    of_each = np.array(parts(pieces, np.concatenate(times), np.concatenate(above))[:_INTEGRALS])
+    free, own, of_line = (Parts(*one) for one in np.split(of_each, 3, axis=1))
+    fast = of_line.linear * (2 / averaging) ** 2  # of the slope of the line
+    half = aperture_time / 2
+    together = [
+        own.constant + of_line.constant + age**2 * fast,
+        own.linear + half**2 * fast,
+        age * half * fast,
+        own.constant_quadratic,
+        0.0,
+        0.0,
+        own.linear_cubic,
+    ]
+    ends = np.array([edge for piece in pieces for edge in (piece.low, piece.high)])[:, None] * age
+    edges = np.sort(np.concatenate((_AGES[:, None] + 0.0 * age, np.clip(ends, _AGES[0], _RESOLVED))), axis=0) / age
+    span = np.log(edges[1:] / edges[:-1])
+    f = edges[:-1] * np.exp(span * _NODES[:, None])  # (nodes, panels, cases)
+    weight = sum(_at(piece, f) for piece in pieces) * f * span * _WEIGHTS[:, None]
+    for place, square in enumerate(_squares_of_set(f, aperture_time, age, averaging)):
+        together[place] = together[place] + (weight * square).sum(axis=(0, 1))
+    constant, linear, both, even, to_cubic, to_quadratic, odd = together
+    return Parts(free.quadratic, free.cubic, free.left, constant, linear, even, odd, both, to_cubic, to_quadratic)
+
+
+def _squares_of_set(f: Floats, aperture_time: Floats, age: Floats, averaging: Floats) -> Iterator[Floats]:
+    """Mean squares and products of the orders of a tone less the line: 00, 11, 01, 02, 03, 12, 13."""
+    quadratic, cubic, _, constant, linear = tone(math.pi * f * aperture_time)
+    *_, mean, slope = tone(math.pi * f * averaging)
+    turn, rate = np.exp(-2j * math.pi * f * age), 2j / averaging * slope
+    orders = (
+        constant - turn * (mean + age * rate),
+        1j * linear - aperture_time / 2 * turn * rate,
+        -quadratic,
+        -1j * cubic,
+    )
+    for one, other in ((0, 0), (1, 1), (0, 1), (0, 2), (0, 3), (1, 2), (1, 3)):
+        yield (orders[one] * orders[other].conjugate()).real
+
+
+# ---------------------------------------------------------------------- a clock that is heard twice
+_HEARD = 12  # turns of a tone within the delay that are followed
+
+
+def heard_parts(pieces: Sequence[PowerLawPiece], aperture_time: Any, delay: Any) -> Parts:
+    """Integrate what a clock has of a spectrum that is heard twice, so long apart: S·4 sin²(πfΔt).
+
+    Parameters
+    ----------
+    pieces : sequence of PowerLawPiece
+        Of a one-sided spectrum. [rad²/Hz]
+    aperture_time, delay : float or (cases,)
+        T and Δt. [s]
+    """
+    times, delays = np.broadcast_arrays(np.atleast_1d(aperture_time), np.atleast_1d(delay))
+    end = max((piece.high for piece in pieces), default=0.0)
+    last = np.minimum(_HEARD / delays, end)
+    edges = [
+        [*_exchange_edges(T, 1 / gap), *(edge for piece in pieces for edge in (piece.low, piece.high))]
+        for T, gap in zip(times.tolist(), delays.tolist(), strict=True)
+    ]
+
+    def density(f: Floats, cases: NDArray[np.intp]) -> Floats:
+        of_all = sum((_at(piece, f) for piece in pieces), np.zeros_like(f))
+        return np.asarray(of_all * 4 * np.sin(math.pi * f * delays[cases]) ** 2)
+
+    scale = math.pi * times
+    total = _over_panels(density, edges, last, scale)
+    for piece in pieces:  # where it turns within the delay so often that its mean counts
+        to_angle = 2 * piece.density * scale ** (piece.slope - 1)
+        low, high = np.maximum(piece.low, last) * scale, piece.high * scale
+        some = piece.high > last
+        total[:, some] += to_angle[some] * _fast(piece.slope, low[some], high[some])
+    return _like(total, aperture_time)
+
+
 # ---------------------------------------------------------------------- synchronisation
 def synchronized_parts(pieces: Sequence[PowerLawPiece], aperture_time: Any, interval: float) -> Parts:
     """The same of what synchronisation leaves: a phase less the straight lines between samples of it.
@@ -230,7 +338,7 @@ def synchronized_parts(pieces: Sequence[PowerLawPiece], aperture_time: Any, inte
     scale = math.pi * times
     last = np.maximum(_FOLDED * rate, _FAST / scale)
     edges = [[*_exchange_edges(T, rate), *_image_edges(pieces, rate)] for T in times.tolist()]
-    total = _over_panels(lambda f: _left(pieces, beyond, f, rate), edges, last, scale)
+    total = _over_panels(lambda f, cases: _left(pieces, beyond, f, rate), edges, last, scale)
     for piece in pieces:  # where straight lines pass nothing any more
         to_angle = piece.density * scale ** (piece.slope - 1)
         low, high = np.maximum(piece.low, last) * scale, piece.high * scale
@@ -244,24 +352,32 @@ def link_parts(aperture_time: Any, interval: float) -> Parts:
     rate, times = 1 / interval, np.atleast_1d(aperture_time)
     edges = [_exchange_edges(T, rate) for T in times.tolist()]
     last = np.full(times.shape, _FOLDED * rate)
-    total = _over_panels(lambda f: 2 * interval * held(2 * math.pi * f * interval), edges, last, math.pi * times)
+
+    def density(f: Floats, cases: NDArray[np.intp]) -> Floats:
+        return np.asarray(2 * interval * held(2 * math.pi * f * interval))
+
+    total = _over_panels(density, edges, last, math.pi * times)
     return _like(total, aperture_time)
 
 
 def _over_panels(
-    density: Callable[[Floats], Floats], edges: Sequence[Sequence[float]], high: Floats, scale: Floats
+    density: Callable[..., Floats],
+    edges: Sequence[Sequence[float]],
+    high: Floats,
+    scale: Floats,
 ) -> Floats:
-    """Integrate a density with the parts of a tone from 0 Hz, between the edges of each case."""
+    """Integrate a density, of frequencies in cases, with the parts of a tone from 0 Hz on, between edges."""
     panels = [
         (low, top, place)
         for place, (of_case, end) in enumerate(zip(edges, high.tolist(), strict=True))
         for low, top in _panels(0.0, end, of_case)
     ]
     low, top, cases = (np.array(column) for column in zip(*panels, strict=True))
-    total = np.zeros((len(Parts._fields), high.size))
+    total = np.zeros((_INTEGRALS, high.size))
     for start in range(0, low.size, _MOST):
         some = slice(start, start + _MOST)
-        found = _panels_of(density, low[some], top[some], scale[cases[some]])
+        here = cases[some]
+        found = _panels_of(partial(density, cases=here), low[some], top[some], scale[here])
         for kept, part in zip(total, found, strict=True):
             kept += np.bincount(cases[some], part, high.size)
     return total

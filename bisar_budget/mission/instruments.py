@@ -10,7 +10,6 @@ from bisar_budget.faults import InvalidValueError, KeyPath, Problem
 from bisar_budget.geometry import Vector
 from bisar_budget.mission.readers import (
     INVALID,
-    LATER_METHODS,
     Choice,
     Key,
     ListOf,
@@ -208,6 +207,10 @@ AllanDeviation = Annotated[
         "σ_y(τ); a power law is fitted.",
     ),
 ]
+Aging = Annotated[
+    float | None,
+    Key(Quantity(units.AGING, ge=0, le=1e-3), "Drift of the fractional frequency since the clock was set."),
+]
 PowerLawFigures = Annotated[
     PowerLaw | None, Key(_PowerLawReader(), "h-2 … h2 of the one-sided spectrum of fractional frequency.")
 ]
@@ -242,6 +245,7 @@ class Oscillator(NamedTuple):
             "Tones of the oscillator, single sideband at its frequency: each makes paired echoes.",
         ),
     ] = ()
+    aging: Aging = None
     sensor: Annotated[
         str | None, Key(Reference(), "A part of the catalogue, or a file; keys beside it override.")
     ] = None
@@ -278,26 +282,59 @@ class Oscillator(NamedTuple):
                 )
 
 
-METHODS = ("linear", "direct_path")
+# Methods with the keys that each needs, and those that it may have beside.
+METHODS: Mapping[str, tuple[str, ...]] = {
+    "linear": ("interval", "error"),
+    "direct_path": ("error",),
+    "holdover": ("age", "averaging"),
+}
+_OF_METHODS = ("interval", "error", "age", "averaging")
 
 
 class Synchronization(NamedTuple):
-    """How the receiver follows the transmitter's oscillator."""
+    """How the receiver follows the transmitter's oscillator, or how both clocks were set."""
 
     error: Annotated[
-        float, Key(Quantity(units.ANGLE, ge=0, lt=math.pi / 2), "Phase error of the link, 1 sigma, each time.")
-    ]
+        float | None,
+        Key(Quantity(units.ANGLE, ge=0, lt=math.pi / 2), "Phase error of the link, 1 sigma, each time; no holdover."),
+    ] = None
     interval: Annotated[
-        float | None, Key(Quantity(units.TIME, gt=0, ge=1e-9, le=1e6), "Between exchanged pulses.")
+        float | None, Key(Quantity(units.TIME, gt=0, ge=1e-9, le=1e6), "Between exchanged pulses; linear.")
     ] = None
     method: Annotated[
         str,
         Key(
-            Choice(*METHODS, refused=LATER_METHODS),
+            Choice(*METHODS),
             "linear: pulses are exchanged, between them the phase is interpolated; "
-            "direct_path: the receiver hears the transmitter and takes it as its clock.",
+            "direct_path: the receiver hears the transmitter and takes it as its clock; "
+            "holdover: the clocks were set once, and have run free since.",
         ),
     ] = "linear"
+    age: Annotated[
+        float | None,
+        Key(
+            Quantity(units.TIME, gt=0, ge=1e-6, le=1e8),
+            "From the middle of the averaging to mid-aperture; holdover.",
+        ),
+    ] = None
+    averaging: Annotated[
+        float | None,
+        Key(
+            Quantity(units.TIME, gt=0, ge=1e-6, le=1e8),
+            "A line fitted to time over so long is what the clock was set by; holdover.",
+        ),
+    ] = None
+    time_error: Annotated[
+        float | None,
+        Key(
+            Quantity(units.TIME, ge=-1e6, le=1e6),
+            "Time that setting left between clocks, 1 sigma; direct_path: the difference of the channels' delays.",
+        ),
+    ] = None
+    frequency_error: Annotated[
+        float | None,
+        Key(Quantity(units.RATIO, ge=-1e-2, le=1e-2), "Fractional frequency that setting left, 1 sigma."),
+    ] = None
     source: Annotated[str | None, Key(Text(), "Where the values come from; shown as evidence.")] = None
 
     @property
@@ -305,13 +342,36 @@ class Synchronization(NamedTuple):
         """Whether the receiver hears the transmitter, and no pulses are exchanged."""
         return self.method == "direct_path"
 
+    @property
+    def is_holdover(self) -> bool:
+        """Whether the clocks were set before the aperture, and run free over it."""
+        return self.method == "holdover"
+
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
-        """Hold exchanged pulses to an interval."""
-        if values.keys() >= {"method", "interval"} and values["method"] == "linear" and values["interval"] is None:
-            yield Problem("is missing", "accepted: the time between exchanged pulses", at=("interval",))
-        if values.get("method") == "direct_path" and values.get("interval") is not None:
-            yield Problem("a direct path is heard with every pulse", "accepted: no interval", at=("interval",))
+        """Hold each method to its own keys."""
+        method = values.get("method")
+        if method is None:
+            return
+        needed = METHODS[method]
+        for key in _OF_METHODS:
+            if key in values and values[key] is None and key in needed:
+                yield Problem("is missing", f"accepted: {_MEANS[key]}", at=(key,))
+            elif values.get(key) is not None and key not in needed:
+                said = _REFUSED.get((method, key), f"has no part in {method}")
+                yield Problem(said, f"accepted: {', '.join(needed)}; no {key}", at=(key,))
+
+
+_MEANS = {
+    "interval": "the time between exchanged pulses",
+    "error": "the phase error of the link",
+    "age": "the time from the middle of the averaging to mid-aperture",
+    "averaging": "the time over which a line was fitted to set the clock",
+}
+_REFUSED = {
+    ("direct_path", "interval"): "a direct path is heard with every pulse",
+    ("holdover", "error"): "a clock in holdover has no link; time_error and frequency_error say how well it was set",
+}
 
 
 IMU = Section(Imu)

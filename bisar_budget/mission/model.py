@@ -172,6 +172,33 @@ class Requirements(NamedTuple):
     ] = ()
 
 
+def least_age(averaging: Any, aperture_time: Any) -> Any:
+    """Least age of a setting, with whose averaging the aperture does not overlap. [s]"""
+    return (averaging + aperture_time) / 2
+
+
+def _unset_clocks(values: Mapping[str, Any]) -> Iterator[Problem]:
+    """Hold clocks that were set to a time before the aperture, and to one way to say what they are wrong by."""
+    sync, collection, timing = (values.get(key) for key in ("synchronization", "collection", "timing_error"))
+    if sync is None or not sync.is_holdover:
+        return
+    if collection is not None:
+        least = least_age(sync.averaging, collection.aperture_time)
+        if sync.age < least:
+            yield Problem(
+                f"the averaging of {sync.averaging:g} s overlaps the aperture of {collection.aperture_time:g} s",
+                f"accepted: at least {least:g} s, half of both",
+                at=("synchronization", "age"),
+            )
+    for term, stands in (("constant", "time_error"), ("linear", "frequency_error")):
+        if timing is not None and getattr(timing, term) is not None:
+            yield Problem(
+                "stands beside synchronization.method holdover, which says what the clocks are wrong by",
+                f"accepted: synchronization.{stands}, or no holdover",
+                at=("timing_error", term),
+            )
+
+
 WHOLE = 1e-6  # by so much the sum of shares may differ from 1
 
 
@@ -348,6 +375,7 @@ class Mission(NamedTuple):
                 collection and collection.aperture_time,
                 has_direct_path=synchronization is not None and synchronization.is_direct_path,
             )
+        yield from _unset_clocks(values)
         seen: set[str] = set()
         for index, other in enumerate(values.get("other_errors", ())):
             if other.name in seen:

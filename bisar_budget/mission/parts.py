@@ -27,6 +27,7 @@ from bisar_budget.mission.instruments import (
     OSCILLATOR,
     AccelerometerBias,
     AccelerometerScaleFactor,
+    Aging,
     AllanDeviation,
     AngleRandomWalk,
     Attitude,
@@ -126,6 +127,7 @@ class OscillatorPart(NamedTuple):
     phase_noise: PhaseNoise = None
     allan_deviation: AllanDeviation = None
     power_law: PowerLawFigures = None
+    aging: Aging = None
     says: Annotated[str | None, _SAYS] = None
 
     @staticmethod
@@ -142,7 +144,8 @@ SECTIONS: dict[str, Section] = {
     "gnss": Section(GnssPart),
     "oscillator": Section(OscillatorPart),
 }
-FIGURES = {"imu": IMU_KINDS, "gnss": _GNSS_KINDS, "oscillator": ("frequency", *FORMS)}
+BESIDE_NOISE = ("aging",)  # figures of an oscillator that a mission's own override one by one
+FIGURES = {"imu": IMU_KINDS, "gnss": _GNSS_KINDS, "oscillator": ("frequency", *FORMS, *BESIDE_NOISE)}
 
 
 class PartError(Exception):
@@ -587,6 +590,7 @@ def taken_figures(mission: Mission) -> Iterator[TakenFigure]:
             path = ("platforms", name, "oscillator", "frequency")
             is_own = {"frequency": path in mission.places}
             is_own |= {form: oscillator.source != evidence(entry.part, form) for form in FORMS}
+            is_own |= {figure: (*path[:-1], figure) in mission.places for figure in BESIDE_NOISE}
             for figure in entry.figures:
                 if not is_own[figure]:
                     key = f"platforms.{name}.oscillator.{figure}"
@@ -617,6 +621,11 @@ def _oscillator_of(oscillator: Oscillator, entry: Entry, path: KeyPath, report: 
             report(path, Problem(problem, "accepted: no frequency, or phase_noise beside it", at=("frequency",)))
             return INVALID
         overridden.append(Overridden("frequency", "oscillator.frequency", part.name, at))
+    for figure in BESIDE_NOISE:
+        if getattr(oscillator, figure) is None:
+            taken[figure] = getattr(part, figure)
+        elif figure in figures:
+            overridden.append(Overridden(figure, f"oscillator.{figure}", part.name, figures[figure]))
     return oscillator._replace(**taken, overridden=tuple(overridden))
 
 
@@ -648,7 +657,8 @@ def _rules(figures: Sequence[str]) -> dict[str, Any]:
 
     Of an oscillator exactly one form is there, and a mask has its frequency. Zeros are for the tool to see.
     """
-    ways = [{"required": [figure], "properties": {figure: _SOME}} for figure in figures if figure != "frequency"]
+    by_itself = [figure for figure in figures if figure not in ("frequency", *BESIDE_NOISE)]
+    ways = [{"required": [figure], "properties": {figure: _SOME}} for figure in by_itself]
     of_each = {"required": ["source"], "properties": {"source": {"type": "object"}}}
     sourced = [
         {

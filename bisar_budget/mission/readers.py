@@ -543,16 +543,14 @@ _LEAVE = "accepted: leave it out"
 _MOTION = f"{_LEAVE}, and state what it does as position, velocity and acceleration errors"
 _OSCILLATOR = f"{_LEAVE}, and state the noise with it, as phase_noise or spurs"
 _OTHER = f"{_LEAVE}; of an error from elsewhere its quadratic_phase_error counts"
-_LINK = "accepted: method linear with interval and error, or direct_path with error"
 _SPECTRUM = f"{_LEAVE}, and state sinusoidal lines and the rms of wideband"
 
 # By the name of the section, as its class has it, and the key: what is accepted instead.
 LATER: Mapping[str, Mapping[str, str]] = {
     "MotionError": {"time_tag": _MOTION, "lever_arm": _MOTION},
     "Vibration": {"spectrum": _SPECTRUM, "spectrum_level": _SPECTRUM},
-    "Oscillator": dict.fromkeys(("acceleration_sensitivity", "aging", "vibration", "level"), _OSCILLATOR),
-    "OscillatorPart": dict.fromkeys(("acceleration_sensitivity", "aging", "vibration", "level"), _OSCILLATOR),
-    "Synchronization": dict.fromkeys(("age", "averaging", "time_error", "frequency_error"), _LINK),
+    "Oscillator": dict.fromkeys(("acceleration_sensitivity", "vibration", "level"), _OSCILLATOR),
+    "OscillatorPart": dict.fromkeys(("acceleration_sensitivity", "vibration", "level"), _OSCILLATOR),
     "CommonMotionError": {"random": f"{_LEAVE}, and state it in motion_error.random of each platform"},
     "OtherError": dict.fromkeys(("cubic_phase_error", "location_error", "islr"), _OTHER),
     "OrbitSource": dict.fromkeys(("eof", "sp3"), "accepted: the same orbit as tle, omm or oem"),
@@ -565,7 +563,6 @@ LATER: Mapping[str, Mapping[str, str]] = {
         "earth_orientation": f"{_LEAVE}; UT1 is taken to be UTC",
     },
 }
-LATER_METHODS: Mapping[str, str] = {"holdover": NOT_COMPUTED}
 LATER_FRAMES: Mapping[str, str] = dict.fromkeys(
     ("track", "look", "ric"), f"{NOT_COMPUTED} of both platforms at once: each has axes of its own"
 )

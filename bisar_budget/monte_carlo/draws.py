@@ -20,7 +20,7 @@ import numpy as np
 
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.constants import SPEED_OF_LIGHT, UTILIZATION_TOLERANCE
-from bisar_budget.effects.effect import CLOCK_UNITS, PLATFORMS, ErrorSource
+from bisar_budget.effects.effect import PLATFORMS, ErrorSource
 from bisar_budget.faults import printable
 from bisar_budget.memory import is_spacious
 from bisar_budget.ranges.exact_ranges import STILL, ExactRanges, Floats, Found, Truths, followed
@@ -34,7 +34,6 @@ BLOCK = 1 << 15
 CHUNK = 1 << 22  # draws of one stream; a second or so
 EXACT_PIECE = 1 << 18  # of a chunk, which it divides, where each draw goes through exact ranges: as long
 _ORDER = {"m": 0, "m/s": 1, "m/s^2": 2}
-_CLOCK = {unit: power for power, unit in enumerate(CLOCK_UNITS.values())}
 _SAMPLE = 512  # draws that decide whether exact ranges are needed
 _DIFFERENT = 0.01  # of a limit
 _AFTER_BYTES = 256
@@ -237,8 +236,8 @@ class Sums:
                     for axis, component in enumerate(source.direction):
                         if component:
                             motion[platform, _ORDER[source.unit], axis] += size * component * drawn
-        elif source.owner == "clock":
-            self._kept(self.clock, owner, (4,))[_CLOCK[source.unit]] += size * drawn
+        elif source.clock is not None:
+            self._kept(self.clock, owner, (4,))[:] += np.multiply.outer(size * np.array(source.clock), drawn)
         else:
             self._add_effects(owner, (size, 0.0, 0.0, 0.0), drawn)
 
@@ -287,7 +286,7 @@ class Sums:
         powers = np.stack((np.ones_like(times), times, times**2 / 2), axis=-1)  # of (22)
         clock_powers = SPEED_OF_LIGHT * times[:, None] ** np.arange(4)
         motion = _sum(self.motion, owners, np.broadcast_to(0.0, (2, 3, 3, self.size)))
-        clock = _sum({} if self.exact.has_direct_path else self.clock, owners, np.broadcast_to(0.0, (4, self.size)))
+        clock = _sum(self.clock, owners, np.broadcast_to(0.0, (4, self.size)))
         shifts = [powers @ one.swapaxes(0, 1) if one.any() else STILL for one in motion]
         return followed(self.exact, clock_powers @ clock, shifts, np.zeros(self.size, dtype=int))
 

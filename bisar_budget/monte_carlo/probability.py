@@ -93,12 +93,14 @@ def monte_carlo(
 
 
 def _distribution(mission: Mission, source: ErrorSource) -> str:
+    if source.clock is not None:
+        # A clock's values are one sigma, as the coverage factor on them says.
+        return "normal"
     if source.owner in PLATFORMS:
         return str(getattr(mission.platforms, source.owner).motion_error.distribution)
     if source.is_common and mission.common_motion_error is not None:
         return mission.common_motion_error.distribution
-    # A clock's values are one sigma, as the coverage factor on them says; what has none is a bound.
-    return "normal" if source.owner == "clock" else "bound"
+    return "bound"
 
 
 def _variables(analysis: Analysis) -> Iterator[Variable]:
@@ -115,8 +117,7 @@ def _variables(analysis: Analysis) -> Iterator[Variable]:
             yield _variable(f"{group.id}.{index}", group.id, group.platform, "normal", parts, full)
     for source in left.values():
         distribution = _distribution(mission, source)
-        is_covered = source.owner != "mission" or source.is_common
-        size = abs(source.declared or 0.0) / (factor if is_covered else 1.0)
+        size = abs(source.declared or 0.0) / (factor if source.is_covered else 1.0)
         if distribution == "uniform":
             size /= math.sqrt(3)  # the standard uncertainty of ±a, GUM 4.3.7
         yield _variable(source.id, source.id, source.owner, distribution, [(source, size)], full)

@@ -44,7 +44,6 @@ SKEWED = 0.01  # the same over the sine between the gradients, where they are ne
 BENT = 0.05  # of what Doppler turns by at the centre: velocity errors turn it by less, or its slopes are others
 FEW = 4
 SHRINKS = 0.5  # square of each step of the search over that of the one before; else it does not settle
-CLOCK_POWERS = {"s": 0, "s/s": 1, "1/s": 2, "1/s^2": 3}  # of slow time, by the unit of a clock error
 EPSILON = 2e-15  # of a range sum: what rounding of a few operations leaves
 UNSEEN_RAD = 3e-5  # what the last step of the search may change a phase by beyond the part counted linearly
 
@@ -344,10 +343,10 @@ class ExactRanges:
         """Position error at the nodes of a unit of an error: 1, τ or τ²/2 of (22)."""
         return {"m": np.ones_like(self.times), "m/s": self.times, "m/s^2": self.times**2 / 2}
 
-    def clock_course(self, unit: str) -> Floats:
-        """Range error at the nodes of a unit of a clock error; nothing if the direct path is the clock. [m/unit]"""
-        metres: Floats = SPEED_OF_LIGHT * self.times ** CLOCK_POWERS[unit]
-        return metres * 0.0 if self.has_direct_path else metres
+    def clock_course(self, terms: Sequence[Any]) -> Floats:
+        """Range error at the nodes of a clock error t̃₀ + t̃₁τ + t̃₂τ² + t̃₃τ³, by its terms. [m]"""
+        seconds = sum(term * self.times**power for power, term in enumerate(terms) if np.any(term))
+        return np.asarray(SPEED_OF_LIGHT * seconds + np.zeros_like(self.times))
 
     def along(self, platform: int, direction: Vectors) -> Floats:
         """Change of a platform's range at the nodes per metre along a direction, −u·d; if heard, −(u − b)·d."""

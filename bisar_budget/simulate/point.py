@@ -368,11 +368,8 @@ def declared_errors(mission: Mission) -> Errors:
             course=getattr(errors, name).course,
         )
         errors = errors.of(name, error)
-    if mission.has_direct_path:  # whose own clock errors are nothing
-        return errors
-    clock = mission.timing_error
-    terms = (clock.constant or 0.0, clock.linear or 0.0, clock.quadratic or 0.0, clock.cubic or 0.0)
-    return errors._replace(clock=tuple(factor * term for term in terms))
+    of_clocks = [[one.declared * term for term in one.clock] for one in analysis.stated if one.clock is not None]
+    return errors._replace(clock=tuple(map(math.fsum, zip((0.0,) * 4, *of_clocks, strict=True))))
 
 
 def _turned(

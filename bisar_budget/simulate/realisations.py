@@ -26,6 +26,8 @@ _STEPS = 512  # from mid-aperture to the end of it, in which a walk is summed up
 _SLOW_TONES = 80  # over logarithms, below a tone per two apertures
 _SLOWEST = 1e-4  # of a tone per aperture; its quadratic phase is nothing
 _PERIODS = 4  # apertures in which phase noise repeats
+_AGES, _PER_AGE = 24, 8  # turns within the age of a setting that are followed, and tones for each
+_TURNED = 256  # turns within an averaging, beyond which nothing of a tone is left in its line
 _PER_CYCLE = 4  # samples of the fastest tone, joined by straight lines
 _MAX_TONES = 1 << 18
 _MOST_KNOTS = 1 << 13  # exchanges in an aperture that are drawn
@@ -185,19 +187,49 @@ def phase_courses(
         return size * math.sqrt(sync.interval / drawn_at) * np.stack(joined)
     oscillator = getattr(mission.platforms, error.owner).oscillator
     pieces = noise_of(oscillator, mission.radar.center_frequency, T).pieces
-    if sync is None:
-        pieces = tuple(piece._replace(high=min(piece.high, highest)) for piece in pieces if piece.low < highest)
-    tones = _Tones(pieces, T)
+    interval = None if sync is None else sync.interval
+    if interval is None:
+        pieces = _below(pieces, highest)
+    if mission.has_direct_path:
+        return _heard_twice(mission, error, size, _Tones(pieces, T), times, draws, rng)
+    setting = None if sync is None or sync.age is None else _Setting(pieces, T, sync.age, sync.averaging or T)
+    tones = _Tones(pieces, T) if setting is None else setting.tones
     waves = _slow_waves(tones.slow, times)
-    interval = sync.interval if sync is not None and sync.method == "linear" else None
     found = np.empty((draws, times.size))
     for index in range(draws):
         drawn = tones.draw(rng)
         found[index] = drawn.at(times, waves)
+        if setting is not None:
+            found[index] -= setting.line(drawn, times, rng)
         if interval is not None:
             # Pulses that follow each other faster take the phase away to nothing that an image shows.
             knots = _knots(times, max(interval, T / _MOST_KNOTS), rng)
             found[index] -= np.interp(times, knots, drawn.at(knots))
+    return size * found
+
+
+def _below(pieces: tuple[PowerLawPiece, ...], highest: float) -> tuple[PowerLawPiece, ...]:
+    """Pieces of a spectrum up to a frequency."""
+    return tuple(piece._replace(high=min(piece.high, highest)) for piece in pieces if piece.low < highest)
+
+
+def _heard_twice(
+    mission: Mission,
+    error: RandomError,
+    size: float,
+    tones: "_Tones",
+    times: Floats,
+    draws: int,
+    rng: np.random.Generator,
+) -> Floats:
+    """Phases of an oscillator at the echo less those at the direct path, (draws, times); the transmitter has none."""
+    found = np.zeros((draws, times.size))
+    if error.owner == "transmitter":
+        return found
+    later = times + float(mission.geometry.echo_delay)
+    for index in range(draws):
+        drawn = tones.draw(rng)
+        found[index] = drawn.at(later) - drawn.at(times)
     return size * found
 
 
@@ -237,9 +269,11 @@ def _slow_waves(frequency: Floats, times: Floats) -> tuple[Floats, Floats]:
 class _Tones:
     """A spectrum as tones: those that turn within the aperture at even distances, the others by logarithms."""
 
-    def __init__(self, pieces: tuple[PowerLawPiece, ...], aperture_time: float) -> None:
+    def __init__(self, pieces: tuple[PowerLawPiece, ...], aperture_time: float, slow: Floats | None = None) -> None:
+        """Take tones of a spectrum over an aperture; `slow` are the edges of those below half the finest step."""
         high, fine = max(piece.high for piece in pieces), 1 / (_PERIODS * aperture_time)
-        slow: Floats = np.geomspace(_SLOWEST / aperture_time, fine / 2, _SLOW_TONES + 1)
+        if slow is None:
+            slow = np.geomspace(_SLOWEST / aperture_time, fine / 2, _SLOW_TONES + 1)
         self.slow: Floats = (slow[1:] + slow[:-1]) / 2
         widths: Floats = slow[1:] - slow[:-1]
         self.slow_size = self._size(pieces, self.slow, widths)
@@ -271,6 +305,39 @@ class _Tones:
         spectrum[1 : both.shape[1] + 1] = (both[0] - 1j * both[1]) * samples / 2
         fast = np.fft.irfft(spectrum, samples)
         return _Drawn(self.slow, cosine, sine, Course(self.times, np.append(fast, fast[0])), self.rest, rng)
+
+
+class _Setting:
+    """A clock that was set before the aperture, by a line fitted to its phase over the averaging.
+
+    Slow tones are the same in the averaging and in the aperture. Of what is faster than a tone per eight apertures,
+    and so often turned within the age, the averaging has a draw of its own.
+    """
+
+    def __init__(self, pieces: tuple[PowerLawPiece, ...], aperture_time: float, age: float, averaging: float) -> None:
+        self.age = age
+        step, fast = 1 / (_PER_AGE * age), 1 / (2 * _PERIODS * aperture_time)
+        followed = min(_AGES * _PER_AGE * step, fast)
+        edges = [np.geomspace(_SLOWEST / max(age, aperture_time), min(step, fast), _SLOW_TONES + 1)]
+        edges += [np.arange(step, followed, step), np.geomspace(followed, fast, _SLOW_TONES + 1)]
+        self.tones = _Tones(pieces, aperture_time, np.unique(np.concatenate(edges)))
+        count = 64 + math.ceil(16 * averaging * fast)
+        self.window: Floats = ((np.arange(count) + 0.5) / count - 0.5) * averaging
+        self.fit: Floats = np.linalg.pinv(np.stack((np.ones(count), self.window), axis=1)).astype(float)
+        cosines, sines = _slow_waves(self.tones.slow, self.window - age)
+        self.of_cosine, self.of_sine = self.fit @ cosines, self.fit @ sines
+        own = tuple(piece._replace(low=max(piece.low, fast)) for piece in _below(pieces, _TURNED / averaging))
+        own = tuple(piece for piece in own if piece.low < piece.high)
+        self.fast = _Tones(own, averaging) if own else None
+
+    def line(self, drawn: _Drawn, times: Floats, rng: np.random.Generator) -> Floats:
+        """The line that was fitted, at other times, (times,). [rad]"""
+        value, slope = self.of_cosine @ drawn.cosine + self.of_sine @ drawn.sine
+        if self.fast is not None:
+            own_value, own_slope = self.fit @ self.fast.draw(rng).at(self.window)
+            value, slope = value + own_value, slope + own_slope
+        found: Floats = value + slope * (times + self.age)
+        return found
 
 
 def clock_seconds(phase: Floats, wavelength_m: float) -> Floats:

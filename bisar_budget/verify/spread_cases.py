@@ -377,7 +377,8 @@ def _courses(study: Study, error: RandomError, rng: np.random.Generator) -> Floa
 def _fits(study: Study, error: RandomError, rng: np.random.Generator) -> tuple[Floats, int]:
     """Legendre coefficients of time series of a clock's phase, (4, draws) [rad], and the number of draws."""
     times = _moments(study, 257)
-    draws = _CLOCK_DRAWS if study.mission.synchronization is None else _SYNCHRONIZED_DRAWS
+    sync = study.mission.synchronization
+    draws = _CLOCK_DRAWS if sync is None or sync.interval is None else _SYNCHRONIZED_DRAWS
     phases = phase_courses(study.mission, error, times, draws, rng, _TURNS / study.collection.aperture_time)
     found = np.polynomial.legendre.legfit(2 * times / study.collection.aperture_time, phases.T, _ORDER)
     return np.asarray(found, float), draws

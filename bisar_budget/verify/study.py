@@ -19,7 +19,6 @@ from bisar_budget.simulate.phase_history import Errors, ExactEffect, Floats, Pat
 from bisar_budget.verify.aperture_reading import READ_CELLS, ApertureReading, read_aperture, refocused
 
 Sizes = Sequence[tuple[ErrorSource, float]]  # errors and how large each is, signed
-_CLOCK_TERMS = ("constant", "linear", "quadratic", "cubic")
 _SHARED_RAD = 0.5  # of phase by which lines on which one phase is estimated may differ
 _SCALED, _SCALINGS = 1e-4, 40  # of a budget; steps at most
 _SLOWEST = 0.02  # of the fastest turn of Doppler: slower, a part of the aperture is not followed
@@ -70,8 +69,7 @@ class Study:
     @property
     def declared(self) -> list[ErrorSource]:
         """Declared errors that an image can show; `other` errors are phases without a motion."""
-        is_heard_out = self.analysis.errors.is_heard_out
-        return [s for s in self.analysis.stated if s.declared and s.is_motion and not is_heard_out(s)]
+        return [s for s in self.analysis.stated if s.declared and s.is_motion and s.is_heard]
 
     def members(self, owner: str) -> list[ErrorSource]:
         """Declared errors that count against an owner's budget."""
@@ -92,10 +90,9 @@ class Study:
 
     def errors(self, source: ErrorSource, size: float) -> Errors:
         """Return one error of a given size and nothing else."""
-        _, owner, kind, axis, *_ = source.subject
-        if owner == "clock":
-            order = _CLOCK_TERMS.index(axis)
-            return Errors(clock=tuple(size if index == order else 0.0 for index in range(4)))
+        _, owner, kind, *_ = source.subject
+        if source.clock is not None:
+            return Errors(clock=tuple(size * term for term in source.clock))
         if kind == "terrain":  # a scene that is higher: both platforms measured too high
             up = PathError(position=(0.0, 0.0, size))
             return Errors(transmitter=up, receiver=up)

@@ -7,7 +7,7 @@ from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.constants import ROUNDING, SPEED_OF_LIGHT
 from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
-from bisar_budget.effects.effect import MOTION_UNITS, PLATFORMS, ErrorSource, Subject, subject
+from bisar_budget.effects.effect import CLOCK_UNITS, MOTION_UNITS, PLATFORMS, ErrorSource, Subject, subject
 from bisar_budget.faults import KeyPath, printable
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.row import Row
@@ -26,7 +26,9 @@ def declaration(mission: Mission, source: ErrorSource) -> Iterator[Step]:
         return
     platform, kind, axis = source.owner, source.subject.kind, source.subject.axis
     k = mission.allocation.coverage_factor
-    if platform in PLATFORMS:
+    if source.clock is not None:
+        own = source.declared / k
+    elif platform in PLATFORMS:
         error = getattr(mission.platforms, platform).motion_error
         values = error.stated(kind)
         if error.frame != "scene" and axis in notation.AXES:
@@ -37,8 +39,6 @@ def declaration(mission: Mission, source: ErrorSource) -> Iterator[Step]:
         own = values[FRAME_AXES[error.frame].index(axis)]
     elif source.is_common:
         own = getattr(mission.common_motion_error, kind)[notation.AXES.index(axis)]
-    elif source.owner == "clock":
-        own = getattr(mission.timing_error, axis)
     else:
         return  # an error of nobody's: no coverage factor
     lines = equation("declared", "k*|value|", {"k": k, "value": own}, abs(source.declared), source.unit)
@@ -102,7 +102,7 @@ def effect(analysis: Analysis, found: MissionFindings, source: ErrorSource, mode
         yield from _common_effect(mission, found, source, sources, signed, each)
     elif source.owner == "mission":
         yield from step("Published model: a height error moves the image, no quadratic term")
-    elif source.owner == "clock":
+    elif source.clock is not None:
         yield from _clock_effect(mission, source, signed, each)
     elif axis in notation.AXES:
         state = getattr(found.geometry, platform)
@@ -147,20 +147,48 @@ def _motion_values(
     }
 
 
+# Terms of the clock by what setting left, time and frequency, and by aging since then: symbol, and t̃₀, t̃₁, t̃₂.
+_OF_SETTING = {
+    "time": ("x", ("x",)),
+    "frequency": ("y", ("y*H", "y")),
+    "oscillator": ("D", ("D*H^2/2", "D*H", "D/2")),
+}
+_TERM_UNITS = tuple(CLOCK_UNITS.values())
+
+
 def _clock_effect(mission: Mission, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
-    order = ("constant", "linear", "quadratic", "cubic").index(source.subject.axis)
+    kind, sync = source.subject.kind, mission.synchronization
     values = {
         "c": SPEED_OF_LIGHT,
         "T": mission.collection.aperture_time,
         "f_0": mission.radar.center_frequency,
-        f"t̃_{order}": size,
     }
-    result = SPEED_OF_LIGHT * size
-    lines = equation(f"β̃_{order}", notation.clock_coefficient(order), values, result, RATES[order])
-    yield from step(f"Table I row 1{each}", *lines)
-    if order == 2:
-        qpe = abs(source.effect.qpe * size)
-        yield from step(f"{source.equation}{each}", *equation("QPE", notation.CLOCK_PHASE, values, qpe, "rad"))
+    if kind == "timing":
+        order = tuple(CLOCK_UNITS).index(source.subject.axis)
+        terms = {order: size}
+    else:
+        terms = {order: size * term for order, term in enumerate(source.clock or ()) if term}
+        title = "Terms of the clock error t̃ at mid-aperture"
+        lines: list[str | WorkedEquation] = []
+        if kind == "frequency" and mission.has_direct_path:
+            title = "Terms of the time y·Δt(τ) by which a wrong clock measures the echo behind the direct path wrong"
+            lines = [f"t̃_{order} = {with_unit(term, _TERM_UNITS[order])}" for order, term in terms.items()]
+        else:
+            age = 0.0 if sync is None or sync.age is None else sync.age
+            if age:
+                title += f", H = {with_unit(age, 's')} after the clocks were set"
+            symbol, formulas = _OF_SETTING[kind]
+            for order, term in terms.items():
+                lines += equation(f"t̃_{order}", formulas[order], {symbol: size, "H": age}, term, _TERM_UNITS[order])
+        yield from step(f"{title}{each}", *lines)
+    for order, term in terms.items():
+        known, result = {**values, f"t̃_{order}": term}, SPEED_OF_LIGHT * term
+        formula = notation.clock_coefficient(order)
+        yield from step(f"Table I row 1{each}", *equation(f"β̃_{order}", formula, known, result, RATES[order]))
+        if order == 2:
+            qpe = abs(source.effect.qpe * size)
+            title = "Table I row 1, step of Table II"
+            yield from step(f"{title}{each}", *equation("QPE", notation.CLOCK_PHASE, known, qpe, "rad"))
 
 
 def _table_i(kind: str, axis: str) -> str:
@@ -338,7 +366,7 @@ def full_chain(analysis: Analysis, source: ErrorSource, size: float, each: str) 
         Said of what is not declared.
     """
     each = each.replace(" of ", ", for ")
-    if analysis.errors.is_heard_out(source):
+    if not source.is_heard:
         yield from step(f"Full model{each}: {analysis.full.no_limit(source)}")
         return
     left = worse(analysis, source, size)

@@ -15,10 +15,18 @@ from bisar_budget.effects.effect import subject
 from bisar_budget.effects.navigation_errors import process_of, specific_force
 from bisar_budget.effects.oscillators import spurs_of
 from bisar_budget.effects.random_effect import RandomEffect, RandomError
-from bisar_budget.effects.spectra import PowerLawPiece, gauss_markov, parts, synchronized_parts
+from bisar_budget.effects.spectra import (
+    PowerLawPiece,
+    gauss_markov,
+    heard_parts,
+    parts,
+    set_parts,
+    synchronized_parts,
+)
 from bisar_budget.faults import printable
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import PlatformState
+from bisar_budget.mission.instruments import Synchronization
 from bisar_budget.mission.model import Mission
 from bisar_budget.report.explain.explained_error import combined, limit_steps, place, smallest_size, stated
 from bisar_budget.report.explain.notation import (
@@ -189,17 +197,47 @@ def _oscillator(mission: Mission, error: RandomError) -> Iterator[Step]:
     if not error.published.quadratic:
         yield Step(no_effect(mission, error))
         return
-    interval = sync.interval if sync is not None and sync.method == "linear" else None
-    yield from _integrals(pieces, mission, interval)
+    yield from _integrals(pieces, mission)
+    if sync is not None and sync.is_holdover:
+        yield from _setting(pieces, mission, sync)
     k = mission.allocation.coverage_factor
     if k != 1:
         yield from step(f"Phases times the coverage factor {number(k)}; what is left is a mean power and has none")
 
 
-def _integrals(pieces: Sequence[PowerLawPiece], mission: Mission, interval: float | None) -> Iterator[Step]:
+def _setting(pieces: Sequence[PowerLawPiece], mission: Mission, sync: Synchronization) -> Iterator[Step]:
+    """What has come since a clock was set: orders 0 and 1 of its range error, at the radar's centre frequency."""
+    T, age, averaging = (
+        np.array([one or 0.0]) for one in (mission.collection.aperture_time, sync.age, sync.averaging)
+    )
+    found = set_parts(pieces, T, age, averaging)
+    per_phase = mission.radar.wavelength / (2 * math.pi)
+    c_0, c_1 = per_phase * math.sqrt(found.constant[0]), per_phase * math.sqrt(found.linear[0]) * 2 / float(T[0])
+    known = float(found.constant_linear[0] / math.sqrt(found.constant[0] * found.linear[0])) if c_0 else 0.0
+    yield from step(
+        "Set by a line over t_c, H before mid-aperture: of a tone A₀ = j₀(πfT) − e^(−2πifH)·[j₀(πft_c) + "
+        "H·(6i/t_c)·j₁(πft_c)] and A₁ = (6i/T)·j₁(πfT) − e^(−2πifH)·(6i/t_c)·j₁(πft_c) are left of orders 0 and 1; "
+        "∫ S·(λ/2π)²·A_m·A_n* df",
+        f"H = {with_unit(float(age[0]), 's')}",
+        f"t_c = {with_unit(float(averaging[0]), 's')}",
+        f"σ(c₀) = {with_unit(c_0, 'm')}",
+        f"σ(c₁) = {with_unit(c_1, 'm/s')}",
+        f"correlation = {number(known)}",
+    )
+
+
+def _integrals(pieces: Sequence[PowerLawPiece], mission: Mission) -> Iterator[Step]:
     """The parts that each piece of a spectrum adds to the mean squares."""
-    T = mission.collection.aperture_time
-    if interval is None:
+    T, sync = mission.collection.aperture_time, mission.synchronization
+    interval = None if sync is None else sync.interval
+    if mission.has_direct_path:
+        delay = mission.geometry.echo_delay
+        each, density = [heard_parts((piece,), T, delay) for piece in pieces], "S_left"
+        yield from step(
+            "Heard directly, and Δt later by the echo: S_left = S·4·sin²(πf·Δt); a constant phase moves nothing",
+            f"Δt = (R_t + R_r − |p_t − p_r|)/c = {with_unit(delay, 's')}",
+        )
+    elif interval is None:
         each, density = [parts((piece,), T) for piece in pieces], "S"
     else:
         each, density = [synchronized_parts((piece,), T, interval) for piece in pieces], "S_left"
