@@ -91,17 +91,11 @@ ANGLE = Dimension(
 )
 RATIO = Dimension("a number", "", {"": 1.0, "%": 1e-2, "ppm": 1e-6, "ppb": 1e-9, "s/s": 1.0})
 _DAY = 86400.0
-_A_DAY = {"/day": 1 / _DAY, "1/day": 1 / _DAY}
-RATE = Dimension("a rate", "1/s", {"1/s": 1.0, "/s": 1.0, "s^-1": 1.0, "Hz": 1.0, "s/s^2": 1.0} | _A_DAY)
+_AGES = {"/day": 1 / _DAY, "1/day": 1 / _DAY, "/month": 1 / (30 * _DAY), "/year": 1 / (365.25 * _DAY)}
+_AGES |= {"ppm/day": 1e-6 / _DAY, "ppb/day": 1e-9 / _DAY}
+RATE = Dimension("a rate", "1/s", {"1/s": 1.0, "/s": 1.0, "s^-1": 1.0, "Hz": 1.0, "s/s^2": 1.0} | _AGES)
 # A bare 1e-10 would be the aging of a day in a second.
-AGING = Dimension(
-    "an aging rate",
-    "1/s",
-    _A_DAY
-    | {"/month": 1 / (30 * _DAY), "/year": 1 / (365.25 * _DAY), "ppm/day": 1e-6 / _DAY, "ppb/day": 1e-9 / _DAY}
-    | {"/s": 1.0, "1/s": 1.0},
-    usual=("/day",),
-)
+AGING = Dimension("an aging rate", "1/s", _AGES | {"/s": 1.0, "1/s": 1.0}, usual=("/day",))
 RATE_SQUARED = Dimension("a rate per second", "1/s^2", {"1/s^2": 1.0, "/s^2": 1.0, "s^-2": 1.0, "s/s^3": 1.0})
 POWER_RATIO = Dimension("a power ratio in decibel", "dB", {"dB": 1.0})
 POSITION_VARIANCE = Dimension("a position variance", "m^2", _scaled("m^2", "kcmu", 2))

@@ -156,8 +156,8 @@ MUTANTS = (
     Mutant(
         "simulate: the clock without coverage factor",
         _POINT,
-        "clock=tuple(factor * term for term in terms)",
-        "clock=tuple(term for term in terms)",
+        "[[one.declared * term for term in one.clock]",
+        "[[one.declared / factor * term for term in one.clock]",
         (f"{_IMAGES}test_the_clock_of_a_simulated_image_has_the_coverage_factor",),
     ),
     Mutant(

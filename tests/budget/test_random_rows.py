@@ -477,9 +477,12 @@ class TestTones:
         assert self.tone(-80, "0.7 Hz").status == "not_evaluated"
         assert self.tone(-80, "0.8 Hz").status == "pass"
 
-    def test_a_direct_path_takes_it_away(self) -> None:
-        with pytest.raises(StopIteration):
-            self.tone(-80, synchronization={"method": "direct_path", "error": 0})
+    def test_a_direct_path_leaves_what_it_changes_by_until_the_echo_comes(self) -> None:
+        """50 Hz, and an echo that comes some microseconds later: 2 sin(πfΔt) of the tone."""
+        heard = self.tone(-80, synchronization={"method": "direct_path", "error": 0})
+        delay = parse_mission(json.dumps(MISSION)).geometry.echo_delay
+        level = self.tone(-80).declared + 20 * math.log10(2 * math.sin(math.pi * 50 * delay))
+        assert heard.declared == pytest.approx(level, abs=1e-6)
 
     @pytest.mark.parametrize(("level", "status"), [("-90 dBc", "info"), ("-80 dBc", "not_evaluated")])
     def test_without_a_requirement_it_is_not_judged(self, level: str, status: str) -> None:

@@ -40,7 +40,7 @@ def faults(**changes: object) -> tuple[Fault, ...]:
         ({f"{ERROR}vibration__spectrum_level": "3 dB"}, "platforms.receiver.motion_error.vibration.spectrum_level"),
         *(
             ({f"{RECEIVER}oscillator": NOISE | {key: "1"}}, f"platforms.receiver.oscillator.{key}")
-            for key in ("acceleration_sensitivity", "aging", "vibration", "level")
+            for key in ("acceleration_sensitivity", "vibration", "level")
         ),
         ({"platforms__receiver": {"orbit": {"eof": "a.EOF"}}}, "platforms.receiver.orbit.eof"),
         ({"platforms__receiver": {"orbit": {"sp3": "a.sp3", "object": "G05"}}}, "platforms.receiver.orbit.sp3"),
@@ -51,11 +51,6 @@ def faults(**changes: object) -> tuple[Fault, ...]:
         *(
             ({"platforms__receiver": {"trajectory": {"file": "a", "format": one}}}, f"{OF_RECEIVER}trajectory.format")
             for one in ("pos", "nmea", "gpx", "ulog")
-        ),
-        ({"synchronization": LINK | {"error": "1 deg", "method": "holdover"}}, "synchronization.method"),
-        *(
-            ({"synchronization": LINK | {key: "1"}}, f"synchronization.{key}")
-            for key in ("age", "averaging", "time_error", "frequency_error")
         ),
         *(
             ({"common_motion_error": {"frame": frame, "position": "1 m"}}, "common_motion_error.frame")
@@ -105,8 +100,8 @@ def test_a_key_that_is_to_come_hides_no_other_fault() -> None:
 
 def test_a_question_about_one_says_so_too() -> None:
     mission = parse_mission(mission_text(), "m.yaml")
-    with pytest.raises(QuestionError, match=r"synchronization\.age: is not computed by this version yet"):
-        number_of(tree_of(mission), "synchronization.age")
+    with pytest.raises(QuestionError, match=r"propagation\.zenith_delay: is not computed by this version yet"):
+        number_of(tree_of(mission), "propagation.zenith_delay")
 
 
 @pytest.mark.parametrize(("value", "is_valid"), [("0.999999", False), ("0.5", False), ("1", True), ("1.01", True)])

@@ -215,9 +215,9 @@ def _setting(pieces: Sequence[PowerLawPiece], mission: Mission, sync: Synchroniz
     c_0, c_1 = per_phase * math.sqrt(found.constant[0]), per_phase * math.sqrt(found.linear[0]) * 2 / float(T[0])
     known = float(found.constant_linear[0] / math.sqrt(found.constant[0] * found.linear[0])) if c_0 else 0.0
     yield from step(
-        "Set by a line over t_c, H before mid-aperture: of a tone A₀ = j₀(πfT) − e^(−2πifH)·[j₀(πft_c) + "
-        "H·(6i/t_c)·j₁(πft_c)] and A₁ = (6i/T)·j₁(πfT) − e^(−2πifH)·(6i/t_c)·j₁(πft_c) are left of orders 0 and 1; "
-        "∫ S·(λ/2π)²·A_m·A_n* df",
+        "Orders 0 and 1 of a tone that are left of a clock set by a line: ∫ S·(λ/2π)²·A_m·A_n* df of each pair",
+        "A₀ = j₀(πfT) − e^(−2πifH)·[j₀(πft_c) + H·(6i/t_c)·j₁(πft_c)]",
+        "A₁ = (6i/T)·j₁(πfT) − e^(−2πifH)·(6i/t_c)·j₁(πft_c)",
         f"H = {with_unit(float(age[0]), 's')}",
         f"t_c = {with_unit(float(averaging[0]), 's')}",
         f"σ(c₀) = {with_unit(c_0, 'm')}",
