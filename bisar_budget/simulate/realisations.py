@@ -28,10 +28,11 @@ _SLOWEST = 1e-4  # of a tone per aperture; its quadratic phase is nothing
 _PERIODS = 4  # apertures in which phase noise repeats
 _AGES, _PER_AGE = 24, 8  # turns within the age of a setting that are followed, and tones for each
 _TURNED = 256  # turns within an averaging, beyond which nothing of a tone is left in its line
-_PER_CYCLE = 4  # samples of the fastest tone, joined by straight lines
+_PER_CYCLE = 8  # samples of the fastest tone, joined by straight lines
 _MAX_TONES = 1 << 18
 _MOST_KNOTS = 1 << 13  # exchanges in an aperture that are drawn
 _FLOWN = 4097  # moments of a time series that is flown
+_MOST_FLOWN = 1 << 19  # of phase noise, whose fastest tones would else be joined by straight lines
 
 
 def position_courses(
@@ -85,8 +86,11 @@ def drawn_errors(analysis: Analysis) -> Errors:
     seed, factor = (mission.simulation or Simulation()).seed, mission.allocation.coverage_factor
     half = mission.collection.aperture_time / 2
     times: Floats = np.linspace(-half, half, _FLOWN)
+    fastest = max((piece.high for one in analysis.random if one.noise for piece in one.noise.pieces), default=0.0)
+    count = min(max(_FLOWN, math.ceil(4 * _PER_CYCLE * half * fastest)), _MOST_FLOWN)
+    moments: Floats = np.linspace(-half, half, count)
     moved: dict[str, Floats] = {}
-    phase: Floats = np.zeros(times.size)
+    phase: Floats = np.zeros(moments.size)
     for error in analysis.random:
         if not error.declared:
             continue
@@ -95,12 +99,14 @@ def drawn_errors(analysis: Analysis) -> Errors:
             drawn = factor * position_courses(mission, error, times, 1, rng)[0]
             moved[error.owner] = moved.get(error.owner, 0.0) + drawn
         elif error.published.spread:
-            drawn = factor * phase_courses(mission, error, times, 1, rng)[0]
-            phase = phase + (drawn if error.full.displacement > 0 else drawn - Course(times, drawn).smooth(1).values)
+            drawn = factor * phase_courses(mission, error, moments, 1, rng)[0]
+            phase = phase + (
+                drawn if error.full.displacement > 0 else drawn - Course(moments, drawn).smooth(1).values
+            )
     transmitter, receiver = (
         PathError(course=Course(times, moved[name]) if name in moved else None) for name in PLATFORMS
     )
-    clock = Course(times, clock_seconds(phase, mission.radar.wavelength)) if phase.any() else None
+    clock = Course(moments, clock_seconds(phase, mission.radar.wavelength)) if phase.any() else None
     return Errors(transmitter, receiver, clock_course=clock)
 
 
@@ -194,7 +200,7 @@ def phase_courses(
         return _heard_twice(mission, error, size, _Tones(pieces, T), times, draws, rng)
     setting = None if sync is None or sync.age is None else _Setting(pieces, T, sync.age, sync.averaging or T)
     tones = _Tones(pieces, T) if setting is None else setting.tones
-    waves = _slow_waves(tones.slow, times)
+    waves = _slow_waves(tones.slow, times) if times.size <= _FLOWN else None
     found = np.empty((draws, times.size))
     for index in range(draws):
         drawn = tones.draw(rng)
@@ -255,8 +261,10 @@ class _Drawn(NamedTuple):
 
     def at(self, times: Floats, waves: tuple[Floats, Floats] | None = None) -> Floats:
         """Sum of the tones; `waves` are those of the slow ones at these times, where they are known. [rad]"""
-        cosines, sines = waves or _slow_waves(self.frequency, times)
-        found: Floats = cosines @ self.cosine + sines @ self.sine + self.fast.at(times)
+        few = times if times.size <= _FLOWN else np.linspace(times[0], times[-1], _FLOWN)
+        cosines, sines = waves or _slow_waves(self.frequency, few)
+        slow = cosines @ self.cosine + sines @ self.sine
+        found: Floats = (slow if few is times else np.interp(times, few, slow)) + self.fast.at(times)
         return found + self.rest * self.rng.standard_normal(times.size) if self.rest else found
 
 
