@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 
 CUBIC_POWER = 4 / 175  # of a cubic phase φ₃ at the edge: its Legendre part 2/5·φ₃, whose mean square is (4/25)/7·φ₃²
 SMALLEST_CUBIC_RAD = 1e-3  # a power of -76 dB, which no image shows
-NOISE = ("velocity_random_walk", "angle_random_walk")  # figures of an inertial sensor that spread
 
 
 class Tone(NamedTuple):
@@ -132,11 +131,22 @@ def wideband_noise(mission: Mission, geometry: Any = None) -> list[SpreadPhase]:
 
 
 def noise(analysis: "Analysis", model: str) -> list[SpreadPhase]:
-    """List what spreads beyond the cubic: wideband vibration, noise of sensors, phase noise, links."""
+    """List what spreads beyond the cubic: wideband vibration, noise of sensors, phase noise, links, powers stated."""
     found = wideband_noise(analysis.mission, analysis.geometry)
     for one in analysis.random:
-        if one.declared is not None and (one.subject.kind != "imu" or one.subject.axis in NOISE):
+        if one.declared is not None and one.spreads:
             found.append(SpreadPhase(one.id, one.owner, (one.effect(model).spread * one.declared) ** 2))
+    return found + stated_powers(analysis.mission, model)
+
+
+def stated_powers(mission: Mission, model: str) -> list[SpreadPhase]:
+    """List what errors from elsewhere spread that state their ISLR: the phase that a model gives for it."""
+    energy, found = mainlobe_energy(mission), []
+    for index, other in enumerate(mission.other_errors):
+        if other.islr is not None:
+            what = subject("mission", "other", f"{other.name}.islr", entry=index)
+            rms = spread_phase(10 ** (np.asarray(other.islr) / 10), model, energy)
+            found.append(SpreadPhase(what.id, what.owner, rms**2))
     return found
 
 

@@ -72,7 +72,7 @@ class RandomEffect(NamedTuple):
 
 
 class RandomError(NamedTuple):
-    """One error of a sensor or a clock: what it is, how large it is declared, what one unit of it does.
+    """One error of a sensor, a clock or the air: what it is, how large it is declared, what one unit of it does.
 
     `declared` is the largest of the axes, coverage factor included, and all axes grow with it; None where the file is
     silent. The unit of an oscillator is `dB`: its noise as a factor of amplitude, declared 1. `noise` is the spectrum
@@ -96,6 +96,21 @@ class RandomError(NamedTuple):
     def owner(self) -> str:
         """Whose share it counts against: transmitter, receiver or clock."""
         return self.subject.owner
+
+    @property
+    def is_covered(self) -> bool:
+        """Whether the coverage factor is in what is declared, or does: not of an effect from elsewhere."""
+        return self.subject.kind != "other"
+
+    def coverage(self, mission: Mission) -> Any:
+        """Coverage factor that is in what its declared size does."""
+        return mission.allocation.coverage_factor if self.is_covered else 1.0
+
+    @property
+    def spreads(self) -> bool:
+        """Whether it is noise, which spreads power over the image; a bias or a delay bends and moves it alone."""
+        kind, figure = self.subject.kind, self.subject.axis
+        return figure.endswith("random_walk") if kind == "imu" else kind not in ("propagation", "other")
 
     @property
     def extrapolated(self) -> Note:

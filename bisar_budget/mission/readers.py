@@ -542,7 +542,6 @@ NOT_COMPUTED = "is not computed by this version yet"
 _LEAVE = "accepted: leave it out"
 _MOTION = f"{_LEAVE}, and state what it does as position, velocity and acceleration errors"
 _OSCILLATOR = f"{_LEAVE}, and state the noise with it, as phase_noise or spurs"
-_OTHER = f"{_LEAVE}; of an error from elsewhere its quadratic_phase_error counts"
 _LINK = "accepted: method linear with interval and error, or direct_path with error"
 _SPECTRUM = f"{_LEAVE}, and state sinusoidal lines and the rms of wideband"
 
@@ -554,16 +553,12 @@ LATER: Mapping[str, Mapping[str, str]] = {
     "OscillatorPart": dict.fromkeys(("acceleration_sensitivity", "aging", "vibration", "level"), _OSCILLATOR),
     "Synchronization": dict.fromkeys(("age", "averaging", "time_error", "frequency_error"), _LINK),
     "CommonMotionError": {"random": f"{_LEAVE}, and state it in motion_error.random of each platform"},
-    "OtherError": dict.fromkeys(("cubic_phase_error", "location_error", "islr"), _OTHER),
     "OrbitSource": dict.fromkeys(("eof", "sp3"), "accepted: the same orbit as tle, omm or oem"),
     "TrajectorySource": dict.fromkeys(
         ("time_scale", "geoid_separation"), f"{_LEAVE}; a log in CSV has UTC, and heights above the ellipsoid"
     ),
     "AllocationRules": {"specify": _LEAVE},
-    "Mission": {
-        "propagation": f"{_LEAVE}, and state what it does in other_errors",
-        "earth_orientation": f"{_LEAVE}; UT1 is taken to be UTC",
-    },
+    "Mission": {"earth_orientation": f"{_LEAVE}; UT1 is taken to be UTC"},
 }
 LATER_METHODS: Mapping[str, str] = {"holdover": NOT_COMPUTED}
 LATER_FRAMES: Mapping[str, str] = dict.fromkeys(

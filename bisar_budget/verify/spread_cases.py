@@ -231,7 +231,7 @@ def measured_power(
 def limits_of(study: Study, error: RandomError) -> dict[str, float]:
     """Size at which each requirement that an error touches is reached, autofocus left out; empty: none limits it."""
     model = _model(study, error)
-    effect = held_effect(study.mission, error.effect(model))
+    effect = held_effect(study.mission, error.effect(model), error.coverage(study.mission))
     sizes = map(float, sizes_at(effect, limits_for(study.mission, study.allocation, error.owner, model)))
     return {name: size for name, size in zip(HELD, sizes, strict=True) if math.isfinite(size)}
 

@@ -279,7 +279,7 @@ def _covered(mission: Mission, error: RandomError) -> float:
 
 def _allowable(mission: Mission, allocation: Allocation, error: RandomError, row: Row, model: str) -> Iterator[Step]:
     effect = error.effect(model)
-    held = held_effect(mission, effect)
+    held = held_effect(mission, effect, error.coverage(mission))
     limit = allocation.qpe_limit(error.owner) * allocation.autofocus_gain
     yield from limit_steps(allocation, error.owner, limit)
     sizes: dict[str, float] = {}
