@@ -132,6 +132,7 @@ def export_phase_history(mission: Mission, targets: Targets) -> Exported:
         transmitter=flown.transmitter,
         receiver=flown.receiver,
         clock_error=flown.clock,
+        electrons=flown.electrons,
         noise_power=10 ** (settings.noise / 10) if settings.noise is not None else 0.0,
         rng=rng,
     )
