@@ -178,7 +178,7 @@ def _plan(mission: Mission, targets: Targets, collection: PointCollection, error
     flown = collection.flight(errors.smooth(), fine)
     measured = sum(np.linalg.norm(path.measured, axis=1) for path in flown.paths)
     actual = sum(np.linalg.norm(path.actual, axis=1) for path in flown.paths)
-    error = actual - measured + SPEED_OF_LIGHT * flown.clock
+    error = actual - measured + SPEED_OF_LIGHT * flown.seen
     delays, turns = [], []
     for corner in ((half, half), (half, -half), (-half, half), (-half, -half)):
         away = sum(np.linalg.norm(path.measured - (*corner, 0.0), axis=1) for path in flown.paths) - measured

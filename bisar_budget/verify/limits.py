@@ -9,6 +9,7 @@ from functools import partial
 
 import numpy as np
 
+from bisar_budget.analysis.spread import stated_powers
 from bisar_budget.analysis.vibration_limits import tone_limits
 from bisar_budget.budget.aggregates import Aggregates
 from bisar_budget.budget.judged_rows import Judging
@@ -157,8 +158,14 @@ def _of_tones_by_islr(study: Study) -> Iterator[tuple[Subject, Case]]:
 def _of_instruments(study: Study) -> Iterator[tuple[str, Case]]:
     """Sensors and clocks that have a limit, and what all noise spreads together."""
     for error in study.analysis.random:
-        if limits_of(study, error):
+        limits = limits_of(study, error)
+        if limits and error.subject.kind == "other":
+            yield error.id, partial(phase_cases.stated, study, error.id, min(limits.values()), error.unit)
+        elif limits:
             yield error.id, partial(verify_random, study, error)
+    for power in stated_powers(study.mission, study.models[-1].name):
+        if study.mission.requirements.islr is not None:
+            yield power.row_id, partial(phase_cases.stated, study, power.row_id, study.mission.requirements.islr, "dB")
     metric, limits = tone_limits(study.mission, study.allocation)
     for spur in spurs_of(study.mission):
         limit = limits.get(spur.name)
