@@ -47,6 +47,17 @@ class SpreadPhase(NamedTuple):
     variance: Any
 
 
+class StatedPower(NamedTuple):
+    """An error from elsewhere, and the ISLR that it is stated to add. [dB]"""
+
+    subject: Subject
+    islr: Any
+
+    def rms(self, model: str, energy: float) -> Any:
+        """Phase that spreads as much by a model, rms; see `spread_phase`. [rad]"""
+        return spread_phase(10 ** (np.asarray(self.islr) / 10), model, energy)
+
+
 def mainlobe_energy(mission: Mission) -> float:
     """Share E of the error-free response's energy within its first nulls, under the window of the images."""
     return MAINLOBE_ENERGY[(mission.simulation or Simulation()).window]
@@ -136,18 +147,19 @@ def noise(analysis: "Analysis", model: str) -> list[SpreadPhase]:
     for one in analysis.random:
         if one.declared is not None and one.spreads:
             found.append(SpreadPhase(one.id, one.owner, (one.effect(model).spread * one.declared) ** 2))
-    return found + stated_powers(analysis.mission, model)
-
-
-def stated_powers(mission: Mission, model: str) -> list[SpreadPhase]:
-    """List what errors from elsewhere spread that state their ISLR: the phase that a model gives for it."""
-    energy, found = mainlobe_energy(mission), []
-    for index, other in enumerate(mission.other_errors):
-        if other.islr is not None:
-            what = subject("mission", "other", f"{other.name}.islr", entry=index)
-            rms = spread_phase(10 ** (np.asarray(other.islr) / 10), model, energy)
-            found.append(SpreadPhase(what.id, what.owner, rms**2))
+    energy = mainlobe_energy(analysis.mission)
+    for power in stated_powers(analysis.mission):
+        found.append(SpreadPhase(power.subject.id, power.subject.owner, power.rms(model, energy) ** 2))
     return found
+
+
+def stated_powers(mission: Mission) -> list[StatedPower]:
+    """List what errors from elsewhere spread that state their ISLR."""
+    return [
+        StatedPower(subject("mission", "other", f"{other.name}.islr", entry=index), other.islr)
+        for index, other in enumerate(mission.other_errors)
+        if other.islr is not None
+    ]
 
 
 def powers_held_by_islr(analysis: "Analysis", owners: Iterable[str], model: str) -> list[list[SpreadPhase]]:

@@ -171,10 +171,12 @@ class RandomRows:
         powers = [self._table([one.variance for one in of_owner]) for of_owner in members]
         is_known = [~np.isnan(of_owner) for of_owner in powers]
         variance = np.array([one.sum(axis=0, where=known) for one, known in zip(powers, is_known, strict=True)])
-        stated = {one.row_id for one in stated_powers(mission, model)}
+        stated = {one.subject.id for one in stated_powers(mission)}
         is_held = [one.row_id.endswith("vibration.wideband") or one.row_id in stated for one in members[-1]]
         is_there = np.array([is_known[-1][~np.array(is_held, dtype=bool)].any(axis=0)] * len(owners))
-        is_there[-1] = True  # where only vibration spreads, its own rows hold it to the shares; what is stated has none
+        is_there[-1] = (
+            True  # where only vibration spreads, its own rows hold it to the shares; what is stated has none
+        )
         is_declared = np.array([known.any(axis=0) for known in is_known]) & is_there
         models = (model, "full" if model == "published" else "published")
         shares = np.sqrt(self._table([split.of(owner) for owner in owners]))
@@ -204,10 +206,10 @@ class RandomRows:
         """Rows of errors from elsewhere that state their ISLR: each may have all that is required."""
         mission = self.mission
         allowed = spread_limit(mission, self.allocation, "mission", model)
-        for one in stated_powers(mission, model):
-            rms = self.judging.array(np.sqrt(one.variance))
+        for one in stated_powers(mission):
+            rms = self.judging.array(one.rms(model, mainlobe_energy(mission)))
             judged = self.judging.row(
-                subject("mission", "other", one.row_id.removeprefix("other.")),
+                one.subject,
                 rms,
                 self.judging.array(allowed),
                 is_info=mission.allocation.combine != "each" or allowed is None,
@@ -321,9 +323,8 @@ class StatedRow:
     def in_words(self, case: Case, _: str) -> Row:
         """The row of one case."""
         mission, row = case.mission, self.judged
-        row_id, is_limited = row.subject.id, not math.isnan(row.allowable[case.place])
+        index, is_limited = row.subject.entry or 0, not math.isnan(row.allowable[case.place])
         missing, over = phrases.no_requirement_of(ISLR), NOTHING
-        index, other = next(one for one in enumerate(mission.other_errors) if row_id == f"other.{one[1].name}.islr")
         if is_limited:
             over = phrases.spreads_too_much(case.number(row.declared), case.number(row.allowable))
         return worded(
@@ -335,7 +336,7 @@ class StatedRow:
             over=over,
             no_limit=missing,
             info=phrases.aggregate_decides(mission.allocation.combine) if is_limited else missing,
-            evidence=other.source,
+            evidence=mission.other_errors[index].source,
             binding_requirement=ISLR if is_limited else None,
         )
 

@@ -77,7 +77,13 @@ def dispersion(mission: Mission, path: PlatformState) -> float:
     Of exp(2πi·K/(c·f)), K = g·f₀², the second order in f − f₀: (2π/λ)·g·(B/2f₀)².
     """
     g = float(group_delay(mission, path, CONTENT, 0.0))
-    return 2 * math.pi / mission.radar.wavelength * g * (mission.radar.bandwidth / mission.radar.center_frequency / 2) ** 2
+    return (
+        2
+        * math.pi
+        / mission.radar.wavelength
+        * g
+        * (mission.radar.bandwidth / mission.radar.center_frequency / 2) ** 2
+    )
 
 
 def delay_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:

@@ -71,7 +71,9 @@ def position_courses(
     return total
 
 
-def delay_courses(mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator) -> Floats:
+def delay_courses(
+    mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator
+) -> Floats:
     """Group delays on one leg at the centre frequency, (draws, times), of one sigma of what is declared. [m]
 
     Parameters are those of `position_courses`. What is above the scene stays as it is within an aperture.

@@ -163,9 +163,9 @@ def _of_instruments(study: Study) -> Iterator[tuple[str, Case]]:
             yield error.id, partial(phase_cases.stated, study, error.id, min(limits.values()), error.unit)
         elif limits:
             yield error.id, partial(verify_random, study, error)
-    for power in stated_powers(study.mission, study.models[-1].name):
-        if study.mission.requirements.islr is not None:
-            yield power.row_id, partial(phase_cases.stated, study, power.row_id, study.mission.requirements.islr, "dB")
+    required = study.mission.requirements.islr
+    for power in stated_powers(study.mission) if required is not None else ():
+        yield power.subject.id, partial(phase_cases.stated, study, power.subject.id, required, "dB")
     metric, limits = tone_limits(study.mission, study.allocation)
     for spur in spurs_of(study.mission):
         limit = limits.get(spur.name)

@@ -62,13 +62,8 @@ def faults(**changes: object) -> tuple[Fault, ...]:
             for frame in ("track", "look", "ric")
         ),
         ({"common_motion_error": {"random": []}}, "common_motion_error.random"),
-        ({"propagation": {"zenith_delay": "5 cm"}}, "propagation"),
         ({"earth_orientation": {"ut1_minus_utc": "-0.1 s"}}, "earth_orientation"),
         ({"allocation": {"specify": ["a"]}}, "allocation.specify"),
-        *(
-            ({"other_errors": [{"name": "antenna", key: "1"}]}, f"other_errors[0].{key}")
-            for key in ("cubic_phase_error", "location_error", "islr")
-        ),
     ],
 )  # fmt: skip
 def test_what_is_not_computed_yet_is_one_error_that_says_so(changes: dict[str, object], key: str) -> None:
@@ -97,10 +92,15 @@ def test_a_key_that_is_to_come_hides_no_other_fault() -> None:
             f"{ERROR}time_tag": "1 ms",
             f"{ERROR}velocity": "1 m",
             f"{ERROR}vibraton": 1,
-            "other_errors": [{"islr": 1}],
+            "earth_orientation": {"islr": 1},
         }
     )
-    assert [fault.key.rpartition(".")[2] for fault in found] == ["time_tag", "velocity", "vibraton", "islr"]
+    assert [fault.key.rpartition(".")[2] for fault in found] == [
+        "time_tag",
+        "velocity",
+        "vibraton",
+        "earth_orientation",
+    ]
 
 
 def test_a_question_about_one_says_so_too() -> None:

@@ -276,7 +276,7 @@ def _sources(before: MissionFindings, after: MissionFindings) -> Iterator[Loosen
 
 def _named_sources(mission: Mission) -> dict[str, str | None]:
     """Source of each error that has a name of its own, by the id of its row."""
-    sources = {f"other.{one.name}": one.source for one in mission.other_errors}
+    sources = {row_id: one.source for one in mission.other_errors for row_id in one.stated}
     for platform in PLATFORMS:
         error = getattr(mission.platforms, platform).motion_error
         evidence = error.evidence("random")
