@@ -407,9 +407,7 @@ def below_the_ionosphere(platform: str) -> str:
 @phrase
 def disperses_over_the_band(phase: float) -> str:
     """Said of an electron content."""
-    return (
-        f"bends the phase by {phase:.3g} rad at the ends of the band, which widens the response in range: not judged"
-    )
+    return f"bends the phase by {phase:.3g} rad at the ends of the band, which no requirement takes"
 
 
 @phrase

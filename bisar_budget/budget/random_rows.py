@@ -174,9 +174,8 @@ class RandomRows:
         stated = {one.subject.id for one in stated_powers(mission)}
         is_held = [one.row_id.endswith("vibration.wideband") or one.row_id in stated for one in members[-1]]
         is_there = np.array([is_known[-1][~np.array(is_held, dtype=bool)].any(axis=0)] * len(owners))
-        is_there[-1] = (
-            True  # where only vibration spreads, its own rows hold it to the shares; what is stated has none
-        )
+        # Where only vibration spreads, its own rows hold it to the shares; what is stated has none.
+        is_there[-1] = True
         is_declared = np.array([known.any(axis=0) for known in is_known]) & is_there
         models = (model, "full" if model == "published" else "published")
         shares = np.sqrt(self._table([split.of(owner) for owner in owners]))
@@ -384,7 +383,7 @@ def _said_of_oscillator(mission: Mission, error: RandomError) -> tuple[str, str 
 
 
 def _said_of_air(mission: Mission, error: RandomError) -> tuple[str, str | None, tuple[Note, ...]]:
-    """The same of a delay on a leg; one of free electrons bends the phase over the band, which no requirement takes."""
+    """The same of a delay on a leg. Free electrons bend the phase over the band, which no requirement takes."""
     leg = None if mission.propagation is None else mission.propagation.leg(error.owner)
     source, notes = None if leg is None else leg.source, tuple[Note, ...]()
     if error.subject.axis == CONTENT and error.declared is not None:

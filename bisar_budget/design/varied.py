@@ -172,8 +172,8 @@ def is_image(mission: Mission, geometries: BistaticGeometry, cases: int) -> NDAr
     for spans in geometries.spans_ground(SAFE):
         is_one &= spans
     if mission.propagation is not None:
-        paths = dict(zip(PLATFORMS, geometries.both, strict=True))
-        for _, _, degrees in low_legs(mission.propagation, paths, mission.collection.aperture_time):
+        legs = dict(zip(PLATFORMS, geometries.both, strict=True))
+        for _, _, degrees in low_legs(mission.propagation, legs, mission.collection.aperture_time):
             is_one &= degrees > LEAST_ELEVATION_DEG * SAFE
     if mission.has_direct_path:
         is_one &= _has_baseline(geometries.apart, np.broadcast_to(half, (cases,)))

@@ -29,8 +29,8 @@ class Subject(NamedTuple):
 
     `owner` is the one whose share it counts against: transmitter, receiver, clock, or mission for what is nobody's.
     `kind` is position, velocity, acceleration, vibration, timing, propagation, terrain, other, or the name of a sum.
-    `axis` is the axis of `frame`, the term of the clock, the figure of a sensor or the air, the name of another error,
-    the sort of a vibration, and `entry` the place of one in the file.
+    `axis` is the axis of `frame`, the term of the clock, the figure of a sensor or the air, the name of another
+    error, the sort of a vibration, and `entry` the place of one in the file.
     """
 
     id: str

@@ -1,7 +1,7 @@
 """Errors from elsewhere that the file states by what they do to the image: a cubic phase, a displacement.
 
-Neither has a sign, and a displacement no direction: each way it has half of its square. A quadratic phase, which has a
-sign, is listed in `sources`, and power that is spread in `analysis.spread`.
+Neither has a sign, and a displacement no direction: each way it has half of its square. A quadratic phase, which has
+a sign, is listed in `sources`, and power that is spread in `analysis.spread`.
 """
 
 import math

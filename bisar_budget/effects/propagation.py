@@ -1,4 +1,4 @@
-"""Delays in the air at random: what correction leaves above the scene makes each leg longer than the processor takes it.
+"""Delays in the air at random: what correction leaves makes each leg longer than the processor takes it for.
 
 A leg has the delay of the zenith times what its elevation, seen from the scene, makes of it. The elevation changes
 over the aperture, and with it the delay: orders 0 and 1 displace the image, from order 2 on it defocuses.
@@ -76,14 +76,8 @@ def dispersion(mission: Mission, path: PlatformState) -> float:
 
     Of exp(2πi·K/(c·f)), K = g·f₀², the second order in f − f₀: (2π/λ)·g·(B/2f₀)².
     """
-    g = float(group_delay(mission, path, CONTENT, 0.0))
-    return (
-        2
-        * math.pi
-        / mission.radar.wavelength
-        * g
-        * (mission.radar.bandwidth / mission.radar.center_frequency / 2) ** 2
-    )
+    radar, g = mission.radar, float(group_delay(mission, path, CONTENT, 0.0))
+    return 2 * math.pi / radar.wavelength * g * (radar.bandwidth / radar.center_frequency / 2) ** 2
 
 
 def delay_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:

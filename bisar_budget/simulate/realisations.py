@@ -81,7 +81,8 @@ def delay_courses(
     size = (error.declared or 0.0) / mission.allocation.coverage_factor
     path: PlatformState = getattr(mission.geometry, error.owner)
     of_unit = np.broadcast_to(group_delay(mission, path, error.subject.axis, times), times.shape)
-    return np.multiply.outer(size * rng.standard_normal(draws), of_unit)
+    found: Floats = np.multiply.outer(size * rng.standard_normal(draws), of_unit)
+    return found
 
 
 def electrons_at_1_hz(mission: Mission, times: Floats, group: Floats) -> Course:

@@ -158,14 +158,15 @@ def _of_tones_by_islr(study: Study) -> Iterator[tuple[Subject, Case]]:
 def _of_instruments(study: Study) -> Iterator[tuple[str, Case]]:
     """Sensors and clocks that have a limit, and what all noise spreads together."""
     for error in study.analysis.random:
-        limits = limits_of(study, error)
-        if limits and error.subject.kind == "other":
-            yield error.id, partial(phase_cases.stated, study, error.id, min(limits.values()), error.unit)
-        elif limits:
+        sizes = limits_of(study, error)
+        if sizes and error.subject.kind == "other":
+            yield error.id, partial(phase_cases.stated, study, error.id, min(sizes.values()), error.unit)
+        elif sizes:
             yield error.id, partial(verify_random, study, error)
     required = study.mission.requirements.islr
-    for power in stated_powers(study.mission) if required is not None else ():
-        yield power.subject.id, partial(phase_cases.stated, study, power.subject.id, required, "dB")
+    if required is not None:
+        for power in stated_powers(study.mission):
+            yield power.subject.id, partial(phase_cases.stated, study, power.subject.id, required, "dB")
     metric, limits = tone_limits(study.mission, study.allocation)
     for spur in spurs_of(study.mission):
         limit = limits.get(spur.name)
