@@ -192,9 +192,15 @@ class SensorCases:
         held : (errors, nodes, cases)
             The same with the line of sight held at mid-aperture, for the published model.
         """
-        constant, linear, quadratic, cubic = np.square(np.einsum("fn,enc->fec", self.exact.fit, held)).sum(axis=1)
-        k = self.exact.k
-        published = RandomEffect(k * np.sqrt(quadratic), k * np.sqrt(cubic), 0.0 * k, *self.moved(constant, linear))
+        k, orders = self.exact.k, np.einsum("fn,enc->fec", self.exact.fit, held)
+        orders = np.where(np.abs(orders) > ROUNDING * np.abs(held).max(axis=1), orders, 0.0)
+        quadratic, cubic = np.sqrt(np.square(orders[2:]).sum(axis=1))
+        # Both orders of a course are one error: unlike those of noise they add with their signs.
+        (a, b), (c, d) = self.plane.adjugate
+        scale = 1 / np.where(self.plane.is_singular, math.nan, self.plane.determinant)
+        constant, linear = orders[0], orders[1] / self.exact.half
+        moved = [np.sqrt(np.square((u * constant + v * linear) * scale).sum(axis=0)) for u, v in ((a, b), (c, d))]
+        published = RandomEffect(k * quadratic, k * cubic, 0.0 * k, *moved)
         weighted = self.weights[:, None] * courses
         effects, sizes = weighted.sum(axis=2), np.square(np.abs(weighted).sum(axis=2)).sum(axis=1)
         (qpe, edge, east, north), covariance = sigmas(np.einsum("fec,gec->fgc", effects, effects), sizes)
