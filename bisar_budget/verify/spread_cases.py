@@ -385,6 +385,20 @@ def _drawn_effects(study: Study, error: RandomError, rng: np.random.Generator) -
     return study.exact_effects("clock", seen_course(group, mean, error.subject.axis))
 
 
+def _left_at_the_point(study: Study, error: RandomError, times: Floats, group: Floats) -> Floats:
+    """Range error that group delays (draws, times) leave where they move a point to. [m]"""
+    half, geometry = study.collection.aperture_time / 2, study.geometry
+    mean = group.mean(axis=1, keepdims=True)
+    seen = seen_course(group, mean, error.subject.axis)
+    at_nodes = np.stack([np.interp(aperture_nodes(2 * half), times, one) for one in seen])
+    found = study.exact_effects("clock", at_nodes)
+    for path in geometry.both:
+        position = np.stack(np.broadcast_arrays(*path.place(times)))
+        sight = position / np.linalg.norm(position, axis=0)
+        seen = seen + np.multiply.outer(found.east, sight[0]) + np.multiply.outer(found.north, sight[1])
+    return np.asarray(seen)
+
+
 def _courses(study: Study, error: RandomError, rng: np.random.Generator) -> Floats:
     """Position errors of a platform at the nodes of exact ranges, (draws, nodes, 3). [m]"""
     if error.subject.kind == "random":  # not smooth between the nodes, as what is integrated is
@@ -497,8 +511,9 @@ def _power(
             if error.subject.kind in ("imu", "random"):
                 moved = position_courses(mission, error, times, draws, rng)
                 phases += 2 * math.pi / collection.wavelength * moved @ np.array(sight_of(mission, error.owner))
-            elif error.subject.kind == "propagation":  # with whichever sign: the constant part is taken out
-                phases += 2 * math.pi / collection.wavelength * delay_courses(mission, error, times, draws, rng)
+            elif error.subject.kind == "propagation":
+                group = delay_courses(mission, error, times, draws, rng)
+                phases += 2 * math.pi / collection.wavelength * _left_at_the_point(study, error, times, group)
             else:
                 phases += phase_courses(mission, error, times, draws, rng)
         phases = phases - phases @ fitted
