@@ -96,7 +96,7 @@ def uncorrected(path: PlatformState, times: np.ndarray) -> np.ndarray:
 
 
 def test_uncorrected_air_at_section_v() -> None:
-    """Both legs at once, along rays: 4.9 m and 0.56 rad. By rows: each leg's zenith column times what a metre does."""
+    """Both legs at once, along rays: 4.9 m and 0.56 rad. By rows: each leg's zenith column, times a metre's effect."""
     mission = parse_mission(SECTION_V)
     legs = mission.geometry.both
     both = through_exact_ranges(mission, lambda times: uncorrected(legs[0], times) + uncorrected(legs[1], times))
@@ -258,9 +258,9 @@ def test_courses_are_independent_errors_of_one_course_each() -> None:
             want = np.sqrt(sum(one[model][part] ** 2 for one in apart))
             assert together[part] == pytest.approx(want, rel=1e-9)
     assert full.covariance == pytest.approx(apart[0][1].covariance + apart[1][1].covariance, rel=1e-9, abs=1e-12)
+    size = 0.01  # m: small enough for a first order
     for course, (by_table, alone) in zip(courses, apart, strict=True):
         fitted = np.polynomial.legendre.legfit(places[:, 0], course[:, 0], 5)
-        size = 0.01  # m: small enough for a first order
         found = through_exact_ranges(mission, lambda t, f=fitted: size * np.polynomial.legendre.legval(t / 3.0, f))
         assert abs(found.quadratic[0]) == pytest.approx(alone.quadratic[0] * size, rel=HALF_PERCENT)
         assert abs(found.cubic[0]) == pytest.approx(alone.cubic[0] * size, rel=HALF_PERCENT)
