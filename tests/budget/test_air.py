@@ -231,7 +231,7 @@ def test_from_both_sides_of_the_limit(effect: str, size: str, over: float, insid
 
 
 def test_without_a_requirement_a_power_is_not_judged() -> None:
-    """-30 dB are 0.03 rad, negligible; -15 dB are not. ISLR takes a cubic phase that has no requirement of its own."""
+    """-30 dB are 0.03 rad, negligible; -15 dB are not. ISLR takes a cubic phase that nothing else takes."""
     small, large = (
         findings(other_errors=[{"name": "a", "islr": level, "quadratic_phase_error": 0}])
         for level in ("-30 dB", "-15 dB")
@@ -262,7 +262,7 @@ def test_a_power_that_is_stated_is_of_no_share() -> None:
 
 # ---------------------------------------------------------------------- draws, questions, words
 def test_draws_are_the_root_sum_square_of_the_rows() -> None:
-    """A million draws know a sigma to 0.07 %; effects from elsewhere are bounds: their mean square is their square."""
+    """A million draws know a sigma to 0.07 %; effects from elsewhere are bounds, of their size in every draw."""
     text = mission_text(
         propagation=AIR, requirements=NEEDS, other_errors=[ELSEWHERE], allocation__coverage_factor="2"
     )

@@ -96,7 +96,7 @@ def uncorrected(path: PlatformState, times: np.ndarray) -> np.ndarray:
 
 
 def test_uncorrected_air_at_section_v() -> None:
-    """Both legs at once, along rays: 4.9 m and 0.56 rad. By rows: each leg's zenith column, times a metre's effect."""
+    """Both legs at once, along rays: 4.9 m and 0.56 rad. By rows: each zenith column times a metre's effect."""
     mission = parse_mission(SECTION_V)
     legs = mission.geometry.both
     both = through_exact_ranges(mission, lambda times: uncorrected(legs[0], times) + uncorrected(legs[1], times))
