@@ -359,3 +359,24 @@ def test_every_format_has_the_rows(run: Callable, tmp_path: Path, suffix: str) -
     if suffix == "html":
         assert "Delays in the air" in text
         assert "weather model" in text
+
+
+def test_what_is_left_out_is_looser(run: Callable, tmp_path: Path) -> None:
+    """Each row that a change takes away is named, those of effects from elsewhere and of the air among them."""
+    changes = {"requirements": NEEDS, "platforms__receiver__motion_error__velocity": "1 mm/s"}
+    files = {
+        "old": {"propagation": AIR, "other_errors": [ELSEWHERE]},
+        "new": {"other_errors": [{"name": "b", "islr": "-40 dB"}]},
+    }
+    for name, errors in files.items():
+        (tmp_path / f"{name}.yaml").write_text(mission_text(**changes, **errors))
+    found = run("diff", "--fail-on-erosion", "10%", *(str(tmp_path / f"{name}.yaml") for name in files))
+    assert found.exit_code == 1
+    refused = found.stdout.partition("Refused")[2]
+    gone = ["", ".cubic_phase_error", ".location_error", ".islr"]
+    for row_id in (
+        *(f"other.antenna{one}" for one in gone),
+        *(f"propagation.{one}.zenith_delay" for one in PLATFORMS),
+    ):
+        assert f"{row_id}: declared -> not declared" in refused
+    assert "propagation.source" not in refused  # there is nothing left to have one
