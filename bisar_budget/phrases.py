@@ -411,6 +411,18 @@ def across_the_line_of_sight() -> str:
 
 
 @phrase
+def below_the_ionosphere(platform: str) -> str:
+    """Said of the electron content on a leg that lies within the air."""
+    return f"the {platform} flies below the ionosphere: no electrons on its leg"
+
+
+@phrase
+def disperses_over_the_band(phase: float) -> str:
+    """Said of an electron content."""
+    return f"bends the phase by {phase:.3g} rad at the ends of the band, which no requirement takes"
+
+
+@phrase
 def nothing_spreads() -> str:
     """Said of a clock's error that does nothing."""
     return "no quadratic phase, no cubic phase and nothing that spreads"

@@ -136,6 +136,12 @@ ANGLE_RANDOM_WALK = Dimension(
     },
     usual=("deg/sqrt(h)", "rad/sqrt(s)"),
 )
+ELECTRON_CONTENT = Dimension(
+    "an electron content",
+    "1/m^2",
+    {"TECU": 1e16, "1/m^2": 1.0, "/m^2": 1.0, "m^-2": 1.0},
+    usual=("TECU",),
+)
 PHASE_NOISE = Dimension("a phase noise L(f)", "dBc/Hz", {"dBc/Hz": 1.0}, usual=("dBc/Hz",))
 TONE = Dimension("the level of a tone", "dBc", {"dBc": 1.0}, usual=("dBc",))
 MEMORY = Dimension("an amount of memory", "B", _scaled("B", "kMGT") | {"KB": 1e3, "MiB": 2.0**20, "GiB": 2.0**30})
@@ -324,6 +330,7 @@ _SHEETS = {
     "m/s/sqrt(s)": (_ROOT_HOUR, " m/s/√h"),
     "rad/sqrt(s)": (_DEGREE * _ROOT_HOUR, " deg/√h"),
     "1": (1e-6, " ppm"),
+    "1/m^2": (1e16, " TECU"),
 }
 
 

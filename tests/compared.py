@@ -212,7 +212,7 @@ def _together(
         share = weights[0] / sum(weights) if sum(weights) else 0.5
         share = min(0.95, max(0.05, share))
         yield _against("balanced share", "transmitter", allocation.qpe.transmitter, share, 0.001)
-    others = np.array([abs(other.quadratic_phase_error) for other in mission.other_errors])
+    others = np.array([abs(other.quadratic_phase_error or 0.0) for other in mission.other_errors])
     if rule != "each":
         for owner in ("transmitter", "receiver", "clock"):
             row_id = f"{'timing' if owner == 'clock' else owner}.quadratic_phase_error"

@@ -21,7 +21,7 @@ from bisar_budget.effects.random_errors import in_one_case, random_errors
 from bisar_budget.effects.sources import exact_ranges
 from bisar_budget.effects.vibration import DeclaredPhase, slow_phases
 from bisar_budget.geometry import BistaticGeometry
-from bisar_budget.mission.model import Mission, has_instruments
+from bisar_budget.mission.model import Mission, has_random_errors
 from bisar_budget.mission.stacked import picked
 from bisar_budget.phrases import Note
 from bisar_budget.ranges.exact_ranges import ExactRanges, nodes_for
@@ -94,8 +94,8 @@ class Analysis:
 
     @cached_property
     def random(self) -> list[RandomError]:
-        """Errors of sensors and clocks that the mission names."""
-        if not has_instruments(self.mission):
+        """Errors of sensors, clocks and the air that the mission names."""
+        if not has_random_errors(self.mission):
             return []
         return random_errors(self.mission, None if self.is_by_itself else self.geometry, self.cases)
 

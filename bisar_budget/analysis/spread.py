@@ -47,6 +47,17 @@ class SpreadPhase(NamedTuple):
     variance: Any
 
 
+class StatedPower(NamedTuple):
+    """An error from elsewhere, and the ISLR that it is stated to add. [dB]"""
+
+    subject: Subject
+    islr: Any
+
+    def rms(self, model: str, energy: float) -> Any:
+        """Phase that spreads as much by a model, rms; see `spread_phase`. [rad]"""
+        return spread_phase(10 ** (np.asarray(self.islr) / 10), model, energy)
+
+
 def mainlobe_energy(mission: Mission) -> float:
     """Share E of the error-free response's energy within its first nulls, under the window of the images."""
     return MAINLOBE_ENERGY[(mission.simulation or Simulation()).window]
@@ -131,12 +142,24 @@ def wideband_noise(mission: Mission, geometry: Any = None) -> list[SpreadPhase]:
 
 
 def noise(analysis: "Analysis", model: str) -> list[SpreadPhase]:
-    """List what spreads beyond the cubic: wideband vibration, noise of sensors, phase noise, links."""
+    """List what spreads beyond the cubic: wideband vibration, noise of sensors, phase noise, links, powers stated."""
     found = wideband_noise(analysis.mission, analysis.geometry)
     for one in analysis.random:
         if one.declared is not None and one.spreads:
             found.append(SpreadPhase(one.id, one.owner, (one.effect(model).spread * one.declared) ** 2))
+    energy = mainlobe_energy(analysis.mission)
+    for power in stated_powers(analysis.mission):
+        found.append(SpreadPhase(power.subject.id, power.subject.owner, power.rms(model, energy) ** 2))
     return found
+
+
+def stated_powers(mission: Mission) -> list[StatedPower]:
+    """List what errors from elsewhere spread that state their ISLR."""
+    return [
+        StatedPower(subject("mission", "other", f"{other.name}.islr", entry=index), other.islr)
+        for index, other in enumerate(mission.other_errors)
+        if other.islr is not None
+    ]
 
 
 def powers_held_by_islr(analysis: "Analysis", owners: Iterable[str], model: str) -> list[list[SpreadPhase]]:

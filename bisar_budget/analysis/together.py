@@ -63,12 +63,13 @@ class Together:
     @cached_property
     def own(self) -> list[DeclaredPhase]:
         """Phases of what has no displacement of its own: slow vibrations, declared errors of sensors and clocks."""
-        array, factor = self.errors.array, self.errors.mission.allocation.coverage_factor
+        array = self.errors.array
         found = [one._replace(qpe_rad=array(one.qpe_rad), cubic_rad=array(one.cubic_rad)) for one in self.slow]
         for error in self.random:
             if error.declared is not None:
                 quadratic, cubic = (array(part * error.declared) for part in error.effect(self.model)[:2])
-                found.append(DeclaredPhase(error.subject.id, error.subject.owner, quadratic, cubic, factor))
+                coverage = error.coverage(self.errors.mission)
+                found.append(DeclaredPhase(error.subject.id, error.subject.owner, quadratic, cubic, coverage))
         return found
 
     @cached_property

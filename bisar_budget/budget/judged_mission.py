@@ -176,6 +176,7 @@ class _Judgement:
         if self._vibrates or self._shows_vibration:
             yield from self._vibrations.rows(model)
         yield from self._random.rows(model)
+        yield from self._random.stated_rows(model)
         yield from spur_rows(self.judging, self.analysis, model)
         if needs.pslr is not None:
             yield pslr_row(self.judging, self.analysis.tones, needs.pslr)

@@ -246,11 +246,13 @@ def declared_kinds(mission: Mission) -> DeclaredKinds:
     if not mission.has_direct_path:
         (declared if _states_clock(mission) else missing).append("timing")
     common, link, others = mission.common_motion_error, mission.synchronization, mission.other_errors
+    legs = [] if mission.propagation is None else [mission.propagation.leg(name) for name in PLATFORMS]
     if mission.scene.height_error is not None:
         declared.append("terrain")
     for kind, is_declared, has_source in (  # nobody owes these
         ("common", common is not None, common is not None and common.source),
         ("synchronization", link is not None, link is not None and link.source),
+        ("propagation", bool(legs), all(leg.source for leg in legs if leg is not None)),
         ("other", bool(others), all(one.source for one in others)),
     ):
         if is_declared:

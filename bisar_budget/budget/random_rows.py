@@ -1,4 +1,4 @@
-"""Rows of sensors and clocks: how bad may a figure be, by its quadratic phase, cubic phase and what it spreads.
+"""Rows of sensors, clocks and the air: how bad may a figure be, by its phases, displacement and what it spreads.
 
 Independent processes add their powers, whatever `allocation.combine` says of phases: what wideband vibration, noise
 of sensors and phase noise spread is held together to each platform's share of ISLR.
@@ -23,13 +23,16 @@ from bisar_budget.analysis.spread import (
     mainlobe_energy,
     powers_held_by_islr,
     spread_limit,
+    stated_powers,
 )
+from bisar_budget.budget.judged_requirements import SMALL_RAD
 from bisar_budget.budget.judged_rows import BOUND, CODE, REQUIREMENTS, Floats, Judged, Judging, worded
 from bisar_budget.budget.pull_in import caps, needed_sentence
 from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.effect import override_notes, subject
 from bisar_budget.effects.navigation_errors import process_of
 from bisar_budget.effects.oscillators import POOR_FIT
+from bisar_budget.effects.propagation import CONTENT, dispersion
 from bisar_budget.effects.random_effect import RandomEffect, RandomError
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import GroundVector
@@ -61,11 +64,14 @@ def limits_for(mission: Mission, allocation: Allocation, owner: str, model: str,
     return Limits(allocation.qpe_limit(owner) * gain, needs.cubic_phase_error, spread, needs.location_error)
 
 
-def held_effect(mission: Mission, effect: RandomEffect) -> RandomEffect:
-    """An effect as requirements hold it: a cubic phase that none takes is power that ISLR holds, at one sigma."""
+def held_effect(mission: Mission, effect: RandomEffect, coverage: Any) -> RandomEffect:
+    """An effect as requirements hold it: a cubic phase that none takes is power that ISLR holds, at one sigma.
+
+    `coverage` is the coverage factor that it has in it.
+    """
     if mission.requirements.cubic_phase_error is not None:
         return effect
-    cubic = effect.cubic / mission.allocation.coverage_factor
+    cubic = effect.cubic / coverage
     return effect._replace(spread=np.sqrt(effect.spread**2 + CUBIC_POWER * cubic**2))
 
 
@@ -104,7 +110,9 @@ class RandomRows:
         columns = zip(*(by_owner[owner] for owner in owners), strict=True)
         limits = Limits(*(None if column[0] is None else self._table(column) for column in columns))
         sizes = np.full((len(HELD), len(owners), self.judging.cases), math.inf)
-        for row, size in zip(sizes, sizes_at(held_effect(self.mission, effects), limits), strict=True):
+        coverage = self._table([error.coverage(self.mission) for error in self.errors])
+        held = held_effect(self.mission, effects, coverage)
+        for row, size in zip(sizes, sizes_at(held, limits), strict=True):
             row[:] = size
         return sizes
 
@@ -163,9 +171,11 @@ class RandomRows:
         powers = [self._table([one.variance for one in of_owner]) for of_owner in members]
         is_known = [~np.isnan(of_owner) for of_owner in powers]
         variance = np.array([one.sum(axis=0, where=known) for one, known in zip(powers, is_known, strict=True)])
-        is_vibration = [one.row_id.endswith("vibration.wideband") for one in members[-1]]
-        is_there = np.array([is_known[-1][~np.array(is_vibration, dtype=bool)].any(axis=0)] * len(owners))
-        is_there[-1] = True  # where only vibration spreads, its own rows hold it to the shares
+        stated = {one.subject.id for one in stated_powers(mission)}
+        is_held = [one.row_id.endswith("vibration.wideband") or one.row_id in stated for one in members[-1]]
+        is_there = np.array([is_known[-1][~np.array(is_held, dtype=bool)].any(axis=0)] * len(owners))
+        # Where only vibration spreads, its own rows hold it to the shares; what is stated has none.
+        is_there[-1] = True
         is_declared = np.array([known.any(axis=0) for known in is_known]) & is_there
         models = (model, "full" if model == "published" else "published")
         shares = np.sqrt(self._table([split.of(owner) for owner in owners]))
@@ -190,6 +200,29 @@ class RandomRows:
         of_rows = (is_there, members, variance, limit, limit_of_other)
         for place, (owner, *others) in enumerate(zip(owners, *of_rows, strict=True)):
             yield IslrRow(judged.at(place, subject(owner, ISLR)), *others)
+
+    def stated_rows(self, model: str) -> Iterator["StatedRow"]:
+        """Rows of errors from elsewhere that state their ISLR: each may have all that is required."""
+        mission = self.mission
+        allowed = spread_limit(mission, self.allocation, "mission", model)
+        for one in stated_powers(mission):
+            rms = self.judging.array(one.rms(model, mainlobe_energy(mission)))
+            judged = self.judging.row(
+                one.subject,
+                rms,
+                self.judging.array(allowed),
+                is_info=mission.allocation.combine != "each" or allowed is None,
+            )
+            declared, allowable = (self._level(column, model) for column in (judged.declared, judged.allowable))
+            yield StatedRow(
+                judged._replace(
+                    declared=declared,
+                    allowable=allowable,
+                    allowable_published=allowable,
+                    allowable_full=allowable,
+                    islr_db=islr_of(mission, rms**2),
+                ).held_to(ISLR)
+            )
 
     def _level(self, rms: Floats, model: str) -> Floats:
         """ISLR of rms phases by a model; not a number where there is none. [dB]"""
@@ -279,6 +312,34 @@ class IslrRow:
         )
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class StatedRow:
+    """Row of an error from elsewhere that states its ISLR, in many cases. [dB]"""
+
+    judged: Judged
+    is_there: bool = True
+
+    def in_words(self, case: Case, _: str) -> Row:
+        """The row of one case."""
+        mission, row = case.mission, self.judged
+        index, is_limited = row.subject.entry or 0, not math.isnan(row.allowable[case.place])
+        missing, over = phrases.no_requirement_of(ISLR), NOTHING
+        if is_limited:
+            over = phrases.spreads_too_much(case.number(row.declared), case.number(row.allowable))
+        return worded(
+            case,
+            row,
+            unit="dB",
+            path=("other_errors", index, ISLR),
+            equation="as declared",
+            over=over,
+            no_limit=missing,
+            info=phrases.aggregate_decides(mission.allocation.combine) if is_limited else missing,
+            evidence=mission.other_errors[index].source,
+            binding_requirement=ISLR if is_limited else None,
+        )
+
+
 # ---------------------------------------------------------------------- in words
 def _displacement(error: RandomError, model: str) -> GroundVector | None:
     """Sigmas of the displacement east and north, coverage factor included; None where they are not known. [m]"""
@@ -295,6 +356,10 @@ def _said(mission: Mission, error: RandomError) -> tuple[str, str | None, tuple[
         return "synchronisation", sync.source, () if sync.interval else (phrases.another_for_each_pulse(),)
     if kind == "oscillator":
         return _said_of_oscillator(mission, error)
+    if kind == "propagation":
+        return _said_of_air(mission, error)
+    if kind == "other":
+        return "as declared", mission.other_errors[error.subject.entry or 0].source, ()
     motion: MotionError = getattr(mission.platforms, error.owner).motion_error
     if kind == "random":
         source, figure, equation = process_of(mission, error).source, "random", "Gauss-Markov"
@@ -329,6 +394,17 @@ def _kept_by(mission: Mission, sync: Synchronization | None) -> Iterator[Note]:
         yield phrases.heard_twice(mission.geometry.echo_delay)
 
 
+def _said_of_air(mission: Mission, error: RandomError) -> tuple[str, str | None, tuple[Note, ...]]:
+    """The same of a delay on a leg. Free electrons bend the phase over the band, which no requirement takes."""
+    leg = None if mission.propagation is None else mission.propagation.leg(error.owner)
+    source, notes = None if leg is None else leg.source, tuple[Note, ...]()
+    if error.subject.axis == CONTENT and error.declared is not None:
+        phase = error.declared * dispersion(mission, getattr(mission.geometry, error.owner))
+        if phase >= SMALL_RAD:
+            notes = (phrases.disperses_over_the_band(phase),)
+    return "delay of the air", source, notes
+
+
 def _unlimited(mission: Mission, error: RandomError, effect: RandomEffect) -> Note:
     """Say why nothing limits an error: it does nothing, or what it does is not required."""
     parts = (("cubic phase", effect.cubic), ("ISLR", effect.spread), ("displacement", effect.displacement))
@@ -340,13 +416,15 @@ def no_effect(mission: Mission, error: RandomError) -> Note:
     """Say why an error does nothing."""
     if error.subject.kind in ("imu", "random"):
         return phrases.across_the_line_of_sight()
+    if error.subject.kind == "propagation":
+        return phrases.below_the_ionosphere(error.owner)
     if error.subject.kind == "synchronization":
         return phrases.nothing_spreads()
     return phrases.oscillators_drop_out() if mission.has_direct_path else phrases.no_phase_noise()
 
 
 def _over(mission: Mission, error: RandomError, model: str, binding: str | None, allocation: Allocation) -> Note:
-    effect, size = held_effect(mission, error.effect(model)), error.declared
+    effect, size = held_effect(mission, error.effect(model), error.coverage(mission)), error.declared
     limits = limits_for(mission, allocation, error.owner, model, allocation.autofocus_gain)
     if binding == CUBIC:
         return phrases.cubic_phase_over(effect.cubic * size, limits.cubic)
@@ -364,7 +442,7 @@ def _over(mission: Mission, error: RandomError, model: str, binding: str | None,
 def _doubt(mission: Mission, error: RandomError, gating: str, binding: str, limit: float) -> Note:
     """Say by which requirement the model that does not gate fails a declared error."""
     other, size = "full" if gating == "published" else "published", error.declared
-    effect = held_effect(mission, error.effect(other))
+    effect = held_effect(mission, error.effect(other), error.coverage(mission))
     if binding == ISLR:
         return phrases.other_model_spreads(other, _levels(mission, other)(effect.spread * size))
     if binding == QUADRATIC:

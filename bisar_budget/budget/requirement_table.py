@@ -157,9 +157,13 @@ def _sizes(row: Row, key: str, case: Case) -> tuple[float | None, float | None]:
     mission, allocation = case.mission, case.allocation
     if row.declared is None and row.metric != key:
         return None, None
-    if row.unit == UNITS[key] and (
-        row.subject.kind in (key, QUADRATIC, "spatial_variance", "autofocus_pull_in", "other")
-        or (key == "pslr" and row.unit == "dB")
+    if (
+        row.unit == UNITS[key]
+        and row.binding_requirement in (key, None)
+        and (
+            row.subject.kind in (key, QUADRATIC, "spatial_variance", "autofocus_pull_in", "other")
+            or (key == "pslr" and row.unit == "dB")
+        )
     ):
         return row.allowable, row.declared
     if key == QUADRATIC:

@@ -27,6 +27,7 @@ from bisar_budget.findings.requirement import Override
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.model import MISSION, SHARES, Mission
 from bisar_budget.mission.parts import taken_figures
+from bisar_budget.mission.propagation import DELAYS
 from bisar_budget.mission.readers import (
     DIRECTION,
     ELEVATION,
@@ -560,6 +561,11 @@ def _declared_errors(mission: Mission) -> Iterator[str]:
             mission.common_motion_error, "common_motion_error", ("position", "velocity", "acceleration")
         )
     yield from _keys_of(mission.timing_error, "timing_error", mission.timing_error._fields)
+    if mission.propagation is not None:
+        legs = ("transmitter", "receiver")
+        stated = [leg for leg in legs if getattr(mission.propagation, leg) is not None]
+        yield from (f"propagation.{leg}" for leg in stated)
+        yield from _keys_of(mission.propagation, "propagation", DELAYS)
     yield from (f"other_errors.{index}" for index in range(len(mission.other_errors)))
 
 

@@ -37,6 +37,7 @@ from bisar_budget.mission.platforms import (
     Platform,
     least_baseline,
 )
+from bisar_budget.mission.propagation import LEAST_ELEVATION_DEG, low_legs
 from bisar_budget.mission.readers import ListOf, OneOf, Quantity, Reader, Section, Triple
 from bisar_budget.ranges.exact_ranges import Floats
 from bisar_budget.units import Dimension, parse_quantity
@@ -171,6 +172,10 @@ def is_image(mission: Mission, geometries: BistaticGeometry, cases: int) -> NDAr
     is_one &= ~np.asarray(still)
     for spans in geometries.spans_ground(SAFE):
         is_one &= spans
+    if mission.propagation is not None:
+        legs = dict(zip(PLATFORMS, geometries.both, strict=True))
+        for _, _, degrees in low_legs(mission.propagation, legs, mission.collection.aperture_time):
+            is_one &= degrees > LEAST_ELEVATION_DEG * SAFE
     if mission.has_direct_path:
         is_one &= _has_baseline(geometries.apart, np.broadcast_to(half, (cases,)))
     return is_one & (np.asarray(mission.radar.bandwidth) * SAFE < 2 * np.asarray(mission.radar.center_frequency))
@@ -212,10 +217,10 @@ def _has_possible_figures(mission: Mission, cases: int) -> NDArray[np.bool_]:
 # What a factor does not multiply: when and how fast an error changes, and settings.
 _KEPT = (units.FREQUENCY, units.TIME, units.RATIO, units.MEMORY)
 _LEVELS = (units.POWER_RATIO, units.PHASE_NOISE, units.TONE)
-_ERRORS = ("motion_error", "common_motion_error", "timing_error", "other_errors")
+_ERRORS = ("motion_error", "common_motion_error", "timing_error", "propagation", "other_errors")
 _ACCEPTED = (
     "accepted: platforms.transmitter.motion_error, platforms.receiver.motion_error, common_motion_error, "
-    "timing_error, other_errors, or a key below one of them"
+    "timing_error, propagation, other_errors, or a key below one of them"
 )
 
 

@@ -7,6 +7,8 @@ __all__ = [
     "effect",
     "navigation_errors",
     "oscillators",
+    "other_errors",
+    "propagation",
     "random_effect",
     "random_errors",
     "sources",

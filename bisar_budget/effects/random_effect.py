@@ -72,7 +72,7 @@ class RandomEffect(NamedTuple):
 
 
 class RandomError(NamedTuple):
-    """One error of a sensor or a clock: what it is, how large it is declared, what one unit of it does.
+    """One error of a sensor, a clock or the air: what it is, how large it is declared, what one unit of it does.
 
     `declared` is the largest of the axes, coverage factor included, and all axes grow with it; None where the file is
     silent. The unit of an oscillator is `dB`: its noise as a factor of amplitude, declared 1. `noise` is the spectrum
@@ -97,6 +97,15 @@ class RandomError(NamedTuple):
     def owner(self) -> str:
         """Whose share it counts against: transmitter, receiver or clock."""
         return self.subject.owner
+
+    @property
+    def is_covered(self) -> bool:
+        """Whether the coverage factor is in what is declared, or does: not of an effect from elsewhere."""
+        return self.subject.kind != "other"
+
+    def coverage(self, mission: Mission) -> Any:
+        """Coverage factor that is in what its declared size does."""
+        return mission.allocation.coverage_factor if self.is_covered else 1.0
 
     @property
     def extrapolated(self) -> Note:
@@ -178,12 +187,15 @@ class SensorCases:
         held : (errors, nodes, cases)
             The same with the line of sight held at mid-aperture, for the published model.
         """
-        fits = np.einsum("fn,enc->fec", self.exact.fit, held)
-        constant, linear, quadratic, cubic = np.square(fits).sum(axis=1)
-        k, both = self.exact.k, (fits[0] * fits[1]).sum(axis=0)
-        published = RandomEffect(
-            k * np.sqrt(quadratic), k * np.sqrt(cubic), 0.0 * k, *self.moved(constant, linear, both)
-        )
+        k, orders = self.exact.k, np.einsum("fn,enc->fec", self.exact.fit, held)
+        orders = np.where(np.abs(orders) > ROUNDING * np.abs(held).max(axis=1), orders, 0.0)
+        quadratic, cubic = np.sqrt(np.square(orders[2:]).sum(axis=1))
+        # Both orders of a course are one error: unlike those of noise they add with their signs.
+        (a, b), (c, d) = self.plane.adjugate
+        scale = 1 / np.where(self.plane.is_singular, math.nan, self.plane.determinant)
+        constant, linear = orders[0], orders[1] / self.exact.half
+        moved = [np.sqrt(np.square((u * constant + v * linear) * scale).sum(axis=0)) for u, v in ((a, b), (c, d))]
+        published = RandomEffect(k * quadratic, k * cubic, 0.0 * k, *moved)
         weighted = self.weights[:, None] * courses
         effects, sizes = weighted.sum(axis=2), np.square(np.abs(weighted).sum(axis=2)).sum(axis=1)
         (qpe, edge, east, north), covariance = sigmas(np.einsum("fec,gec->fgc", effects, effects), sizes)

@@ -1,9 +1,11 @@
-"""Every random error of sensors and clocks that a mission names, in one case or in many."""
+"""Every random error of sensors, clocks and the air that a mission names, in one case or in many."""
 
 from bisar_budget.effects.clock_errors import link_noise, oscillator_noise
 from bisar_budget.effects.effect import PLATFORMS, plain
 from bisar_budget.effects.navigation_errors import inertial_errors, position_noise
 from bisar_budget.effects.oscillators import noise_of
+from bisar_budget.effects.other_errors import stated_effects
+from bisar_budget.effects.propagation import delay_errors
 from bisar_budget.effects.random_effect import RandomError, SensorCases
 from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.instruments import Oscillator
@@ -11,7 +13,7 @@ from bisar_budget.mission.model import Mission
 
 
 def random_errors(mission: Mission, geometry: BistaticGeometry | None = None, cases: int = 1) -> list[RandomError]:
-    """List the errors of sensors and clocks that a mission names, in a fixed order; nothing for most.
+    """List the errors of sensors, clocks and the air that a mission names, in a fixed order; nothing for most.
 
     Of a platform with an inertial sensor every figure is listed, declared or not. `geometry` is that of many cases;
     without it all numbers are floats.
@@ -21,6 +23,8 @@ def random_errors(mission: Mission, geometry: BistaticGeometry | None = None, ca
     found += [error for name in PLATFORMS for error in position_noise(seen, name)]
     found += [error for name in PLATFORMS for error in oscillator_noise(seen, name)]
     found += link_noise(seen)
+    found += [error for name in PLATFORMS for error in delay_errors(seen, name)]
+    found += stated_effects(mission)
     return [in_one_case(mission, error) for error in found] if geometry is None else found
 
 

@@ -317,6 +317,8 @@ class ErrorListing:
 
     def _others(self) -> Iterator[ErrorSource]:
         for index, other in enumerate(self.mission.other_errors):
+            if other.quadratic_phase_error is None:
+                continue
             yield ErrorSource(
                 subject=subject("mission", "other", other.name),
                 unit="rad",

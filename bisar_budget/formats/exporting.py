@@ -132,6 +132,7 @@ def export_phase_history(mission: Mission, targets: Targets) -> Exported:
         transmitter=flown.transmitter,
         receiver=flown.receiver,
         clock_error=flown.clock,
+        electrons=flown.electrons,
         noise_power=10 ** (settings.noise / 10) if settings.noise is not None else 0.0,
         rng=rng,
     )
@@ -177,7 +178,7 @@ def _plan(mission: Mission, targets: Targets, collection: PointCollection, error
     flown = collection.flight(errors.smooth(), fine)
     measured = sum(np.linalg.norm(path.measured, axis=1) for path in flown.paths)
     actual = sum(np.linalg.norm(path.actual, axis=1) for path in flown.paths)
-    error = actual - measured + SPEED_OF_LIGHT * flown.clock
+    error = actual - measured + SPEED_OF_LIGHT * flown.seen
     delays, turns = [], []
     for corner in ((half, half), (half, -half), (-half, half), (-half, -half)):
         away = sum(np.linalg.norm(path.measured - (*corner, 0.0), axis=1) for path in flown.paths) - measured

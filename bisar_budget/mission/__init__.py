@@ -9,6 +9,7 @@ __all__ = [
     "model",
     "parts",
     "platforms",
+    "propagation",
     "readers",
     "revision",
     "stacked",

@@ -11,6 +11,7 @@ from bisar_budget.faults import Changed, KeyPath, Place, Problem, SetValue, show
 from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.instruments import SYNCHRONIZATION, Synchronization
 from bisar_budget.mission.platforms import INSTANT, CommonMotionError, Platforms, without_image
+from bisar_budget.mission.propagation import PROPAGATION, Propagation, too_low
 from bisar_budget.mission.readers import (
     COORDINATE,
     DIRECTION,
@@ -23,6 +24,7 @@ from bisar_budget.mission.readers import (
     RANGE,
     SHARE,
     SIDELOBE_REQUIREMENT,
+    SIZE,
     Choice,
     Day,
     Glob,
@@ -132,11 +134,31 @@ class TimingError(NamedTuple):
 
 
 class OtherError(NamedTuple):
-    """A quadratic phase error from elsewhere, at the aperture edge."""
+    """An error from elsewhere by what it does to the image; at least one of its effects."""
 
-    name: Annotated[str, Key(Text(), "Becomes the row id other.NAME.")]
-    quadratic_phase_error: Annotated[float, Key(PHASE)]
+    name: Annotated[str, Key(Text(), "Becomes the row ids other.NAME, other.NAME.cubic_phase_error and so on.")]
+    quadratic_phase_error: Annotated[float | None, Key(PHASE, "At the aperture edge.")] = None
+    cubic_phase_error: Annotated[float | None, Key(PHASE, "At the aperture edge.")] = None
+    location_error: Annotated[float | None, Key(SIZE, "Displacement of the image, in whatever direction.")] = None
+    islr: Annotated[float | None, Key(SIDELOBE_REQUIREMENT, "Power that it spreads over the image. [dB]")] = None
     source: Annotated[str | None, Key(Text())] = None
+
+    @staticmethod
+    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
+        """Hold it to an effect."""
+        if values.keys() >= set(OTHER_EFFECTS) and all(values[one] is None for one in OTHER_EFFECTS):
+            yield Problem("states no effect", f"accepted: any of {', '.join(OTHER_EFFECTS)}")
+
+    @property
+    def stated(self) -> dict[str, float]:
+        """Size of each effect that the file states, by row id."""
+        first, *others = OTHER_EFFECTS
+        sizes = {f"other.{self.name}": getattr(self, first)}
+        sizes |= {f"other.{self.name}.{one}": getattr(self, one) for one in others}
+        return {row_id: size for row_id, size in sizes.items() if size is not None}
+
+
+OTHER_EFFECTS = ("quadratic_phase_error", "cubic_phase_error", "location_error", "islr")
 
 
 # Kinds of error that each platform has, and the clock's.
@@ -339,6 +361,9 @@ class Mission(NamedTuple):
         Synchronization | None,
         Key(SYNCHRONIZATION, "How the receiver follows the transmitter's oscillator."),
     ] = None
+    propagation: Annotated[
+        Propagation | None, Key(PROPAGATION, "Delays in the air, on the way to the scene and back.")
+    ] = None
     other_errors: Annotated[tuple[OtherError, ...], Key(ListOf(OtherError))] = ()
     requirements: Annotated[Requirements, Key(Section(Requirements))] = Requirements()
     requirement_ids: Annotated[Mapping[str, str], Key(TextMap(), "Row id to the project's own requirement id.")] = {}
@@ -370,17 +395,24 @@ class Mission(NamedTuple):
         platforms: Platforms | None = values.get("platforms")
         if platforms is not None and not any(platform.is_of_the_earth for platform in platforms):
             collection, synchronization = values.get("collection"), values.get("synchronization")
+            propagation: Propagation | None = values.get("propagation")
+            if propagation is not None and collection is not None:
+                yield from too_low(propagation, platforms, collection.aperture_time)
             yield from without_image(
                 platforms,
                 collection and collection.aperture_time,
                 has_direct_path=synchronization is not None and synchronization.is_direct_path,
             )
         yield from _unset_clocks(values)
-        seen: set[str] = set()
+        names, row_ids = set[str](), set[str]()
         for index, other in enumerate(values.get("other_errors", ())):
-            if other.name in seen:
-                yield Problem("is the name of an earlier error", at=("other_errors", index, "name"))
-            seen.add(other.name)
+            if other.name in names or not row_ids.isdisjoint(other.stated):
+                problem = "is the name of an earlier error"
+                if other.name not in names:
+                    problem = f"makes the row id {min(row_ids.intersection(other.stated))}, as an earlier error does"
+                yield Problem(problem, at=("other_errors", index, "name"))
+            names.add(other.name)
+            row_ids |= other.stated.keys()
 
     @property
     def geometry(self) -> BistaticGeometry:
@@ -421,6 +453,15 @@ def has_instruments(mission: Mission) -> bool:
     return mission.synchronization is not None or any(
         platform.oscillator is not None or platform.motion_error.imu is not None or platform.motion_error.random
         for platform in mission.platforms
+    )
+
+
+def has_random_errors(mission: Mission) -> bool:
+    """Whether a mission says anything of sensors, clocks or the air, or of others what is no quadratic phase."""
+    return (
+        has_instruments(mission)
+        or mission.propagation is not None
+        or any(getattr(other, effect) is not None for other in mission.other_errors for effect in OTHER_EFFECTS[1:])
     )
 
 

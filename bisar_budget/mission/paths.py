@@ -24,6 +24,7 @@ from bisar_budget.mission.platforms import (
     TrajectorySource,
     without_image,
 )
+from bisar_budget.mission.propagation import too_low
 from bisar_budget.mission.readers import INVALID, Report
 from bisar_budget.paths import earth
 from bisar_budget.paths.elements import read_omm, read_tle
@@ -142,6 +143,10 @@ def with_paths(mission: Mission, read: Beside, report: Report) -> Any:
     for problem in without_image(platforms, aperture_time, has_direct_path=mission.has_direct_path):
         report((), problem)
         is_valid = False
+    if mission.propagation is not None:
+        for problem in too_low(mission.propagation, platforms, aperture_time):
+            report((), problem)
+            is_valid = False
     return mission._replace(platforms=platforms) if is_valid else INVALID
 
 

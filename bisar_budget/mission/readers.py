@@ -542,7 +542,6 @@ NOT_COMPUTED = "is not computed by this version yet"
 _LEAVE = "accepted: leave it out"
 _MOTION = f"{_LEAVE}, and state what it does as position, velocity and acceleration errors"
 _OSCILLATOR = f"{_LEAVE}, and state the noise with it, as phase_noise or spurs"
-_OTHER = f"{_LEAVE}; of an error from elsewhere its quadratic_phase_error counts"
 _SPECTRUM = f"{_LEAVE}, and state sinusoidal lines and the rms of wideband"
 
 # By the name of the section, as its class has it, and the key: what is accepted instead.
@@ -552,16 +551,12 @@ LATER: Mapping[str, Mapping[str, str]] = {
     "Oscillator": dict.fromkeys(("acceleration_sensitivity", "vibration", "level"), _OSCILLATOR),
     "OscillatorPart": dict.fromkeys(("acceleration_sensitivity", "vibration", "level"), _OSCILLATOR),
     "CommonMotionError": {"random": f"{_LEAVE}, and state it in motion_error.random of each platform"},
-    "OtherError": dict.fromkeys(("cubic_phase_error", "location_error", "islr"), _OTHER),
     "OrbitSource": dict.fromkeys(("eof", "sp3"), "accepted: the same orbit as tle, omm or oem"),
     "TrajectorySource": dict.fromkeys(
         ("time_scale", "geoid_separation"), f"{_LEAVE}; a log in CSV has UTC, and heights above the ellipsoid"
     ),
     "AllocationRules": {"specify": _LEAVE},
-    "Mission": {
-        "propagation": f"{_LEAVE}, and state what it does in other_errors",
-        "earth_orientation": f"{_LEAVE}; UT1 is taken to be UTC",
-    },
+    "Mission": {"earth_orientation": f"{_LEAVE}; UT1 is taken to be UTC"},
 }
 LATER_FRAMES: Mapping[str, str] = dict.fromkeys(
     ("track", "look", "ric"), f"{NOT_COMPUTED} of both platforms at once: each has axes of its own"

@@ -88,7 +88,7 @@ def monte_carlo(
         probability_low=low,
         probability_high=high,
         is_exact=drawing.is_exact,
-        notes=tuple(_notes(mission, analysis.stated, is_exact=drawing.is_exact, is_placed=is_placed)),
+        notes=tuple(_notes(mission, analysis, is_exact=drawing.is_exact, is_placed=is_placed)),
     )
 
 
@@ -126,13 +126,15 @@ def _variables(analysis: Analysis) -> Iterator[Variable]:
 
 
 def _of_noise(error: RandomError, factor: float) -> Iterator[Variable]:
-    """Variables of a sensor or a clock: its quadratic phase with all that goes with it, the cubic with what is left…
+    """Variables of a sensor, a clock or the air: its quadratic phase and what goes with it, the cubic with the rest…
 
-    They are columns of the Cholesky root of its covariance of phases and displacement.
+    They are columns of the Cholesky root of its covariance of phases and displacement. An effect from elsewhere is a
+    bound: a phase of either sign, a displacement of its length.
     """
     if not error.declared or error.full.covariance is None:
         return
-    size = error.declared / factor  # of an oscillator the coverage factor is in its effects
+    size = error.declared / (factor if error.is_covered else 1.0)  # that of an oscillator is in its effects
+    distribution = "normal" if error.is_covered else "bound"
     left = np.array(error.full.covariance) * size**2
     scale = np.diagonal(left).copy()
     for place, part in enumerate(_PARTS):
@@ -140,7 +142,7 @@ def _of_noise(error: RandomError, factor: float) -> Iterator[Variable]:
             continue
         column = left[:, place] / math.sqrt(left[place, place])
         left = left - np.multiply.outer(column, column)
-        yield Variable(f"{error.id}{part}", error.id, error.owner, "normal", (), tuple(column.tolist()))
+        yield Variable(f"{error.id}{part}", error.id, error.owner, distribution, (), tuple(column.tolist()))
 
 
 def _variable(
@@ -210,7 +212,7 @@ class _Predictions:
 
     def is_normal(self, name: str) -> bool:
         """Whether an error has a normal distribution; a covariance, which is no single variable, always has."""
-        return all(v.distribution == "normal" for v in self.variables if v.id == name)
+        return all(v.distribution == "normal" for v in self.variables if v.of == name)
 
     def probability_normal(self, judged: HeldSum) -> float:
         """Probability that a normal distribution with these variances stays within the limit."""
@@ -301,7 +303,7 @@ def _doubts(found: Requirement, holds: int, draws: int, predictions: _Prediction
         )
 
 
-def _notes(mission: Mission, declared: Sequence[ErrorSource], *, is_exact: bool, is_placed: bool) -> Iterator[Note]:
+def _notes(mission: Mission, analysis: Analysis, *, is_exact: bool, is_placed: bool) -> Iterator[Note]:
     """Say what is drawn by a rule of ours, and what is not drawn."""
     if is_exact:
         yield phrases.drawn_through_exact_ranges()
@@ -309,7 +311,8 @@ def _notes(mission: Mission, declared: Sequence[ErrorSource], *, is_exact: bool,
         yield phrases.drawn_by_the_full_model(mission.gating_model)
     if mission.allocation.combine == "each":
         yield phrases.drawn_all_at_once()
-    bounds = [source.id for source in declared if source.owner == "mission" and not source.is_common]
+    bounds = [source.id for source in analysis.stated if source.owner == "mission" and not source.is_common]
+    bounds += [error.id for error in analysis.random if not error.is_covered]
     if bounds:
         yield phrases.drawn_as_bounds(bounds)
     vibrations = [getattr(mission.platforms, name).motion_error.vibration for name in PLATFORMS]
@@ -317,7 +320,8 @@ def _notes(mission: Mission, declared: Sequence[ErrorSource], *, is_exact: bool,
         yield phrases.vibration_is_not_drawn()
     if mission.requirements.location_error is not None and not is_placed:
         yield phrases.unset_clocks_are_not_drawn()
-    if mission.requirements.islr is not None and has_instruments(mission):
+    stated = any(other.islr is not None for other in mission.other_errors)
+    if mission.requirements.islr is not None and (stated or has_instruments(mission)):
         yield phrases.mean_power_is_not_drawn()
     if mission.allocation.coverage_factor != 1:
         yield phrases.drawn_without_coverage()

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.effects.propagation import CONTENT, seen_course
 from bisar_budget.geometry import BistaticGeometry, GroundVector
 from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.ranges.exact_ranges import aperture_nodes
@@ -236,7 +237,12 @@ class PointCollection:
             clock = clock + errors.clock_course.at(slow_time)
         if self.has_direct_path:
             clock = clock + direct_path_error((transmitter, receiver))
-        return Flight(transmitter, receiver, clock)
+        if errors.electrons is None:
+            return Flight(transmitter, receiver, clock, clock)
+        square = self.radar.center_frequency**2
+        group = errors.electrons.at(slow_time)
+        seen = clock + seen_course(group, errors.electrons.mean, CONTENT) / square
+        return Flight(transmitter, receiver, clock, seen, group)
 
     def effect(self, errors: Errors, seen_from: GroundVector = (0.0, 0.0)) -> ExactEffect:
         """Displacement and phases of a point of the ground, by exact ranges.
@@ -248,7 +254,7 @@ class PointCollection:
         """
         flight = self.flight(errors.slow(), self._nodes)
         transmitter, receiver = (one.seen_from(seen_from) for one in flight.paths)
-        return exact_effect(self._nodes, transmitter, receiver, flight.clock, self.wavelength, self.aperture_time)
+        return exact_effect(self._nodes, transmitter, receiver, flight.seen, self.wavelength, self.aperture_time)
 
     def range_lines(self, errors: Errors) -> RangeLines:
         """Lines of equal range by the measured paths, vibration left out: what a processor lays its grid by."""
@@ -303,6 +309,7 @@ class PointCollection:
             transmitter=flight.transmitter,
             receiver=flight.receiver,
             clock_error=flight.clock,
+            electrons=flight.electrons,
         )
         if self.is_tapered:
             history.samples[:] *= np.outer(self.window(slow_time.size), self.window(frequencies))

@@ -54,6 +54,12 @@ class Course:
         fit = np.polynomial.legendre.legfit(place, self.values, order)
         return Course(self.times, np.polynomial.legendre.legval(place, fit).T)
 
+    @property
+    def mean(self) -> float:
+        """Mean over its times, of values (n,)."""
+        middles = (self.values[1:] + self.values[:-1]) / 2
+        return float(middles @ np.diff(self.times) / (self.times[-1] - self.times[0]))
+
 
 class PathError(NamedTuple):
     """Measured minus actual position of one platform, r̃(τ): (22) and what is faster.
@@ -90,13 +96,15 @@ class PathError(NamedTuple):
 class Errors(NamedTuple):
     """Errors in one image: of both platforms, the clock's t̃₀ … t̃₃ of (1), and any other history of the clock.
 
-    [s], [1], [1/s], [1/s²]; `clock_course` [s].
+    [s], [1], [1/s], [1/s²]; `clock_course` [s], which a delay in the air is too. `electrons` is the delay by free
+    electrons at a frequency f of 1 Hz, which falls as 1/f² and advances the phase. [s·Hz²]
     """
 
     transmitter: PathError = PathError()
     receiver: PathError = PathError()
     clock: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
     clock_course: Course | None = None
+    electrons: Course | None = None
 
     def of(self, platform: str, error: PathError) -> "Errors":
         """Give one platform an error."""
@@ -116,6 +124,7 @@ class Errors(NamedTuple):
             transmitter=self.transmitter.slow(),
             receiver=self.receiver.slow(),
             clock_course=self.clock_course and self.clock_course.smooth(),
+            electrons=self.electrons and self.electrons.smooth(),
         )
 
 
@@ -146,11 +155,17 @@ class Path:
 
 @dataclass(frozen=True, eq=False)
 class Flight:
-    """Both platforms at some slow times, and the error of the clock there, (times,). [s]"""
+    """Both platforms at some slow times, and the error of the clock there, (times,). [s]
+
+    `electrons` is the delay by free electrons at 1 Hz [s·Hz²], None without. `seen` is the error of a clock that has
+    the same effect at the centre frequency as the clock and they have together. [s]
+    """
 
     transmitter: Path
     receiver: Path
     clock: Floats
+    seen: Floats
+    electrons: Floats | None = None
 
     @property
     def paths(self) -> tuple[Path, Path]:
@@ -160,7 +175,7 @@ class Flight:
     def as_measured(self) -> "Flight":
         """The flight that the processor believes in: where the paths were measured, by a perfect clock."""
         transmitter, receiver = (Path(actual=one.measured, measured=one.measured) for one in self.paths)
-        return Flight(transmitter, receiver, np.zeros_like(self.clock))
+        return Flight(transmitter, receiver, np.zeros_like(self.clock), np.zeros_like(self.clock))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -311,6 +326,7 @@ def phase_history(
     transmitter: Path,
     receiver: Path,
     clock_error: Floats | float = 0.0,
+    electrons: Floats | None = None,
     noise_power: float = 0.0,
     rng: np.random.Generator | None = None,
 ) -> PhaseHistory:
@@ -330,6 +346,8 @@ def phase_history(
         At the pulses.
     clock_error : (pulses,) ndarray or float
         t̃(τ) of (1). [s]
+    electrons : (pulses,) ndarray, optional
+        Delay by free electrons at a frequency of 1 Hz, the same for every scatterer. [s·Hz²]
     noise_power : float
         Variance of the circular white Gaussian noise of a sample, relative to amplitude 1.
     rng : numpy Generator, optional
@@ -368,6 +386,8 @@ def phase_history(
             by_coarse = np.exp(-1j * coarse[:, None] * ranges[:, None]) * amplitudes[part]  # (2), (3)
             total += by_coarse @ np.exp(-1j * ranges[..., None] * fine)
         samples[some] = total.reshape(len(total), -1)[:, : wavenumber.size]
+    if electrons is not None:  # a delay of K/f² is a phase of +2πK/f: its derivative by 2πf is -K/f²
+        samples *= np.exp(2j * math.pi * electrons[:, None] / frequency)
     if noise_power:
         if rng is None:
             raise ValueError("noise needs a random generator")

@@ -253,6 +253,7 @@ def simulate_point(
             transmitter=flight.transmitter,
             receiver=flight.receiver,
             clock_error=flight.clock,
+            electrons=flight.electrons,
             noise_power=10 ** (settings.noise / 10) if settings.noise is not None else 0.0,
             rng=rng,
         )
@@ -501,7 +502,7 @@ def _range_error(flight: Flight, scatterer: GroundVector, seen_at: GroundVector)
     total: Floats = np.zeros(flight.clock.shape)
     for one in flight.paths:
         total += np.linalg.norm(one.actual - there, axis=1) - np.linalg.norm(one.measured - here, axis=1)
-    return total + SPEED_OF_LIGHT * flight.clock
+    return total + SPEED_OF_LIGHT * flight.seen
 
 
 def _measured(image: Complexes, spacing: float, mask_m: float | None) -> ImpulseResponse:

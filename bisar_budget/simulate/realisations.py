@@ -1,4 +1,4 @@
-"""Time series of sensors and clocks: what each may have done within one aperture, drawn moment by moment.
+"""Time series of sensors, clocks and the air: what each may have done within one aperture, drawn moment by moment.
 
 They share nothing with the formulas that they judge: walks are sums of steps, correlated noise follows its recursion,
 phase noise is a sum of tones, and synchronisation joins samples of it by straight lines.
@@ -15,11 +15,14 @@ from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.navigation_errors import acceleration_errors, process_of, specific_force
 from bisar_budget.effects.oscillators import noise_of
+from bisar_budget.effects.propagation import CONTENT, DELAY, group_delay
 from bisar_budget.effects.random_effect import RandomError
 from bisar_budget.effects.random_errors import random_errors
 from bisar_budget.effects.spectra import PowerLawPiece
+from bisar_budget.geometry import PlatformState
 from bisar_budget.mission.instruments import GaussMarkov
 from bisar_budget.mission.model import Mission, Simulation
+from bisar_budget.mission.propagation import DELAYS
 from bisar_budget.simulate.phase_history import Course, Errors, Floats, PathError
 
 _STEPS = 512  # from mid-aperture to the end of it, in which a walk is summed up
@@ -71,13 +74,32 @@ def position_courses(
     return total
 
 
+def delay_courses(
+    mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator
+) -> Floats:
+    """Group delays on one leg at the centre frequency, (draws, times), of one sigma of what is declared. [m]
+
+    Parameters are those of `position_courses`. What is above the scene stays as it is within an aperture.
+    """
+    size = (error.declared or 0.0) / mission.allocation.coverage_factor
+    path: PlatformState = getattr(mission.geometry, error.owner)
+    of_unit = np.broadcast_to(group_delay(mission, path, error.subject.axis, times), times.shape)
+    found: Floats = np.multiply.outer(size * rng.standard_normal(draws), of_unit)
+    return found
+
+
+def electrons_at_1_hz(mission: Mission, times: Floats, group: Floats) -> Course:
+    """Group delays at the centre frequency by free electrons, (times,) [m], as a history of `Errors`. [s·Hz²]"""
+    return Course(times, group / SPEED_OF_LIGHT * mission.radar.center_frequency**2)
+
+
 def has_unset_clocks(mission: Mission) -> bool:
     """Whether oscillators are flown without mean and slope: the file does not say how they are set."""
     return any(error.displaces_unknown for error in random_errors(mission))
 
 
 def drawn_errors(analysis: Analysis) -> Errors:
-    """One time series of each declared error of sensors and clocks, with the coverage factor, by the file's seed.
+    """One time series of each declared error of sensors, clocks and the air, with the coverage factor, by the seed.
 
     A clock is flown as it is set. What setting leaves, `timing_error` has, so that an oscillator beside it is flown
     without mean and slope; and so is a free one of which the file does not say how it is set.
@@ -91,6 +113,7 @@ def drawn_errors(analysis: Analysis) -> Errors:
     moments: Floats = np.linspace(-half, half, count)
     moved: dict[str, Floats] = {}
     phase: Floats = np.zeros(moments.size)
+    air = dict.fromkeys(DELAYS, np.zeros(times.size))
     for error in analysis.random:
         if not error.declared:
             continue
@@ -98,6 +121,9 @@ def drawn_errors(analysis: Analysis) -> Errors:
         if error.subject.kind in ("imu", "random"):
             drawn = factor * position_courses(mission, error, times, 1, rng)[0]
             moved[error.owner] = moved.get(error.owner, 0.0) + drawn
+        elif error.subject.kind == "propagation":
+            (group,) = factor * delay_courses(mission, error, times, 1, rng)
+            air[error.subject.axis] = air[error.subject.axis] + group
         elif error.published.spread:
             drawn = factor * phase_courses(mission, error, moments, 1, rng)[0]
             phase = phase + (
@@ -106,8 +132,12 @@ def drawn_errors(analysis: Analysis) -> Errors:
     transmitter, receiver = (
         PathError(course=Course(times, moved[name]) if name in moved else None) for name in PLATFORMS
     )
-    clock = Course(moments, clock_seconds(phase, mission.radar.wavelength)) if phase.any() else None
-    return Errors(transmitter, receiver, clock_course=clock)
+    seconds = clock_seconds(phase, mission.radar.wavelength)
+    if air[DELAY].any():
+        seconds = seconds + np.interp(moments, times, air[DELAY]) / SPEED_OF_LIGHT
+    clock = Course(moments, seconds) if seconds.any() else None
+    electrons = electrons_at_1_hz(mission, times, air[CONTENT]) if air[CONTENT].any() else None
+    return Errors(transmitter, receiver, clock_course=clock, electrons=electrons)
 
 
 def _bias(order: int) -> Callable[[Floats, int, np.random.Generator], Floats]:

@@ -9,6 +9,7 @@ from functools import partial
 
 import numpy as np
 
+from bisar_budget.analysis.spread import stated_powers
 from bisar_budget.analysis.vibration_limits import tone_limits
 from bisar_budget.budget.aggregates import Aggregates
 from bisar_budget.budget.judged_rows import Judging
@@ -157,8 +158,15 @@ def _of_tones_by_islr(study: Study) -> Iterator[tuple[Subject, Case]]:
 def _of_instruments(study: Study) -> Iterator[tuple[str, Case]]:
     """Sensors and clocks that have a limit, and what all noise spreads together."""
     for error in study.analysis.random:
-        if limits_of(study, error):
+        sizes = limits_of(study, error)
+        if sizes and error.subject.kind == "other":
+            yield error.id, partial(phase_cases.stated, study, error.id, min(sizes.values()), error.unit)
+        elif sizes:
             yield error.id, partial(verify_random, study, error)
+    required = study.mission.requirements.islr
+    if required is not None:
+        for power in stated_powers(study.mission):
+            yield power.subject.id, partial(phase_cases.stated, study, power.subject.id, required, "dB")
     metric, limits = tone_limits(study.mission, study.allocation)
     for spur in spurs_of(study.mission):
         limit = limits.get(spur.name)

@@ -119,6 +119,11 @@ def other(study: Study, source: ErrorSource) -> Verdict:
     return study.blank(source.id, budget, source.unit, budget_rad=budget, reason=reasons.phase_without_motion())
 
 
+def stated(study: Study, row_id: str, limit: float, unit: str) -> Verdict:
+    """Effect from elsewhere other than a quadratic phase."""
+    return study.blank(row_id, limit, unit, reason=reasons.stated_by_its_effect())
+
+
 def edge(study: Study) -> Verdict:
     """Difference between two places of the scene; what images and exact ranges say of it is in the tests."""
     budget = study.allocation.qpe_total

@@ -75,6 +75,12 @@ def phase_without_motion() -> str:
 
 
 @phrase
+def stated_by_its_effect() -> str:
+    """Said of an error from elsewhere that is stated by what it does."""
+    return "stated by its effect: there is nothing to form an image of"
+
+
+@phrase
 def images_are_of_the_centre() -> str:
     """Said of the row of the scene's edge."""
     return "the difference of two places of the scene: images are formed of its centre"

@@ -22,12 +22,13 @@ from bisar_budget.effects.declared import CUBIC, LOCATION
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.navigation_errors import process_of
 from bisar_budget.effects.oscillators import Spur
+from bisar_budget.effects.propagation import CONTENT, seen_course
 from bisar_budget.effects.random_effect import RandomError
 from bisar_budget.effects.vibration import SLOWEST, Line, lines_of, near_lines, sight_of, worst_phases
 from bisar_budget.findings.images import Verdict
 from bisar_budget.mission.model import Simulation
 from bisar_budget.phrases import Note
-from bisar_budget.ranges.exact_ranges import aperture_nodes
+from bisar_budget.ranges.exact_ranges import FINE, Found, aperture_nodes, nodes
 from bisar_budget.simulate.collection import CELLS, PointCollection
 from bisar_budget.simulate.impulse_response import upsampled
 from bisar_budget.simulate.phase_history import (
@@ -40,7 +41,13 @@ from bisar_budget.simulate.phase_history import (
     cell_centres,
     direct_path_error,
 )
-from bisar_budget.simulate.realisations import clock_seconds, phase_courses, position_courses
+from bisar_budget.simulate.realisations import (
+    clock_seconds,
+    delay_courses,
+    electrons_at_1_hz,
+    phase_courses,
+    position_courses,
+)
 from bisar_budget.verify import reasons
 from bisar_budget.verify.aperture_reading import measured_shift
 from bisar_budget.verify.phase_cases import TOLERANCE, compare, moved
@@ -68,6 +75,7 @@ _AT_MOST = 256  # of them in memory
 _NORMAL_95 = 1.96  # standard errors on either side of a mean
 _SURE = 3.3  # of them within one verdict, 99.9 %: another seed must not draw another verdict
 _KNOWN_DB = 0.25  # half of an interval at most: one that is drawn too early may lie anywhere
+_FOLLOWED = ("imu", "random", "propagation")  # kinds whose histories go through exact ranges as they are
 _NODES = 32  # of the mainlobe's integral
 _STEPS = 64  # in a cell, by which the first null is sought: the response is 0 there, and so is what a step holds
 _TINY = 1e-300
@@ -231,7 +239,7 @@ def measured_power(
 def limits_of(study: Study, error: RandomError) -> dict[str, float]:
     """Size at which each requirement that an error touches is reached, autofocus left out; empty: none limits it."""
     model = _model(study, error)
-    effect = held_effect(study.mission, error.effect(model))
+    effect = held_effect(study.mission, error.effect(model), error.coverage(study.mission))
     sizes = map(float, sizes_at(effect, limits_for(study.mission, study.allocation, error.owner, model)))
     return {name: size for name, size in zip(HELD, sizes, strict=True) if math.isfinite(size)}
 
@@ -323,8 +331,8 @@ def _place(study: Study, blank: Verdict, error: RandomError, rng: np.random.Gene
     """Sigma of the displacement at the limit, coverage factor included, against the requirement."""
     required = study.mission.requirements.location_error or 0.0
     factor, draws = study.mission.allocation.coverage_factor, _DRAWS
-    if error.subject.kind in ("imu", "random"):
-        found = study.exact_effects(error.owner, _courses(study, error, rng))
+    if error.subject.kind in _FOLLOWED:
+        found = _drawn_effects(study, error, rng)
     else:
         fit, draws = _fits(study, error, rng)
         if error.subject.kind == "synchronization":  # a constant phase moves nothing
@@ -360,11 +368,35 @@ def _stream(study: Study, row_id: str) -> np.random.Generator:
 
 def _sigma(study: Study, error: RandomError, rng: np.random.Generator, is_cubic: bool) -> tuple[float, int]:
     """Standard deviation of a phase over many time series, and their number. [rad]"""
-    if error.subject.kind in ("imu", "random"):
-        found = study.exact_effects(error.owner, _courses(study, error, rng))
+    if error.subject.kind in _FOLLOWED:
+        found = _drawn_effects(study, error, rng)
         return float(np.nanstd(found.cubic if is_cubic else found.quadratic)), _DRAWS
     fit, draws = _fits(study, error, rng)
     return float(np.std(2.5 * fit[3] if is_cubic else 1.5 * fit[2])), draws
+
+
+def _drawn_effects(study: Study, error: RandomError, rng: np.random.Generator) -> Found:
+    """Effects of many histories of a sensor or the air, by exact ranges, (draws,)."""
+    if error.subject.kind != "propagation":
+        return study.exact_effects(error.owner, _courses(study, error, rng))
+    moments = aperture_nodes(study.collection.aperture_time)
+    group = delay_courses(study.mission, error, moments, _DRAWS, rng)
+    mean = (group @ nodes(FINE).fit[0])[:, None]
+    return study.exact_effects("clock", seen_course(group, mean, error.subject.axis))
+
+
+def _left_at_the_point(study: Study, error: RandomError, times: Floats, group: Floats) -> Floats:
+    """Range error that group delays (draws, times) leave where they move a point to. [m]"""
+    half, geometry = study.collection.aperture_time / 2, study.geometry
+    mean = group.mean(axis=1, keepdims=True)
+    seen = seen_course(group, mean, error.subject.axis)
+    at_nodes = np.stack([np.interp(aperture_nodes(2 * half), times, one) for one in seen])
+    found = study.exact_effects("clock", at_nodes)
+    for path in geometry.both:
+        position = np.stack(np.broadcast_arrays(*path.place(times)))
+        sight = position / np.linalg.norm(position, axis=0)
+        seen = seen + np.multiply.outer(found.east, sight[0]) + np.multiply.outer(found.north, sight[1])
+    return np.asarray(seen)
 
 
 def _courses(study: Study, error: RandomError, rng: np.random.Generator) -> Floats:
@@ -415,6 +447,11 @@ def _series(study: Study, error: RandomError, rng: np.random.Generator) -> list[
     if error.subject.kind in ("imu", "random"):
         courses = position_courses(study.mission, error, times, _IMAGES, rng)
         return [Errors().of(error.owner, PathError(course=Course(times, one).smooth(_ORDER))) for one in courses]
+    if error.subject.kind == "propagation":
+        groups = delay_courses(study.mission, error, times, _IMAGES, rng)
+        if error.subject.axis == CONTENT:
+            return [Errors(electrons=electrons_at_1_hz(study.mission, times, one)) for one in groups]
+        return [Errors(clock_course=Course(times, one / SPEED_OF_LIGHT)) for one in groups]
     phases = phase_courses(study.mission, error, times, _IMAGES, rng)
     delays = [clock_seconds(one, study.collection.wavelength) for one in phases]
     return [Errors(clock_course=Course(times, one).smooth(_ORDER)) for one in delays]
@@ -475,6 +512,9 @@ def _power(
             if error.subject.kind in ("imu", "random"):
                 moved = position_courses(mission, error, times, draws, rng)
                 phases += 2 * math.pi / collection.wavelength * moved @ np.array(sight_of(mission, error.owner))
+            elif error.subject.kind == "propagation":
+                group = delay_courses(mission, error, times, draws, rng)
+                phases += 2 * math.pi / collection.wavelength * _left_at_the_point(study, error, times, group)
             else:
                 phases += phase_courses(mission, error, times, draws, rng)
         phases = phases - phases @ fitted

@@ -239,7 +239,7 @@ class Study:
         time = np.linspace(-half, half, 257)
         point = np.array([*effect.displacement, 0.0])
         flight = self.collection.flight(errors.smooth(), time)
-        left: Floats = SPEED_OF_LIGHT * flight.clock
+        left: Floats = SPEED_OF_LIGHT * flight.seen
         slopes: Floats = np.zeros((time.size, 2))
         for one in flight.paths:
             sight = one.measured - point

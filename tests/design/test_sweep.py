@@ -144,6 +144,14 @@ _RULES = {
     "platforms.receiver.motion_error.random": ("[{name: GNSS, sigma: [1 mm, 2 mm, 0], correlation_time: 2 s}]",),
     "platforms.receiver.motion_error": (COVARIANCE,),
     "platforms.receiver.oscillator": (MASK, "{allan_deviation: {1 s: 3e-12, 10 s: 2e-12, 100 s: 4e-12}}"),
+    "propagation": (
+        "{zenith_delay: 5 cm, zenith_electron_content: 2 TECU}",
+        "{transmitter: {zenith_delay: 1 m, zenith_electron_content: 50 TECU}}",
+    ),
+    "other_errors": (
+        "[{name: a, cubic_phase_error: 3 deg, islr: -35 dB}, {name: b, location_error: 2 m}]",
+        "[{name: a, quadratic_phase_error: 3 deg, location_error: 1 cm}]",
+    ),
     "synchronization": ("{error: 1 deg, interval: 0.3 s}", "{error: 1 deg, method: direct_path}"),
 }
 

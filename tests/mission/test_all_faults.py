@@ -28,9 +28,9 @@ SECTIONS = {
     ),
     "word": ("requirements: {declare: [imus]}", "imus", "requirements.declare[0]", "is not a known choice"),
     "later": (
-        "propagation: {zenith_delay: 5 cm}",
-        "propagation",
-        "propagation",
+        "earth_orientation: {ut1_minus_utc: 0.1 s}",
+        "earth_orientation",
+        "earth_orientation",
         "is not computed by this version yet",
     ),
 }

@@ -239,9 +239,8 @@ def _waived_rows(before: MissionFindings, after: MissionFindings) -> Iterator[Lo
 def _errors(before: MissionFindings, after: MissionFindings) -> Iterator[Loosened]:
     """Errors that the file declares no more, or as zero; of motion along whatever axes."""
     old, new = _declared(before), _declared(after)
-    for name in dict.fromkeys(_error(row) for row in before.rows if row.declared is not None and row.is_independent):
-        if name.rpartition(".")[2] in _SUMS:
-            continue
+    stated = (row for row in before.rows if row.declared is not None and row.is_independent)
+    for name in dict.fromkeys(_error(row) for row in stated if row.subject.kind not in _SUMS):
         if name not in new:
             yield Loosened(name, "declared", "not declared")
         elif old[name] and not new[name]:
@@ -276,7 +275,7 @@ def _sources(before: MissionFindings, after: MissionFindings) -> Iterator[Loosen
 
 def _named_sources(mission: Mission) -> dict[str, str | None]:
     """Source of each error that has a name of its own, by the id of its row."""
-    sources = {f"other.{one.name}": one.source for one in mission.other_errors}
+    sources = {row_id: one.source for one in mission.other_errors for row_id in one.stated}
     for platform in PLATFORMS:
         error = getattr(mission.platforms, platform).motion_error
         evidence = error.evidence("random")

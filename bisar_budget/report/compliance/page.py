@@ -666,6 +666,12 @@ def _validity(mission: Mission, found: MissionFindings) -> Iterator[tuple[str, s
             "spectra of phase are one-sided, and count to the mask’s end or the oscillator’s bandwidth, 1 kHz where "
             "neither is stated. The level of an oscillator is that of its noise against the noise declared, 0 dB",
         )
+    if mission.propagation is not None:
+        yield (
+            "Delays in the air",
+            "one sigma of what correction leaves above the scene, legs independent. Below 80 km a leg is as long as "
+            "over a flat Earth and crosses no free electrons; above, it crosses spherical shells at 7 km and 350 km",
+        )
     for row in found.rows:
         if row.subject.kind == "oscillator" and row.remarks:
             yield f"Oscillator of the {row.owner}", "; ".join(row.remarks)
@@ -710,7 +716,7 @@ def _inputs(mission: Mission, found: MissionFindings, file: str) -> Iterator[Inp
     yield given("warning above", f"{100 * allocation.warn_above:g} % of a limit", ("allocation", "warn_above"))
 
 
-_SOURCED = (*MOTION_UNITS, "vibration", "other", "imu", "random", "oscillator", "synchronization")
+_SOURCED = (*MOTION_UNITS, "vibration", "other", "imu", "random", "oscillator", "synchronization", "propagation")
 
 
 def _may_have_a_source(row: Row) -> bool:

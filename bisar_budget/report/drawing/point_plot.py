@@ -107,6 +107,8 @@ def _flown(mission: Mission) -> str:
     likely = "; of a covariance its most probable one" if any(error.covariance for error in errors) else ""
     seed = (mission.simulation or Simulation()).seed
     drawn = f"; of sensors and clocks one time series each, seed {seed}" if has_instruments(mission) else ""
+    if mission.propagation is not None:
+        drawn += f"; of delays in the air one draw each, seed {seed}"
     if any(platform.oscillator and platform.oscillator.spurs for platform in mission.platforms):
         drawn += "; tones of oscillators are left out"
     if has_instruments(mission) and has_unset_clocks(mission):

@@ -1,4 +1,4 @@
-"""How a sensor or a clock comes to its phases: figures of a data sheet, line of sight, spectra and integrals."""
+"""How a sensor, a clock or the air comes to its phases: figures, line of sight, spectra and integrals."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -28,6 +28,7 @@ from bisar_budget.findings.row import Row
 from bisar_budget.geometry import PlatformState
 from bisar_budget.mission.instruments import Synchronization
 from bisar_budget.mission.model import Mission
+from bisar_budget.report.explain.explained_air import delay_on_a_leg, effect_from_elsewhere
 from bisar_budget.report.explain.explained_error import combined, limit_steps, place, smallest_size, stated
 from bisar_budget.report.explain.notation import (
     Step,
@@ -63,6 +64,10 @@ def explained_random(analysis: Analysis, allocation: Allocation, error: RandomEr
         yield from _position(analysis, error)
     elif kind == "oscillator":
         yield from _oscillator(mission, error)
+    elif kind == "propagation":
+        yield from delay_on_a_leg(analysis, error)
+    elif kind == "other":
+        yield from effect_from_elsewhere()
     else:
         yield from _link(mission, error)
     if model == "full":
@@ -77,9 +82,10 @@ def _declared(mission: Mission, error: RandomError, row: Row) -> Iterator[Step]:
     if error.declared is None:
         return
     k = mission.allocation.coverage_factor
-    if error.unit != "dB":
+    if error.unit != "dB" and error.is_covered:
         lines = equation("declared", "k*|value|", {"k": k, "value": error.declared / k}, error.declared, error.unit)
-        yield from step("Coverage factor allocation.coverage_factor; of three axes the largest value", *lines)
+        of_axes = "; of three axes the largest value" if error.subject.kind in ("imu", "random") else ""
+        yield from step(f"Coverage factor allocation.coverage_factor{of_axes}", *lines)
 
 
 def _imu(analysis: Analysis, error: RandomError) -> Iterator[Step]:
@@ -141,8 +147,10 @@ def _moved(error: RandomError, model: str) -> Iterator[Step]:
     if not effect.displacement > 0:
         return
     values, unit = {"east/unit": effect.east, "north/unit": effect.north}, _per_unit("m", error)
+    by = "(25)" if model == "published" else "exact ranges"
+    title = f"Orders 0 and 1 displace the image, by {by}; rms length"
     yield from step(
-        f"Orders 0 and 1 displace the image, by {'(25)' if model == 'published' else 'exact ranges'}; rms length",
+        title if error.is_covered else "In whatever direction: half of its square east, half of it north",
         *(f"{symbol} = {with_unit(value, unit)}" for symbol, value in values.items()),
         *equation("moved/unit", "sqrt((east/unit)^2 + (north/unit)^2)", values, effect.displacement, unit),
     )
@@ -312,14 +320,15 @@ def _phases(mission: Mission, error: RandomError, model: str) -> Iterator[Step]:
 
 def _covered(mission: Mission, error: RandomError) -> float:
     """Coverage factor within what is declared; that of an oscillator is in its phases."""
-    return 1.0 if error.unit == "dB" else mission.allocation.coverage_factor
+    return 1.0 if error.unit == "dB" else float(error.coverage(mission))
 
 
 def _allowable(mission: Mission, allocation: Allocation, error: RandomError, row: Row, model: str) -> Iterator[Step]:
     effect = error.effect(model)
-    held = held_effect(mission, effect)
+    held = held_effect(mission, effect, error.coverage(mission))
     limit = allocation.qpe_limit(error.owner) * allocation.autofocus_gain
-    yield from limit_steps(allocation, error.owner, limit)
+    if error.is_covered:  # an effect from elsewhere has no quadratic phase here
+        yield from limit_steps(allocation, error.owner, limit)
     sizes: dict[str, float] = {}
     required = mission.requirements
     if effect.quadratic:
@@ -361,7 +370,7 @@ def _allowable(mission: Mission, allocation: Allocation, error: RandomError, row
 
 def _with_cubic(mission: Mission, error: RandomError, effect: RandomEffect, held: RandomEffect) -> Iterator[Step]:
     """Add the power of the cubic phase to what is left, where no requirement of its own takes it."""
-    k, factor = _covered(mission, error), mission.allocation.coverage_factor
+    k, factor = _covered(mission, error), float(error.coverage(mission))
     values = {"cubic/unit": effect.cubic, "left/unit": effect.spread * k, "k": factor}
     # What is left is shown of one sigma, the cubic phase with the factor of what is declared or without it.
     formula = "4*(cubic/unit)^2/175" if k == factor else "4*(cubic/unit/k)^2/175"

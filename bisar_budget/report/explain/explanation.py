@@ -126,6 +126,10 @@ def _to_utilization(mission: Mission, found: MissionFindings, row: Row) -> Itera
         from bisar_budget.report.explain.explained_random import explained_spur
 
         yield from explained_spur(mission, found.allocation, row)
+    elif row.subject.kind == "other":
+        from bisar_budget.report.explain.explained_air import explained_power
+
+        yield from explained_power(mission, found.allocation, row)
     elif row.subject.kind == "pslr":
         from bisar_budget.report.explain.explained_random import explained_pslr
 

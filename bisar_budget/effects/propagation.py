@@ -1,0 +1,107 @@
+"""Delays in the air at random: what correction leaves makes each leg longer than the processor takes it for.
+
+A leg has the delay of the zenith times what its elevation, seen from the scene, makes of it. The elevation changes
+over the aperture, and with it the delay: orders 0 and 1 displace the image, from order 2 on it defocuses.
+
+The troposphere delays every frequency alike. Free electrons delay the group of frequencies, g = 40.3·TEC/f², and
+advance the phase at the centre frequency by as much. An image finds its range by the band, the group, and everything
+else by the phase. So its range error is that of the phase, −g, with the constant part of the group, +ḡ: the
+displacement Q⁻¹[ḡ, −g₁] and the phases of −g, with what the displacement adds. Derived here.
+"""
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from bisar_budget.constants import EARTH_RADIUS
+from bisar_budget.effects.effect import PLATFORMS, subject
+from bisar_budget.effects.random_effect import RandomError, SensorCases
+from bisar_budget.geometry import PlatformState, Vectors, norm
+from bisar_budget.mission.model import Mission
+from bisar_budget.mission.propagation import ABOVE_THE_AIR, DELAYS, height_of
+
+ELECTRONS = 40.308  # m³/s²: e²/(8π²ε₀mₑ), the group delay of 1/m² is so much over f² (CODATA 2018)
+TROPOSPHERE = 7e3  # m, height at which a spherical troposphere is crossed as a whole
+IONOSPHERE = 350e3  # m, the same of free electrons, where the platform is not lower
+DELAY, CONTENT = DELAYS
+UNITS = dict(zip(DELAYS, ("m", "1/m^2"), strict=True))
+
+
+def obliquity(position: Vectors, shell: Any) -> Any:
+    """Length of a leg through a thin shell of the air over that of the zenith, exact for a sphere.
+
+    Parameters
+    ----------
+    position : Vectors
+        Of the platform, east, north and up of the scene, (…). [m]
+    shell : float or (…)
+        Height of the shell; 0 for a flat Earth, 1/sin of the elevation. [m]
+    """
+    x, y, _ = position
+    level = np.square(np.hypot(x, y) / norm(position))  # cos² of the elevation
+    return 1 / np.sqrt(1 - level / np.square(1 + np.asarray(shell) / EARTH_RADIUS))
+
+
+def leg_factor(delay: str, position: Vectors, middle: Vectors) -> Any:
+    """Delay of a leg over that of the zenith, for positions (…) of a platform that is at `middle` at mid-aperture.
+
+    One within the air has a flat Earth below it, and no free electrons on its leg.
+    """
+    height = np.asarray(height_of(middle))
+    is_above = height >= ABOVE_THE_AIR
+    if delay == DELAY:
+        return obliquity(position, np.where(is_above, TROPOSPHERE, 0.0))
+    return np.where(is_above, obliquity(position, np.minimum(IONOSPHERE, np.maximum(height, 0.0))), 0.0)
+
+
+def metres_per_unit(mission: Mission, delay: str) -> Any:
+    """Group delay of the zenith by a unit of a figure, at the centre frequency. [m/unit]"""
+    return 1.0 if delay == DELAY else ELECTRONS / np.square(mission.radar.center_frequency)
+
+
+def group_delay(mission: Mission, path: PlatformState, delay: str, times: Any) -> Any:
+    """Group delay of the leg of a platform by a unit of a figure, at slow times. [m/unit]"""
+    return metres_per_unit(mission, delay) * leg_factor(delay, path.place(times), path.position)
+
+
+def seen_course(group: Any, mean: Any, delay: str) -> Any:
+    """Range error that an image shows by a group delay whose constant part is `mean`. [m]"""
+    return group if delay == DELAY else 2 * mean - group
+
+
+def dispersion(mission: Mission, path: PlatformState) -> float:
+    """Phase at the ends of the band that a unit of electron content bends it by, of one case. [rad/unit]
+
+    Of exp(2πi·K/(c·f)), K = g·f₀², the second order in f − f₀: (2π/λ)·g·(B/2f₀)².
+    """
+    radar, g = mission.radar, float(group_delay(mission, path, CONTENT, 0.0))
+    return 2 * math.pi / radar.wavelength * g * (radar.bandwidth / radar.center_frequency / 2) ** 2
+
+
+def delay_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
+    """Delays on the leg of a platform, declared or not; none where nothing is stated of it."""
+    propagation = seen.mission.propagation
+    leg = None if propagation is None else propagation.leg(name)
+    if propagation is None or leg is None:
+        return
+    exact, place = seen.exact, PLATFORMS.index(name)
+    track, middle = exact.tracks[place], getattr(seen.geometry, name).position
+    for delay, unit in UNITS.items():
+        scale = metres_per_unit(seen.mission, delay)
+        moving, still = (
+            np.broadcast_to(scale * leg_factor(delay, one, middle), exact.times.shape) for one in (track, middle)
+        )
+        mean = exact.fit[0] @ moving
+        published, full = seen.of_courses(seen_course(moving, mean, delay)[None], still[None])
+        value = getattr(leg, delay)
+        yield RandomError(
+            subject=subject(name, "propagation", delay),
+            unit=unit,
+            declared=None if value is None else value * seen.factor,
+            path=propagation.path(name, delay),
+            published=published,
+            full=full,
+            spreads=False,
+        )

@@ -1,0 +1,117 @@
+"""Delays in the air: what correction leaves above the scene, on the leg of each platform. Values are SI, 1 sigma."""
+
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+
+from bisar_budget import units
+from bisar_budget.constants import EARTH_RADIUS
+from bisar_budget.faults import KeyPath, Problem
+from bisar_budget.geometry import PlatformState, Vectors
+from bisar_budget.mission.platforms import Platforms
+from bisar_budget.mission.readers import Key, Quantity, Section, Text
+
+DELAYS = ("zenith_delay", "zenith_electron_content")
+LEAST_ELEVATION_DEG = 3.0  # below, a delay does not follow from that of the zenith
+ABOVE_THE_AIR = 80e3  # m; below, there are no free electrons to speak of, and hardly any air above
+
+_ZENITH_DELAY = Quantity(units.LENGTH, ge=0, le=1e3)
+_ELECTRON_CONTENT = Quantity(units.ELECTRON_CONTENT, ge=0, le=1e20)
+_PLACES = np.linspace(-1.0, 1.0, 9)[:, None]  # of an aperture, in halves of it
+
+
+class LegDelay(NamedTuple):
+    """What correction leaves of the delays on one leg, 1 sigma."""
+
+    zenith_delay: Annotated[float | None, Key(_ZENITH_DELAY, "Of the troposphere.")] = None
+    zenith_electron_content: Annotated[
+        float | None, Key(_ELECTRON_CONTENT, "Of the ionosphere; 1 TECU is 1e16/m².")
+    ] = None
+    source: Annotated[str | None, Key(Text(), "Where the values come from; shown as evidence.")] = None
+
+    @staticmethod
+    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
+        """Hold it to state something."""
+        if values.keys() >= set(DELAYS) and all(values[one] is None for one in DELAYS):
+            yield Problem("states no delay", f"accepted: {' or '.join(DELAYS)}")
+
+
+_LEG = Section(LegDelay)
+
+
+class Propagation(NamedTuple):
+    """What correction leaves of the delays in the air, 1 sigma: the same for each leg, or of each leg its own."""
+
+    zenith_delay: Annotated[float | None, Key(_ZENITH_DELAY, "Of the troposphere, on each leg.")] = None
+    zenith_electron_content: Annotated[
+        float | None, Key(_ELECTRON_CONTENT, "Of the ionosphere, on each leg; 1 TECU is 1e16/m².")
+    ] = None
+    transmitter: Annotated[LegDelay | None, Key(_LEG, "From the transmitter to the scene, alone.")] = None
+    receiver: Annotated[LegDelay | None, Key(_LEG, "From the scene to the receiver, alone.")] = None
+    source: Annotated[str | None, Key(Text(), "Where the values come from; shown as evidence.")] = None
+
+    @staticmethod
+    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
+        """Hold it to figures of both legs, or of each."""
+        if not values.keys() >= {*DELAYS, *Platforms._fields}:
+            return
+        of_both = [one for one in DELAYS if values[one] is not None]
+        of_one = [name for name in Platforms._fields if values[name] is not None]
+        accepted = f"accepted: {' and '.join(DELAYS)} of both legs, or transmitter and receiver with their own"
+        if of_both and of_one:
+            yield Problem(f"mixes {of_both[0]} of both legs with {of_one[0]}", accepted, at=(of_one[0],))
+        elif not (of_both or of_one):
+            yield Problem("states no delay", accepted)
+
+    def leg(self, platform: str) -> LegDelay | None:
+        """What is stated of a platform's leg; None where that of the other alone is."""
+        if self.transmitter is None and self.receiver is None:
+            return LegDelay(self.zenith_delay, self.zenith_electron_content, self.source)
+        own: LegDelay | None = getattr(self, platform)
+        return own if own is None or own.source else own._replace(source=self.source)
+
+    def path(self, platform: str, delay: str) -> KeyPath:
+        """Where a figure of a leg stands in the file."""
+        is_of_both = self.transmitter is None and self.receiver is None
+        return ("propagation", *(() if is_of_both else (platform,)), delay)
+
+
+PROPAGATION = Section(Propagation)
+
+
+def height_of(position: Vectors) -> Any:
+    """Height of places (…) above the sphere of the Earth's mean radius that touches the scene. [m]"""
+    x, y, z = position
+    return np.sqrt(x * x + y * y + (z + EARTH_RADIUS) ** 2) - EARTH_RADIUS
+
+
+def low_legs(
+    propagation: Propagation, paths: Mapping[str, PlatformState], aperture_time_s: Any
+) -> Iterator[tuple[str, str, Any]]:
+    """Least elevation of the legs of which a delay is stated: platform, figure, and its degrees in the aperture."""
+    for name, path in paths.items():
+        leg = propagation.leg(name)
+        if leg is None:
+            continue
+        x, y, z = path.place(_PLACES * (np.asarray(aperture_time_s, dtype=float) / 2))
+        least = np.degrees(np.arctan2(z, np.hypot(x, y))).min(axis=0)
+        if leg.zenith_delay is not None:
+            yield name, DELAYS[0], least
+        if leg.zenith_electron_content is not None:
+            is_below = np.asarray(height_of(path.position)) < ABOVE_THE_AIR
+            yield name, DELAYS[1], np.where(is_below, 90.0, least)  # it has no leg there
+
+
+def too_low(propagation: Propagation, platforms: Platforms, aperture_time_s: float) -> Iterator[Problem]:
+    """Refuse delays of legs that run along the ground."""
+    paths = dict(zip(Platforms._fields, platforms.geometry.both, strict=True))
+    for name, delay, least in low_legs(propagation, paths, aperture_time_s):
+        (degrees,) = least.tolist()
+        if degrees < LEAST_ELEVATION_DEG:
+            yield Problem(
+                f"the {name} is seen at an elevation of {degrees:.3g} deg within the aperture: a delay along the "
+                "ground does not follow from that of the zenith",
+                f"accepted: elevations of at least {LEAST_ELEVATION_DEG:g} deg, or the delays of the other leg alone",
+                at=propagation.path(name, delay),
+            )

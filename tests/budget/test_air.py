@@ -1,0 +1,382 @@
+"""Rows of delays in the air and of effects from elsewhere: what each is held to, and in which sums it counts."""
+
+import json
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.budget.check import check_mission
+from bisar_budget.budget.judged_requirements import declared_kinds
+from bisar_budget.findings.mission import MissionFindings
+from bisar_budget.mission.load import parse_mission
+from bisar_budget.monte_carlo.probability import monte_carlo
+from bisar_budget.report.explain.explanation import explain
+from tests.conftest import TODAY, mission_text, row
+from tests.conftest import findings as found_of
+from tests.design.test_sweep import assert_as_checked, grid, swept
+from tests.report.test_report_explanation import evaluated, sums
+
+NEEDS = {"cubic_phase_error": "22.5 deg", "islr": "-20 dB", "location_error": "1 m"}
+AIR = {"zenith_delay": "5 cm", "source": "weather model"}
+ORBITS = {
+    "radar": {"center_frequency": "1.25 GHz", "bandwidth": "80 MHz"},
+    "platforms__transmitter": {
+        "position": ["500 km", "20 km", "600 km"],
+        "velocity": [0, "7500 m/s", 0],
+        "acceleration": ["-4 m/s^2", 0, "-5 m/s^2"],
+    },
+    "platforms__receiver": {
+        "position": ["480 km", "-20 km", "620 km"],
+        "velocity": [0, "7400 m/s", 0],
+        "acceleration": ["-4 m/s^2", 0, "-5 m/s^2"],
+    },
+}
+ELSEWHERE = {
+    "name": "antenna",
+    "quadratic_phase_error": "5 deg",
+    "cubic_phase_error": "-1 deg",
+    "location_error": "10 cm",
+    "islr": "-40 dB",
+    "source": "range test",
+}
+PLATFORMS = ("transmitter", "receiver")
+DELAY, CONTENT = "propagation.transmitter.zenith_delay", "propagation.transmitter.zenith_electron_content"
+
+
+def findings(**changes: object) -> MissionFindings:
+    """Check the base mission by the full model, by root-sum-square unless the changes say otherwise."""
+    rules = {"allocation__model": "full", "allocation__combine": "rss"}
+    if "allocation" in changes:
+        changes["allocation"] = {"model": "full", "combine": "rss"} | changes["allocation"]
+        rules = {}
+    return found_of(**(rules | changes))
+
+
+# ---------------------------------------------------------------------- delays in the air
+def test_a_delay_is_held_to_its_platforms_share() -> None:
+    split = {"transmitter": 0.2, "receiver": 0.8}
+    found = findings(propagation=AIR, allocation={"split": split})
+    rows = [row(found, f"propagation.{name}.zenith_delay") for name in ("transmitter", "receiver")]
+    for one, share in zip(rows, split.values(), strict=True):
+        assert one.subject.owner in one.id
+        assert one.binding_requirement == "quadratic_phase_error"
+        assert one.allowable / one.declared == pytest.approx(share * math.pi / 4 / one.qpe_full_rad)
+        assert (one.unit, one.evidence, one.islr_db) == ("m", "weather model", None)
+    for name, one in zip(split, rows, strict=True):
+        assert row(found, f"{name}.quadratic_phase_error").declared == pytest.approx(one.qpe_full_rad)
+
+
+def test_the_coverage_factor_multiplies_it() -> None:
+    one, two = (row(findings(propagation=AIR, allocation={"coverage_factor": k}), DELAY) for k in ("1", "2"))
+    assert two.declared == pytest.approx(2 * one.declared)
+    assert two.qpe_full_rad == pytest.approx(2 * one.qpe_full_rad)
+    assert two.allowable == pytest.approx(one.allowable)
+
+
+def test_legs_are_independent() -> None:
+    found = findings(propagation=AIR, requirements__location_error="1 m")
+    legs = [math.hypot(*row(found, f"propagation.{name}.zenith_delay").displacement_m) for name in PLATFORMS]
+    assert row(found, "mission.location_error").declared == pytest.approx(math.hypot(*legs))
+    summed = findings(propagation=AIR, requirements__location_error="1 m", allocation={"combine": "sum"})
+    assert row(summed, "mission.location_error").declared == pytest.approx(sum(legs))
+
+
+def test_below_the_ionosphere_electrons_do_nothing() -> None:
+    found = row(findings(propagation={"zenith_electron_content": "5 TECU"}), CONTENT)
+    assert (found.declared, found.allowable, found.displacement_m) == (5e16, None, (0.0, 0.0))
+    assert found.reason == "the transmitter flies below the ionosphere: no electrons on its leg"
+
+
+@pytest.mark.parametrize(("content", "said"), [("5 TECU", False), ("30 TECU", True)])
+def test_what_disperses_over_the_band_is_said(content: str, said: bool) -> None:
+    """30 TECU at 1.25 GHz and 80 MHz: 0.26 rad at the ends of the band, by the second order of K/f."""
+    found = row(findings(**ORBITS, propagation={"zenith_electron_content": content}), CONTENT)
+    assert any("at the ends of the band" in note for note in found.remarks) == said
+    if said:
+        f, edge = 1.25e9, 1.29e9
+        group = 40.308 * 30e16 / f**2 * 1.26  # the shell's factor, to a percent
+        tau = group / 299_792_458
+        phase = [2 * math.pi * tau * f**2 / one for one in (f, edge, 2 * f - edge)]
+        bend = (phase[1] + phase[2]) / 2 - phase[0]
+        (note,) = (note for note in found.remarks if "at the ends of the band" in note)
+        assert note.values[0] == pytest.approx(bend, rel=0.01)
+
+
+def test_a_leg_of_which_nothing_is_stated_has_no_row() -> None:
+    found = findings(propagation={"receiver": {"zenith_delay": "5 cm"}})
+    ids = [one.id for one in found.rows if one.subject.kind == "propagation"]
+    assert ids == ["propagation.receiver.zenith_delay", "propagation.receiver.zenith_electron_content"]
+    assert row(found, ids[1]).status == "not_declared"
+    assert row(findings(**ORBITS, propagation={"receiver": {"zenith_delay": 0}}), ids[1]).allowable > 0
+
+
+def test_no_requirement_takes_a_displacement_or_it_is_judged() -> None:
+    assert row(findings(propagation=AIR), "mission.location_error").status == "info"
+    judged = findings(propagation=AIR, requirements__location_error="15 cm")
+    assert row(judged, DELAY).status == "info"
+    assert row(judged, "mission.location_error").status == "fail"
+    assert row(judged, DELAY).binding_requirement == "location_error"
+
+
+def test_air_alone_is_a_mission_that_is_judged_but_spreads_nothing() -> None:
+    found = findings(propagation=AIR, requirements=NEEDS)
+    status = {one.key: one.status for one in found.requirements}
+    assert status["quadratic_phase_error"] == status["cubic_phase_error"] == status["location_error"] == "pass"
+    assert status["islr"] == "not_evaluated"
+
+
+@pytest.mark.parametrize(
+    ("propagation", "is_sourced"),
+    [
+        ({"zenith_delay": "5 cm"}, False),
+        (AIR, True),
+        ({"receiver": {"zenith_delay": "5 cm", "source": "a"}}, True),
+        ({"receiver": {"zenith_delay": "5 cm", "source": "a"}, "transmitter": {"zenith_delay": "1 cm"}}, False),
+    ],
+)
+def test_it_is_a_kind_of_error_with_a_source(propagation: dict[str, object], is_sourced: bool) -> None:
+    kinds = declared_kinds(parse_mission(mission_text(propagation=propagation)))
+    assert "propagation" in kinds.declared
+    assert ("propagation" in kinds.without_source) != is_sourced
+    assert "propagation" not in kinds.missing
+
+
+@pytest.mark.parametrize("model", ["published", "full", "strictest"])
+@pytest.mark.parametrize("combine", ["each", "sum", "rss"])
+def test_every_model_and_every_rule(model: str, combine: str) -> None:
+    """To the published model the line of sight is held: a delay displaces, and bends nothing."""
+    found = findings(
+        propagation=AIR, requirements=NEEDS, other_errors=[ELSEWHERE], allocation={"model": model, "combine": combine}
+    )
+    one = row(found, DELAY)
+    assert one.qpe_published_rad == 0
+    assert one.qpe_full_rad > 0
+    assert one.allowable_published is None
+    assert found.status == "pass"
+
+
+def test_with_a_direct_path() -> None:
+    found = findings(propagation=AIR, synchronization={"method": "direct_path", "error": "1 deg"})
+    plain = findings(propagation=AIR)
+    assert row(found, DELAY).displacement_m == pytest.approx(row(plain, DELAY).displacement_m, rel=1e-3)
+
+
+# ---------------------------------------------------------------------- effects from elsewhere
+@pytest.mark.parametrize("combine", ["each", "sum", "rss"])
+def test_effects_from_elsewhere_count_in_the_missions_sums(combine: str) -> None:
+    """Two of them beside a receiver that is wrong by a velocity; no share, no coverage factor."""
+    others = [ELSEWHERE, {"name": "scene", "cubic_phase_error": "2 deg", "location_error": "20 cm", "islr": "-37 dB"}]
+    velocity = {"platforms__receiver__motion_error__velocity": ["1 mm/s", 0, 0]}
+    allocation = {"combine": combine, "coverage_factor": "2"}
+    alone = findings(**velocity, requirements=NEEDS, allocation=allocation)
+    found = findings(**velocity, requirements=NEEDS, allocation=allocation, other_errors=others)
+    join: Callable[..., float] = {"each": max, "sum": lambda *sizes: sum(sizes), "rss": math.hypot}[combine]
+    by_velocity = row(alone, "receiver.velocity.x")
+    cubic = join(abs(by_velocity.cubic_rad), math.radians(1), math.radians(2))
+    assert row(found, "mission.cubic_phase_error").declared == pytest.approx(cubic)
+    moved = join(math.hypot(*by_velocity.displacement_m), 0.1, 0.2)
+    assert row(found, "mission.location_error").declared == pytest.approx(moved, rel=1e-6)
+    energy = 0.9028233335802807  # of a uniform window's mainlobe
+    variance = sum(math.log1p(10 ** (level / 10) * energy) for level in (-40, -37))
+    assert row(found, "mission.islr").declared == pytest.approx(10 * math.log10(math.expm1(variance) / energy))
+    assert row(found, "other.antenna").declared == pytest.approx(math.radians(5))
+    if combine != "each":
+        for name in PLATFORMS:
+            row_id = f"{name}.quadratic_phase_error"
+            assert row(found, row_id).declared == row(alone, row_id).declared
+
+
+@pytest.mark.parametrize("model", ["published", "full"])
+@pytest.mark.parametrize(
+    ("effect", "unit", "declared", "allowable", "binding"),
+    [
+        ("cubic_phase_error", "rad", math.radians(1), math.radians(22.5), "cubic_phase_error"),
+        ("location_error", "m", 0.1, 1.0, "location_error"),
+        ("islr", "dB", -40.0, -20.0, "islr"),
+    ],
+)
+def test_each_has_all_that_is_required(
+    model: str, effect: str, unit: str, declared: float, allowable: float, binding: str
+) -> None:
+    allocation = {"combine": "each", "model": model, "coverage_factor": "3", "split": "equal"}
+    found = row(
+        findings(requirements=NEEDS, other_errors=[ELSEWHERE], allocation=allocation), f"other.antenna.{effect}"
+    )
+    assert (found.unit, found.status, found.binding_requirement) == (unit, "pass", binding)
+    assert found.declared == pytest.approx(declared)
+    assert found.allowable == pytest.approx(allowable)
+    assert (found.evidence, found.equation, found.subject.owner) == ("range test", "as declared", "mission")
+    use = 10 ** ((declared - allowable) / 20) if unit == "dB" else declared / allowable
+    assert found.utilization == pytest.approx(use, rel=0.003)  # of rms phases, which an ISLR bends a little
+
+
+@pytest.mark.parametrize(
+    ("effect", "size", "over", "inside"),
+    [
+        ("cubic_phase_error", "{} deg", 22.6, 22.4),
+        ("location_error", "{} m", 1.01, 0.99),
+        ("islr", "{} dB", -19.9, -20.1),
+    ],
+)
+def test_from_both_sides_of_the_limit(effect: str, size: str, over: float, inside: float) -> None:
+    for value, status in ((over, "fail"), (inside, "warn")):
+        other = {"name": "a", effect: size.format(value)}
+        found = findings(requirements=NEEDS, other_errors=[other], allocation={"combine": "each"})
+        assert row(found, f"other.a.{effect}").status == status
+        assert {one.key: one.status for one in found.requirements}[effect] == status
+
+
+def test_without_a_requirement_a_power_is_not_judged() -> None:
+    """-30 dB are 0.03 rad, negligible; -15 dB are not. ISLR takes a cubic phase that nothing else takes."""
+    small, large = (
+        findings(other_errors=[{"name": "a", "islr": level, "quadratic_phase_error": 0}])
+        for level in ("-30 dB", "-15 dB")
+    )
+    assert row(small, "other.a.islr").status == "info"
+    assert row(large, "other.a.islr").status == "not_evaluated"
+    cubic = [{"name": "a", "cubic_phase_error": "20 deg"}]
+    found = row(findings(other_errors=cubic, requirements__islr="-20 dB"), "other.a.cubic_phase_error")
+    assert found.binding_requirement == "islr"
+    limit = math.sqrt(math.log1p(0.01 * 0.9028233335802807) * 175 / 4)
+    assert found.allowable == pytest.approx(limit)
+    assert row(findings(other_errors=cubic), "other.a.cubic_phase_error").status == "not_evaluated"
+
+
+def test_without_a_quadratic_phase_there_is_no_row_of_it() -> None:
+    found = findings(other_errors=[{"name": "a", "location_error": "1 cm"}], requirements__location_error="1 m")
+    assert [one.id for one in found.rows if one.subject.kind == "other"] == ["other.a.location_error"]
+    assert math.hypot(*row(found, "other.a.location_error").displacement_m) == pytest.approx(0.01)
+    assert found.kinds.declared == ("other",)
+
+
+def test_a_power_that_is_stated_is_of_no_share() -> None:
+    """Rows of the platforms' shares stay away where nothing of theirs spreads."""
+    ids = {one.id for one in findings(requirements=NEEDS, other_errors=[ELSEWHERE]).rows}
+    assert "mission.islr" in ids
+    assert not ids & {"transmitter.islr", "receiver.islr"}
+
+
+# ---------------------------------------------------------------------- draws, questions, words
+def test_draws_are_the_root_sum_square_of_the_rows() -> None:
+    """A million draws know a sigma to 0.07 %; effects from elsewhere are bounds, of their size in every draw."""
+    text = mission_text(
+        propagation=AIR, requirements=NEEDS, other_errors=[ELSEWHERE], allocation__coverage_factor="2"
+    )
+    analysis = Analysis(parse_mission(text))
+    drawn = {one.id: one for one in monte_carlo(analysis, 1_000_000, 7).requirements}
+    legs = [one for one in analysis.random if one.subject.kind == "propagation" and one.declared]
+    moved = math.hypot(*(one.full.displacement * one.declared / 2 for one in legs), 0.1)
+    phases = math.hypot(*(one.full.quadratic * one.declared / 2 for one in legs), math.radians(5))
+    assert drawn["mission.location_error"].sigma == pytest.approx(moved, rel=2e-3)
+    assert drawn["mission.quadratic_phase_error"].sigma == pytest.approx(phases, rel=2e-3)
+    assert drawn["mission.cubic_phase_error"].sigma == pytest.approx(math.radians(1), rel=2e-3)
+
+
+def test_a_displacement_from_elsewhere_always_has_its_length() -> None:
+    text = mission_text(other_errors=[{"name": "a", "location_error": "10 cm"}], requirements__location_error="0.1 m")
+    analysis = Analysis(parse_mission(text))
+    (found,) = (one for one in monte_carlo(analysis, 10_000, 1).requirements if one.unit == "m")
+    assert found.probability == 1.0
+    text = text.replace("0.1 m", "0.0999 m")
+    (found,) = (one for one in monte_carlo(Analysis(parse_mission(text)), 10_000, 1).requirements if one.unit == "m")
+    assert found.probability == 0.0
+
+
+ROWS = (DELAY, CONTENT, *(f"other.antenna.{one}" for one in ("cubic_phase_error", "location_error", "islr")))
+
+
+@pytest.mark.parametrize(
+    ("key", "values", "changes"),
+    [
+        ("propagation.zenith_delay", np.linspace(0.01, 0.5, 7), {}),
+        ("propagation.zenith_electron_content", np.linspace(1e16, 40e16, 7), ORBITS),
+        ("platforms.transmitter.position.2", np.linspace(1.2e3, 100e3, 9), {}),  # too low at first
+        ("other_errors.0.location_error", np.linspace(0.0, 1.2, 7), {}),
+        ("other_errors.0.islr", np.linspace(-45, -18, 7), {}),
+        ("other_errors.0.cubic_phase_error", np.linspace(-0.5, 0.5, 7), {}),
+    ],
+)
+def test_a_sweep_is_a_check_of_each(key: str, values: np.ndarray, changes: dict[str, object]) -> None:
+    air = AIR | {"zenith_electron_content": "2 TECU"}
+    rules = {"allocation__model": "full", "allocation__combine": "rss"}
+    text = mission_text(**changes, **rules, propagation=air, requirements=NEEDS, other_errors=[ELSEWHERE])
+    mission = parse_mission(text, "m.yaml")
+    cases = grid(mission, **{key.replace(".", "__"): values})
+    columns = [f"{row_id}.{field}" for row_id in ROWS for field in ("declared", "allowable", "utilization")]
+    assert_as_checked(mission, cases, swept(mission, cases, columns), columns)
+
+
+def test_questions_of_design(run: Callable, tmp_path: Path) -> None:
+    """`solve` finds the allowable of a row, `sensitivity` knows the keys, `--scale` multiplies them."""
+    needs = {"location_error": "0.5 m"}
+    file = tmp_path / "m.yaml"
+    file.write_text(mission_text(propagation=AIR, requirements=needs))
+    solved = json.loads(run("solve", str(file), "--for", "propagation.zenith_delay", "--format", "json").stdout)
+    found = found_of(propagation=AIR, requirements=needs)
+    least = min(row(found, f"propagation.{name}.zenith_delay").allowable for name in PLATFORMS)
+    assert solved["missions"][0]["value"] == pytest.approx(least, rel=1e-4)
+    scaled = json.loads(run("solve", str(file), "--for", "propagation", "--scale", "--format", "json").stdout)
+    assert scaled["missions"][0]["value"] == pytest.approx(least / 0.05, rel=1e-4)
+    assert "propagation.zenith_delay" in run("sensitivity", str(file)).stdout
+
+
+@pytest.mark.parametrize("model", ["published", "full"])
+@pytest.mark.parametrize("needs", [NEEDS, {"islr": "-20 dB"}, {}])
+@pytest.mark.parametrize("changes", [{}, ORBITS], ids=["flat", "orbits"])
+def test_explanations_can_be_repeated(model: str, needs: dict[str, str], changes: dict[str, object]) -> None:
+    """Each sum, done with the digits that stand there, gives what stands behind it; the last one what a row says."""
+    air = AIR | {"zenith_electron_content": "2 TECU"}
+    rules = {"model": model, "combine": "each", "coverage_factor": "2"}
+    text = mission_text(**changes, propagation=air, requirements=needs, other_errors=[ELSEWHERE], allocation=rules)
+    mission = parse_mission(text)
+    found = check_mission(mission, TODAY)
+    rows = [one for one in found.rows if one.subject.kind in ("propagation", "other") and one.declared is not None]
+    assert len(rows) == 8
+    for one in rows:
+        lines = sums(explain(mission, found, one.id))
+        for symbol, numbers, value in lines:
+            if "..." not in numbers:
+                assert evaluated(numbers) == pytest.approx(value, rel=2e-4, abs=1e-12), (one.id, symbol)
+        said = {symbol: value for symbol, _, value in lines}
+        if one.allowable is not None and one.unit != "rad":
+            assert said["allowable"] == pytest.approx(one.allowable, rel=1e-5)
+
+
+@pytest.mark.parametrize("suffix", ["html", "md", "json", "csv", "xml", "sarif"])
+def test_every_format_has_the_rows(run: Callable, tmp_path: Path, suffix: str) -> None:
+    file, report = tmp_path / "m.yaml", tmp_path / f"report.{suffix}"
+    rules = {"model": "full", "combine": "rss"}
+    file.write_text(mission_text(propagation=AIR, requirements=NEEDS, other_errors=[ELSEWHERE], allocation=rules))
+    assert run("check", str(file), "-q", "--detail", "full", "--report", str(report)).exit_code == 0
+    text = report.read_text()
+    if suffix != "sarif":  # of what passes there is no result
+        assert DELAY in text
+        assert "other.antenna.islr" in text
+    if suffix == "html":
+        assert "Delays in the air" in text
+        assert "weather model" in text
+
+
+def test_what_is_left_out_is_looser(run: Callable, tmp_path: Path) -> None:
+    """Each row that a change takes away is named, those of effects from elsewhere and of the air among them."""
+    changes = {"requirements": NEEDS, "platforms__receiver__motion_error__velocity": "1 mm/s"}
+    files = {
+        "old": {"propagation": AIR, "other_errors": [ELSEWHERE]},
+        "new": {"other_errors": [{"name": "b", "islr": "-40 dB"}]},
+    }
+    for name, errors in files.items():
+        (tmp_path / f"{name}.yaml").write_text(mission_text(**changes, **errors))
+    found = run("diff", "--fail-on-erosion", "10%", *(str(tmp_path / f"{name}.yaml") for name in files))
+    assert found.exit_code == 1
+    refused = found.stdout.partition("Refused")[2]
+    gone = ["", ".cubic_phase_error", ".location_error", ".islr"]
+    for row_id in (
+        *(f"other.antenna{one}" for one in gone),
+        *(f"propagation.{one}.zenith_delay" for one in PLATFORMS),
+    ):
+        assert f"{row_id}: declared -> not declared" in refused
+    assert "propagation.source" not in refused  # there is nothing left to have one

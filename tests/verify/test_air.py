@@ -1,0 +1,123 @@
+"""Images of delays in the air: what `verify` says of their limits, and what `simulate` flies."""
+
+import math
+
+import numpy as np
+import pytest
+
+from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.mission.load import parse_mission
+from bisar_budget.simulate.collection import PointCollection
+from bisar_budget.simulate.point import declared_errors
+from bisar_budget.simulate.realisations import delay_courses, drawn_errors
+from bisar_budget.verify.limits import verify_mission
+from bisar_budget.verify.spread_cases import verify_random
+from bisar_budget.verify.study import Study
+from tests.conftest import mission_text
+from tests.effects.test_propagation import ORBITS, SECTION_V, TECU
+
+FULL = {"allocation__model": "full", "allocation__combine": "each"}
+
+
+def limits(text: str, needs: str, only: str = "propagation.*") -> dict[str, str]:
+    mission = parse_mission(f"{text.strip()}\nrequirements: {needs}\n")
+    return {one.id.removeprefix("propagation."): one.verdict for one in verify_mission(mission, only).rows}
+
+
+def test_images_confirm_limits_within_the_air() -> None:
+    assert limits(SECTION_V, "{location_error: 1 m}") == {
+        "transmitter.zenith_delay": "confirmed",
+        "receiver.zenith_delay": "confirmed",
+    }
+
+
+def test_images_confirm_limits_from_orbit_by_the_phase() -> None:
+    found = limits(ORBITS, "{quadratic_phase_error: 10 deg}", "propagation.*.zenith_*")
+    assert set(found.values()) == {"confirmed"}
+    assert len(found) == 4
+
+
+def test_a_limit_that_is_wrong_is_seen() -> None:
+    """The effect of the group alone: its displacement is another one, and the images say so."""
+    text = ORBITS.replace("[500 km, 20 km, 600 km]", "[300 km, 500 km, 600 km]").replace("30 s", "8 s")
+    study = Study(parse_mission(f"{text.strip()}\nrequirements: {{location_error: 5 m}}\n"))
+    error = next(one for one in study.analysis.random if one.id == "propagation.transmitter.zenith_electron_content")
+    assert verify_random(study, error).verdict == "confirmed"
+    smaller = error.full._replace(east=error.full.east * 0.8, north=error.full.north * 0.8)
+    assert verify_random(study, error._replace(full=smaller, published=smaller)).verdict == "optimistic"
+
+
+def test_where_only_islr_takes_a_cubic_phase_it_is_drawn_too() -> None:
+    """A squinted leg bends the delay by a cubic as well; without a requirement of its own ISLR holds it.
+
+    4/175·φ₃² is more than images show of a cubic phase, by 0.8 dB.
+    """
+    text = ORBITS.replace("[500 km, 20 km, 600 km]", "[300 km, 500 km, 600 km]")
+    mission = parse_mission(f"{text.strip()}\nrequirements: {{islr: -60 dB}}\n")
+    (row,) = verify_mission(mission, "propagation.transmitter.zenith_delay").rows
+    assert row.verdict == "conservative"
+    assert row.measured_db - row.requirement_db == pytest.approx(-0.8, abs=0.3)
+
+
+def test_what_is_stated_as_an_effect_has_no_image() -> None:
+    others = [{"name": "a", "cubic_phase_error": "1 deg", "location_error": "1 cm", "islr": "-40 dB"}]
+    needs = {"cubic_phase_error": "22.5 deg", "islr": "-20 dB", "location_error": "1 m"}
+    found = verify_mission(parse_mission(mission_text(**FULL, other_errors=others, requirements=needs)), "other.*")
+    assert [one.id for one in found.rows] == [f"other.a.{key}" for key in others[0] if key != "name"]
+    for one in found.rows:
+        assert one.verdict == "not_evaluated"
+        assert one.reason == "stated by its effect: there is nothing to form an image of"
+
+
+# ---------------------------------------------------------------------- what is flown
+def test_draws_of_a_leg_are_one_number_times_its_course() -> None:
+    mission = parse_mission(ORBITS)
+    error = next(one for one in Analysis(mission).random if one.id == "propagation.receiver.zenith_electron_content")
+    times = np.linspace(-15, 15, 7)
+    drawn = delay_courses(mission, error, times, 20_000, np.random.default_rng(4))
+    course = drawn[0] / drawn[0, 3]
+    assert drawn == pytest.approx(np.outer(drawn[:, 3], course))
+    x, y, z = (np.asarray(one) for one in mission.geometry.receiver.place(times))
+    level = np.hypot(x, y) / np.sqrt(x**2 + y**2 + z**2) * 6371 / 6721  # a shell at 350 km
+    want = 40.308 * 20 * TECU / 1.25e9**2 / np.sqrt(1 - level**2)
+    assert drawn.std(axis=0) == pytest.approx(want, rel=0.015)  # 20 000 draws know a sigma to 0.5 %
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("text", [SECTION_V, ORBITS], ids=["flat", "orbits"])
+def test_the_air_is_flown_as_it_is_drawn(text: str, seed: int) -> None:
+    """An image of all declared errors has the displacement of the drawn delays of both legs, each row its own."""
+    mission = parse_mission(f"{text.strip()}\nsimulation: {{seed: {seed}}}\n")
+    errors = declared_errors(mission)
+    collection = PointCollection(mission, mission.geometry)
+    effect = collection.effect(errors)
+    analysis = Analysis(mission)
+    total = np.zeros(4)
+    half = mission.collection.aperture_time / 2
+    for error in analysis.random:
+        rng = np.random.default_rng([seed, *error.id.encode()])
+        times = np.linspace(-half, half, 4097)
+        (drawn,) = delay_courses(mission, error, times, 1, rng)
+        if not drawn.any():
+            continue
+        of_unit = delay_courses(mission, error, times, 1, _One())
+        total += drawn[0] / of_unit[0, 0] * _signed(error.full.covariance) * (error.declared or 0.0)
+    assert effect.displacement == pytest.approx(total[2:], rel=0.01, abs=1e-3)
+    assert effect.quadratic == pytest.approx(total[0], rel=0.02, abs=2e-3)
+    assert (drawn_errors(analysis).electrons is not None) == (text is ORBITS)
+
+
+class _One(np.random.Generator):
+    """A generator whose draws are one sigma."""
+
+    def __init__(self) -> None:
+        super().__init__(np.random.PCG64(0))
+
+    def standard_normal(self, *size: object, **_: object) -> np.ndarray:  # type: ignore[override]
+        return np.ones(size)
+
+
+def _signed(covariance: np.ndarray) -> np.ndarray:
+    """Effects of a longer leg by a unit: an error of one course has a covariance of rank one. East is negative."""
+    effects = np.sqrt(np.diagonal(covariance)) * np.sign(covariance[2])
+    return np.asarray(-effects * math.copysign(1.0, effects[2]))
