@@ -351,6 +351,12 @@ def no_common_component(cause: str, axis: str) -> str:
 
 
 @phrase
+def no_quadratic_term_of_time_tag() -> str:
+    """Said of a time tag by Tables I and II: a straight path is moved along itself."""
+    return "a path that is straight, or still, is displaced along itself: no quadratic term"
+
+
+@phrase
 def no_quadratic_term_of_clock(term: str) -> str:
     """Said of a clock, by the published model."""
     return f"no quadratic term: the clock's {term} term has another order (Table I row 1)"

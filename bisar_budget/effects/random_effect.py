@@ -76,7 +76,8 @@ class RandomError(NamedTuple):
 
     `declared` is the largest of the axes, coverage factor included, and all axes grow with it; None where the file is
     silent. The unit of an oscillator is `dB`: its noise as a factor of amplitude, declared 1. `noise` is the spectrum
-    of an oscillator; not of many cases.
+    of an oscillator; not of many cases. `counted_in` is the id of a row whose error does this too, so that this one
+    counts nowhere.
     """
 
     subject: Subject
@@ -86,6 +87,7 @@ class RandomError(NamedTuple):
     published: RandomEffect
     full: RandomEffect
     noise: Noise | None = None
+    counted_in: str = ""
 
     @property
     def id(self) -> str:
@@ -133,10 +135,10 @@ class SensorCases:
         found: MotionError = getattr(self.mission.platforms, name).motion_error
         return found
 
-    def axes(self, name: str) -> Floats:
-        """Axes of a platform's errors, (axes, 3, cases)."""
+    def axes(self, name: str, frame: str = "") -> Floats:
+        """Axes of a platform's errors, or of another frame of it, (axes, 3, cases)."""
         path: PlatformState = getattr(self.geometry, name)
-        return np.array([self.vector(axis) for axis in path.frame(self.error(name).frame)])
+        return np.array([self.vector(axis) for axis in path.frame(frame or self.error(name).frame)])
 
     def along(self, name: str, directions: Floats) -> tuple[Floats, Floats]:
         """Root-sum-square of what directions (axes, 3, cases) have of the line of sight, and of what data hear."""
@@ -177,13 +179,21 @@ class SensorCases:
         held : (errors, nodes, cases)
             The same with the line of sight held at mid-aperture, for the published model.
         """
-        constant, linear, quadratic, cubic = np.square(np.einsum("fn,enc->fec", self.exact.fit, held)).sum(axis=1)
-        k = self.exact.k
+        fit, k = self.exact.fit, self.exact.k
+        parts = np.square(np.einsum("fn,enc->fec", fit, held)).sum(axis=1)
+        seen = np.square(np.einsum("fn,enc->fec", np.abs(fit), np.abs(held))).sum(axis=1)
+        constant, linear, quadratic, cubic = np.where(parts > _CANCELS * seen, parts, 0.0)  # else it is rounding
         published = RandomEffect(k * np.sqrt(quadratic), k * np.sqrt(cubic), 0.0 * k, *self.moved(constant, linear))
         weighted = self.weights[:, None] * courses
         effects, sizes = weighted.sum(axis=2), np.square(np.abs(weighted).sum(axis=2)).sum(axis=1)
         (qpe, edge, east, north), covariance = sigmas(np.einsum("fec,gec->fgc", effects, effects), sizes)
         return published, RandomEffect(qpe, edge, 0.0 * k, east, north, covariance)
+
+    def of_motion(self, place: int, moved: Floats) -> tuple["RandomEffect", "RandomEffect"]:
+        """The same of independent position errors of a platform, (errors, 3, nodes, cases). [m/unit]"""
+        look = self.vector(self.geometry.both[place].look)
+        x, y, z = np.moveaxis(moved, 1, 0)
+        return self.of_courses(self.exact.along(place, (x, y, z)), -np.einsum("ac,eanc->enc", look, moved))
 
     def moved(self, constant: Any, linear: Any) -> list[Any]:
         """Sigmas of the displacement by (25), of mean squares of constant and linear part at the edge [m²]. [m]"""
