@@ -500,6 +500,12 @@ def held_to_the_total(owners: str) -> str:
 
 
 @phrase
+def counted_in_another_row(row_id: str) -> str:
+    """Said of a part of what an error does: the row of all of it judges."""
+    return f"a part of {row_id}, which has all that the attitude does: this row counts nowhere again"
+
+
+@phrase
 def counted_as_one(group: str) -> str:
     """Said of a covariance in a root-sum-square."""
     return f"the errors of {group} count as one, the root of gᵀCg"

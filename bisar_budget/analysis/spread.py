@@ -135,9 +135,14 @@ def noise(analysis: "Analysis", model: str) -> list[SpreadPhase]:
     """List what spreads beyond the cubic: wideband vibration, noise of sensors, phase noise, links."""
     found = wideband_noise(analysis.mission, analysis.geometry)
     for one in analysis.random:
-        if one.declared is not None and (one.subject.kind != "imu" or one.subject.axis in NOISE):
+        if one.declared is not None and _spreads(one.subject):
             found.append(SpreadPhase(one.id, one.owner, (one.effect(model).spread * one.declared) ** 2))
     return found
+
+
+def _spreads(what: Subject) -> bool:
+    """Whether an error of a sensor or a clock is noise from moment to moment, and no bias."""
+    return what.kind != "lever_arm" and (what.kind != "imu" or what.axis in NOISE)
 
 
 def powers_held_by_islr(analysis: "Analysis", owners: Iterable[str], model: str) -> list[list[SpreadPhase]]:

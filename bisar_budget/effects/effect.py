@@ -28,9 +28,9 @@ class Subject(NamedTuple):
     """The thing that a row or an error is about. `subject` makes it, with its id; nobody reads an id to find out.
 
     `owner` is the one whose share it counts against: transmitter, receiver, clock, or mission for what is nobody's.
-    `kind` is position, velocity, acceleration, time_tag, vibration, timing, terrain, other, or the name of a sum. `axis` is the
-    axis of `frame`, the term of the clock, the name of another error, the sort of a vibration, and `entry` the place
-    of one in the file.
+    `kind` is position, velocity, acceleration, time_tag, vibration, timing, terrain, other, or the name of a sum.
+    `axis` is the axis of `frame`, the term of the clock, the name of another error, the sort of a vibration, and
+    `entry` the place of one in the file.
     """
 
     id: str

@@ -1,10 +1,10 @@
 """Lever arms: from the navigation's reference to the antenna's phase centre, in axes that turn with the body.
 
 The body's axes are along, cross and up of the velocity, at every moment of the aperture; those of a platform that
-stands still are the scene's. The antenna's position is the navigation's plus R(τ)·l. An error δl of the arm is carried
-along, R(τ)·δl: a displacement, and as the body turns a defocus. An attitude error ψ swings the arm, ψ × R(τ)·l: ψ keeps
-its direction in space, as what a strapdown navigation with perfect gyros believes does, and as it does where it turns
-the specific force. A gyro's bias ε lets it grow, ψ = ε·τ, its noise lets it walk.
+stands still are the scene's. The antenna's position is the navigation's plus R(τ)·l. An error δl of the arm is
+carried along, R(τ)·δl: a displacement, and as the body turns a defocus. An attitude error ψ swings the arm,
+ψ × R(τ)·l. It keeps its direction in space, as that of a strapdown navigation with perfect gyros does, and as it does
+where it turns the specific force. A gyro's bias ε lets it grow, ψ = ε·τ, its noise lets it walk.
 
 The same ψ acts through the specific force and through the arm. So a figure of an inertial sensor has both in its own
 row, and what attitude does through the arm alone is a row that counts nowhere again. Derived here.
@@ -19,6 +19,7 @@ from bisar_budget.constants import ROUNDING
 from bisar_budget.effects.effect import PLATFORMS, subject
 from bisar_budget.effects.random_effect import RandomError, SensorCases, parts_of_largest
 from bisar_budget.effects.spectra import Floats
+from bisar_budget.faults import KeyPath
 from bisar_budget.geometry import PlatformState
 from bisar_budget.mission.instruments import LeverArm
 
@@ -43,9 +44,9 @@ def arm_at(state: PlatformState, arm: Any, times: Floats) -> Floats:
 
 
 def swung(axes: Floats, arm: Floats) -> Floats:
-    """Displacement of an arm (3, times, cases) by a unit of tilt about axes (axes, 3, cases), (axes, 3, times, cases).
+    """Displacement of an arm by a unit of tilt about each of some axes, (axes, 3, times, cases). [m/rad]
 
-    [m/rad]
+    The arm is (3, times, cases) [m], the axes are (axes, 3, cases).
     """
     return np.asarray(np.cross(axes[:, :, None], arm[None], axis=1))
 
@@ -65,15 +66,14 @@ def lever_arm_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
             declared, sizes = parts_of_largest(seen.vector(attitude))
             declared, axes = declared * seen.factor, axes * sizes[:, None]
         published, full = seen.of_motion(place, swung(axes, arm_at(state, lever.arm, times)))
-        path = ("sensor",) if error.key_of("attitude") != "attitude" else ("imu", "attitude")
+        is_of_part = error.key_of("attitude") != "attitude"
+        path: KeyPath = (*key, "sensor") if is_of_part else (*key, "imu", "attitude")
         what = subject(name, "lever_arm", "attitude")
         counted = subject(name, "imu", "attitude").id
-        yield RandomError(what, "rad", declared, (*key, *path), published, full, counted_in=counted)
+        yield RandomError(what, "rad", declared, path, published, full, counted_in=counted)
     if lever.uncertainty is not None:
         declared, sizes = parts_of_largest(seen.vector(lever.uncertainty))
         published, full = seen.of_motion(place, body_axes(state, times) * sizes[:, None, None])
         what = subject(name, "lever_arm", "uncertainty")
         path = (*key, "lever_arm", "uncertainty")
         yield RandomError(what, "m", declared * seen.factor, path, published, full)
-
-

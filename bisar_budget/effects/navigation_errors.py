@@ -33,7 +33,7 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import CommonMotionError, MotionError
 
 _IMU_UNITS = dict(zip(IMU_KINDS, ("m/s^2", "1", "rad", "rad/s", "m/s/sqrt(s)", "rad/sqrt(s)"), strict=True))
-_TILTS = ("attitude", "gyro_bias", "angle_random_walk")
+TILTS = ("attitude", "gyro_bias", "angle_random_walk")
 # The covariance of a position error over the aperture grows as this power of the aperture time.
 _GROWS = {
     "accelerometer_bias": 4,
@@ -73,7 +73,7 @@ def acceleration_errors(kind: str, axes: Floats, force: Floats) -> Floats:
     A tilt turns what accelerometers measure, the specific force (3, ...); a scale factor is a part of it. What is an
     acceleration is one. [m/s²/unit]
     """
-    if kind in _TILTS:
+    if kind in TILTS:
         return np.asarray(np.cross(axes, force, axisa=1, axisb=0, axisc=1))
     if kind == "accelerometer_scale_factor":
         return np.asarray(axes * (axes * force).sum(axis=1, keepdims=True))
@@ -99,7 +99,7 @@ def inertial_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
         row = heard = _at_mid_aperture(seen.mission, index, along)
         if along_heard is not along:
             heard = _at_mid_aperture(seen.mission, index, along_heard)
-        if arm is not None and kind in _TILTS:
+        if arm is not None and kind in TILTS:
             published, full = _with_arm(seen, place, kind, directions, about, arm)
         else:
             (quadratic, cubic, east, north), covariance = _over_aperture(seen, place, kind, directions)
@@ -203,9 +203,9 @@ def _with_arm(
         left = left + scale * walk.left * (held[i] * held[j]).sum(axis=0)
         left_heard = left_heard + scale * walk.left * (heard[i] * heard[j]).sum(axis=0)
     (quadratic, cubic, east, north), covariance = sigmas(np.asarray(whole), np.asarray(sizes))
-    constant, linear, *phases = np.maximum(orders, 0.0)
+    constant, linear, own, own_cubic = np.maximum(orders, 0.0)
     spread, spread_heard = (k * np.sqrt(np.maximum(one, 0.0)) for one in (left, left_heard))
-    published = RandomEffect(*(k * np.sqrt(one) for one in phases), spread, *seen.moved(constant, linear))
+    published = RandomEffect(k * np.sqrt(own), k * np.sqrt(own_cubic), spread, *seen.moved(constant, linear))
     return published, RandomEffect(quadratic, cubic, spread_heard, east, north, covariance)
 
 
@@ -231,7 +231,7 @@ def _walks(first: int, second: int) -> _Walks:
         """Order n of the integral by a unit of noise at each start, (n, starts)."""
         ahead = start[:, None] + (1 - start[:, None]) * start
         grown = ((ahead - start[:, None]) ** times / math.factorial(times)) * weight * (1 - start[:, None])
-        return (2 * number[:, None] + 1) / 2 * np.einsum("snp,sn->ps", _legendre(ahead), grown)
+        return np.asarray((2 * number[:, None] + 1) / 2 * np.einsum("snp,sn->ps", _legendre(ahead), grown))
 
     both = np.einsum("is,js,s->ij", order_of(first), order_of(second), weight)
     both = both * (1 + (-1.0) ** np.add.outer(number, number))  # that of the other side is as large
@@ -269,7 +269,7 @@ def _noise(
     k = 2 * math.pi / seen.mission.radar.wavelength
     largest, sizes = parts_of_largest(seen.vector(process.sigma))
     found = gauss_markov(seen.aperture_time, process.correlation_time)
-    sighted, heard, moved = [], [], []
+    sighted, heard, moved = list[Floats](), list[Floats](), list[Floats]()
     for name, of_platform in axes.items():
         place, directions = PLATFORMS.index(name), of_platform * sizes[:, None]
         for kept, sight in ((sighted, seen.geometry.both[place].look), (heard, seen.sights[place])):

@@ -24,7 +24,7 @@ from bisar_budget.effects.effect import (
     subject,
 )
 from bisar_budget.faults import KeyPath
-from bisar_budget.geometry import FRAME_AXES, BistaticGeometry, Vectors
+from bisar_budget.geometry import FRAME_AXES, BistaticGeometry, PlatformState, Vectors
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
 from bisar_budget.phrases import NOTHING, Note
@@ -181,8 +181,8 @@ class ErrorListing:
         """Errors that both platforms have in common: the effects of both legs add with their signs.
 
         A bias of one GNSS service moves both measured paths by the same vector, along the axes of the scene; along
-        those of another frame each path is moved by the same components in its own axes. The range error, and with it
-        Table I and the full model, is linear in the errors, so the common effect is the sum of the two platforms' own.
+        those of another frame each path is moved by the same components in its own axes. The range error, and with
+        it Table I and the full model, is linear in the errors: the common effect is the sum of the platforms' own.
         """
         error = self.mission.common_motion_error
         if error is None:
@@ -246,9 +246,8 @@ class ErrorListing:
     def _of_time_tag(
         self, owner: str, places: Sequence[int], value: Any, key: KeyPath, source: str | None, *notes: Note
     ) -> ErrorSource:
-        ways = [tuple(np.broadcast_to(v, self.exact.times.shape) for v in path.at(self.exact.times)[1])
-                for path in self.geometry.both]  # fmt: skip
-        moved = sum(self.exact.along(place, ways[place]) for place in places)
+        ways = [self._velocities(path) for path in self.geometry.both]
+        moved = np.sum([self.exact.along(place, ways[place]) for place in places], axis=0)
         parts = [
             _along(self.legs(place, kind)[0], vector)
             for place in places
@@ -260,7 +259,7 @@ class ErrorListing:
             declared=value * self.factor,
             path=key,
             effect=_sum(parts),
-            full=self.exact.effect(np.asarray(moved)),
+            full=self.exact.effect(moved),
             direction=ways[places[0]],
             equation="Tables I and II along the velocity and its rates",
             no_limit=phrases.no_quadratic_term_of_time_tag(),
@@ -268,6 +267,12 @@ class ErrorListing:
             notes=notes,
             of_receiver=ways[1] if len(places) > 1 else None,
         )
+
+    def _velocities(self, path: PlatformState) -> Vectors:
+        """Velocity of a path at the nodes, (nodes, cases) each. [m/s]"""
+        times = self.exact.times
+        u, v, w = (np.broadcast_to(part, times.shape) for part in path.at(times)[1])
+        return (u, v, w)
 
     def _of_terrain(self) -> Iterator[ErrorSource]:
         """A scene that is higher than the processor takes it for: both platforms measured too high by as much."""

@@ -89,7 +89,7 @@ class GaussMarkov(NamedTuple):
 class LeverArm(NamedTuple):
     """From the navigation's reference to the antenna's phase centre, in the platform's own axes.
 
-    They are along, cross and up of its velocity, and turn with it; of a platform that stands still those of the scene.
+    They are along, cross and up of its velocity, and turn with it; of one that stands still those of the scene.
     """
 
     arm: Annotated[
@@ -101,7 +101,9 @@ class LeverArm(NamedTuple):
     ] = None
     uncertainty: Annotated[
         Vector | None,
-        Key(Triple(Quantity(units.LENGTH, ge=0, le=1e3), or_scalar=True), "1 sigma, each axis; it turns as the body."),
+        Key(
+            Triple(Quantity(units.LENGTH, ge=0, le=1e3), or_scalar=True), "1 sigma, each axis; it turns as the body."
+        ),
     ] = None
     source: Annotated[str | None, Key(Text(), "Where the values come from; shown as evidence.")] = None
 

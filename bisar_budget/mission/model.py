@@ -393,21 +393,27 @@ class Mission(NamedTuple):
 
 
 def has_instruments(mission: Mission) -> bool:
-    """Whether a mission says anything of inertial sensors, position noise, lever arms, oscillators or synchronisation."""
-    return mission.synchronization is not None or any(
-        platform.oscillator is not None
-        or platform.motion_error.imu is not None
-        or platform.motion_error.random
-        or platform.motion_error.lever_arm is not None
-        for platform in mission.platforms
-    ) or bool(mission.common_motion_error is not None and mission.common_motion_error.random)
+    """Whether a mission says anything of inertial sensors, position noise, lever arms, or oscillators and links."""
+    return (
+        mission.synchronization is not None
+        or any(
+            platform.oscillator is not None
+            or platform.motion_error.imu is not None
+            or platform.motion_error.random
+            or platform.motion_error.lever_arm is not None
+            for platform in mission.platforms
+        )
+        or bool(mission.common_motion_error is not None and mission.common_motion_error.random)
+    )
 
 
 def flies_on_earth(mission: Mission) -> bool:
     """Whether paths of a mission depend on where on the Earth its scene is, or stand in files."""
     common = mission.common_motion_error
-    return mission.scene.is_on_earth or (common is not None and common.frame == "ric") or any(
-        platform.is_of_the_earth or platform.motion_error.frame == "ric" for platform in mission.platforms
+    return (
+        mission.scene.is_on_earth
+        or (common is not None and common.frame == "ric")
+        or any(platform.is_of_the_earth or platform.motion_error.frame == "ric" for platform in mission.platforms)
     )
 
 

@@ -151,7 +151,7 @@ class MotionError(NamedTuple):
     ] = ()
     time_tag: Annotated[
         float | None,
-        Key(TIME_TAG, "Time of the navigation against the radar's: positive, positions are those of later moments."),
+        Key(TIME_TAG, "Of the navigation against the radar: positive, positions are those of later moments."),
     ] = None
     lever_arm: Annotated[
         LeverArm | None, Key(LEVER_ARM, "From the navigation's reference to the antenna's phase centre.")
@@ -222,7 +222,10 @@ class CommonMotionError(NamedTuple):
     ] = ()
     time_tag: Annotated[
         float | None,
-        Key(TIME_TAG, "Of one clock that tags both: time of the navigation against the radar's: positive, positions are those of later moments."),
+        Key(
+            TIME_TAG,
+            "As that of a platform, where one clock tags both.",
+        ),
     ] = None
     source: Annotated[str | None, Key(Text(), "Where the values come from; shown as evidence.")] = None
 
@@ -548,13 +551,23 @@ def _no_common_frame(platforms: Platforms, frame: str) -> Iterator[Problem]:
             yield Problem(f"of the {name}: {undefined}", "accepted: scene", at=("common_motion_error", "frame"))
 
 
+def has_body_axes(state: PlatformState, half: Any, margin: float = 1.0) -> Any:
+    """Whether a velocity keeps a direction on the ground within apertures, half of which last so long (cases,) [s].
+
+    That of a platform that stands still does not matter.
+    """
+    times = half * _PLACES
+    u, v, w = (np.broadcast_to(one, times.shape) for one in state.at(times)[1])
+    fastest = np.sqrt(u * u + v * v + w * w).max(axis=0)
+    return np.asarray((np.hypot(u, v).min(axis=0) > margin * _UPRIGHT * fastest) | state.is_still)
+
+
 def _no_body_axes(platforms: Platforms, half: float) -> Iterator[Problem]:
     """Lever arms of platforms whose velocity has no direction on the ground, at some time of the aperture."""
     for name, platform in zip(Platforms._fields, platforms, strict=True):
         if platform.motion_error.lever_arm is None or platform.state.is_still:
             continue
-        u, v, w = (np.broadcast_to(one, _PLACES.shape) for one in platform.state.at(half * _PLACES)[1])
-        if np.any(np.hypot(u, v) <= _UPRIGHT * np.sqrt(u * u + v * v + w * w).max()):
+        if not has_body_axes(platform.state, np.array([half]))[0]:
             yield Problem(
                 "its axes are those of the velocity, which within the aperture stops or is vertical",
                 "accepted: a velocity that keeps a direction on the ground, or a platform that stands still",

@@ -129,7 +129,7 @@ def _of_noise(error: RandomError, factor: float) -> Iterator[Variable]:
 
     They are columns of the Cholesky root of its covariance of phases and displacement.
     """
-    if not error.declared or error.full.covariance is None:
+    if not error.declared or error.full.covariance is None or error.counted_in:
         return
     size = error.declared / factor  # of an oscillator the coverage factor is in its effects
     left = np.array(error.full.covariance) * size**2

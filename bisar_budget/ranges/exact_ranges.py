@@ -139,11 +139,11 @@ class Lanes:
         """Half of what directions change by from the first node to the last, of both platforms. [m/unit]"""
         if not self.turns:
             return 0.0
-        changes = [
-            weight * norm([part[-1] - part[0] if np.ndim(part) > 1 else 0.0 * part for part in direction])
-            for weight, direction in zip(self.moves, self.directions, strict=True)
-        ]
-        return sum(changes) / 2
+        found: Any = 0.0
+        for weight, direction in zip(self.moves, self.directions, strict=True):
+            x, y, z = (part[-1] - part[0] if np.ndim(part) > 1 else 0.0 * part for part in direction)
+            found = found + weight * norm((x, y, z)) / 2
+        return found
 
     @property
     def platforms(self) -> list[int]:
@@ -183,8 +183,8 @@ class SmallErrors(NamedTuple):
 
     `courses` of errors over the aperture are (courses, nodes, cases) [m/unit], and `course` is that of each error,
     (errors,). `ways` say how far each moves the transmitter east, north and up, so the receiver, and the range by the
-    clock, (errors, 7, cases); what all cases share is there once. Of errors that turn it is `turning` that says so, by
-    the place of each, at the nodes, (7, nodes, cases).
+    clock, (errors, 7, cases); what all cases share is there once. Of errors that turn it is `turning` that says so,
+    by the place of each, at the nodes, (7, nodes, cases).
     """
 
     courses: Floats

@@ -40,7 +40,7 @@ from bisar_budget.simulate.phase_history import (
     cell_centres,
     direct_path_error,
 )
-from bisar_budget.simulate.realisations import clock_seconds, phase_courses, position_courses
+from bisar_budget.simulate.realisations import MOVING, clock_seconds, phase_courses, position_courses
 from bisar_budget.verify import reasons
 from bisar_budget.verify.aperture_reading import measured_shift
 from bisar_budget.verify.phase_cases import TOLERANCE, compare, moved
@@ -323,8 +323,8 @@ def _place(study: Study, blank: Verdict, error: RandomError, rng: np.random.Gene
     """Sigma of the displacement at the limit, coverage factor included, against the requirement."""
     required = study.mission.requirements.location_error or 0.0
     factor, draws = study.mission.allocation.coverage_factor, _DRAWS
-    if error.subject.kind in ("imu", "random"):
-        found = study.exact_effects(error.owner, _courses(study, error, rng))
+    if error.subject.kind in MOVING:
+        found = study.exact_effects(_courses(study, error, rng))
     else:
         fit, draws = _fits(study, error, rng)
         if error.subject.kind == "synchronization":  # a constant phase moves nothing
@@ -332,7 +332,7 @@ def _place(study: Study, blank: Verdict, error: RandomError, rng: np.random.Gene
         half = study.collection.aperture_time / 2
         phases = np.polynomial.legendre.legval(aperture_nodes(study.collection.aperture_time) / half, fit)
         metres = np.asarray(phases * study.collection.wavelength / (2 * math.pi), float)
-        found = study.exact_effects("clock", metres)
+        found = study.exact_effects({"clock": metres})
     east, north = (factor * math.sqrt(np.nanmean(np.square(one))) for one in (found.east, found.north))
     drawn, seen = list[float](), list[float]()
     try:
@@ -360,15 +360,15 @@ def _stream(study: Study, row_id: str) -> np.random.Generator:
 
 def _sigma(study: Study, error: RandomError, rng: np.random.Generator, is_cubic: bool) -> tuple[float, int]:
     """Standard deviation of a phase over many time series, and their number. [rad]"""
-    if error.subject.kind in ("imu", "random"):
-        found = study.exact_effects(error.owner, _courses(study, error, rng))
+    if error.subject.kind in MOVING:
+        found = study.exact_effects(_courses(study, error, rng))
         return float(np.nanstd(found.cubic if is_cubic else found.quadratic)), _DRAWS
     fit, draws = _fits(study, error, rng)
     return float(np.std(2.5 * fit[3] if is_cubic else 1.5 * fit[2])), draws
 
 
-def _courses(study: Study, error: RandomError, rng: np.random.Generator) -> Floats:
-    """Position errors of a platform at the nodes of exact ranges, (draws, nodes, 3). [m]"""
+def _courses(study: Study, error: RandomError, rng: np.random.Generator) -> dict[str, Floats]:
+    """Position errors of platforms at the nodes of exact ranges, (draws, nodes, 3) each. [m]"""
     if error.subject.kind == "random":  # not smooth between the nodes, as what is integrated is
         return _smooth_noise(study, error, rng)
     return position_courses(study.mission, error, aperture_nodes(study.collection.aperture_time), _DRAWS, rng)
@@ -383,8 +383,8 @@ def _fits(study: Study, error: RandomError, rng: np.random.Generator) -> tuple[F
     return np.asarray(found, float), draws
 
 
-def _smooth_noise(study: Study, error: RandomError, rng: np.random.Generator) -> Floats:
-    """Correlated noise at the nodes of exact ranges, (draws, nodes, 3), without what they cannot tell. [m]
+def _smooth_noise(study: Study, error: RandomError, rng: np.random.Generator) -> dict[str, Floats]:
+    """Correlated noise at the nodes of exact ranges, (draws, nodes, 3) each, without what they cannot tell. [m]
 
     At the nodes alone noise of a short correlation time would pass for a larger phase.
     """
@@ -393,13 +393,14 @@ def _smooth_noise(study: Study, error: RandomError, rng: np.random.Generator) ->
     legendre = np.polynomial.legendre
     fit = np.linalg.pinv(legendre.legvander(2 * times / T, SMOOTH))
     at_nodes = legendre.legvander(2 * aperture_nodes(T) / T, SMOOTH) @ fit
-    drawn = (position_courses(study.mission, error, times, _AT_ONCE, rng) for _ in range(_DRAWS // _AT_ONCE))
-    found = np.concatenate([at_nodes @ one for one in drawn])
+    drawn = [
+        {name: at_nodes @ one for name, one in position_courses(study.mission, error, times, _AT_ONCE, rng).items()}
+        for _ in range(_DRAWS // _AT_ONCE)
+    ]
     # Samples a step Δ apart have more power at low frequencies than the noise: Δ·coth(Δ/2τ_c), not 2τ_c.
     step = float(times[1] - times[0])
     power = 2 * time / step * math.tanh(step / (2 * time))
-    courses: Floats = found * math.sqrt(power)
-    return courses
+    return {name: np.concatenate([one[name] for one in drawn]) * math.sqrt(power) for name in drawn[0]}
 
 
 def _moments(study: Study, count: int) -> Floats:
@@ -411,9 +412,12 @@ def _moments(study: Study, count: int) -> Floats:
 def _series(study: Study, error: RandomError, rng: np.random.Generator) -> list[Errors]:
     """A few time series as errors of an image, up to the cubic phase: what is left spreads, and would hide it."""
     times = _moments(study, _FINE)
-    if error.subject.kind in ("imu", "random"):
-        courses = position_courses(study.mission, error, times, _IMAGES, rng)
-        return [Errors().of(error.owner, PathError(course=Course(times, one).smooth(_ORDER))) for one in courses]
+    if error.subject.kind in MOVING:
+        found = [Errors()] * _IMAGES
+        for name, courses in position_courses(study.mission, error, times, _IMAGES, rng).items():
+            smooth = (PathError(course=Course(times, one).smooth(_ORDER)) for one in courses)
+            found = [one.of(name, error_of_path) for one, error_of_path in zip(found, smooth, strict=True)]
+        return found
     phases = phase_courses(study.mission, error, times, _IMAGES, rng)
     delays = [clock_seconds(one, study.collection.wavelength) for one in phases]
     return [Errors(clock_course=Course(times, one).smooth(_ORDER)) for one in delays]
@@ -471,9 +475,9 @@ def _power(
         """Phases without what moves and defocuses the response."""
         phases = white * rng.standard_normal((draws, times.size))
         for error in members:
-            if error.subject.kind in ("imu", "random"):
-                moved = position_courses(mission, error, times, draws, rng)
-                phases += 2 * math.pi / collection.wavelength * moved @ np.array(sight_of(mission, error.owner))
+            if error.subject.kind in MOVING:
+                for name, moved in position_courses(mission, error, times, draws, rng).items():
+                    phases += 2 * math.pi / collection.wavelength * moved @ np.array(sight_of(mission, name))
             else:
                 phases += phase_courses(mission, error, times, draws, rng)
         phases = phases - phases @ fitted
