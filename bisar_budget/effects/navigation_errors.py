@@ -195,11 +195,10 @@ def _with_arm(
     whole, sizes, orders, left, left_heard = (np.zeros(()) for _ in range(5))
     for (i, a), (j, b) in product(enumerate((2, 0)), repeat=2):  # how often each is integrated
         walk, scale = _walks(a, b), half ** (a + b + 1)
-        kernel = walk.at_nodes if i <= j else walk.at_nodes.T
-        whole = whole + scale * np.einsum("fanc,nm,gamc->fgc", moved[i], kernel, moved[j])
-        seen_at = [np.abs(moved[place]) * np.sqrt(np.abs(np.diagonal(kernel)))[:, None] for place in (i, j)]
-        sizes = sizes + scale * np.einsum("fanc,famc->fc", *seen_at)
-        orders = orders + scale * np.diagonal(fit @ kernel @ fit.T)[:, None] * (held[i] * held[j]).sum(axis=0)
+        whole = whole + scale * np.einsum("fanc,nm,gamc->fgc", moved[i], walk.at_nodes, moved[j])
+        reach = np.sqrt(np.abs(np.diagonal(walk.at_nodes)))[:, None]
+        sizes = sizes + scale * np.einsum("fanc,famc->fc", *(np.abs(moved[one]) * reach for one in (i, j)))
+        orders = orders + scale * np.diagonal(fit @ walk.at_nodes @ fit.T)[:, None] * (held[i] * held[j]).sum(axis=0)
         left = left + scale * walk.left * (held[i] * held[j]).sum(axis=0)
         left_heard = left_heard + scale * walk.left * (heard[i] * heard[j]).sum(axis=0)
     (quadratic, cubic, east, north), covariance = sigmas(np.asarray(whole), np.asarray(sizes))

@@ -559,7 +559,9 @@ def has_body_axes(state: PlatformState, half: Any, margin: float = 1.0) -> Any:
     times = half * _PLACES
     u, v, w = (np.broadcast_to(one, times.shape) for one in state.at(times)[1])
     fastest = np.sqrt(u * u + v * v + w * w).max(axis=0)
-    return np.asarray((np.hypot(u, v).min(axis=0) > margin * _UPRIGHT * fastest) | state.is_still)
+    is_level = np.hypot(u, v).min(axis=0) > margin * _UPRIGHT * fastest
+    goes_on = (u[1:] * u[:-1] + v[1:] * v[:-1] > 0).all(axis=0)  # else it stops and turns back between two places
+    return np.asarray((is_level & goes_on) | state.is_still)
 
 
 def _no_body_axes(platforms: Platforms, half: float) -> Iterator[Problem]:
