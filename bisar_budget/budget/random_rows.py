@@ -307,16 +307,17 @@ def _said(mission: Mission, error: RandomError) -> tuple[str, str | None, tuple[
             note = phrases.held_to_the_total("both platforms")
             return equation, source or (common and common.source), (note,)
     motion: MotionError = getattr(mission.platforms, error.owner).motion_error
-    if kind == "lever_arm" and motion.lever_arm is not None:
-        if figure == "uncertainty":
-            return "lever arm", motion.lever_arm.source or motion.source, ()
-        notes: tuple[Note, ...] = (phrases.counted_in_another_row(error.counted_in),)
-        source, equation = motion.lever_arm.source, "lever arm"
-        return equation, source or motion.source, notes
+    if kind == "lever_arm" and figure == "uncertainty":
+        lever = motion.lever_arm
+        return "lever arm", (lever and lever.source) or motion.source, ()
     if kind != "random":
         is_own = motion.imu is not None and motion.key_of(figure) == figure
-        source, equation = motion.imu.source if motion.imu and is_own else None, "inertial sensor"
-    return equation, source or motion.evidence(figure), override_notes(error.owner, motion.overridden, figure)
+        source = motion.imu.source if motion.imu and is_own else None
+        equation = "lever arm" if kind == "lever_arm" else "inertial sensor"
+    notes = override_notes(error.owner, motion.overridden, figure)
+    if error.counted_in:
+        notes = (phrases.counted_in_another_row(error.counted_in), *notes)
+    return equation, source or motion.evidence(figure), notes
 
 
 def _said_of_oscillator(mission: Mission, error: RandomError) -> tuple[str, str | None, tuple[Note, ...]]:

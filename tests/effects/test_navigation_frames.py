@@ -1,7 +1,7 @@
 """Lever arms, time tags and common errors against brute force: drawn or flown here, sent through exact ranges.
 
-Nothing of the tool's own courses is used: paths are polynomials written out, axes of the body are made of the velocity,
-what turns turns by a cross product. Histories go through `followed`, which the exact ranges of the tests hold.
+Nothing of the tool's own courses is used: paths are polynomials written out, axes of the body are made of the
+velocity, what turns turns by a cross product. Histories go through `followed`, which tests of exact ranges hold.
 """
 
 import math
@@ -38,8 +38,8 @@ requirements: {location_error: 10 m, islr: -20 dB}
 """
 P, V, A = np.array([5e3, 0, 1.5e3]), np.array([30.0, 40, 0]), np.array([-3.2, 2.4, 0])
 PT, VT = np.array([30.41e3, 0, 6e3]), np.array([0.0, 150, 0])
-G = -3.986004418e14 * (P + [0, 0, 6371e3]) / np.linalg.norm(P + np.array([0, 0, 6371e3])) ** 3
-FORCE = A - G
+FROM_CENTRE = P + np.array([0, 0, 6371e3])
+FORCE = A + 3.986004418e14 * FROM_CENTRE / np.linalg.norm(FROM_CENTRE) ** 3
 ARM = np.array([2.0, 0.3, -0.5])
 T = 4.0
 TIMES = aperture_nodes(T)

@@ -665,6 +665,14 @@ def _validity(mission: Mission, found: MissionFindings) -> Iterator[tuple[str, s
             "position and velocity. Attitude and gyros turn the specific force, scale factors add a part of it. "
             "Random walks start at mid-aperture",
         )
+    if any(platform.motion_error.lever_arm for platform in mission.platforms):
+        yield (
+            "Lever arms",
+            "along, cross and up of the velocity, turning with it; of a platform that stands still along the axes of "
+            "the scene. Attitude swings an arm and turns the specific force: the row of the inertial sensor has both",
+        )
+    if any(row.subject.kind == "time_tag" for row in found.rows):
+        yield "Time tags", "a path is measured where its platform is later by so much: velocity times the time"
     if any(platform.oscillator for platform in mission.platforms) or mission.synchronization:
         yield (
             "Clocks",

@@ -152,7 +152,7 @@ def _arm(analysis: Analysis, error: RandomError) -> Iterator[Step]:
     arm = arm_at(state, motion.lever_arm.arm, np.zeros(1))[:, 0]
     tilt = _GROWS[figure]
     yield from step(
-        f"The arm l at mid-aperture along the axes of the scene; a tilt swings it by {tilt} × R(τ)·l, as the body turns",
+        f"The arm l at mid-aperture along the axes of the scene; a tilt swings it by {tilt} × R(τ)·l as it turns",
         f"l = [{', '.join(with_unit(float(part) + 0.0, 'm') for part in arm)}]",
     )
     axes, look = np.array(state.frame(motion.frame)), np.array(state.look)
