@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.analysis.scene import differences_at
 from bisar_budget.effects.random_effect import RandomError, SensorCases
 from bisar_budget.effects.random_errors import random_errors
 from bisar_budget.mission.load import parse_mission
@@ -457,3 +458,47 @@ class TestCourses:
                 for model in ("published", "full"):
                     of_case = [np.broadcast_to(part, values.shape)[case] for part in one.effect(model)[:5]]
                     assert of_case == pytest.approx(other.effect(model)[:5], rel=1e-9, abs=1e-12)
+
+
+class TestOtherPlaces:
+    """Where else errors that turn, or have two directions, are looked at."""
+
+    def test_at_the_edge_of_a_scene_a_time_tag_of_a_straight_path_is_a_position_error(self) -> None:
+        level = TURN.replace("[-3.2 m/s^2, 2.4 m/s^2, 0 m/s^2]", "[0, 0, 0]").replace(
+            "COMMON", "scene: {radius: 800 m}"
+        )
+        texts = ("{time_tag: 0.1 ms}", "{position: [3 mm, 4 mm, 0]}")
+        edges = [differences(parse_mission(level.replace("ERROR", one))) for one in texts]
+        assert sum(edges[0]) == pytest.approx(sum(edges[1]), rel=1e-6)
+        assert abs(sum(edges[0])) > 1e-6
+
+    def test_at_the_edge_of_a_scene_that_of_a_turn_is_position_and_velocity(self) -> None:
+        """v·δt and a·δt, signed: to first order the differences add."""
+        turn = TURN.replace("COMMON", "scene: {radius: 800 m}")
+        (tag,) = differences(parse_mission(turn.replace("ERROR", "{time_tag: 10 us}")))
+        both = "{position: [0.3 mm, 0.4 mm, 0 m], velocity: [-32 um/s, 24 um/s, 0 m/s]}"
+        assert tag == pytest.approx(sum(differences(parse_mission(turn.replace("ERROR", both)))), rel=1e-5)
+
+    @pytest.mark.parametrize("said", ["frame: track, position: 2 m", "frame: look, position: 2 m", "time_tag: 1 ms"])
+    def test_with_a_direct_path(self, said: str) -> None:
+        """Other vectors for both platforms change their distance, which then is the clock."""
+        link = "synchronization: {method: direct_path, error: 1 deg}"
+        mission = mission_of(common=f"common_motion_error: {{{said}}}\n{link}")
+        analysis = Analysis(mission)
+        exact = ExactRanges.of(mission.geometry.both, mission.radar.wavelength, T, FINE, has_direct_path=True)
+        frame = said.split(",")[0].removeprefix("frame: ")
+        for index, source in enumerate(analysis.stated):
+            if "time_tag" in said:
+                of_tx, of_rx = np.broadcast_to(VT * 1e-3, (FINE, 3)), flown(1e-3)
+            else:
+                of_tx, of_rx = (2.0 * np.tile(one[index], (FINE, 1)) for one in TestCommonFrames.axes(frame))
+            shifts = [np.ascontiguousarray(one[None].T) for one in (of_tx, of_rx)]
+            found = followed(exact, np.zeros((FINE, 1)), shifts, np.zeros(1, dtype=int))
+            does = analysis.does(analysis.full, source)
+            assert does.displacement == pytest.approx((found.east[0], found.north[0]), rel=EXACT, abs=1e-4)
+            assert does.qpe == pytest.approx(found.quadratic[0], rel=0.01, abs=2e-3)
+
+
+def differences(mission: Mission) -> list[float]:
+    """Phase of each declared error 800 m north of the centre, less that there. [rad]"""
+    return [phase for _, phase in differences_at(Analysis(mission).errors, 800.0, math.pi / 2)]
