@@ -15,27 +15,23 @@ from typing import Any
 
 import numpy as np
 
-from bisar_budget.constants import ROUNDING
 from bisar_budget.effects.effect import PLATFORMS, subject
 from bisar_budget.effects.random_effect import RandomError, SensorCases, parts_of_largest
 from bisar_budget.effects.spectra import Floats
 from bisar_budget.faults import KeyPath
-from bisar_budget.geometry import PlatformState
+from bisar_budget.geometry import PlatformState, cross, unit, without_rounding
 from bisar_budget.mission.instruments import LeverArm
 
 
 def body_axes(state: PlatformState, times: Floats) -> Floats:
     """Axes of a platform's body, along, cross and up of its velocity at slow times [s], (axes, 3, *times.shape)."""
-    velocity = np.array([np.broadcast_to(part, times.shape) for part in state.at(times)[1]])
-    still = np.broadcast_to(state.is_still, times.shape)
-    east, north, up = np.eye(3).reshape(3, 3, *[1] * times.ndim)
-    along = np.where(still, east, velocity)
-    along = along / np.sqrt(np.square(along).sum(axis=0))
-    cross = np.cross(up, along, axis=0)
+    u, v, w = (np.broadcast_to(part, times.shape) for part in state.at(times)[1])
+    if np.any(state.is_still):
+        u, v, w = (np.where(state.is_still, *both) for both in ((1.0, u), (0.0, v), (0.0, w)))
     with np.errstate(all="ignore"):
-        cross = np.where(still, north, cross / np.sqrt(np.square(cross).sum(axis=0)))
-    axes = np.array((along, cross, np.cross(along, cross, axis=0)))
-    return np.where(np.abs(axes) > ROUNDING, axes, 0.0)
+        along = without_rounding(unit((u, v, w)))
+        left = without_rounding(unit((-v, u, 0.0 * w)))
+    return np.array((along, left, cross(along, left)))
 
 
 def arm_at(state: PlatformState, arm: Any, times: Floats) -> Floats:
@@ -48,7 +44,8 @@ def swung(axes: Floats, arm: Floats) -> Floats:
 
     The arm is (3, times, cases) [m], the axes are (axes, 3, cases).
     """
-    return np.asarray(np.cross(axes[:, :, None], arm[None], axis=1))
+    about = (axes[:, 0, None], axes[:, 1, None], axes[:, 2, None])
+    return np.stack(cross(about, (arm[0], arm[1], arm[2])), axis=1)
 
 
 def lever_arm_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:

@@ -86,7 +86,8 @@ def inertial_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
     if error.imu is None:
         return
     axes, place, state = seen.axes(name), PLATFORMS.index(name), getattr(seen.geometry, name)
-    arm = None if error.lever_arm is None else error.lever_arm.arm
+    stated = None if error.lever_arm is None else error.lever_arm.arm
+    arm = None if stated is None else arm_at(state, stated, seen.exact.times)
     force = seen.vector(specific_force(seen.mission, state))
     for index, (kind, unit) in enumerate(_IMU_UNITS.items()):
         values, key = getattr(error.imu, kind), error.key_of(kind)
@@ -171,14 +172,14 @@ def _angle_walk(early: float, late: float) -> float:
 
 # ---------------------------------------------------------------------- tilts that swing a lever arm
 def _with_arm(
-    seen: SensorCases, place: int, kind: str, directions: Floats, about: Floats, arm: Any
+    seen: SensorCases, place: int, kind: str, directions: Floats, about: Floats, arm: Floats
 ) -> tuple[RandomEffect, RandomEffect]:
     """Effects by both models of a unit of tilt about axes (axes, 3, cases), or of its rate or noise, with an arm.
 
-    `directions` (axes, 3, cases) is what it makes of the specific force. [m/s²/unit]
+    `directions` (axes, 3, cases) is what it makes of the specific force [m/s²/unit], `arm` the arm at the nodes. [m]
     """
     state, times = seen.geometry.both[place], seen.exact.times
-    swings = swung(about, arm_at(state, arm, times))
+    swings = swung(about, arm)
     if kind != "angle_random_walk":
         order = 2 if kind == "attitude" else 3
         grows = times**order / math.factorial(order)
@@ -188,7 +189,9 @@ def _with_arm(
     u, v, w = np.moveaxis(swings, 1, 0)
     moves = (seen.exact.along(place, (x, y, z)), seen.exact.along(place, (u, v, w)))
     moved = [seen.weights[:, None] * one for one in moves]  # (4, axes, nodes, cases)
-    at_middle = swung(about, arm_at(state, arm, np.zeros((1, seen.cases))))[:, :, 0]
+    stated = seen.error(PLATFORMS[place]).lever_arm
+    assert stated is not None
+    at_middle = swung(about, arm_at(state, stated.arm, np.zeros((1, seen.cases))))[:, :, 0]
     look, sight = (seen.vector(one) for one in (state.look, seen.sights[place]))
     held, heard = ([np.einsum("ac,eac->ec", way, one) for one in (directions, at_middle)] for way in (look, sight))
     fit, half, k = seen.exact.fit, seen.exact.half, seen.exact.k
