@@ -315,7 +315,7 @@ def _said(mission: Mission, error: RandomError) -> tuple[str, str | None, tuple[
         source = motion.imu.source if motion.imu and is_own else None
         equation = "lever arm" if kind == "lever_arm" else "inertial sensor"
     notes = override_notes(error.owner, motion.overridden, figure)
-    if error.counted_in:
+    if error.counted_in and error.declared is None:  # else it is the reason of the row
         notes = (phrases.counted_in_another_row(error.counted_in), *notes)
     return equation, source or motion.evidence(figure), notes
 
