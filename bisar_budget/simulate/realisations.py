@@ -76,17 +76,15 @@ def _drawn_parts(
     kind, figure = error.subject.kind, error.subject.axis
     if kind == "random":
         process = process_of(mission, error)
-        of_axis = [(size, _correlated(process)(times, draws, rng)) for size in _of_largest(process.sigma)]
+        draw, sizes = _correlated(process), _of_largest(process.sigma)
+        of_axis = [(axis, size * draw(times, draws, rng)) for axis, size in enumerate(sizes) if size]
         common, names = mission.common_motion_error, [error.owner]
         if error.owner not in PLATFORMS and common is not None:
             names, frame = [*PLATFORMS], common.frame
         else:
             frame = _motion(mission, error.owner).frame
         axes = {name: np.array(getattr(mission.platforms, name).state.frame(frame)) for name in names}
-        return {
-            name: [(size * drawn, axis) for (size, drawn), axis in zip(of_axis, of_platform, strict=True)]
-            for name, of_platform in axes.items()
-        }
+        return {name: [(drawn, of_platform[axis]) for axis, drawn in of_axis] for name, of_platform in axes.items()}
     state: PlatformState = getattr(mission.platforms, error.owner).state
     motion = _motion(mission, error.owner)
     lever, axes_now = motion.lever_arm, np.asarray(state.frame(motion.frame), float)
