@@ -117,6 +117,12 @@ class PlatformState:
         """Whether the velocity is constant."""
         return self.acceleration == STRAIGHT and not self.bends
 
+    @property
+    def rates(self) -> tuple[Vectors, ...]:
+        """Velocity, acceleration, jerk, …: rates of the position at the midpoint. [m/s], [m/s²], …"""
+        faster = ((bend, math.factorial(power)) for power, bend in enumerate(self.bends, 3))
+        return (self.velocity, self.acceleration, *((b[0] * n, b[1] * n, b[2] * n) for b, n in faster))
+
     def place(self, tau: Any) -> Vectors:
         """Position at slow times from the midpoint. [m]"""
         p, v, a = self.position, self.velocity, self.acceleration

@@ -351,6 +351,12 @@ def no_common_component(cause: str, axis: str) -> str:
 
 
 @phrase
+def no_quadratic_term_of_time_tag() -> str:
+    """Said of a time tag by Tables I and II: a straight path is moved along itself."""
+    return "a path that is straight, or still, is displaced along itself: no quadratic term"
+
+
+@phrase
 def no_quadratic_term_of_clock(term: str) -> str:
     """Said of a clock, by the published model."""
     return f"no quadratic term: the clock's {term} term has another order (Table I row 1)"
@@ -515,6 +521,12 @@ def over_at_the_edge(row_id: str, phase: float, limit: float) -> str:
 def held_to_the_total(owners: str) -> str:
     """Said of an error of both platforms, or of none."""
     return f"held to the total budget: it belongs to {owners}"
+
+
+@phrase
+def counted_in_another_row(row_id: str) -> str:
+    """Said of a part of what an error does: the row of all of it judges."""
+    return f"a part of {row_id}, which has all that the attitude does: this row counts nowhere again"
 
 
 @phrase

@@ -51,7 +51,8 @@ class Together:
         random: Sequence[RandomError],
         groups: Sequence[Correlated],
     ) -> None:
-        self.errors, self.model, self.slow, self.random, self.groups = errors, model, slow, random, groups
+        self.errors, self.model, self.slow, self.groups = errors, model, slow, groups
+        self.random = [error for error in random if not error.counted_in]
         self.rule = errors.mission.allocation.combine
         self.motion = [error for error in errors.stated if error.is_motion]
 

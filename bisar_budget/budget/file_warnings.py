@@ -11,13 +11,14 @@ from bisar_budget.analysis.analysis import Case
 from bisar_budget.budget.doubts import input_doubts
 from bisar_budget.budget.pull_in import ROOM, caps, rounded_down
 from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.effects.navigation_errors import TILTS
 from bisar_budget.effects.oscillators import POOR_FIT
 from bisar_budget.faults import KeyPath, changes_words
 from bisar_budget.findings.mission import FileWarning, Resolution
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import norm
 from bisar_budget.mission.model import Mission
-from bisar_budget.mission.platforms import Platform
+from bisar_budget.mission.platforms import MotionError, Platform
 from bisar_budget.phrases import Note, phrase
 from bisar_budget.units import format_quantity
 
@@ -55,6 +56,7 @@ def file_warnings(
         *straight_orbits(mission),
         *_doubtful_paths(mission),
         *_of_instruments(case),
+        *_of_lever_arms(mission),
         *_of_autofocus(mission, resolution),
         *_nothing_declared(rows),
     )
@@ -174,6 +176,26 @@ def _of_instruments(case: Case) -> Iterator[_Warned]:
         declared = error.subject.axis == "accelerometer_bias" and error.declared is not None
         if declared and getattr(mission.platforms, error.owner).motion_error.acceleration is not None:
             yield _Warned(error.path, stated_twice(error.owner))
+
+
+def _of_lever_arms(mission: Mission) -> Iterator[_Warned]:
+    """Arms that nothing swings, as far as the file says."""
+    for name in PLATFORMS:
+        error: MotionError = getattr(mission.platforms, name).motion_error
+        lever = error.lever_arm
+        if lever is None or lever.arm is None or not any(lever.arm):
+            continue
+        if error.imu is None or all(getattr(error.imu, figure) is None for figure in TILTS):
+            yield _Warned(("platforms", name, "motion_error", "lever_arm", "arm"), nothing_swings_the_arm(name))
+
+
+@phrase
+def nothing_swings_the_arm(platform: str) -> str:
+    """Said of a lever arm without attitude errors."""
+    return (
+        f"platforms.{platform}.motion_error.lever_arm.arm: attitude errors swing it, and imu states none: "
+        "add imu.attitude, gyro_bias or angle_random_walk"
+    )
 
 
 def _unused_correlations(mission: Mission) -> Iterator[_Warned]:

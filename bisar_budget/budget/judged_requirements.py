@@ -221,7 +221,10 @@ _DECLARES: Mapping[str, tuple[str, Callable[[Platform], bool]]] = {
     "imu": ("motion_error.imu", lambda one: one.motion_error.imu is not None and one.motion_error.imu.is_stated),
     "random": ("motion_error.random", lambda one: bool(one.motion_error.random)),
     "oscillator": ("oscillator", lambda one: one.oscillator is not None),
+    "time_tag": ("motion_error.time_tag", lambda one: one.motion_error.time_tag is not None),
+    "lever_arm": ("motion_error.lever_arm", lambda one: one.motion_error.lever_arm is not None),
 }
+_NOBODY_OWES = ("time_tag", "lever_arm")  # unless `declare` asks for them
 
 
 def declared_kinds(mission: Mission) -> DeclaredKinds:
@@ -241,7 +244,7 @@ def declared_kinds(mission: Mission) -> DeclaredKinds:
                 declared.append(f"{name}.{kind}")
                 if not _has_source(platform, kind):
                     without_source.append(f"{name}.{kind}")
-            elif name not in still or kind in ("position", "oscillator"):
+            elif kind not in _NOBODY_OWES and (name not in still or kind in ("position", "oscillator")):
                 missing.append(f"{name}.{kind}")
     if not mission.has_direct_path:
         (declared if _states_clock(mission) else missing).append("timing")
@@ -278,7 +281,9 @@ def _has_source(platform: Platform, kind: str) -> bool:
         return bool(source) or all(error.evidence(key) for key, figure in stated.items() if figure is not None)
     if kind == "random":
         return bool(error.evidence("random")) or all(process.source for process in error.random)
-    return bool(error.source if kind == "vibration" else error.evidence(kind))
+    if kind == "lever_arm":
+        return bool(error.lever_arm is not None and error.lever_arm.source) or bool(error.source)
+    return bool(error.source if kind in ("vibration", "time_tag") else error.evidence(kind))
 
 
 def still_platforms(mission: Mission) -> list[str]:

@@ -29,7 +29,7 @@ from bisar_budget.budget.judged_requirements import SMALL_RAD
 from bisar_budget.budget.judged_rows import BOUND, CODE, REQUIREMENTS, Floats, Judged, Judging, worded
 from bisar_budget.budget.pull_in import caps, needed_sentence
 from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
-from bisar_budget.effects.effect import override_notes, subject
+from bisar_budget.effects.effect import PLATFORMS, override_notes, subject
 from bisar_budget.effects.navigation_errors import process_of
 from bisar_budget.effects.oscillators import POOR_FIT
 from bisar_budget.effects.propagation import CONTENT, dispersion
@@ -124,7 +124,7 @@ class RandomRows:
         mine, theirs = self._effects(model), self._effects(other)
         sizes, sizes_of_other = self._sizes(model, mine), self._sizes(other, theirs)
         declared = self._table([math.nan if one.declared is None else one.declared for one in self.errors])
-        allocation, smallest = self.allocation, sizes.min(axis=0)
+        allocation, smallest, combine = self.allocation, sizes.min(axis=0), self.mission.allocation.combine
         gain = allocation.autofocus_gain
         is_limited = np.isfinite(smallest)
         binds = np.where(is_limited, sizes.argmin(axis=0), -1)
@@ -140,7 +140,7 @@ class RandomRows:
             allowable,
             doubt=is_over_other,
             without_autofocus=without_autofocus,
-            is_info=self.mission.allocation.combine != "each",
+            is_info=self._table([combine != "each" or bool(one.counted_in) for one in self.errors]) > 0,
         )._replace(
             binding=np.array([-1, *map(REQUIREMENTS.index, HELD)], np.int8)[binds + 1],
             qpe_published_rad=published.quadratic * declared,
@@ -262,7 +262,12 @@ class RandomRow:
             over=over,
             doubt=doubt,
             no_limit=_unlimited(mission, error, error.effect(gating)),
-            info=NOTHING if combine == "each" else phrases.aggregate_decides(combine),
+            info=phrases.counted_in_another_row(error.counted_in)
+            if error.counted_in
+            else NOTHING
+            if combine == "each"
+            else phrases.aggregate_decides(combine),
+            is_independent=not error.counted_in,
             without_autofocus=case.number(self.without_autofocus),
             evidence=evidence,
             remarks=notes,
@@ -360,13 +365,24 @@ def _said(mission: Mission, error: RandomError) -> tuple[str, str | None, tuple[
         return _said_of_air(mission, error)
     if kind == "other":
         return "as declared", mission.other_errors[error.subject.entry or 0].source, ()
-    motion: MotionError = getattr(mission.platforms, error.owner).motion_error
     if kind == "random":
         source, figure, equation = process_of(mission, error).source, "random", "Gauss-Markov"
-    else:
+        if error.owner not in PLATFORMS:
+            common = mission.common_motion_error
+            note = phrases.held_to_the_total("both platforms")
+            return equation, source or (common and common.source), (note,)
+    motion: MotionError = getattr(mission.platforms, error.owner).motion_error
+    if kind == "lever_arm" and figure == "uncertainty":
+        lever = motion.lever_arm
+        return "lever arm", (lever and lever.source) or motion.source, ()
+    if kind != "random":
         is_own = motion.imu is not None and motion.key_of(figure) == figure
-        source, equation = motion.imu.source if motion.imu and is_own else None, "inertial sensor"
-    return equation, source or motion.evidence(figure), override_notes(error.owner, motion.overridden, figure)
+        source = motion.imu.source if motion.imu and is_own else None
+        equation = "lever arm" if kind == "lever_arm" else "inertial sensor"
+    notes = override_notes(error.owner, motion.overridden, figure)
+    if error.counted_in and error.declared is None:  # else it is the reason of the row
+        notes = (phrases.counted_in_another_row(error.counted_in), *notes)
+    return equation, source or motion.evidence(figure), notes
 
 
 def _said_of_oscillator(mission: Mission, error: RandomError) -> tuple[str, str | None, tuple[Note, ...]]:
@@ -414,7 +430,7 @@ def _unlimited(mission: Mission, error: RandomError, effect: RandomEffect) -> No
 
 def no_effect(mission: Mission, error: RandomError) -> Note:
     """Say why an error does nothing."""
-    if error.subject.kind in ("imu", "random"):
+    if error.subject.kind in ("imu", "random", "lever_arm"):
         return phrases.across_the_line_of_sight()
     if error.subject.kind == "propagation":
         return phrases.below_the_ionosphere(error.owner)

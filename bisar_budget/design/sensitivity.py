@@ -556,10 +556,15 @@ def _declared_errors(mission: Mission) -> Iterator[str]:
             figures = [figure for figure in error.imu._fields if figure != "source"]
             yield from _keys_of(error.imu, f"platforms.{name}.motion_error.imu", figures)
         yield from (f"platforms.{name}.motion_error.random.{index}" for index in range(len(error.random)))
+        yield from _keys_of(error, f"platforms.{name}.motion_error", ("time_tag",))
+        if error.lever_arm is not None:
+            yield from _keys_of(error.lever_arm, f"platforms.{name}.motion_error.lever_arm", ("uncertainty",))
     if mission.common_motion_error is not None:
         yield from _keys_of(
-            mission.common_motion_error, "common_motion_error", ("position", "velocity", "acceleration")
+            mission.common_motion_error, "common_motion_error", ("position", "velocity", "acceleration", "time_tag")
         )
+        count = len(mission.common_motion_error.random)
+        yield from (f"common_motion_error.random.{index}" for index in range(count))
     yield from _keys_of(mission.timing_error, "timing_error", mission.timing_error._fields)
     if mission.propagation is not None:
         legs = ("transmitter", "receiver")

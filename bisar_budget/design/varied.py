@@ -17,7 +17,7 @@ from bisar_budget.effects.effect import MOTION, PLATFORMS
 from bisar_budget.geometry import STILL, BistaticGeometry, PlatformState, norm
 from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.covariance import EIGENVALUE_TOLERANCE, KINDS, Covariance, error_index
-from bisar_budget.mission.instruments import RISE, STEEPEST, Imu, PowerLaw
+from bisar_budget.mission.instruments import RISE, STEEPEST, Imu, LeverArm, PowerLaw
 from bisar_budget.mission.model import (
     MISSION,
     PLACE_KEYS,
@@ -35,6 +35,7 @@ from bisar_budget.mission.platforms import (
     CommonMotionError,
     MotionError,
     Platform,
+    has_body_axes,
     least_baseline,
 )
 from bisar_budget.mission.propagation import LEAST_ELEVATION_DEG, low_legs
@@ -45,10 +46,11 @@ from bisar_budget.units import Dimension, parse_quantity
 # Sections that a file may leave out, and keys whose scalar stands for each of three axes.
 _SECTIONS: Mapping[str, Callable[[], Any]] = {
     "imu": Imu,
+    "lever_arm": LeverArm,
     "common_motion_error": CommonMotionError,
     "simulation": Simulation,
 }
-_TRIPLES = ("position", "velocity", "acceleration", *Imu._fields[:-1])
+_TRIPLES = ("position", "velocity", "acceleration", *Imu._fields[:-1], "uncertainty")
 # Curves of an oscillator, with the dimension of what their points are named by.
 _CURVES: Mapping[str, Dimension] = {
     "phase_noise": units.FREQUENCY,
@@ -137,7 +139,7 @@ def _is_held_of_error(error: MotionError, parts: Sequence[str], is_stated: bool)
         return parts[0] == "acceleration" or error.covariance is None  # which replaces the others
     if parts[0] == "covariance" and error.covariance is not None:
         return is_stated and not error.covariance.is_matrix  # an element of a matrix has a twin
-    return is_stated or parts[0] == "imu"
+    return is_stated or parts[0] == "imu" or tuple(parts) in (("time_tag",), ("lever_arm", "uncertainty"))
 
 
 def _is_held_of_path(platform: Platform, name: str, is_stated: bool) -> bool:
@@ -166,6 +168,10 @@ def is_image(mission: Mission, geometries: BistaticGeometry, cases: int) -> NDAr
         platform = getattr(mission.platforms, name)
         is_one &= (paths.slant_range > SAFE) & (np.asarray(paths.position[2]) - paths.sinks(half) >= 0)
         is_one &= paths.has_frame(platform.motion_error.frame, SAFE)
+        if mission.common_motion_error is not None:
+            is_one &= paths.has_frame(mission.common_motion_error.frame, SAFE)
+        if platform.motion_error.lever_arm is not None:
+            is_one &= has_body_axes(paths, np.broadcast_to(half, (cases,)), SAFE)
         still = still & (norm(paths.velocity) < STILL * SAFE)
         if np.ndim(platform.speed):
             is_one &= np.asarray(platform.speed) != 0
@@ -216,6 +222,7 @@ def _has_possible_figures(mission: Mission, cases: int) -> NDArray[np.bool_]:
 # ---------------------------------------------------------------------- scaled errors
 # What a factor does not multiply: when and how fast an error changes, and settings.
 _KEPT = (units.FREQUENCY, units.TIME, units.RATIO, units.MEMORY)
+_TIMES, _MEASURES = ("time_tag",), ("arm",)  # by their keys: a time that is an error; a length that is none
 _LEVELS = (units.POWER_RATIO, units.PHASE_NOISE, units.TONE)
 _ERRORS = ("motion_error", "common_motion_error", "timing_error", "propagation", "other_errors")
 _ACCEPTED = (
@@ -246,7 +253,11 @@ def scaled(mission: Mission, key: str, factor: Any) -> Mission:
 def _below(value: Any, reader: Reader, parts: Sequence[str], factor: Any, key: str) -> tuple[Any, int]:
     """Go down to the key, and put what is scaled in its place on the way back."""
     if not parts:
-        return _scaled(value, reader, factor, is_clock=parts_of(key)[0] == "timing_error")
+        name = parts_of(key)[-1]
+        if name in _MEASURES:
+            return value, 0
+        is_clock = parts_of(key)[0] == "timing_error" or name in _TIMES
+        return _scaled(value, reader, factor, is_clock=is_clock)
     part, *rest = parts
     reader = _form(reader, value)
     if isinstance(reader, Section) and part in reader.keys and value is not None:
@@ -267,7 +278,9 @@ def _scaled(value: Any, reader: Reader, factor: Any, is_clock: bool) -> tuple[An
     if isinstance(reader, Section):
         count = 0
         for name, below in reader.keys.items():
-            inner, found = _scaled(getattr(value, name), below.reader, factor, is_clock)
+            if name in _MEASURES:
+                continue
+            inner, found = _scaled(getattr(value, name), below.reader, factor, is_clock or name in _TIMES)
             value, count = value._replace(**{name: inner}), count + found
         return value, count
     if isinstance(reader, ListOf | Triple):

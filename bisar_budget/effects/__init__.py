@@ -5,6 +5,7 @@ __all__ = [
     "combined",
     "declared",
     "effect",
+    "lever_arms",
     "navigation_errors",
     "oscillators",
     "other_errors",

@@ -21,7 +21,7 @@ from bisar_budget import evaluators, phrases
 from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG
 from bisar_budget.effects.effect import PLATFORMS, ErrorSource, plain
 from bisar_budget.effects.sources import ErrorListing
-from bisar_budget.geometry import BistaticGeometry, GroundVector, angle_between_lines
+from bisar_budget.geometry import BistaticGeometry, GroundVector, angle_between_lines, norm
 from bisar_budget.mission.model import Mission
 from bisar_budget.phrases import NOTHING, Note
 from bisar_budget.ranges.exact_ranges import Effect, ExactRanges, Floats, Lanes, Places, Truths
@@ -150,7 +150,7 @@ class ErrorBlock:
         for place, source in enumerate(sources):
             if source.declared is not None:
                 self.declared[place] = source.declared
-            self.edge[place] = table.edge.get(source.unit, 0.0)
+            self.edge[place] = table.edge_of(source)
             for part, numbers in enumerate(zip(source.effect, source.full, strict=True)):
                 published[part, place], full[part, place] = numbers
         self.effects = {"published": Effect(*published), "full": Effect(*full)}
@@ -443,27 +443,47 @@ class DeclaredErrors:
     def lanes(self, *errors: ErrorSource, signs: Sequence[float] = (1.0,)) -> Lanes:
         """A unit of errors, of each sign, in each case; by error, sign and case."""
         moved = [error.platforms for error in errors]
-        orders = [list(self.edge).index(error.unit) if error.platforms else -1 for error in errors]
+        orders = [self._order(error) for error in errors]
         courses = np.array([self._course(error, order) for error, order in zip(errors, orders, strict=True)])
         at_nodes = np.moveaxis(courses[:, None] * np.array(signs)[:, None, None], 2, 0)
         moves: list[list[Any]] = [[float(platform in one) for one in moved] for platform in (0, 1)]
         u, v, order = (self._of_each(values, len(signs)) for values in (*moves, orders))
         x, y, z = (self._of_each([error.direction[axis] for error in errors], len(signs)) for axis in (0, 1, 2))
+        of_receiver = None
+        if any(error.of_receiver is not None for error in errors):
+            ways = [[error.direction_of(1)[axis] for error in errors] for axis in (0, 1, 2)]
+            of_receiver = tuple(self._of_each(along, len(signs)) for along in ways)
         case = np.tile(self.each, len(errors) * len(signs))
-        return Lanes(case, at_nodes.reshape(len(at_nodes), -1), (u, v), (x, y, z), order)
+        return Lanes(case, at_nodes.reshape(len(at_nodes), -1), (u, v), (x, y, z), order, of_receiver)
+
+    def edge_of(self, error: ErrorSource) -> Any:
+        """Position error at the aperture's edge by a unit of an error, the larger of both platforms; 0 of a clock."""
+        if error.subject.kind != "time_tag":
+            return self.edge.get(error.unit, 0.0)
+        return np.max([norm(error.direction_of(place)).max(axis=0) for place in error.platforms], axis=0)
+
+    def _order(self, error: ErrorSource) -> int:
+        """Power of slow time with which a position error grows: -1 of a clock, 0 of a time tag, whose way turns."""
+        if not error.platforms:
+            return -1
+        return 0 if error.subject.kind == "time_tag" else list(self.edge).index(error.unit)
 
     def _course(self, error: ErrorSource, order: int) -> Floats:
         """Position error at the nodes of a unit of an error, or the range error of what moves no platform."""
         exact = self.exact
         if order >= 0:
-            return exact.powers[error.unit]
+            return exact.powers[list(self.edge)[order]]
         if error.clock is not None:
             return exact.clock_course(error.clock)
         # A phase as such: a quadratic that displaces nothing.
         return np.asarray(((exact.times / exact.half) ** 2 - 1 / 3) / exact.k)
 
     def _of_each(self, values: Sequence[Any], signs: int) -> Any:
-        """One value of each error for its lanes, or the one that all have."""
+        """One value of each error for its lanes, or the one that all have; of ways that turn at each node."""
+        if any(np.ndim(value) > 1 for value in values):
+            count = self.exact.fit.shape[1]
+            turning = np.stack([np.broadcast_to(value, (count, self.cases)) for value in values], axis=1)
+            return np.repeat(turning[:, :, None], signs, axis=2).reshape(count, -1)
         if any(isinstance(value, np.ndarray) for value in values):
             return np.repeat([self.array(value) for value in values], signs, axis=0).reshape(-1)
         return values[0] if len(set(values)) == 1 else np.repeat(values, signs * self.cases)

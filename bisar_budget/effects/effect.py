@@ -28,9 +28,9 @@ class Subject(NamedTuple):
     """The thing that a row or an error is about. `subject` makes it, with its id; nobody reads an id to find out.
 
     `owner` is the one whose share it counts against: transmitter, receiver, clock, or mission for what is nobody's.
-    `kind` is position, velocity, acceleration, vibration, timing, propagation, terrain, other, or the name of a sum.
-    `axis` is the axis of `frame`, the term of the clock, the figure of a sensor or the air, the name of another
-    error, the sort of a vibration, and `entry` the place of one in the file.
+    `kind` is position, velocity, acceleration, time_tag, vibration, timing, propagation, terrain, other, or the name
+    of a sum. `axis` is the axis of `frame`, the term of the clock, the figure of a sensor or the air, the name of
+    another error, the sort of a vibration, and `entry` the place of one in the file.
     """
 
     id: str
@@ -50,7 +50,7 @@ def subject(owner: str, kind: str, axis: str = "", frame: str = "scene", entry: 
         parts = [kind, owner, axis]
     elif owner == "clock":
         parts = ["timing", kind]
-    elif owner == "mission" and kind in MOTION:
+    elif owner == "mission" and kind in (*MOTION, "time_tag", "random"):
         parts = ["common", kind, axis]
     else:
         parts = [owner, kind, axis, "" if entry is None else str(entry)]
@@ -79,6 +79,11 @@ def plain(column: Any, place: int = 0) -> float:
     return float(column.item(place if column.size > 1 else 0))
 
 
+def _plain_way(part: Any) -> Any:
+    """A component of a direction in one case; of one that turns all nodes."""
+    return part if np.ndim(part) > 1 else plain(part)
+
+
 class ErrorSource(NamedTuple):
     """One error: what it is, how large it is declared, what one unit of it does; in one case, or in many as arrays.
 
@@ -86,8 +91,9 @@ class ErrorSource(NamedTuple):
     coverage factor; None where the file is silent. `is_independent` marks the errors as the file states
     them: sums and root-sum-squares run over these alone, so that an error stated along the track is not
     counted again by its components along the scene's axes. `direction` is a unit vector of the scene, zero for
-    what is no motion; of the mission's own it is that of both platforms. `clock` are t̃₀ … t̃₃ of a unit of an error of
-    the clock, zeros where nothing of it is heard; None for any other error.
+    what is no motion; of the mission's own it is that of both platforms, unless the receiver has another one. That of
+    a time tag is the velocity at the nodes of the aperture, (nodes, cases). [m/s] `clock` are t̃₀ … t̃₃ of a unit of an
+    error of the clock, zeros where nothing of it is heard; None for any other error.
     """
 
     subject: Subject
@@ -103,6 +109,7 @@ class ErrorSource(NamedTuple):
     is_independent: bool = True
     notes: tuple[Note, ...] = ()
     clock: tuple[Any, ...] | None = None
+    of_receiver: Any = None
 
     @property
     def id(self) -> str:
@@ -113,9 +120,15 @@ class ErrorSource(NamedTuple):
         """The same with plain numbers in the place of arrays of one case."""
         effect, full = (Effect._make(map(plain, one)) for one in (self.effect, self.full))
         declared = None if self.declared is None else plain(self.declared)
-        clock = None if self.clock is None else tuple(map(plain, self.clock))
-        direction = tuple(map(plain, self.direction))
-        return self._replace(declared=declared, effect=effect, full=full, direction=direction, clock=clock)
+        clock = self.clock and tuple(map(plain, self.clock))
+        direction, of_receiver = (one and tuple(map(_plain_way, one)) for one in (self.direction, self.of_receiver))
+        return self._replace(
+            declared=declared, effect=effect, full=full, direction=direction, of_receiver=of_receiver, clock=clock
+        )
+
+    def direction_of(self, place: int) -> Any:
+        """Direction in which it moves a platform."""
+        return self.of_receiver if place == 1 and self.of_receiver is not None else self.direction
 
     @property
     def owner(self) -> str:
@@ -130,7 +143,7 @@ class ErrorSource(NamedTuple):
     @property
     def is_covered(self) -> bool:
         """Whether the coverage factor is in what is declared: not of the terrain, and not of what only is a phase."""
-        return self.subject.kind in MOTION or self.clock is not None
+        return self.subject.kind in (*MOTION, "time_tag") or self.clock is not None
 
     @property
     def is_heard(self) -> bool:
@@ -150,7 +163,7 @@ class ErrorSource(NamedTuple):
     @property
     def is_common(self) -> bool:
         """Whether it is one error of the paths of both platforms."""
-        return self.owner == "mission" and self.subject.kind in MOTION
+        return self.owner == "mission" and self.subject.kind in (*MOTION, "time_tag")
 
     def moves(self, platform: str) -> bool:
         """Whether it is an error of a platform's position; one of the mission's own is of both."""

@@ -1,18 +1,21 @@
 """Errors of navigation at random: figures of inertial sensors, and noise of a position.
 
 Biases of an inertial sensor are one error over the aperture, noise is another at every moment; both count from
-mid-aperture on: position and velocity there are what aiding leaves, and the mission declares them.
+mid-aperture on: position and velocity there are what aiding leaves, and the mission declares them. What tilts also
+swings a lever arm, where the file states one, and an error of the attitude at mid-aperture does so there already.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import cache
-from typing import Any
+from itertools import product
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from bisar_budget import evaluators
 from bisar_budget.effects.effect import PLATFORMS, subject
+from bisar_budget.effects.lever_arms import arm_at, swung
 from bisar_budget.effects.random_effect import (
     NODES,
     RandomEffect,
@@ -23,14 +26,15 @@ from bisar_budget.effects.random_effect import (
     sigmas,
 )
 from bisar_budget.effects.spectra import Floats, gauss_markov
+from bisar_budget.faults import KeyPath
 from bisar_budget.geometry import PlatformState, Vector
 from bisar_budget.mission.instruments import IMU_KINDS, GaussMarkov
 from bisar_budget.mission.model import Mission
-from bisar_budget.mission.platforms import MotionError
+from bisar_budget.mission.platforms import CommonMotionError, MotionError
 
 _IMU_UNITS = dict(zip(IMU_KINDS, ("m/s^2", "1", "rad", "rad/s", "m/s/sqrt(s)", "rad/sqrt(s)"), strict=True))
 NOISE = ("velocity_random_walk", "angle_random_walk")  # figures of an inertial sensor that spread
-_TILTS = ("attitude", "gyro_bias", "angle_random_walk")
+TILTS = ("attitude", "gyro_bias", "angle_random_walk")
 # The covariance of a position error over the aperture grows as this power of the aperture time.
 _GROWS = {
     "accelerometer_bias": 4,
@@ -45,7 +49,10 @@ _GROWS = {
 # ---------------------------------------------------------------------- inertial sensors
 def process_of(mission: Mission, error: RandomError) -> GaussMarkov:
     """Process of an error that is correlated noise of a position."""
-    motion: MotionError = getattr(mission.platforms, error.owner).motion_error
+    motion: MotionError | CommonMotionError | None = mission.common_motion_error
+    if error.owner in PLATFORMS:
+        motion = getattr(mission.platforms, error.owner).motion_error
+    assert motion is not None
     return next(one for one in motion.random if one.name == error.subject.axis)
 
 
@@ -67,7 +74,7 @@ def acceleration_errors(kind: str, axes: Floats, force: Floats) -> Floats:
     A tilt turns what accelerometers measure, the specific force (3, ...); a scale factor is a part of it. What is an
     acceleration is one. [m/s²/unit]
     """
-    if kind in _TILTS:
+    if kind in TILTS:
         return np.asarray(np.cross(axes, force, axisa=1, axisb=0, axisc=1))
     if kind == "accelerometer_scale_factor":
         return np.asarray(axes * (axes * force).sum(axis=1, keepdims=True))
@@ -79,26 +86,34 @@ def inertial_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
     error = seen.error(name)
     if error.imu is None:
         return
-    axes = seen.axes(name)
-    force = seen.vector(specific_force(seen.mission, getattr(seen.geometry, name)))
+    axes, place, state = seen.axes(name), PLATFORMS.index(name), getattr(seen.geometry, name)
+    stated = None if error.lever_arm is None else error.lever_arm.arm
+    arm = None if stated is None else arm_at(state, stated, seen.exact.times)
+    force = seen.vector(specific_force(seen.mission, state))
     for index, (kind, unit) in enumerate(_IMU_UNITS.items()):
         values, key = getattr(error.imu, kind), error.key_of(kind)
-        directions, declared = acceleration_errors(kind, axes, force), None
+        declared, about = None, axes
+        directions = acceleration_errors(kind, axes, force)
         if values is not None:
             declared, sizes = parts_of_largest(seen.vector(values))
-            directions = directions * sizes[:, None]
+            directions, about = directions * sizes[:, None], axes * sizes[:, None]
         along, along_heard = seen.along(name, directions)
         row = heard = _at_mid_aperture(seen.mission, index, along)
         if along_heard is not along:
             heard = _at_mid_aperture(seen.mission, index, along_heard)
-        (quadratic, cubic, east, north), covariance = _over_aperture(seen, PLATFORMS.index(name), kind, directions)
+        if arm is not None and kind in TILTS:
+            published, full = _with_arm(seen, place, kind, directions, about, arm)
+        else:
+            (quadratic, cubic, east, north), covariance = _over_aperture(seen, place, kind, directions)
+            published = RandomEffect(row[0], row[1], row[2] / seen.factor, *_moved_by_imu(seen, kind, along))
+            full = RandomEffect(quadratic, cubic, heard[2] / seen.factor, east, north, covariance)
         yield RandomError(
             subject=subject(name, "imu", kind),
             unit=unit,
             declared=None if declared is None else declared * seen.factor,
             path=("platforms", name, "motion_error", *(("imu", kind) if key == kind else (key,))),
-            published=RandomEffect(row[0], row[1], row[2] / seen.factor, *_moved_by_imu(seen, kind, along)),
-            full=RandomEffect(quadratic, cubic, heard[2] / seen.factor, east, north, covariance),
+            published=published,
+            full=full,
             spreads=kind in NOISE,
         )
 
@@ -157,32 +172,128 @@ def _angle_walk(early: float, late: float) -> float:
     return (early**5 / 5 + lag * early**4 / 2 + lag**2 * early**3 / 3) / 4
 
 
+# ---------------------------------------------------------------------- tilts that swing a lever arm
+def _with_arm(
+    seen: SensorCases, place: int, kind: str, directions: Floats, about: Floats, arm: Floats
+) -> tuple[RandomEffect, RandomEffect]:
+    """Effects by both models of a unit of tilt about axes (axes, 3, cases), or of its rate or noise, with an arm.
+
+    `directions` (axes, 3, cases) is what it makes of the specific force [m/s²/unit], `arm` the arm at the nodes. [m]
+    """
+    state, times = seen.geometry.both[place], seen.exact.times
+    swings = swung(about, arm)
+    if kind != "angle_random_walk":
+        order = 2 if kind == "attitude" else 3
+        grows = times**order / math.factorial(order)
+        return seen.of_motion(place, directions[:, :, None] * grows + swings * times ** (order - 2))
+    # The tilt walks, and twice integrated it is a position: two walks, of which each axis has its own.
+    x, y, z = np.moveaxis(directions, 1, 0)[:, :, None]
+    u, v, w = np.moveaxis(swings, 1, 0)
+    moves = (seen.exact.along(place, (x, y, z)), seen.exact.along(place, (u, v, w)))
+    moved = [seen.weights[:, None] * one for one in moves]  # (4, axes, nodes, cases)
+    stated = seen.error(PLATFORMS[place]).lever_arm
+    assert stated is not None
+    at_middle = swung(about, arm_at(state, stated.arm, np.zeros((1, seen.cases))))[:, :, 0]
+    look, sight = (seen.vector(one) for one in (state.look, seen.sights[place]))
+    held, heard = ([np.einsum("ac,eac->ec", way, one) for one in (directions, at_middle)] for way in (look, sight))
+    fit, half, k = seen.exact.fit, seen.exact.half, seen.exact.k
+    whole, sizes, orders, left, left_heard = (np.zeros(()) for _ in range(5))
+    for (i, a), (j, b) in product(enumerate((2, 0)), repeat=2):  # how often each is integrated
+        walk, scale = _walks(a, b), half ** (a + b + 1)
+        whole = whole + scale * np.einsum("fanc,nm,gamc->fgc", moved[i], walk.at_nodes, moved[j])
+        reach = np.sqrt(np.abs(np.diagonal(walk.at_nodes)))[:, None]
+        sizes = sizes + scale * np.einsum("fanc,famc->fc", *(np.abs(moved[one]) * reach for one in (i, j)))
+        orders = orders + scale * np.diagonal(fit @ walk.at_nodes @ fit.T)[:, None] * (held[i] * held[j]).sum(axis=0)
+        left = left + scale * walk.left * (held[i] * held[j]).sum(axis=0)
+        left_heard = left_heard + scale * walk.left * (heard[i] * heard[j]).sum(axis=0)
+    (quadratic, cubic, east, north), covariance = sigmas(np.asarray(whole), np.asarray(sizes))
+    constant, linear, own, own_cubic = np.maximum(orders, 0.0)
+    spread, spread_heard = (k * np.sqrt(np.maximum(one, 0.0)) for one in (left, left_heard))
+    published = RandomEffect(k * np.sqrt(own), k * np.sqrt(own_cubic), spread, *seen.moved(constant, linear))
+    return published, RandomEffect(quadratic, cubic, spread_heard, east, north, covariance)
+
+
+class _Walks(NamedTuple):
+    """Two integrals of one white noise of density 1, from the middle of an aperture of 2 s on, each way.
+
+    Covariance of the first at the nodes with the second, (nodes, nodes), of their Legendre orders up to the last that
+    nodes tell apart; and the mean over the aperture of what they have in common beyond order 3.
+    """
+
+    at_nodes: Floats
+    left: float
+
+
+@cache
+def _walks(first: int, second: int) -> _Walks:
+    """The noise integrated once more than so many times: 0 is a walk."""
+    places, weights = np.polynomial.legendre.leggauss(2 * NODES)
+    start, weight = (1 + places) / 2, weights / 2  # on one side
+    number = np.arange(NODES)
+
+    def order_of(times: int) -> Floats:
+        """Order n of the integral by a unit of noise at each start, (n, starts)."""
+        ahead = start[:, None] + (1 - start[:, None]) * start
+        grown = ((ahead - start[:, None]) ** times / math.factorial(times)) * weight * (1 - start[:, None])
+        return np.asarray((2 * number[:, None] + 1) / 2 * np.einsum("snp,sn->ps", _legendre(ahead), grown))
+
+    both = np.einsum("is,js,s->ij", order_of(first), order_of(second), weight)
+    both = both * (1 + (-1.0) ** np.add.outer(number, number))  # that of the other side is as large
+    mean = 1 / ((first + second + 2) * (first + second + 1) * math.factorial(first) * math.factorial(second))
+    at_nodes = _legendre(np.array(evaluators.LEGENDRE_FITS[NODES][0]))
+    return _Walks(at_nodes @ both @ at_nodes.T, mean - float((np.diagonal(both) / (2 * number + 1))[:4].sum()))
+
+
+def _legendre(places: Floats) -> Floats:
+    return np.asarray(np.polynomial.legendre.legvander(places, NODES - 1))
+
+
 # ---------------------------------------------------------------------- position noise
 def position_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
     """Correlated noise of a platform's position."""
     error = seen.error(name)
-    if not error.random:
-        return
-    k, axes, key = 2 * math.pi / seen.mission.radar.wavelength, seen.axes(name), error.key_of("random")
+    key = error.key_of("random")
     for index, process in enumerate(error.random):
-        largest, sizes = parts_of_largest(seen.vector(process.sigma))
-        directions = axes * sizes[:, None]
-        found = gauss_markov(seen.aperture_time, process.correlation_time)
-        along, along_heard = seen.along(name, directions)
-        seen_along = seen.exact.along(PLATFORMS.index(name), tuple(np.moveaxis(directions, 1, 0)[:, :, None]))
-        covariance = seen.of_orders(of_cases(found.covariance, seen.cases), seen_along)
-        quadratic, cubic, left = (np.sqrt(one) for one in found[:3])
-        (own, own_cubic, east, north), covariance = sigmas(covariance, np.einsum("ffc->fc", covariance))
-        yield RandomError(
-            subject=subject(name, "random", process.name),
-            unit="m",
-            declared=largest * seen.factor,
-            path=("platforms", name, "motion_error", *((key, index, "sigma") if key == "random" else (key,))),
-            published=RandomEffect(
-                k * along * quadratic,
-                k * along * cubic,
-                k * along * left / seen.factor,
-                *seen.moved(found.constant * along**2, found.linear * along**2),
-            ),
-            full=RandomEffect(own, own_cubic, k * along_heard * left / seen.factor, east, north, covariance),
-        )
+        path = ("platforms", name, "motion_error", *((key, index, "sigma") if key == "random" else (key,)))
+        yield _noise(seen, process, name, {name: seen.axes(name)}, path)
+
+
+def common_noise(seen: SensorCases) -> Iterator[RandomError]:
+    """Correlated noise that both platforms have in common: along each axis of its frame what both legs do adds."""
+    error = seen.mission.common_motion_error
+    for index, process in enumerate(() if error is None else error.random):
+        axes = {name: seen.axes(name, error.frame) for name in PLATFORMS} if error is not None else {}
+        yield _noise(seen, process, "mission", axes, ("common_motion_error", "random", index, "sigma"))
+
+
+def _noise(
+    seen: SensorCases, process: GaussMarkov, owner: str, axes: Mapping[str, Floats], path: KeyPath
+) -> RandomError:
+    """Noise along axes of the platforms that it moves, (axes, 3, cases) each."""
+    k = 2 * math.pi / seen.mission.radar.wavelength
+    largest, sizes = parts_of_largest(seen.vector(process.sigma))
+    found = gauss_markov(seen.aperture_time, process.correlation_time)
+    sighted, heard, moved = list[Floats](), list[Floats](), list[Floats]()
+    for name, of_platform in axes.items():
+        place, directions = PLATFORMS.index(name), of_platform * sizes[:, None]
+        for kept, sight in ((sighted, seen.geometry.both[place].look), (heard, seen.sights[place])):
+            kept.append((directions * seen.vector(sight)).sum(axis=1))
+        x, y, z = np.moveaxis(directions, 1, 0)[:, :, None]
+        moved.append(seen.exact.along(place, (x, y, z)))
+    along, along_heard = (np.sqrt(np.square(sum(one)).sum(axis=0)) for one in (sighted, heard))
+    covariance = seen.of_orders(of_cases(found.covariance, seen.cases), sum(moved))
+    quadratic, cubic, left = (np.sqrt(one) for one in found[:3])
+    (own, own_cubic, east, north), covariance = sigmas(covariance, np.einsum("ffc->fc", covariance))
+    return RandomError(
+        subject=subject(owner, "random", process.name),
+        unit="m",
+        declared=largest * seen.factor,
+        path=path,
+        published=RandomEffect(
+            k * along * quadratic,
+            k * along * cubic,
+            k * along * left / seen.factor,
+            *seen.moved(found.constant * along**2, found.linear * along**2),
+        ),
+        full=RandomEffect(own, own_cubic, k * along_heard * left / seen.factor, east, north, covariance),
+    )

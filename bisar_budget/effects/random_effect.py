@@ -77,6 +77,7 @@ class RandomError(NamedTuple):
     `declared` is the largest of the axes, coverage factor included, and all axes grow with it; None where the file is
     silent. The unit of an oscillator is `dB`: its noise as a factor of amplitude, declared 1. `noise` is the spectrum
     of an oscillator; not of many cases. `spreads` tells noise from what changes within the aperture by a few orders.
+    `counted_in` is the id of a row whose error does this too, so that this one counts nowhere.
     """
 
     subject: Subject
@@ -87,6 +88,7 @@ class RandomError(NamedTuple):
     full: RandomEffect
     noise: Noise | None = None
     spreads: bool = True
+    counted_in: str = ""
 
     @property
     def id(self) -> str:
@@ -143,10 +145,10 @@ class SensorCases:
         found: MotionError = getattr(self.mission.platforms, name).motion_error
         return found
 
-    def axes(self, name: str) -> Floats:
-        """Axes of a platform's errors, (axes, 3, cases)."""
+    def axes(self, name: str, frame: str = "") -> Floats:
+        """Axes of a platform's errors, or of another frame of it, (axes, 3, cases)."""
         path: PlatformState = getattr(self.geometry, name)
-        return np.array([self.vector(axis) for axis in path.frame(self.error(name).frame)])
+        return np.array([self.vector(axis) for axis in path.frame(frame or self.error(name).frame)])
 
     def along(self, name: str, directions: Floats) -> tuple[Floats, Floats]:
         """Root-sum-square of what directions (axes, 3, cases) have of the line of sight, and of what data hear."""
@@ -200,6 +202,12 @@ class SensorCases:
         effects, sizes = weighted.sum(axis=2), np.square(np.abs(weighted).sum(axis=2)).sum(axis=1)
         (qpe, edge, east, north), covariance = sigmas(np.einsum("fec,gec->fgc", effects, effects), sizes)
         return published, RandomEffect(qpe, edge, 0.0 * k, east, north, covariance)
+
+    def of_motion(self, place: int, moved: Floats) -> tuple["RandomEffect", "RandomEffect"]:
+        """The same of independent position errors of a platform, (errors, 3, nodes, cases). [m/unit]"""
+        look = self.vector(self.geometry.both[place].look)
+        x, y, z = np.moveaxis(moved, 1, 0)
+        return self.of_courses(self.exact.along(place, (x, y, z)), -np.einsum("ac,eanc->enc", look, moved))
 
     def moved(self, constant: Any, linear: Any, both: Any = 0.0) -> list[Any]:
         """Sigmas of the displacement by (25). [m]

@@ -2,7 +2,8 @@
 
 from bisar_budget.effects.clock_errors import link_noise, oscillator_noise
 from bisar_budget.effects.effect import PLATFORMS, plain
-from bisar_budget.effects.navigation_errors import inertial_errors, position_noise
+from bisar_budget.effects.lever_arms import lever_arm_errors
+from bisar_budget.effects.navigation_errors import common_noise, inertial_errors, position_noise
 from bisar_budget.effects.oscillators import noise_of
 from bisar_budget.effects.other_errors import stated_effects
 from bisar_budget.effects.propagation import delay_errors
@@ -15,12 +16,15 @@ from bisar_budget.mission.model import Mission
 def random_errors(mission: Mission, geometry: BistaticGeometry | None = None, cases: int = 1) -> list[RandomError]:
     """List the errors of sensors, clocks and the air that a mission names, in a fixed order; nothing for most.
 
-    Of a platform with an inertial sensor every figure is listed, declared or not. `geometry` is that of many cases;
+    Of a platform with an inertial sensor every figure is listed, declared or not, and of one with a lever arm its
+    attitude. `geometry` is that of many cases;
     without it all numbers are floats.
     """
     seen = SensorCases(mission, geometry or mission.geometry, cases)
     found = [error for name in PLATFORMS for error in inertial_errors(seen, name)]
+    found += [error for name in PLATFORMS for error in lever_arm_errors(seen, name)]
     found += [error for name in PLATFORMS for error in position_noise(seen, name)]
+    found += common_noise(seen)
     found += [error for name in PLATFORMS for error in oscillator_noise(seen, name)]
     found += link_noise(seen)
     found += [error for name in PLATFORMS for error in delay_errors(seen, name)]

@@ -24,7 +24,7 @@ from bisar_budget.effects.effect import (
     subject,
 )
 from bisar_budget.faults import KeyPath
-from bisar_budget.geometry import FRAME_AXES, BistaticGeometry, Vectors
+from bisar_budget.geometry import FRAME_AXES, BistaticGeometry, PlatformState, Vectors
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
 from bisar_budget.phrases import NOTHING, Note
@@ -75,6 +75,7 @@ class ErrorListing:
                 yield from self._of_motion(place, name, kind, unit)
         yield from self._of_clock()
         yield from self._of_both_platforms()
+        yield from self._of_time_tags()
         yield from self._of_terrain()
         yield from self._others()
 
@@ -153,7 +154,7 @@ class ErrorListing:
                 full=_along(full, direction),
                 direction=direction,
                 equation=_equation(kind, None),
-                no_limit=_no_limit(kind, f"the {error.frame} frame's {axis_name} axis"),
+                no_limit=_no_limit(kind, _axis_of(error.frame, axis_name)),
                 evidence=evidence,
                 notes=notes,
             )
@@ -254,31 +255,39 @@ class ErrorListing:
         yield self._of_terms(what, "1/s", value, path, terms, no_limit, evidence=oscillator.source)
 
     def _of_both_platforms(self) -> Iterator[ErrorSource]:
-        """ErrorListing that both platforms have in common: the effects of both legs add with their signs.
+        """Errors that both platforms have in common: the effects of both legs add with their signs.
 
-        A bias of one GNSS service moves both measured paths by the same vector. The range error, and with it Table I
-        and the full model, is linear in the errors, so the common effect is the sum of the two platforms' own.
+        A bias of one GNSS service moves both measured paths by the same vector, along the axes of the scene; along
+        those of another frame each path is moved by the same components in its own axes. The range error, and with
+        it Table I and the full model, is linear in the errors: the common effect is the sum of the platforms' own.
         """
         error = self.mission.common_motion_error
         if error is None:
             return
+        in_scene, names = error.frame == "scene", FRAME_AXES[error.frame]
+        frames = [path.frame(error.frame) for path in self.geometry.both]
         for kind, unit in MOTION_UNITS.items():
             values = getattr(error, kind)
-            for axis, letter in enumerate("xyz"):
-                what = subject("mission", kind, letter)
+            for axis, name in enumerate(names):
+                what = subject("mission", kind, name, error.frame)
                 if not self._is_listed(what, values):
                     continue
+                ways = [frame[axis] for frame in frames]
                 published, full = (
-                    _sum([self.legs(place, kind)[model][axis] for place in (0, 1)]) for model in (0, 1)
-                )
-                if kind == "position" and letter != "z":
+                    _sum([
+                        legs[axis] if in_scene else _along(legs, ways[place])
+                        for place, legs in enumerate(self.legs(place, kind)[model] for place in (0, 1))
+                    ])
+                    for model in (0, 1)
+                )  # fmt: skip
+                if kind == "position" and name in ("x", "y"):
                     # A horizontal shift of both platforms is a shift of the scene: x̂ is the error itself, and β̃ₙ and
                     # ½s̈·x̂ cancel. What a sum of rounded numbers leaves would be a limit out of nothing.
                     full = full._replace(qpe=0.0 * full.qpe, cubic=0.0 * full.cubic)
-                *_, equation, no_limit = _scene_axes(PLATFORMS[0], kind)[axis]
+                no_limit = phrases.no_quadratic_term_of_position()
                 if kind != "position":
                     cause = "velocities" if kind == "velocity" else "lines of sight"
-                    no_limit = phrases.no_common_component(cause, letter)
+                    no_limit = phrases.no_common_component(cause, name if in_scene else _axis_of(error.frame, name))
                 yield ErrorSource(
                     subject=what,
                     unit=unit,
@@ -286,12 +295,61 @@ class ErrorListing:
                     path=("common_motion_error", kind, axis),
                     effect=published,
                     full=full,
-                    direction=_AXES[axis],
-                    equation=f"{equation}, both platforms",
+                    direction=ways[0],
+                    equation=f"{_equation(kind, axis if in_scene else None)}, both platforms",
                     no_limit=no_limit,
                     evidence=error.source,
                     notes=(phrases.held_to_the_total("both platforms"),),
+                    of_receiver=None if in_scene else ways[1],
                 )
+
+    def _of_time_tags(self) -> Iterator[ErrorSource]:
+        """Time of the navigation against that of the radar: each platform's, and that of one clock for both.
+
+        A path is measured where the platform is a little later: p(τ + δt) − p(τ) = v(τ)·δt, to first order in δt.
+        What a·δt²/2 adds is δt·a/2v of it: 0.2 % for 0.1 s in a turn of 4 m/s² at 100 m/s.
+        """
+        for place, name in enumerate(PLATFORMS):
+            error: MotionError = getattr(self.mission.platforms, name).motion_error
+            if error.time_tag is not None:
+                key: KeyPath = ("platforms", name, "motion_error", "time_tag")
+                yield self._of_time_tag(name, (place,), error.time_tag, key, error.source)
+        common = self.mission.common_motion_error
+        if common is not None and common.time_tag is not None:
+            note = phrases.held_to_the_total("both platforms")
+            key = ("common_motion_error", "time_tag")
+            yield self._of_time_tag("mission", (0, 1), common.time_tag, key, common.source, note)
+
+    def _of_time_tag(
+        self, owner: str, places: Sequence[int], value: Any, key: KeyPath, source: str | None, *notes: Note
+    ) -> ErrorSource:
+        ways = [self._velocities(path) for path in self.geometry.both]
+        moved = np.sum([self.exact.along(place, ways[place]) for place in places], axis=0)
+        parts = [
+            _along(self.legs(place, kind)[0], vector)
+            for place in places
+            for kind, vector in zip(MOTION_UNITS, self.geometry.both[place].rates, strict=False)
+        ]
+        return ErrorSource(
+            subject=subject(owner, "time_tag"),
+            unit="s",
+            declared=value * self.factor,
+            path=key,
+            effect=_sum(parts),
+            full=self.exact.effect(moved),
+            direction=ways[places[0]],
+            equation="Tables I and II along the velocity and its rates",
+            no_limit=phrases.no_quadratic_term_of_time_tag(),
+            evidence=source,
+            notes=notes,
+            of_receiver=ways[1] if len(places) > 1 else None,
+        )
+
+    def _velocities(self, path: PlatformState) -> Vectors:
+        """Velocity of a path at the nodes, (nodes, cases) each. [m/s]"""
+        times = self.exact.times
+        u, v, w = (np.broadcast_to(part, times.shape) for part in path.at(times)[1])
+        return (u, v, w)
 
     def _of_terrain(self) -> Iterator[ErrorSource]:
         """A scene that is higher than the processor takes it for: both platforms measured too high by as much."""
@@ -388,6 +446,10 @@ def _equation(kind: str, axis: int | None) -> str:
         return "Table I" if axis is None else f"Table I row {2 + 3 * axis}"
     first = 1 if kind == "velocity" else 4
     return f"Table II rows {first}-{first + 2}" if axis is None else f"Table II row {first + axis}"
+
+
+def _axis_of(frame: str, axis: str) -> str:
+    return f"the {frame} frame's {axis} axis"
 
 
 def _no_limit(kind: str, axis: str) -> Note:

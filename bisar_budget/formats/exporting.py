@@ -473,6 +473,13 @@ def _covariance(mission: Mission, whose: str, axes: SceneAxes, added: dict[str, 
     if error.acceleration is not None:
         turn = np.eye(3) if is_radial or error.frame == "scene" else np.array(source).T
         added[f"{whose}.acceleration"] = " ".join(f"{x:.12g}" for x in turn @ error.acceleration) + " m/s^2"
+    if error.time_tag is not None:
+        added[f"{whose}.time_tag"] = f"{error.time_tag:.12g} s"
+    if error.lever_arm is not None and error.lever_arm.uncertainty is not None:
+        sizes = " ".join(f"{x:.12g}" for x in error.lever_arm.uncertainty)
+        added[f"{whose}.lever_arm.uncertainty"] = f"{sizes} m"
+    if common is not None and common.time_tag is not None:
+        added["common.time_tag"] = f"{common.time_tag:.12g} s"
     if error.distribution != "normal":
         added[f"{whose}.distribution"] = error.distribution
     if is_radial:
@@ -481,10 +488,11 @@ def _covariance(mission: Mission, whose: str, axes: SceneAxes, added: dict[str, 
     both = np.kron(np.eye(2), np.array(source).T)
     found = both @ found @ both.T
     if common is not None:
+        turn = np.array(state.frame(common.frame)).T
         for index, kind in enumerate(("position", "velocity")):
             if getattr(common, kind) is not None:
                 block = slice(3 * index, 3 * index + 3)
-                found[block, block] += np.diag(np.square(getattr(common, kind)))
+                found[block, block] += turn @ np.diag(np.square(getattr(common, kind))) @ turn.T
         added[f"{whose}.common"] = "the sigmas hold an error that both platforms share"
     both = np.kron(np.eye(2), np.array(axes.axes).T)
     return both @ found @ both.T, "ECF"

@@ -85,6 +85,34 @@ class GaussMarkov(NamedTuple):
     source: Annotated[str | None, Key(Text())] = None
 
 
+class LeverArm(NamedTuple):
+    """From the navigation's reference to the antenna's phase centre, in the platform's own axes.
+
+    They are along, cross and up of its velocity, and turn with it; of one that stands still those of the scene.
+    """
+
+    arm: Annotated[
+        Vector | None,
+        Key(
+            Triple(Quantity(units.LENGTH, ge=-1e3, le=1e3)),
+            "Along, cross (to the left) and up: errors of imu.attitude, gyro_bias and angle_random_walk swing it.",
+        ),
+    ] = None
+    uncertainty: Annotated[
+        Vector | None,
+        Key(
+            Triple(Quantity(units.LENGTH, ge=0, le=1e3), or_scalar=True), "1 sigma, each axis; it turns as the body."
+        ),
+    ] = None
+    source: Annotated[str | None, Key(Text(), "Where the values come from; shown as evidence.")] = None
+
+    @staticmethod
+    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
+        """Hold it to saying something."""
+        if values.keys() >= {"arm", "uncertainty"} and values["arm"] is None and values["uncertainty"] is None:
+            yield Problem("is empty", "accepted: arm, uncertainty or both")
+
+
 class _Curve(Reader):
     """A mapping of abscissas to ordinates, in any order of the file, read into pairs in rising order."""
 
@@ -375,6 +403,7 @@ _REFUSED = {
 
 
 IMU = Section(Imu)
+LEVER_ARM = Section(LeverArm)
 RANDOM = ListOf(GaussMarkov)
 OSCILLATOR = Section(Oscillator)
 SYNCHRONIZATION = Section(Synchronization)

@@ -162,7 +162,10 @@ OTHER_EFFECTS = ("quadratic_phase_error", "cubic_phase_error", "location_error",
 
 
 # Kinds of error that each platform has, and the clock's.
-OF_PLATFORMS = ("position", "velocity", "acceleration", "covariance", "vibration", "imu", "random", "oscillator")
+OF_PLATFORMS = (
+    *("position", "velocity", "acceleration", "covariance", "vibration", "imu", "random", "oscillator"),
+    *("time_tag", "lever_arm"),
+)
 DECLARABLE = (*OF_PLATFORMS, "timing")
 _OF_ONE = tuple(f"{name}.{kind}" for name in Platforms._fields for kind in OF_PLATFORMS)
 
@@ -354,7 +357,7 @@ class Mission(NamedTuple):
     document: Annotated[Document, Key(Section(Document), "Number, issue and author, for the reports.")] = Document()
     scene: Annotated[Scene, Key(Section(Scene))] = Scene()
     common_motion_error: Annotated[
-        CommonMotionError | None, Key(Section(CommonMotionError), "The same for both platforms, in the scene's axes.")
+        CommonMotionError | None, Key(Section(CommonMotionError), "The same for both platforms.")
     ] = None
     timing_error: Annotated[TimingError, Key(Section(TimingError))] = TimingError()
     synchronization: Annotated[
@@ -401,6 +404,7 @@ class Mission(NamedTuple):
             yield from without_image(
                 platforms,
                 collection and collection.aperture_time,
+                values.get("common_motion_error"),
                 has_direct_path=synchronization is not None and synchronization.is_direct_path,
             )
         yield from _unset_clocks(values)
@@ -449,10 +453,17 @@ class Mission(NamedTuple):
 
 
 def has_instruments(mission: Mission) -> bool:
-    """Whether a mission says anything of inertial sensors, position noise, oscillators or synchronisation."""
-    return mission.synchronization is not None or any(
-        platform.oscillator is not None or platform.motion_error.imu is not None or platform.motion_error.random
-        for platform in mission.platforms
+    """Whether a mission says anything of inertial sensors, position noise, lever arms, or oscillators and links."""
+    return (
+        mission.synchronization is not None
+        or any(
+            platform.oscillator is not None
+            or platform.motion_error.imu is not None
+            or platform.motion_error.random
+            or platform.motion_error.lever_arm is not None
+            for platform in mission.platforms
+        )
+        or bool(mission.common_motion_error is not None and mission.common_motion_error.random)
     )
 
 
@@ -467,8 +478,11 @@ def has_random_errors(mission: Mission) -> bool:
 
 def flies_on_earth(mission: Mission) -> bool:
     """Whether paths of a mission depend on where on the Earth its scene is, or stand in files."""
-    return mission.scene.is_on_earth or any(
-        platform.is_of_the_earth or platform.motion_error.frame == "ric" for platform in mission.platforms
+    common = mission.common_motion_error
+    return (
+        mission.scene.is_on_earth
+        or (common is not None and common.frame == "ric")
+        or any(platform.is_of_the_earth or platform.motion_error.frame == "ric" for platform in mission.platforms)
     )
 
 

@@ -140,7 +140,8 @@ def with_paths(mission: Mission, read: Beside, report: Report) -> Any:
     if not is_valid:
         return INVALID
     aperture_time = mission.collection.aperture_time
-    for problem in without_image(platforms, aperture_time, has_direct_path=mission.has_direct_path):
+    common = mission.common_motion_error
+    for problem in without_image(platforms, aperture_time, common, has_direct_path=mission.has_direct_path):
         report((), problem)
         is_valid = False
     if mission.propagation is not None:

@@ -19,7 +19,17 @@ from bisar_budget.geometry import (
     state_from_angles,
 )
 from bisar_budget.mission.covariance import COVARIANCE, Covariance, misplaced_axes
-from bisar_budget.mission.instruments import IMU, OSCILLATOR, RANDOM, GaussMarkov, Imu, Oscillator, Overridden
+from bisar_budget.mission.instruments import (
+    IMU,
+    LEVER_ARM,
+    OSCILLATOR,
+    RANDOM,
+    GaussMarkov,
+    Imu,
+    LeverArm,
+    Oscillator,
+    Overridden,
+)
 from bisar_budget.mission.readers import (
     ACCELERATION,
     COORDINATE,
@@ -31,7 +41,6 @@ from bisar_budget.mission.readers import (
     INVALID,
     JERK,
     LATER_FORMATS,
-    LATER_FRAMES,
     LATITUDE,
     RANGE,
     SIZE,
@@ -57,6 +66,8 @@ from bisar_budget.paths.instant import parse_instant
 
 LEAST_BASELINE = 1.0  # m, between platforms of which one hears the other
 FARTHEST_BY = 3  # times the least baseline, that they move by in half an aperture: so far a fit of 16 nodes is true
+
+_UPRIGHT = 1e-3  # of the speed: of less than that over the ground a velocity has no direction there
 
 SIZES = Triple(SIZE)
 # A 32nd of the way from one place to the next, the distance between is not smaller by as much as matters.
@@ -96,6 +107,8 @@ class Vibration(NamedTuple):
         return bool(self.sinusoidal) or self.wideband is not None
 
 
+FRAMES = Choice("scene", "track", "look", "ric")
+TIME_TAG = Quantity(units.TIME, ge=-1e3, le=1e3)
 PART = Reference()
 PARTS = OneOf(lambda value: TextList() if isinstance(value, list) else PART, (PART, TextList()))
 
@@ -110,7 +123,7 @@ class MotionError(NamedTuple):
     frame: Annotated[
         str,
         Key(
-            Choice("scene", "track", "look", "ric"),
+            FRAMES,
             "scene: east, north, up; track: along, cross, up; look: line of sight, cross, up; ric: radial, in-track, "
             "cross-track.",
         ),
@@ -136,6 +149,13 @@ class MotionError(NamedTuple):
         tuple[GaussMarkov, ...],
         Key(RANDOM, "Position errors that change within the aperture."),
     ] = ()
+    time_tag: Annotated[
+        float | None,
+        Key(TIME_TAG, "Of the navigation against the radar: positive, positions are those of later moments."),
+    ] = None
+    lever_arm: Annotated[
+        LeverArm | None, Key(LEVER_ARM, "From the navigation's reference to the antenna's phase centre.")
+    ] = None
     source: Annotated[str | None, Key(Text(), "Where the values come from; shown as evidence.")] = None
     of_parts: tuple[tuple[str, str], ...] = ()
     overridden: tuple[Overridden, ...] = ()
@@ -143,11 +163,7 @@ class MotionError(NamedTuple):
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
         """Hold a covariance to standing alone, to its frame and to a normal distribution; names to one each."""
-        seen: set[str] = set()
-        for index, one in enumerate(values.get("random", ())):
-            if one.name in seen:
-                yield Problem("is the name of an earlier error", at=("random", index, "name"))
-            seen.add(one.name)
+        yield from _names_twice(values.get("random", ()))
         covariance: Covariance | None = values.get("covariance")
         if covariance is None:
             return
@@ -175,21 +191,48 @@ class MotionError(NamedTuple):
         return "sensor" if figure in dict(self.of_parts) else figure
 
 
+def _names_twice(random: Sequence[GaussMarkov]) -> Iterator[Problem]:
+    seen: set[str] = set()
+    for index, one in enumerate(random):
+        if one.name in seen:
+            yield Problem("is the name of an earlier error", at=("random", index, "name"))
+        seen.add(one.name)
+
+
 class CommonMotionError(NamedTuple):
-    """The same error on both platforms, such as the bias of one GNSS service. A scalar means each axis."""
+    """The same error on both platforms, such as the bias of one GNSS service. A scalar means each axis.
+
+    Along the scene's axes both are moved by one vector. Along those of another frame each is moved by the same
+    components in its own axes: both too far along their tracks, or from the scene.
+    """
 
     frame: Annotated[
         str,
         Key(
-            Choice("scene", refused=LATER_FRAMES),
-            "east, north, up.",
+            FRAMES,
+            "scene: one vector, east, north, up; track, look, ric: the same components in each platform's own axes.",
         ),
     ] = "scene"
     position: Annotated[Vector | None, Key(Triple(COORDINATE, or_scalar=True), "At the midpoint.")] = None
     velocity: Annotated[Vector | None, Key(Triple(VELOCITY, or_scalar=True), "Constant part.")] = None
     acceleration: Annotated[Vector | None, Key(Triple(ACCELERATION, or_scalar=True), "Constant part.")] = None
     distribution: Annotated[str, Key(DISTRIBUTION, DISTRIBUTIONS)] = "normal"
+    random: Annotated[
+        tuple[GaussMarkov, ...], Key(RANDOM, "Position errors that change within the aperture, the same of both.")
+    ] = ()
+    time_tag: Annotated[
+        float | None,
+        Key(
+            TIME_TAG,
+            "As that of a platform, where one clock tags both.",
+        ),
+    ] = None
     source: Annotated[str | None, Key(Text(), "Where the values come from; shown as evidence.")] = None
+
+    @staticmethod
+    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
+        """Hold names to one each."""
+        yield from _names_twice(values.get("random", ()))
 
 
 # ---------------------------------------------------------------------- where a platform flies
@@ -472,12 +515,21 @@ class Platforms(NamedTuple):
         return BistaticGeometry(transmitter=self.transmitter.state, receiver=self.receiver.state)
 
 
-def without_image(platforms: Platforms, aperture_time_s: float | None, *, has_direct_path: bool) -> Iterator[Problem]:
-    """Say what keeps paths from forming an image; no aperture is one that is wrong by itself."""
+def without_image(
+    platforms: Platforms,
+    aperture_time_s: float | None,
+    common: CommonMotionError | None = None,
+    *,
+    has_direct_path: bool,
+) -> Iterator[Problem]:
+    """Say what keeps paths from forming an image, and errors from having axes; no aperture is wrong by itself."""
     geometry = platforms.geometry
     yield from _no_image(geometry)
+    if common is not None:
+        yield from _no_common_frame(platforms, common.frame)
     if aperture_time_s is not None:
         yield from _dives(platforms, geometry, aperture_time_s)
+        yield from _no_body_axes(platforms, aperture_time_s / 2)
         if has_direct_path:
             yield from _no_baseline(geometry.apart, aperture_time_s / 2)
 
@@ -487,6 +539,42 @@ def _no_image(geometry: BistaticGeometry) -> Iterator[Problem]:
         yield Problem("both platforms are still: no aperture", at=("platforms",))
     elif degeneracy := geometry.degeneracy():
         yield Problem(degeneracy, at=("platforms",))
+
+
+def _no_common_frame(platforms: Platforms, frame: str) -> Iterator[Problem]:
+    for name, platform in zip(Platforms._fields, platforms, strict=True):
+        if frame == "ric" and platform.path is None:  # yet
+            continue
+        try:
+            platform.state.frame(frame)
+        except UndefinedFrameError as undefined:
+            yield Problem(f"of the {name}: {undefined}", "accepted: scene", at=("common_motion_error", "frame"))
+
+
+def has_body_axes(state: PlatformState, half: Any, margin: float = 1.0) -> Any:
+    """Whether a velocity keeps a direction on the ground within apertures, half of which last so long (cases,) [s].
+
+    That of a platform that stands still does not matter.
+    """
+    times = half * _PLACES
+    u, v, w = (np.broadcast_to(one, times.shape) for one in state.at(times)[1])
+    fastest = np.sqrt(u * u + v * v + w * w).max(axis=0)
+    is_level = np.hypot(u, v).min(axis=0) > margin * _UPRIGHT * fastest
+    goes_on = (u[1:] * u[:-1] + v[1:] * v[:-1] > 0).all(axis=0)  # else it stops and turns back between two places
+    return np.asarray((is_level & goes_on) | state.is_still)
+
+
+def _no_body_axes(platforms: Platforms, half: float) -> Iterator[Problem]:
+    """Lever arms of platforms whose velocity has no direction on the ground, at some time of the aperture."""
+    for name, platform in zip(Platforms._fields, platforms, strict=True):
+        if platform.motion_error.lever_arm is None or platform.state.is_still:
+            continue
+        if not has_body_axes(platform.state, np.array([half]))[0]:
+            yield Problem(
+                "its axes are those of the velocity, which within the aperture stops or is vertical",
+                "accepted: a velocity that keeps a direction on the ground, or a platform that stands still",
+                at=("platforms", name, "motion_error", "lever_arm"),
+            )
 
 
 def _dives(platforms: Platforms, geometry: BistaticGeometry, aperture_time: float) -> Iterator[Problem]:

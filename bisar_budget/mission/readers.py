@@ -540,17 +540,14 @@ DISTRIBUTIONS = "normal: the values are one sigma; uniform, bound: they are not 
 # of them in a file is an error that says so: an unknown key would be told which other key was perhaps meant.
 NOT_COMPUTED = "is not computed by this version yet"
 _LEAVE = "accepted: leave it out"
-_MOTION = f"{_LEAVE}, and state what it does as position, velocity and acceleration errors"
 _OSCILLATOR = f"{_LEAVE}, and state the noise with it, as phase_noise or spurs"
 _SPECTRUM = f"{_LEAVE}, and state sinusoidal lines and the rms of wideband"
 
 # By the name of the section, as its class has it, and the key: what is accepted instead.
 LATER: Mapping[str, Mapping[str, str]] = {
-    "MotionError": {"time_tag": _MOTION, "lever_arm": _MOTION},
     "Vibration": {"spectrum": _SPECTRUM, "spectrum_level": _SPECTRUM},
     "Oscillator": dict.fromkeys(("acceleration_sensitivity", "vibration", "level"), _OSCILLATOR),
     "OscillatorPart": dict.fromkeys(("acceleration_sensitivity", "vibration", "level"), _OSCILLATOR),
-    "CommonMotionError": {"random": f"{_LEAVE}, and state it in motion_error.random of each platform"},
     "OrbitSource": dict.fromkeys(("eof", "sp3"), "accepted: the same orbit as tle, omm or oem"),
     "TrajectorySource": dict.fromkeys(
         ("time_scale", "geoid_separation"), f"{_LEAVE}; a log in CSV has UTC, and heights above the ellipsoid"
@@ -558,7 +555,4 @@ LATER: Mapping[str, Mapping[str, str]] = {
     "AllocationRules": {"specify": _LEAVE},
     "Mission": {"earth_orientation": f"{_LEAVE}; UT1 is taken to be UTC"},
 }
-LATER_FRAMES: Mapping[str, str] = dict.fromkeys(
-    ("track", "look", "ric"), f"{NOT_COMPUTED} of both platforms at once: each has axes of its own"
-)
 LATER_FORMATS: Mapping[str, str] = dict.fromkeys(("pos", "nmea", "gpx", "ulog"), NOT_COMPUTED)

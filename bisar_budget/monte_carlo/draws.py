@@ -20,8 +20,9 @@ import numpy as np
 
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.constants import SPEED_OF_LIGHT, UTILIZATION_TOLERANCE
-from bisar_budget.effects.effect import PLATFORMS, ErrorSource
+from bisar_budget.effects.effect import ErrorSource
 from bisar_budget.faults import printable
+from bisar_budget.geometry import PlatformState
 from bisar_budget.memory import is_spacious
 from bisar_budget.ranges.exact_ranges import STILL, ExactRanges, Floats, Found, Truths, followed
 
@@ -88,6 +89,7 @@ class Drawing(NamedTuple):
     variables: tuple[Variable, ...]
     judged: tuple[HeldSum, ...]
     exact: ExactRanges
+    paths: tuple[PlatformState, PlatformState]
     draws: int
     seed: int
     is_exact: bool
@@ -130,7 +132,7 @@ def drawing_of(
     analysis: Analysis, variables: Sequence[Variable], judged: Sequence[HeldSum], draws: int, seed: int
 ) -> Drawing:
     """Prepare draws of all variables; a sample decides whether they need exact ranges."""
-    given = (analysis.mission.name, tuple(variables), tuple(judged), analysis.exact)
+    given = (analysis.mission.name, tuple(variables), tuple(judged), analysis.exact, analysis.geometry.both)
     drawing = Drawing(*given, draws, seed, False, CHUNK)
     is_exact = bool(variables and judged) and _needs_exact_ranges(drawing)
     drawn = tuple(variable for variable in variables if _counts(variable, judged, is_exact))
@@ -182,7 +184,8 @@ def tally_of(drawing: Drawing, piece: DrawsPiece) -> Tally:
 class Sums:
     """Effects of one block of draws, added up: the quadratic phase by owner, all else for the mission.
 
-    By owner, if kept: `motion` is position, velocity and acceleration error of both platforms, (2, 3, 3, draws),
+    By owner, if kept: `motion` is position, velocity, acceleration error and so on of both platforms, (2, rates, 3,
+    draws),
     `clock` its coefficients (4, draws), `alone` what is known by its effects only: quadratic and cubic phase,
     displacement east and north (4, draws).
 
@@ -197,7 +200,9 @@ class Sums:
     """
 
     def __init__(self, drawing: Drawing, size: int, *, adds: bool, keeps_motion: bool) -> None:
-        self.exact, self.size, self.keeps_motion = drawing.exact, size, keeps_motion
+        self.exact, self.size, self.keeps_motion, self.paths = drawing.exact, size, keeps_motion, drawing.paths
+        is_late = any(one.subject.kind == "time_tag" for variable in drawing.variables for one, _ in variable.parts)
+        self.rates = max(3, *(len(path.rates) for path in self.paths)) if is_late else 3
         wanted = {column for one in drawing.judged for column in one.columns}
         self.phases = {variable.owner: np.zeros(size) for variable in drawing.variables} if adds else {}
         self.totals = {column: np.zeros(size) for column in sorted(wanted - {0})} if adds else {}
@@ -230,12 +235,14 @@ class Sums:
 
     def _add_motion(self, owner: str, source: ErrorSource, size: float, drawn: Floats) -> None:
         if source.is_position:
-            motion = self._kept(self.motion, owner, (2, 3, 3))
-            for platform, name in enumerate(PLATFORMS):
-                if source.moves(name):
-                    for axis, component in enumerate(source.direction):
+            motion = self._kept(self.motion, owner, (2, self.rates, 3))
+            for platform in source.platforms:
+                is_late = source.subject.kind == "time_tag"  # v·δt at mid-aperture, a·δt of velocity, …
+                ways = self.paths[platform].rates if is_late else (source.direction_of(platform),)
+                for order, way in enumerate(ways, 0 if is_late else _ORDER[source.unit]):
+                    for axis, component in enumerate(way):
                         if component:
-                            motion[platform, _ORDER[source.unit], axis] += size * component * drawn
+                            motion[platform, order, axis] += size * component * drawn
         elif source.clock is not None:
             self._kept(self.clock, owner, (4,))[:] += np.multiply.outer(size * np.array(source.clock), drawn)
         else:
@@ -283,9 +290,10 @@ class Sums:
 
     def _by_exact_ranges(self, owners: tuple[str, ...]) -> Found:
         times = self.exact.times[:, 0]
-        powers = np.stack((np.ones_like(times), times, times**2 / 2), axis=-1)  # of (22)
+        factorials = [math.factorial(order) for order in range(self.rates)]
+        powers = times[:, None] ** np.arange(self.rates) / factorials  # of (22)
         clock_powers = SPEED_OF_LIGHT * times[:, None] ** np.arange(4)
-        motion = _sum(self.motion, owners, np.broadcast_to(0.0, (2, 3, 3, self.size)))
+        motion = _sum(self.motion, owners, np.broadcast_to(0.0, (2, self.rates, 3, self.size)))
         clock = _sum(self.clock, owners, np.broadcast_to(0.0, (4, self.size)))
         shifts = [powers @ one.swapaxes(0, 1) if one.any() else STILL for one in motion]
         return followed(self.exact, clock_powers @ clock, shifts, np.zeros(self.size, dtype=int))

@@ -131,7 +131,7 @@ def _of_noise(error: RandomError, factor: float) -> Iterator[Variable]:
     They are columns of the Cholesky root of its covariance of phases and displacement. An effect from elsewhere is a
     bound: a phase of either sign, a displacement of its length.
     """
-    if not error.declared or error.full.covariance is None:
+    if not error.declared or error.full.covariance is None or error.counted_in:
         return
     size = error.declared / (factor if error.is_covered else 1.0)  # that of an oscillator is in its effects
     distribution = "normal" if error.is_covered else "bound"

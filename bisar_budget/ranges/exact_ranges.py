@@ -14,7 +14,7 @@ of one case. A single case serves any number of lanes as it stands.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property, reduce
 from typing import Any, NamedTuple
@@ -110,9 +110,11 @@ class Lanes:
     moves : two of float or (lanes,)
         1 where transmitter, receiver moves, else 0.
     direction : Vectors
-        Of the motion; floats or (lanes,).
+        Of the motion; floats, (lanes,), or (nodes, lanes) of one that turns.
     order : int or (lanes,)
         Power of slow time that a position error grows with, those of velocity turn Doppler; -1 of a clock.
+    of_receiver : Vectors, optional
+        Direction of the receiver's motion where it is another one.
     """
 
     case: Places
@@ -120,6 +122,27 @@ class Lanes:
     moves: tuple[Any, Any] = (0.0, 0.0)
     direction: Vectors = (0.0, 0.0, 0.0)
     order: Any = -1
+    of_receiver: Vectors | None = None
+
+    @property
+    def directions(self) -> tuple[Vectors, Vectors]:
+        """Directions in which transmitter and receiver are moved."""
+        return self.direction, self.direction if self.of_receiver is None else self.of_receiver
+
+    @property
+    def turns(self) -> bool:
+        """Whether any direction turns within the aperture."""
+        return any(np.ndim(part) > 1 for direction in self.directions for part in direction)
+
+    def turned(self) -> Any:
+        """Half of what directions change by from the first node to the last, of both platforms. [m/unit]"""
+        if not self.turns:
+            return 0.0
+        found: Any = 0.0
+        for weight, direction in zip(self.moves, self.directions, strict=True):
+            x, y, z = (part[-1] - part[0] if np.ndim(part) > 1 else 0.0 * part for part in direction)
+            found = found + weight * norm((x, y, z)) / 2
+        return found
 
     @property
     def platforms(self) -> list[int]:
@@ -128,11 +151,12 @@ class Lanes:
 
     def of(self, some: Places) -> "Lanes":
         """Some of the lanes."""
-        u, v, x, y, z, order = (
-            part.take(some) if isinstance(part, np.ndarray) else part
-            for part in (*self.moves, *self.direction, self.order)
+        u, v, x, y, z, order, *others = (
+            part.take(some, axis=-1) if isinstance(part, np.ndarray) else part
+            for part in (*self.moves, *self.direction, self.order, *(self.of_receiver or ()))
         )
-        return Lanes(self.case.take(some), self.at_nodes.take(some, axis=1), (u, v), (x, y, z), order)
+        of_receiver = (others[0], others[1], others[2]) if others else None
+        return Lanes(self.case.take(some), self.at_nodes.take(some, axis=1), (u, v), (x, y, z), order, of_receiver)
 
     def there(self, case: Places) -> "Lanes":
         """The same of lanes, one a case, where cases are chosen anew: errors of `ExactRanges.at`."""
@@ -141,7 +165,10 @@ class Lanes:
     def shifts(self, size: Any) -> list[Any]:
         """Shift of each platform by errors of sizes at the nodes. [m]"""
         along = [self.at_nodes * (size * part) for part in self.direction]
-        return [_weighted(along, weight) for weight in self.moves]
+        if self.of_receiver is None:
+            return [_weighted(along, weight) for weight in self.moves]
+        other = [self.at_nodes * (size * part) for part in self.of_receiver]
+        return [_weighted(own, weight) for own, weight in zip((along, other), self.moves, strict=True)]
 
     def clock(self, size: Any) -> Any:
         """Range error by clocks of errors of sizes at the nodes. [m]"""
@@ -155,32 +182,38 @@ class SmallErrors(NamedTuple):
 
     `courses` of errors over the aperture are (courses, nodes, cases) [m/unit], and `course` is that of each error,
     (errors,). `ways` say how far each moves the transmitter east, north and up, so the receiver, and the range by the
-    clock, (errors, 7, cases); what all cases share is there once.
+    clock, (errors, 7, cases); what all cases share is there once. Of errors that turn it is `turning` that says so,
+    by the place of each, at the nodes, (7, nodes, cases).
     """
 
     courses: Floats
     course: Places
     ways: Floats
+    turning: Mapping[int, Floats] = {}
 
     @classmethod
     def of(cls, errors: Sequence[Lanes]) -> "SmallErrors":
         """Errors whose lanes are the cases."""
         courses: dict[Any, Floats] = {}
-        ways = np.zeros((len(errors), 7, max((np.size(part) for one in errors for part in one.direction), default=1)))
+        parts = [part for one in errors for direction in one.directions for part in direction]
+        cases = max((np.shape(part)[-1] for part in parts if np.ndim(part)), default=1)
+        ways, turning = np.zeros((len(errors), 7, cases)), dict[int, Floats]()
         for index, (lanes, way) in enumerate(zip(errors, ways, strict=True), 1):
             courses[lanes.order if lanes.platforms else -index] = lanes.at_nodes
+            if lanes.turns:
+                way = turning[index - 1] = np.zeros((7, len(lanes.at_nodes), cases))
             for platform in lanes.platforms:
-                for axis, part in enumerate(lanes.direction):
-                    way[3 * platform + axis] = part
+                for axis, part in enumerate(lanes.directions[platform]):
+                    way[3 * platform + axis] = part * lanes.at_nodes if lanes.turns else part
             way[6] = not lanes.platforms
         names = list(courses)
         course = [names.index(one.order if one.platforms else -index) for index, one in enumerate(errors, 1)]
-        return cls(np.array(list(courses.values())), np.array(course), ways)
+        return cls(np.array(list(courses.values())), np.array(course), ways, turning)
 
     def there(self, case: Places) -> "SmallErrors":
         """The same errors where cases are chosen anew; as `Lanes.there`."""
-        courses, ways = _of([self.courses, self.ways], case)
-        return SmallErrors(courses, self.course, ways)
+        courses, ways, *turning = _of([self.courses, self.ways, *self.turning.values()], case)
+        return SmallErrors(courses, self.course, ways, dict(zip(self.turning, turning, strict=True)))
 
 
 class Found(NamedTuple):
@@ -357,7 +390,7 @@ class ExactRanges:
         """Range error at the nodes of a small unit of errors, one of each case, or all of a single case. [m/unit]"""
         moved = lanes.clock(1.0)
         for platform in lanes.platforms:
-            moved = moved + lanes.moves[platform] * self.along(platform, lanes.direction) * lanes.at_nodes
+            moved = moved + lanes.moves[platform] * self.along(platform, lanes.directions[platform]) * lanes.at_nodes
         return np.asarray(moved)
 
     def quadratics_of(self, errors: SmallErrors) -> Floats:
@@ -373,8 +406,11 @@ class ExactRanges:
         along[6] = 1.0
         by_way = np.einsum("cnp,wnp->cwp", weights * errors.courses, along)
         phase = np.einsum("ewp,ewp->ep", errors.ways, by_way[errors.course])
-        seen = np.abs(weights).sum(axis=0) * np.abs(errors.courses).max(axis=1)
-        return np.where(np.abs(phase) > ROUNDING * seen[errors.course], phase, 0.0)
+        seen = (np.abs(weights).sum(axis=0) * np.abs(errors.courses).max(axis=1))[errors.course]
+        for place, ways in errors.turning.items():
+            phase[place] = np.einsum("np,wnp,wnp->p", weights, ways, along)
+            seen[place] = np.einsum("np,wnp->p", np.abs(weights), np.abs(ways))
+        return np.where(np.abs(phase) > ROUNDING * seen, phase, 0.0)
 
     @cached_property
     def phase_weights(self) -> tuple[Floats, Floats]:
@@ -434,6 +470,9 @@ class ExactRanges:
         shifts = lanes.shifts(size)
         clock = lanes.clock(size)
         bend = np.abs(size) * np.where(lanes.order == 1, lanes.moves[0] + lanes.moves[1], 0.0)
+        if lanes.turns:
+            (half,) = _of([self.half], lanes.case)
+            bend = bend + np.abs(size) * lanes.turned() / half
         return self.settled(clock, shifts, near, bend, lanes.case)
 
     def left_over(self, lanes: Lanes, size: Floats, place: tuple[Any, Any]) -> Floats:
@@ -451,24 +490,26 @@ class ExactRanges:
 
     def way(self, lanes: Lanes, size: Floats, place: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
         """Where points go with larger errors, at the places that errors of sizes move them to. [m/unit]"""
-        (x, y, z), course = lanes.direction, lanes.at_nodes
+        course = lanes.at_nodes
         east, north = place
         change = lanes.clock(1.0)
         by_east, by_north = np.zeros_like(course), np.zeros_like(course)
-        for track, weight, shift in zip(self.tracks, lanes.moves, lanes.shifts(size), strict=True):
+        for track, weight, shift, (x, y, z) in zip(
+            self.tracks, lanes.moves, lanes.shifts(size), lanes.directions, strict=True
+        ):
             a, b, c = (one + moved for one, moved in zip(_of([*track], lanes.case), shift, strict=True))
             a, b = a - east, b - north
             R = np.sqrt(a * a + b * b + c * c)
             by_east, by_north = by_east + a / R, by_north + b / R
             if np.any(weight):
                 change = change - weight * course * (a * x + b * y + c * z) / R
-        side = lanes.moves[0] - lanes.moves[1]
-        if self.has_direct_path and np.any(side):
-            a, b, c = (side * part for part in _of([*self._between], lanes.case))
+        if self.has_direct_path:
+            ahead, back = lanes.moves
+            x, y, z = (ahead * one - back * other for one, other in zip(*lanes.directions, strict=True))
+            a, b, c = _of([*self._between], lanes.case)
             a, b, c = a + size * course * x, b + size * course * y, c + size * course * z
             apart = np.sqrt(a * a + b * b + c * c)
-            heard = np.where(apart > 0, course * (a * x + b * y + c * z) / apart, 0.0)
-            change = change + np.where(side, heard, 0.0)
+            change = change + np.where(apart > 0, course * (a * x + b * y + c * z) / apart, 0.0)
         (a, c), (b, d), (constant, linear) = (self.fit[:2] @ one for one in (by_east, by_north, change))
         determinant = a * d - b * c
         return (b * linear - d * constant) / determinant, (c * constant - a * linear) / determinant

@@ -65,7 +65,8 @@ class PathError(NamedTuple):
     """Measured minus actual position of one platform, r̃(τ): (22) and what is faster.
 
     Position [m], velocity [m/s], acceleration [m/s²] and `course` [m], which is any other history, are
-    east-north-up; vibration is along the line of sight, positive away from the scene. `wideband_rms` [m] is noise
+    east-north-up; vibration is along the line of sight, positive away from the scene. `time_tag` [s] takes the true
+    path for what it is so much later. `wideband_rms` [m] is noise
     of the pulses, white or within `wideband_band` (low, high) [Hz], and needs a generator.
     """
 
@@ -76,6 +77,7 @@ class PathError(NamedTuple):
     wideband_rms: float = 0.0
     wideband_band: tuple[float, float] | None = None
     course: Course | None = None
+    time_tag: float = 0.0
 
     def slow(self) -> "PathError":
         """The same with what is smooth of its other history."""
@@ -86,11 +88,11 @@ class PathError(NamedTuple):
         return self._replace(sinusoids=(), wideband_rms=0.0)
 
     def plus(self, other: "PathError") -> "PathError":
-        """Both polynomial errors at once; vibration is not added."""
+        """Both polynomial errors and time tags at once; vibration is not added."""
         position, velocity, acceleration = (
             (u[0] + v[0], u[1] + v[1], u[2] + v[2]) for u, v in zip(self[:3], other[:3], strict=True)
         )
-        return PathError(position, velocity, acceleration)
+        return PathError(position, velocity, acceleration, time_tag=self.time_tag + other.time_tag)
 
 
 class Errors(NamedTuple):
@@ -243,14 +245,12 @@ def path(
         Wideband vibration without a generator, or in a band that holds no frequency of the pulses.
     """
     tau = slow_time[:, None]
-    actual = np.asarray(state.position) + np.asarray(state.velocity) * tau
-    actual = actual + np.asarray(state.acceleration) * tau**2 / 2
-    for power, bend in enumerate(state.bends, 3):
-        actual = actual + np.asarray(bend) * tau**power
+    actual = _flown(state, tau)
     if error is None:
         return Path(actual=actual, measured=actual)
     # (22): p̃ + ṽτ + ãτ²/2
-    measured = actual + np.asarray(error.position) + np.asarray(error.velocity) * tau
+    measured = _flown(state, tau + error.time_tag) if error.time_tag else actual
+    measured = measured + np.asarray(error.position) + np.asarray(error.velocity) * tau
     measured = measured + np.asarray(error.acceleration) * tau**2 / 2
     if error.course is not None:
         measured = measured + error.course.at(slow_time)
@@ -263,6 +263,15 @@ def path(
         along += error.wideband_rms * _noise(slow_time, error.wideband_band, rng)
     sight = actual / np.linalg.norm(actual, axis=1, keepdims=True) if way is None else way
     return Path(actual=actual, measured=measured + sight * along[:, None])
+
+
+def _flown(state: PlatformState, tau: Floats) -> Floats:
+    """Where a platform is at slow times (times, 1), (times, 3). [m]"""
+    place = np.asarray(state.position) + np.asarray(state.velocity) * tau
+    place = place + np.asarray(state.acceleration) * tau**2 / 2
+    for power, bend in enumerate(state.bends, 3):
+        place = place + np.asarray(bend) * tau**power
+    return np.asarray(place)
 
 
 def _noise(slow_time: Floats, band: tuple[float, float] | None, rng: np.random.Generator) -> Floats:

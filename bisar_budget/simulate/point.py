@@ -356,12 +356,14 @@ def declared_errors(mission: Mission) -> Errors:
         state = getattr(mission.geometry, name)
         axes = state.frame(declared.frame)
         error = _turned((declared.position, declared.velocity, declared.acceleration), axes, factor)
+        error = error._replace(time_tag=factor * (declared.time_tag or 0.0))
         if name in likely:
             flown = _turned((likely[name][:3], likely[name][3:]), axes, 1.0)
             error = flown._replace(acceleration=error.acceleration)
         if common is not None:
             shared = (common.position, common.velocity, common.acceleration)
-            error = error.plus(_turned(shared, state.frame("scene"), factor))
+            of_both = _turned(shared, state.frame(common.frame), factor)
+            error = error.plus(of_both._replace(time_tag=factor * (common.time_tag or 0.0)))
         wideband = declared.vibration.wideband
         error = error._replace(
             sinusoids=tuple(PathSinusoid(*line) for line in lines_of(mission, name)),

@@ -5,7 +5,7 @@ phase noise is a sum of tones, and synchronisation joins samples of it by straig
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +13,8 @@ import numpy as np
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.effect import PLATFORMS
-from bisar_budget.effects.navigation_errors import acceleration_errors, process_of, specific_force
+from bisar_budget.effects.lever_arms import arm_at, body_axes
+from bisar_budget.effects.navigation_errors import TILTS, acceleration_errors, process_of, specific_force
 from bisar_budget.effects.oscillators import noise_of
 from bisar_budget.effects.propagation import CONTENT, DELAY, group_delay
 from bisar_budget.effects.random_effect import RandomError
@@ -22,6 +23,7 @@ from bisar_budget.effects.spectra import PowerLawPiece
 from bisar_budget.geometry import PlatformState
 from bisar_budget.mission.instruments import GaussMarkov
 from bisar_budget.mission.model import Mission, Simulation
+from bisar_budget.mission.platforms import MotionError
 from bisar_budget.mission.propagation import DELAYS
 from bisar_budget.simulate.phase_history import Course, Errors, Floats, PathError
 
@@ -40,15 +42,17 @@ _MOST_FLOWN = 1 << 19  # of phase noise, whose fastest tones would else be joine
 
 def position_courses(
     mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator
-) -> Floats:
+) -> dict[str, Floats]:
     """Position errors by one sensor, (draws, times, 3), east, north, up, of one sigma of what is declared. [m]
+
+    They are by the name of the platform: of what both have in common the same draws, along the axes of each.
 
     Parameters
     ----------
     mission : Mission
         Says the sizes along each axis.
     error : RandomError
-        Of an inertial sensor, or of correlated noise; `declared` may be any size.
+        Of an inertial sensor, a lever arm, or of correlated noise; `declared` may be any size.
     times : (times,) ndarray
         Slow time within the aperture. [s]
     draws : int
@@ -56,22 +60,73 @@ def position_courses(
     rng : numpy Generator
         Source of the draws.
     """
-    platform = getattr(mission.platforms, error.owner)
-    motion, kind = platform.motion_error, error.subject.axis
-    factor = mission.allocation.coverage_factor
-    axes = np.array(platform.state.frame(motion.frame))
-    process = process_of(mission, error) if error.subject.kind == "random" else None
-    values = process.sigma if process is not None else getattr(motion.imu, kind) or (1.0, 1.0, 1.0)
-    sizes = np.array(values) / max(values) if max(values) else np.ones(3)
-    sizes = sizes * (error.declared or 0.0) / factor
-    if process is None:
-        axes = acceleration_errors(kind, axes, np.array(specific_force(mission, platform.state)))
-    draw = _correlated(process) if process is not None else _INERTIAL[kind]
-    total = np.zeros((draws, times.size, 3))
-    for axis, size in zip(axes, sizes, strict=True):
-        if size:
-            total += size * draw(times, draws, rng)[:, :, None] * axis
-    return total
+    size = (error.declared or 0.0) / mission.allocation.coverage_factor
+    found = {}
+    for name, parts in _drawn_parts(mission, error, times, draws, rng).items():
+        total = np.zeros((draws, times.size, 3))
+        for drawn, way in parts:
+            total += size * drawn[:, :, None] * way
+        found[name] = total
+    return found
+
+
+# What is drawn, (draws, times), and how it moves a platform, (3,) or (times, 3).
+_Parts = list[tuple[Floats, Floats]]
+
+
+def _drawn_parts(
+    mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator
+) -> dict[str, _Parts]:
+    """What moves each platform, of a unit of the largest axis."""
+    kind, figure = error.subject.kind, error.subject.axis
+    if kind == "random":
+        process = process_of(mission, error)
+        draw, sizes = _correlated(process), _of_largest(process.sigma)
+        of_axis = [(axis, size * draw(times, draws, rng)) for axis, size in enumerate(sizes) if size]
+        common, names = mission.common_motion_error, [error.owner]
+        if error.owner not in PLATFORMS and common is not None:
+            names, frame = [*PLATFORMS], common.frame
+        else:
+            frame = _motion(mission, error.owner).frame
+        axes = {name: np.array(getattr(mission.platforms, name).state.frame(frame)) for name in names}
+        return {name: [(drawn, of_platform[axis]) for axis, drawn in of_axis] for name, of_platform in axes.items()}
+    state: PlatformState = getattr(mission.platforms, error.owner).state
+    motion = _motion(mission, error.owner)
+    lever, axes_now = motion.lever_arm, np.asarray(state.frame(motion.frame), float)
+    if kind == "lever_arm" and figure == "uncertainty":
+        sizes = _of_largest(lever.uncertainty if lever is not None and lever.uncertainty else (1.0, 1.0, 1.0))
+        body = np.moveaxis(body_axes(state, times), 1, 2)
+        return {
+            error.owner: [(size * _bias(0)(times, draws, rng), way) for size, way in zip(sizes, body, strict=True)]
+        }
+    figure = "attitude" if kind == "lever_arm" else figure
+    sizes = _of_largest(getattr(motion.imu, figure, None) or (1.0, 1.0, 1.0))
+    pushes = acceleration_errors(figure, axes_now, np.array(specific_force(mission, state)))
+    swings = None
+    if lever is not None and lever.arm is not None and figure in TILTS:
+        arm = arm_at(state, lever.arm, times)
+        swings = np.cross(axes_now[:, None], arm.T[None])
+    parts: _Parts = []
+    for axis, size in enumerate(sizes):
+        if not size:
+            continue
+        pushed, tilted = _INERTIAL[figure](times, draws, rng)
+        if kind == "imu":
+            parts.append((size * pushed, pushes[axis]))
+        if swings is not None:
+            parts.append((size * tilted, swings[axis]))
+    return {error.owner: parts}
+
+
+def _motion(mission: Mission, name: str) -> MotionError:
+    found: MotionError = getattr(mission.platforms, name).motion_error
+    return found
+
+
+def _of_largest(values: Sequence[float]) -> Floats:
+    """Sizes over the largest; 1 where there is none."""
+    largest: Floats = np.array(values) / max(values) if max(values) else np.ones(3)
+    return largest
 
 
 def delay_courses(
@@ -115,12 +170,12 @@ def drawn_errors(analysis: Analysis) -> Errors:
     phase: Floats = np.zeros(moments.size)
     air = dict.fromkeys(DELAYS, np.zeros(times.size))
     for error in analysis.random:
-        if not error.declared:
+        if not error.declared or error.counted_in:
             continue
         rng = np.random.default_rng([seed, *error.id.encode()])
-        if error.subject.kind in ("imu", "random"):
-            drawn = factor * position_courses(mission, error, times, 1, rng)[0]
-            moved[error.owner] = moved.get(error.owner, 0.0) + drawn
+        if error.subject.kind in MOVING:
+            for name, drawn in position_courses(mission, error, times, 1, rng).items():
+                moved[name] = moved.get(name, 0.0) + factor * drawn[0]
         elif error.subject.kind == "propagation":
             (group,) = factor * delay_courses(mission, error, times, 1, rng)
             air[error.subject.axis] = air[error.subject.axis] + group
@@ -140,6 +195,10 @@ def drawn_errors(analysis: Analysis) -> Errors:
     return Errors(transmitter, receiver, clock_course=clock, electrons=electrons)
 
 
+MOVING = ("imu", "random", "lever_arm")  # kinds of error that move platforms
+_Draw = Callable[[Floats, int, np.random.Generator], tuple[Floats, Floats]]
+
+
 def _bias(order: int) -> Callable[[Floats, int, np.random.Generator], Floats]:
     def draw(times: Floats, draws: int, rng: np.random.Generator) -> Floats:
         found: Floats = rng.standard_normal((draws, 1)) * times**order / math.factorial(order)
@@ -148,26 +207,37 @@ def _bias(order: int) -> Callable[[Floats, int, np.random.Generator], Floats]:
     return draw
 
 
-def _walk(integrals: int) -> Callable[[Floats, int, np.random.Generator], Floats]:
-    """White noise, summed up so many times from mid-aperture on; each side has a noise of its own."""
+def _biased(order: int) -> _Draw:
+    """What a bias makes of a position, and the tilt that goes with it: two integrals less."""
 
-    def draw(times: Floats, draws: int, rng: np.random.Generator) -> Floats:
+    def draw(times: Floats, draws: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
+        found: Floats = rng.standard_normal((draws, 1))
+        return found * times**order / math.factorial(order), found * times ** (order - 2)
+
+    return draw
+
+
+def _walk(integrals: int) -> _Draw:
+    """White noise, summed up so many times from mid-aperture on, and once; each side has a noise of its own."""
+
+    def draw(times: Floats, draws: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
         end = float(np.abs(times).max())
         step = end / _STEPS
         fine = np.linspace(0, end, _STEPS + 1)
-        found = np.zeros((draws, times.size))
+        found, first = np.zeros((2, draws, times.size))
         for sign in (1, -1):
             side = np.zeros((draws, _STEPS + 1))
             np.cumsum(rng.standard_normal((draws, _STEPS)) * math.sqrt(step), axis=1, out=side[:, 1:])
-            for _ in range(integrals - 1):
-                area = np.cumsum((side[:, 1:] + side[:, :-1]) * (step / 2), axis=1)
-                side[:, 1:] = area
             where = np.flatnonzero(sign * times > 0)
             at = np.abs(times[where]) / step
             low = np.minimum(at.astype(int), fine.size - 2)
             part = at - low
+            first[:, where] = side[:, low] * (1 - part) + side[:, low + 1] * part
+            for _ in range(integrals - 1):
+                area = np.cumsum((side[:, 1:] + side[:, :-1]) * (step / 2), axis=1)
+                side[:, 1:] = area
             found[:, where] = side[:, low] * (1 - part) + side[:, low + 1] * part
-        return found
+        return found, first
 
     return draw
 
@@ -185,11 +255,12 @@ def _correlated(process: GaussMarkov) -> Callable[[Floats, int, np.random.Genera
     return draw
 
 
+# By figure: draws of a position error by a unit of acceleration, or of its rate or noise, and of the tilt itself.
 _INERTIAL = {
-    "accelerometer_bias": _bias(2),
-    "accelerometer_scale_factor": _bias(2),
-    "attitude": _bias(2),
-    "gyro_bias": _bias(3),
+    "accelerometer_bias": _biased(2),
+    "accelerometer_scale_factor": _biased(2),
+    "attitude": _biased(2),
+    "gyro_bias": _biased(3),
     "velocity_random_walk": _walk(2),
     "angle_random_walk": _walk(3),
 }

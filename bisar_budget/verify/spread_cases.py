@@ -42,6 +42,7 @@ from bisar_budget.simulate.phase_history import (
     direct_path_error,
 )
 from bisar_budget.simulate.realisations import (
+    MOVING,
     clock_seconds,
     delay_courses,
     electrons_at_1_hz,
@@ -75,7 +76,7 @@ _AT_MOST = 256  # of them in memory
 _NORMAL_95 = 1.96  # standard errors on either side of a mean
 _SURE = 3.3  # of them within one verdict, 99.9 %: another seed must not draw another verdict
 _KNOWN_DB = 0.25  # half of an interval at most: one that is drawn too early may lie anywhere
-_FOLLOWED = ("imu", "random", "propagation")  # kinds whose histories go through exact ranges as they are
+_FOLLOWED = (*MOVING, "propagation")  # kinds whose histories go through exact ranges as they are
 _NODES = 32  # of the mainlobe's integral
 _STEPS = 64  # in a cell, by which the first null is sought: the response is 0 there, and so is what a step holds
 _TINY = 1e-300
@@ -340,7 +341,7 @@ def _place(study: Study, blank: Verdict, error: RandomError, rng: np.random.Gene
         half = study.collection.aperture_time / 2
         phases = np.polynomial.legendre.legval(aperture_nodes(study.collection.aperture_time) / half, fit)
         metres = np.asarray(phases * study.collection.wavelength / (2 * math.pi), float)
-        found = study.exact_effects("clock", metres)
+        found = study.exact_effects({"clock": metres})
     east, north = (factor * math.sqrt(np.nanmean(np.square(one))) for one in (found.east, found.north))
     drawn, seen = list[float](), list[float]()
     try:
@@ -378,11 +379,11 @@ def _sigma(study: Study, error: RandomError, rng: np.random.Generator, is_cubic:
 def _drawn_effects(study: Study, error: RandomError, rng: np.random.Generator) -> Found:
     """Effects of many histories of a sensor or the air, by exact ranges, (draws,)."""
     if error.subject.kind != "propagation":
-        return study.exact_effects(error.owner, _courses(study, error, rng))
+        return study.exact_effects(_courses(study, error, rng))
     moments = aperture_nodes(study.collection.aperture_time)
     group = delay_courses(study.mission, error, moments, _DRAWS, rng)
     mean = (group @ nodes(FINE).fit[0])[:, None]
-    return study.exact_effects("clock", seen_course(group, mean, error.subject.axis))
+    return study.exact_effects({"clock": seen_course(group, mean, error.subject.axis)})
 
 
 def _left_at_the_point(study: Study, error: RandomError, times: Floats, group: Floats) -> Floats:
@@ -391,7 +392,7 @@ def _left_at_the_point(study: Study, error: RandomError, times: Floats, group: F
     mean = group.mean(axis=1, keepdims=True)
     seen = seen_course(group, mean, error.subject.axis)
     at_nodes = np.stack([np.interp(aperture_nodes(2 * half), times, one) for one in seen])
-    found = study.exact_effects("clock", at_nodes)
+    found = study.exact_effects({"clock": at_nodes})
     for path in geometry.both:
         position = np.stack(np.broadcast_arrays(*path.place(times)))
         sight = position / np.linalg.norm(position, axis=0)
@@ -399,8 +400,8 @@ def _left_at_the_point(study: Study, error: RandomError, times: Floats, group: F
     return np.asarray(seen)
 
 
-def _courses(study: Study, error: RandomError, rng: np.random.Generator) -> Floats:
-    """Position errors of a platform at the nodes of exact ranges, (draws, nodes, 3). [m]"""
+def _courses(study: Study, error: RandomError, rng: np.random.Generator) -> dict[str, Floats]:
+    """Position errors of platforms at the nodes of exact ranges, (draws, nodes, 3) each. [m]"""
     if error.subject.kind == "random":  # not smooth between the nodes, as what is integrated is
         return _smooth_noise(study, error, rng)
     return position_courses(study.mission, error, aperture_nodes(study.collection.aperture_time), _DRAWS, rng)
@@ -416,8 +417,8 @@ def _fits(study: Study, error: RandomError, rng: np.random.Generator) -> tuple[F
     return np.asarray(found, float), draws
 
 
-def _smooth_noise(study: Study, error: RandomError, rng: np.random.Generator) -> Floats:
-    """Correlated noise at the nodes of exact ranges, (draws, nodes, 3), without what they cannot tell. [m]
+def _smooth_noise(study: Study, error: RandomError, rng: np.random.Generator) -> dict[str, Floats]:
+    """Correlated noise at the nodes of exact ranges, (draws, nodes, 3) each, without what they cannot tell. [m]
 
     At the nodes alone noise of a short correlation time would pass for a larger phase.
     """
@@ -426,13 +427,14 @@ def _smooth_noise(study: Study, error: RandomError, rng: np.random.Generator) ->
     legendre = np.polynomial.legendre
     fit = np.linalg.pinv(legendre.legvander(2 * times / T, SMOOTH))
     at_nodes = legendre.legvander(2 * aperture_nodes(T) / T, SMOOTH) @ fit
-    drawn = (position_courses(study.mission, error, times, _AT_ONCE, rng) for _ in range(_DRAWS // _AT_ONCE))
-    found = np.concatenate([at_nodes @ one for one in drawn])
+    drawn = [
+        {name: at_nodes @ one for name, one in position_courses(study.mission, error, times, _AT_ONCE, rng).items()}
+        for _ in range(_DRAWS // _AT_ONCE)
+    ]
     # Samples a step Δ apart have more power at low frequencies than the noise: Δ·coth(Δ/2τ_c), not 2τ_c.
     step = float(times[1] - times[0])
     power = 2 * time / step * math.tanh(step / (2 * time))
-    courses: Floats = found * math.sqrt(power)
-    return courses
+    return {name: np.concatenate([one[name] for one in drawn]) * math.sqrt(power) for name in drawn[0]}
 
 
 def _moments(study: Study, count: int) -> Floats:
@@ -444,9 +446,12 @@ def _moments(study: Study, count: int) -> Floats:
 def _series(study: Study, error: RandomError, rng: np.random.Generator) -> list[Errors]:
     """A few time series as errors of an image, up to the cubic phase: what is left spreads, and would hide it."""
     times = _moments(study, _FINE)
-    if error.subject.kind in ("imu", "random"):
-        courses = position_courses(study.mission, error, times, _IMAGES, rng)
-        return [Errors().of(error.owner, PathError(course=Course(times, one).smooth(_ORDER))) for one in courses]
+    if error.subject.kind in MOVING:
+        found = [Errors()] * _IMAGES
+        for name, courses in position_courses(study.mission, error, times, _IMAGES, rng).items():
+            smooth = (PathError(course=Course(times, one).smooth(_ORDER)) for one in courses)
+            found = [one.of(name, error_of_path) for one, error_of_path in zip(found, smooth, strict=True)]
+        return found
     if error.subject.kind == "propagation":
         groups = delay_courses(study.mission, error, times, _IMAGES, rng)
         if error.subject.axis == CONTENT:
@@ -509,9 +514,9 @@ def _power(
         """Phases without what moves and defocuses the response."""
         phases = white * rng.standard_normal((draws, times.size))
         for error in members:
-            if error.subject.kind in ("imu", "random"):
-                moved = position_courses(mission, error, times, draws, rng)
-                phases += 2 * math.pi / collection.wavelength * moved @ np.array(sight_of(mission, error.owner))
+            if error.subject.kind in MOVING:
+                for name, moved in position_courses(mission, error, times, draws, rng).items():
+                    phases += 2 * math.pi / collection.wavelength * moved @ np.array(sight_of(mission, name))
             elif error.subject.kind == "propagation":
                 group = delay_courses(mission, error, times, draws, rng)
                 phases += 2 * math.pi / collection.wavelength * _left_at_the_point(study, error, times, group)

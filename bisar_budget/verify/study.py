@@ -1,7 +1,7 @@
 """One mission as `verify` looks at it: its errors put into images, at a limit or at any size."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -90,19 +90,24 @@ class Study:
 
     def errors(self, source: ErrorSource, size: float) -> Errors:
         """Return one error of a given size and nothing else."""
-        _, owner, kind, *_ = source.subject
+        kind = source.subject.kind
         if source.clock is not None:
             return Errors(clock=tuple(size * term for term in source.clock))
         if kind == "terrain":  # a scene that is higher: both platforms measured too high
             up = PathError(position=(0.0, 0.0, size))
             return Errors(transmitter=up, receiver=up)
-        x, y, z = (size * component for component in source.direction)
-        error = {
-            "position": PathError(position=(x, y, z)),
-            "velocity": PathError(velocity=(x, y, z)),
-            "acceleration": PathError(acceleration=(x, y, z)),
-        }[kind]
-        return Errors(transmitter=error, receiver=error) if source.is_common else Errors().of(owner, error)
+        found = Errors()
+        for place in source.platforms:
+            error = PathError(time_tag=size)
+            if kind != "time_tag":
+                x, y, z = (size * component for component in source.direction_of(place))
+                error = {
+                    "position": PathError(position=(x, y, z)),
+                    "velocity": PathError(velocity=(x, y, z)),
+                    "acceleration": PathError(acceleration=(x, y, z)),
+                }[kind]
+            found = found.of(PLATFORMS[place], error)
+        return found
 
     def together(self, sizes: Sizes, scale: float = 1.0) -> Errors:
         """Several errors at once, each `scale` times its size."""
@@ -112,18 +117,20 @@ class Study:
         """Effect of several errors by exact ranges."""
         return self.collection.effect(self.together(sizes, scale))
 
-    def exact_effects(self, owner: str, courses: Floats) -> Found:
-        """Effects of many histories: of one platform's position error, (draws, nodes, 3), or of the clock's. [m]
+    def exact_effects(self, courses: Mapping[str, Floats]) -> Found:
+        """Effects of many histories: of position errors of platforms, (draws, nodes, 3), or of the clock's. [m]
 
-        That of the clock is a range error, (draws, nodes). The nodes are those of `aperture_nodes`.
+        They are by the name of what has them. That of the clock is a range error, (draws, nodes). The nodes are those
+        of `aperture_nodes`.
         """
         paths, seen = (self.geometry.transmitter, self.geometry.receiver), self.collection
         is_heard = seen.has_direct_path
         exact = ExactRanges.of(paths, seen.wavelength, seen.aperture_time, FINE, has_direct_path=is_heard)
-        moved = np.ascontiguousarray(courses.T)
-        shifts = [moved if name == owner else STILL for name in PLATFORMS]
-        clock = np.zeros(moved.shape[-2:]) if owner in PLATFORMS else moved
-        return followed(exact, clock, shifts, np.zeros(len(courses), dtype=int))
+        moved = {name: np.ascontiguousarray(one.T) for name, one in courses.items()}
+        shifts = [moved.get(name, STILL) for name in PLATFORMS]
+        draws = len(next(iter(courses.values())))
+        clock = moved.get("clock", np.zeros((FINE, draws)))
+        return followed(exact, clock, shifts, np.zeros(draws, dtype=int))
 
     def worse_sign(self, sizes: Sizes, scale: float) -> float:
         """The scale with the sign that leaves more quadratic phase: a limit has two signs.

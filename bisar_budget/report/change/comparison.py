@@ -280,6 +280,9 @@ def _named_sources(mission: Mission) -> dict[str, str | None]:
         error = getattr(mission.platforms, platform).motion_error
         evidence = error.evidence("random")
         sources |= {f"{platform}.random.{one.name}": one.source or evidence for one in error.random}
+    common = mission.common_motion_error
+    for one in () if common is None else common.random:
+        sources[f"common.random.{one.name}"] = one.source or (common and common.source)
     return sources
 
 

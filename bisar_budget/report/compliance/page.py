@@ -595,7 +595,7 @@ def _moves(found: MissionFindings, stated: Iterable[ErrorSource | RandomError]) 
 def _kind(subject: Subject) -> tuple[str, str, str]:
     """Owner, kind and axis of an error."""
     _, owner, kind, axis, *_ = subject
-    if kind in MOTION_UNITS:
+    if kind in (*MOTION_UNITS, "time_tag"):
         return "both platforms" if owner == "mission" else owner, kind, axis.replace("_", " ")
     if kind == "terrain":
         return owner, kind, "height"
@@ -644,7 +644,12 @@ def _validity(mission: Mission, found: MissionFindings) -> Iterator[tuple[str, s
     common = mission.common_motion_error
     if common is not None:
         said = _DISTRIBUTIONS[common.distribution]
-        yield "Errors of both platforms", f"along the axes of the scene; {said}"
+        frame = (
+            "along the axes of the scene"
+            if common.frame == "scene"
+            else f"the same along the axes of each platform’s own frame “{common.frame}”"
+        )
+        yield "Errors of both platforms", f"{frame}; {said}"
     yield (
         "Autofocus",
         _gain(found.allocation) + ("" if found.allocation.n_pull is None else f" ({mission.autofocus.algorithm})"),
@@ -660,6 +665,14 @@ def _validity(mission: Mission, found: MissionFindings) -> Iterator[tuple[str, s
             "position and velocity. Attitude and gyros turn the specific force, scale factors add a part of it. "
             "Random walks start at mid-aperture",
         )
+    if any(platform.motion_error.lever_arm for platform in mission.platforms):
+        yield (
+            "Lever arms",
+            "along, cross and up of the velocity, turning with it; of a platform that stands still along the axes of "
+            "the scene. Attitude swings an arm and turns the specific force: the row of the inertial sensor has both",
+        )
+    if any(row.subject.kind == "time_tag" for row in found.rows):
+        yield "Time tags", "a path is measured where its platform is later by so much: velocity times the time"
     if any(platform.oscillator for platform in mission.platforms) or mission.synchronization:
         yield (
             "Clocks",
@@ -716,7 +729,10 @@ def _inputs(mission: Mission, found: MissionFindings, file: str) -> Iterator[Inp
     yield given("warning above", f"{100 * allocation.warn_above:g} % of a limit", ("allocation", "warn_above"))
 
 
-_SOURCED = (*MOTION_UNITS, "vibration", "other", "imu", "random", "oscillator", "synchronization", "propagation")
+_SOURCED = (
+    *(*MOTION_UNITS, "time_tag", "lever_arm", "vibration", "other"),
+    *("imu", "random", "oscillator", "synchronization", "propagation"),
+)
 
 
 def _may_have_a_source(row: Row) -> bool:

@@ -28,6 +28,9 @@ def declaration(mission: Mission, source: ErrorSource) -> Iterator[Step]:
     k = mission.allocation.coverage_factor
     if source.clock is not None:
         own = source.declared / k
+    elif kind == "time_tag":
+        owner = mission.common_motion_error if source.is_common else getattr(mission.platforms, platform).motion_error
+        own = getattr(owner, kind)
     elif platform in PLATFORMS:
         error = getattr(mission.platforms, platform).motion_error
         values = error.stated(kind)
@@ -38,7 +41,7 @@ def declaration(mission: Mission, source: ErrorSource) -> Iterator[Step]:
             yield from step("One sigma is the root of the variance")
         own = values[FRAME_AXES[error.frame].index(axis)]
     elif source.is_common:
-        own = getattr(mission.common_motion_error, kind)[notation.AXES.index(axis)]
+        own = getattr(mission.common_motion_error, kind)[FRAME_AXES[source.subject.frame].index(axis)]
     else:
         return  # an error of nobody's: no coverage factor
     lines = equation("declared", "k*|value|", {"k": k, "value": own}, abs(source.declared), source.unit)
@@ -93,11 +96,15 @@ def effect(analysis: Analysis, found: MissionFindings, source: ErrorSource, mode
     qpe = abs(source.effect.qpe) * size
     platform, kind, axis = source.owner, source.subject.kind, source.subject.axis
     gates_by_full = model == "full"
-    if gates_by_full and source.is_motion and source.owner != "mission":
+    if gates_by_full and source.is_motion and (source.owner != "mission" or kind == "time_tag"):
         unaware = ", which does not know the direct path" if mission.has_direct_path else ""
         yield from step(f"The published model, for comparison{unaware}; what gates, the full model, comes after it")
     if not source.is_motion:
         yield from step("Quadratic phase error, as declared", f"QPE = {size:.6g} rad")
+    elif kind == "time_tag":
+        yield from _time_tag_effect(found, source, size, each)
+    elif source.is_common and source.subject.frame != "scene":
+        yield from _common_projected_effect(found, source, sources, size, each)
     elif source.is_common:
         yield from _common_effect(mission, found, source, sources, signed, each)
     elif source.owner == "mission":
@@ -222,6 +229,61 @@ def _common_effect(
         return
     qpe = abs(source.effect.qpe * size)
     yield from step(f"{source.equation}{each}, signed", *equation("QPE", "|φ_t + φ_r|", values, qpe, "rad"))
+
+
+def _time_tag_effect(found: MissionFindings, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
+    """Velocity times the time tag, and by its rates what the published model has of it."""
+    for name in (PLATFORMS[place] for place in source.platforms):
+        state: PlatformState = getattr(found.geometry, name)
+        values = {"δt": size}
+        lines: list[str | WorkedEquation | Sum] = []
+        for symbol, vector, unit in (("v", state.velocity, "m/s"), ("a", state.acceleration, "m/s^2")):
+            parts = ", ".join(with_unit(part + 0.0, unit) for part in vector)
+            lines.append(f"{symbol} = [{parts}] of the {name}")
+            speed = math.sqrt(math.fsum(part * part for part in vector))
+            if speed:
+                per = {"v": "m", "a": "m/s"}[symbol]
+                lines += equation(f"|{symbol}|*δt", f"{symbol}*δt", {symbol: speed, **values}, speed * size, per)
+        yield from step(
+            f"p(τ + δt) − p(τ): a position error v·δt at mid-aperture, a velocity error a·δt{each}", *lines
+        )
+    unit = f"rad per {source.unit}"
+    yield from step(
+        f"{source.equation}: Table II times v, a and the jerk, added",
+        f"QPE/unit = {with_unit(source.effect.qpe, unit)}",
+    )
+    values = {"QPE/unit": abs(source.effect.qpe), "declared": size}
+    qpe = abs(source.effect.qpe) * size
+    yield from step(f"Quadratic phase error{each}", *equation("QPE", "QPE/unit*declared", values, qpe, "rad"))
+
+
+def _common_projected_effect(
+    found: MissionFindings,
+    source: ErrorSource,
+    sources: Mapping[Subject, ErrorSource],
+    size: float,
+    each: str,
+) -> Iterator[Step]:
+    """The same components in each platform's own axes: projections of both, added with their signs."""
+    _, _, kind, axis, frame, _ = source.subject
+    unit, values = f"rad per {source.unit}", dict[str, float]()
+    for platform in PLATFORMS:
+        state: PlatformState = getattr(found.geometry, platform)
+        direction = state.frame(frame)[FRAME_AXES[frame].index(axis)]
+        along = [sources[subject(platform, kind, letter)].effect.qpe for letter in notation.AXES]
+        terms = " + ".join(f"{number(q)}*{number(d)}" for q, d in zip(along, direction, strict=True))
+        leg = math.fsum(q * d for q, d in zip(along, direction, strict=True))
+        symbol = f"φ_{platform[0]}/unit"
+        values[symbol] = leg
+        yield from step(
+            f"{source.equation.removesuffix(', both platforms')}, {unit.replace('^2', '²')} along x, y, z of the "
+            f"{platform}, times the {axis} axis of its {frame} frame",
+            Sum(f"{symbol} = {terms} = {with_unit(leg, unit)}"),
+        )
+    values["declared"] = size
+    qpe = abs(source.effect.qpe) * size
+    lines = equation("QPE", "|φ_t/unit + φ_r/unit|*declared", values, qpe, "rad")
+    yield from step(f"{source.equation}{each}, signed", *lines)
 
 
 def _projected_effect(

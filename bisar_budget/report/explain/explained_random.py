@@ -12,9 +12,11 @@ from bisar_budget.analysis.vibration_limits import LARGEST_ECHO, Echo, bessel, h
 from bisar_budget.budget.random_rows import held_effect, no_effect
 from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.effect import subject
-from bisar_budget.effects.navigation_errors import process_of, specific_force
+from bisar_budget.effects.lever_arms import arm_at, body_axes
+from bisar_budget.effects.navigation_errors import TILTS, process_of, specific_force
 from bisar_budget.effects.oscillators import spurs_of
 from bisar_budget.effects.random_effect import RandomEffect, RandomError
+from bisar_budget.effects.random_errors import random_errors
 from bisar_budget.effects.spectra import (
     PowerLawPiece,
     gauss_markov,
@@ -59,7 +61,10 @@ def explained_random(analysis: Analysis, allocation: Allocation, error: RandomEr
     model = row.model or "published"
     yield from _declared(mission, error, row)
     if kind == "imu":
-        yield from _imu(analysis, error)
+        yield from _imu(analysis, _without_arm(analysis, error))
+        yield from _with_arm(analysis, error)
+    elif kind == "lever_arm":
+        yield from _lever_arm(analysis, error)
     elif kind == "random":
         yield from _position(analysis, error)
     elif kind == "oscillator":
@@ -120,6 +125,92 @@ def _imu(analysis: Analysis, error: RandomError) -> Iterator[Step]:
             yield from step(
                 f"Derived: {_WHAT[index]}, of one unit", *equation(_PARTS[index], formula, values, result, "rad")
             )
+
+
+def _without_arm(analysis: Analysis, error: RandomError) -> RandomError:
+    """The same figure of an inertial sensor of which no arm swings."""
+    mission = analysis.mission
+    platform = getattr(mission.platforms, error.owner)
+    bare = platform._replace(motion_error=platform.motion_error._replace(lever_arm=None))
+    platforms = mission.platforms._replace(**{error.owner: bare})
+    found = random_errors(mission._replace(platforms=platforms))
+    return next(one for one in found if one.id == error.id)
+
+
+def _with_arm(analysis: Analysis, error: RandomError) -> Iterator[Step]:
+    """What a tilt does through the lever arm too."""
+    lever = getattr(analysis.mission.platforms, error.owner).motion_error.lever_arm
+    if lever is None or lever.arm is None or error.subject.axis not in TILTS:
+        return
+    yield from _arm(analysis, error)
+    unit = _per_unit("rad", error)
+    yield from step(
+        "Published model: both together, the line of sight held",
+        *(
+            f"{part}/unit = {with_unit(value, unit)}"
+            for part, value in zip(_PARTS[:2], error.published[:2], strict=True)
+            if value
+        ),
+    )
+
+
+_GROWS = {"attitude": "ψ", "gyro_bias": "ε·τ", "angle_random_walk": "N_g·W(τ)"}
+
+
+def _arm(analysis: Analysis, error: RandomError) -> Iterator[Step]:
+    """The arm at mid-aperture, and how far a tilt swings it along the line of sight."""
+    mission = analysis.mission
+    platform = getattr(mission.platforms, error.owner)
+    state, motion = platform.state, platform.motion_error
+    figure = error.subject.axis
+    arm = arm_at(state, motion.lever_arm.arm, np.zeros(1))[:, 0]
+    tilt = _GROWS[figure]
+    yield from step(
+        f"The arm l at mid-aperture along the axes of the scene; a tilt swings it by {tilt} × R(τ)·l as it turns",
+        f"l = [{', '.join(with_unit(float(part) + 0.0, 'm') for part in arm)}]",
+    )
+    axes, look = np.array(state.frame(motion.frame)), np.array(state.look)
+    sizes = _shares_of_largest(getattr(motion.imu, figure, None))
+    seen = [float(look @ np.cross(axis, arm)) * size + 0.0 for axis, size in zip(axes, sizes, strict=True)]
+    values = dict(zip(("l_1", "l_2", "l_3"), seen, strict=True))
+    total = math.sqrt(math.fsum(one * one for one in seen))
+    lines = equation("l_u", "sqrt(l_1^2 + l_2^2 + l_3^2)", values, total, "m per rad")
+    yield from step(
+        "Along the line of sight, u·(ψ × l) about each axis, and of all at their sizes over the largest", *lines
+    )
+
+
+def _shares_of_largest(values: Sequence[float] | None) -> Sequence[float]:
+    largest = max(values) if values is not None else 0.0
+    return [one / largest for one in values] if values is not None and largest else (1.0, 1.0, 1.0)
+
+
+def _lever_arm(analysis: Analysis, error: RandomError) -> Iterator[Step]:
+    if error.subject.axis == "attitude":
+        yield from _arm(analysis, error)
+    else:
+        platform = getattr(analysis.mission.platforms, error.owner)
+        axes, look = body_axes(platform.state, np.zeros(1))[:, :, 0], np.array(platform.state.look)
+        sizes = _shares_of_largest(platform.motion_error.lever_arm.uncertainty)
+        seen = [float(look @ axis) * size + 0.0 for axis, size in zip(axes, sizes, strict=True)]
+        values = dict(zip(("u_along", "u_cross", "u_up"), seen, strict=True))
+        total = math.sqrt(math.fsum(one * one for one in seen))
+        lines = equation("u_l", "sqrt(u_along^2 + u_cross^2 + u_up^2)", values, total, "")
+        title = (
+            "R(τ)·δl along the line of sight at mid-aperture: of each axis of the body, at its size over the largest"
+        )
+        yield from step(title, *lines)
+    rate = (
+        "Tables I and II: a position error that turns with the body; its quadratic and cubic part over the aperture"
+    )
+    unit = _per_unit("rad", error)
+    yield from step(
+        rate,
+        *(
+            f"{part}/unit = {with_unit(value, unit)}"
+            for part, value in zip(_PARTS[:2], error.published[:2], strict=True)
+        ),
+    )
 
 
 def _by_exact_ranges(mission: Mission, error: RandomError) -> Iterator[Step]:
