@@ -26,9 +26,10 @@ def oscillator_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
     found = np.zeros((len(Parts._fields), seen.cases))
     if sync is None or not sync.is_direct_path:
         interval = None if sync is None else sync.interval
-        for (alike, each), places in _groups_alike((oscillator, interval), seen.cases):
+        for (alike, each), places in _groups_alike((oscillator.noise_alone, interval), seen.cases):
             found[:, places] = _parts_at_1_hz(alike, each, seen.aperture_time[places])
-    published, full = _of_clock(seen, Parts(*found * mission.radar.center_frequency**2))
+    scale = mission.radar.center_frequency**2 * 10 ** (np.asarray(oscillator.level) / 10)
+    published, full = _of_clock(seen, Parts(*found * scale))
     key = ("platforms", name, "oscillator")
     path = key if oscillator.sensor is None else (*key, "sensor")
     yield RandomError(

@@ -211,7 +211,7 @@ def lines_of(mission: Mission, name: str, geometry: Any = None) -> list[Line]:
     """Sinusoids of one platform, along the line of sight."""
     error: MotionError = getattr(mission.platforms, name).motion_error
     lines = error.vibration.sinusoidal
-    return [Line(counted(mission, name, line.amplitude, "pslr", geometry), line.frequency) for line in lines]
+    return [Line(counted(mission, name, line.displacement, "pslr", geometry), line.frequency) for line in lines]
 
 
 def projected(mission: Mission, value: float | Vector, error: MotionError, along: float) -> tuple[Note, ...]:
@@ -284,7 +284,7 @@ def _largest_displacement(mission: Mission, name: str, index: int, line: Line, g
     one is 1/(|s| sin γ) on the ground and a metre per second of the other 1/(|ṡ| sin γ).
     """
     T = mission.collection.aperture_time
-    stated: Any = getattr(mission.platforms, name).motion_error.vibration.sinusoidal[index].amplitude
+    stated: Any = getattr(mission.platforms, name).motion_error.vibration.sinusoidal[index].displacement
     x = math.pi * line.frequency * T
     mean = np.sin(x) / x
     slope = np.where(x > SLOW, 3 * (mean - np.cos(x)) / x, x)  # 3·j₁(x), which is below x

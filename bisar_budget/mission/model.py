@@ -389,9 +389,12 @@ class Mission(NamedTuple):
 
 
 def has_instruments(mission: Mission) -> bool:
-    """Whether a mission says anything of inertial sensors, position noise, oscillators or synchronisation."""
+    """Whether a mission says anything of sensors, clocks or spectra: what is random over an aperture."""
     return mission.synchronization is not None or any(
-        platform.oscillator is not None or platform.motion_error.imu is not None or platform.motion_error.random
+        platform.oscillator is not None
+        or platform.motion_error.imu is not None
+        or platform.motion_error.random
+        or platform.motion_error.vibration.spectrum is not None
         for platform in mission.platforms
     )
 

@@ -24,7 +24,9 @@ from bisar_budget.geometry import Vector
 from bisar_budget.mission.instruments import (
     FORMS,
     IMU_KINDS,
+    NOT_SENSITIVE,
     OSCILLATOR,
+    AccelerationSensitivity,
     AccelerometerBias,
     AccelerometerScaleFactor,
     AllanDeviation,
@@ -126,6 +128,7 @@ class OscillatorPart(NamedTuple):
     phase_noise: PhaseNoise = None
     allan_deviation: AllanDeviation = None
     power_law: PowerLawFigures = None
+    acceleration_sensitivity: AccelerationSensitivity = None
     says: Annotated[str | None, _SAYS] = None
 
     @staticmethod
@@ -142,7 +145,8 @@ SECTIONS: dict[str, Section] = {
     "gnss": Section(GnssPart),
     "oscillator": Section(OscillatorPart),
 }
-FIGURES = {"imu": IMU_KINDS, "gnss": _GNSS_KINDS, "oscillator": ("frequency", *FORMS)}
+_SENSITIVITY = "acceleration_sensitivity"
+FIGURES = {"imu": IMU_KINDS, "gnss": _GNSS_KINDS, "oscillator": ("frequency", *FORMS, _SENSITIVITY)}
 
 
 class PartError(Exception):
@@ -482,6 +486,9 @@ def _with_sensor(oscillator: Oscillator, path: KeyPath, find: Find, report: Repo
         problem = f"{shown(parts[0].part.name)} states no frequency, at which the mask or the tones are stated"
         report(path, Problem(problem, "accepted: oscillator.frequency", at=("frequency",)))
         return INVALID
+    if found is not INVALID and found.vibration is not None and found.acceleration_sensitivity is None:
+        report(path, NOT_SENSITIVE)
+        return INVALID
     return found
 
 
@@ -587,6 +594,7 @@ def taken_figures(mission: Mission) -> Iterator[TakenFigure]:
             path = ("platforms", name, "oscillator", "frequency")
             is_own = {"frequency": path in mission.places}
             is_own |= {form: oscillator.source != evidence(entry.part, form) for form in FORMS}
+            is_own[_SENSITIVITY] = _SENSITIVITY not in dict(oscillator.of_parts)
             for figure in entry.figures:
                 if not is_own[figure]:
                     key = f"platforms.{name}.oscillator.{figure}"
@@ -608,6 +616,12 @@ def _oscillator_of(oscillator: Oscillator, entry: Entry, path: KeyPath, report: 
         taken = {form: getattr(part, form), "source": evidence(part, form)}
     else:
         overridden.append(Overridden(own, f"oscillator.{own}", part.name, f"{form} {figures[form]}"))
+    sensitivity = getattr(part, _SENSITIVITY, None)
+    if sensitivity is not None and oscillator.acceleration_sensitivity is None:
+        taken |= {_SENSITIVITY: sensitivity, "of_parts": ((_SENSITIVITY, evidence(part, _SENSITIVITY)),)}
+    elif sensitivity is not None:
+        text = figures[_SENSITIVITY]
+        overridden.append(Overridden(_SENSITIVITY, f"oscillator.{_SENSITIVITY}", part.name, text))
     if oscillator.frequency is None:
         taken["frequency"] = stated
     elif stated is not None and oscillator.frequency != stated:
@@ -648,7 +662,8 @@ def _rules(figures: Sequence[str]) -> dict[str, Any]:
 
     Of an oscillator exactly one form is there, and a mask has its frequency. Zeros are for the tool to see.
     """
-    ways = [{"required": [figure], "properties": {figure: _SOME}} for figure in figures if figure != "frequency"]
+    beside = ("frequency", _SENSITIVITY)
+    ways = [{"required": [figure], "properties": {figure: _SOME}} for figure in figures if figure not in beside]
     of_each = {"required": ["source"], "properties": {"source": {"type": "object"}}}
     sourced = [
         {

@@ -448,10 +448,10 @@ class Section(Reader):
 
 
 class ListOf(Reader):
-    """A list of sections."""
+    """A list of sections, of one kind or of several forms."""
 
-    def __init__(self, kind: type[Any]) -> None:
-        self.section = Section(kind)
+    def __init__(self, kind: "type[Any] | Reader") -> None:
+        self.section: Reader = kind if isinstance(kind, Reader) else Section(kind)
 
     def read(self, value: Any, path: KeyPath, report: Report) -> Any:
         """Read each entry at its own place."""
@@ -544,14 +544,12 @@ _MOTION = f"{_LEAVE}, and state what it does as position, velocity and accelerat
 _OSCILLATOR = f"{_LEAVE}, and state the noise with it, as phase_noise or spurs"
 _OTHER = f"{_LEAVE}; of an error from elsewhere its quadratic_phase_error counts"
 _LINK = "accepted: method linear with interval and error, or direct_path with error"
-_SPECTRUM = f"{_LEAVE}, and state sinusoidal lines and the rms of wideband"
 
 # By the name of the section, as its class has it, and the key: what is accepted instead.
 LATER: Mapping[str, Mapping[str, str]] = {
     "MotionError": {"time_tag": _MOTION, "lever_arm": _MOTION},
-    "Vibration": {"spectrum": _SPECTRUM, "spectrum_level": _SPECTRUM},
-    "Oscillator": dict.fromkeys(("acceleration_sensitivity", "aging", "vibration", "level"), _OSCILLATOR),
-    "OscillatorPart": dict.fromkeys(("acceleration_sensitivity", "aging", "vibration", "level"), _OSCILLATOR),
+    "Oscillator": {"aging": _OSCILLATOR},
+    "OscillatorPart": {"aging": _OSCILLATOR},
     "Synchronization": dict.fromkeys(("age", "averaging", "time_error", "frequency_error"), _LINK),
     "CommonMotionError": {"random": f"{_LEAVE}, and state it in motion_error.random of each platform"},
     "OtherError": dict.fromkeys(("cubic_phase_error", "location_error", "islr"), _OTHER),
