@@ -149,7 +149,7 @@ def _worst(parts: Floats) -> Parts:
     """Parts of a tone of amplitude 1, each in the phase where it is largest; orders n and n + 2 have other signs."""
     quadratic, cubic, left, constant, linear = parts
     both = -constant * quadratic, -linear * cubic
-    return Parts(quadratic**2, cubic**2, left / 2, constant**2, linear**2, *both)
+    return Parts(quadratic**2, cubic**2, left, constant**2, linear**2, *both)
 
 
 def _turning(seen: SensorCases, name: str) -> tuple[RandomEffect, RandomEffect] | None:
