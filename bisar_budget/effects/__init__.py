@@ -6,10 +6,12 @@ __all__ = [
     "declared",
     "effect",
     "navigation_errors",
+    "oscillator_acceleration",
     "oscillators",
     "random_effect",
     "random_errors",
     "sources",
     "spectra",
     "vibration",
+    "vibration_spectra",
 ]

@@ -66,7 +66,8 @@ class AcceleratedTone(NamedTuple):
     """A vibration as an oscillator's tone: platform, entry, frequency [Hz], peak phase by a unit of Γ [rad/(s²/m)].
 
     `in_quadrature` is the row of the vibration of the platform that makes it, from which it is a quarter of a turn
-    away; None of one along several axes, and of one that the oscillator alone is said to feel. `left` is the part that exchanged pulses leave.
+    away; None of one along several axes, and of one that the oscillator alone is said to feel. `left` is the part
+    that exchanged pulses leave.
     """
 
     name: str
@@ -95,7 +96,9 @@ def accelerated_tones(mission: Mission) -> list[AcceleratedTone]:
     found = []
     for name in PLATFORMS:
         one = felt(mission, name)
-        for index, line in enumerate(() if one is None else one.vibration.sinusoidal):
+        if one is None:
+            continue
+        for index, line in enumerate(one.vibration.sinusoidal):
             left = left_by_exchanges(line.frequency, mission)
             phase = mission.radar.center_frequency * _length(line.acceleration) / line.frequency * left
             # Axes may vibrate in any phase: then a quarter of a turn is not certain.
@@ -120,10 +123,10 @@ def oscillator_acceleration(seen: SensorCases, name: str) -> Iterator[RandomErro
     found, turn = Parts(*np.zeros((len(Parts._fields), seen.cases))), None
     if not seen.mission.has_direct_path:  # by which both oscillators drop out
         found, turn = _vibrating(seen, name, one), _turning(seen, name)
-    effects = effects_of(seen, found)
+    published, full = effects_of(seen, found)
     if turn is not None:
-        effects = tuple(_together(*both) for both in zip(effects, turn, strict=True))
-    published, full = (effect._replace(spread=effect.spread / seen.factor) for effect in effects)
+        published, full = _together(published, turn[0]), _together(full, turn[1])
+    published, full = (effect._replace(spread=effect.spread / seen.factor) for effect in (published, full))
     path = ("platforms", name, "oscillator", "acceleration_sensitivity")
     what = subject(name, "oscillator", "acceleration")
     yield RandomError(what, "s^2/m", one.sensitivity * seen.factor + np.zeros(seen.cases), path, published, full)
@@ -171,6 +174,7 @@ def turn_courses(state: PlatformState, moments: Floats, interval: Any = None) ->
 
     Those begin anywhere in their interval: of several beginnings each has its part of the mean square.
     """
+
     def gained(tau: Any) -> Floats:
         now, middle = state.at(tau)[1], state.velocity
         return np.array([np.broadcast_to(a - b, np.shape(tau)) for a, b in zip(now, middle, strict=True)])
@@ -200,9 +204,10 @@ def flies_a_turn(mission: Mission, name: str) -> bool:
 
 def _together(one: RandomEffect, other: RandomEffect) -> RandomEffect:
     """Effect of two independent errors that grow alike."""
-    sizes = (np.hypot(*both) for both in zip(one[:5], other[:5], strict=True))
+    quadratic, cubic, spread, east, north = (np.hypot(*both) for both in zip(one[:5], other[:5], strict=True))
     is_known = one.covariance is not None and other.covariance is not None
-    return RandomEffect(*sizes, one.covariance + other.covariance if is_known else None)
+    covariance = one.covariance + other.covariance if is_known else None
+    return RandomEffect(quadratic, cubic, spread, east, north, covariance)
 
 
 def pieces_by_acceleration(mission: Mission, name: str) -> tuple[PowerLawPiece, ...]:

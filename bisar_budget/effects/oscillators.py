@@ -11,7 +11,8 @@ import numpy as np
 from bisar_budget import evaluators, phrases
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.spectra import PowerLawPiece, held
-from bisar_budget.mission.instruments import Oscillator, Points, PowerLaw
+from bisar_budget.mission.curves import Points
+from bisar_budget.mission.instruments import Oscillator, PowerLaw
 from bisar_budget.mission.model import Mission
 from bisar_budget.phrases import NOTHING, Note
 

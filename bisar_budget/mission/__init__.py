@@ -4,6 +4,7 @@
 __all__ = [
     "changes",
     "covariance",
+    "curves",
     "instruments",
     "load",
     "model",
@@ -13,4 +14,5 @@ __all__ = [
     "revision",
     "stacked",
     "tree",
+    "vibration",
 ]

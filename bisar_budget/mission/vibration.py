@@ -187,7 +187,10 @@ class Vibration(NamedTuple):
     ] = None
     spectrum_level: Annotated[float | None, Key(LEVEL, "Shifts the spectrum.")] = None
 
-    problems = staticmethod(_problems)
+    @staticmethod
+    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
+        """Hold a level to a spectrum."""
+        yield from _problems(values)
 
     @property
     def is_stated(self) -> bool:
@@ -204,7 +207,10 @@ class FeltVibration(NamedTuple):
     ] = None
     spectrum_level: Annotated[float | None, Key(LEVEL, "Shifts the spectrum.")] = None
 
-    problems = staticmethod(_problems)
+    @staticmethod
+    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
+        """Hold a level to a spectrum."""
+        yield from _problems(values)
 
 
 FELT_VIBRATION = Section(FeltVibration)

@@ -260,7 +260,7 @@ def verify_spur(study: Study, spur: Spur, row_id: str, amplitude: float) -> Verd
 
 
 def verify_accelerated_tone(study: Study, tone: AcceleratedTone, blank: Verdict, amplitude: float) -> Verdict:
-    """A tone of an oscillator that vibrates, at its limit: the motion of the platform that makes the same phase. [m]"""
+    """A tone of an oscillator that vibrates, at its limit: the motion [m] that makes the same phase."""
     return echo(study, blank, {tone.name: (PathSinusoid(amplitude, tone.frequency),)}, "the tone alone")
 
 
