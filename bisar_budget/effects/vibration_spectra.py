@@ -25,7 +25,7 @@ _STEPS = 16  # by which such a piece is taken instead: it is narrow, or nearly n
 
 def power_of(vibration: Vibration | FeltVibration) -> Any:
     """Factor of power by which `spectrum_level` shifts a spectrum."""
-    return 10 ** (np.asarray(vibration.spectrum_level or 0.0) / 10) if vibration.spectrum_level is not None else 1.0
+    return 1.0 if vibration.spectrum_level is None else 10 ** (np.asarray(vibration.spectrum_level) / 10)
 
 
 def spectrum_pieces(spectrum: Spectrum, law: tuple[float, float] = (1.0, 0.0)) -> tuple[PowerLawPiece, ...]:
