@@ -377,5 +377,5 @@ def equations() -> tuple[Equation, ...]:
         Equation("", "Spectrum of displacement", positive("S_x"), of_spectrum(vibrating_path())),
         Equation("", "Peak phase of an oscillator so accelerated, a quarter of a turn away", positive("phi"),
                  vibrating_oscillator()),
-        Equation("", "Spectrum of an oscillator's phase", positive("S_phi"), of_spectrum(vibrating_oscillator())),
+        Equation("", "Spectrum of an oscillator's phase", positive("S"), of_spectrum(vibrating_oscillator())),
     )  # fmt: skip
