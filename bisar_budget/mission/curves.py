@@ -8,7 +8,7 @@ from bisar_budget.mission.readers import INVALID, Quantity, Reader, Report
 Points = tuple[tuple[float, float], ...]
 
 
-class Curve(Reader):
+class CurveReader(Reader):
     """A mapping of abscissas to ordinates, in any order of the file, read into pairs in rising order."""
 
     def __init__(self, abscissa: Quantity, ordinate: Quantity, what: str, fewest: int, most: int = 100) -> None:

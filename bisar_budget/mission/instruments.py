@@ -8,7 +8,7 @@ from typing import Annotated, Any, NamedTuple
 from bisar_budget import units
 from bisar_budget.faults import KeyPath, Problem
 from bisar_budget.geometry import Vector
-from bisar_budget.mission.curves import Curve, Points
+from bisar_budget.mission.curves import CurveReader, Points
 from bisar_budget.mission.readers import (
     INVALID,
     LATER_METHODS,
@@ -149,7 +149,7 @@ Frequency = Annotated[float | None, Key(Quantity(units.FREQUENCY, gt=0, ge=1, le
 PhaseNoise = Annotated[
     Points | None,
     Key(
-        Curve(
+        CurveReader(
             Quantity(units.FREQUENCY, gt=0, ge=1e-6, le=1e12),
             Quantity(units.PHASE_NOISE, ge=-250, le=60),
             "{1 Hz: -95 dBc/Hz, 10 Hz: -125 dBc/Hz} and the like",
@@ -161,7 +161,7 @@ PhaseNoise = Annotated[
 AllanDeviation = Annotated[
     Points | None,
     Key(
-        Curve(
+        CurveReader(
             Quantity(units.TIME, gt=0, ge=1e-6, le=1e9),
             Quantity(units.RATIO, gt=0, ge=1e-20, le=1e-3),
             "{1 s: 6e-12, 10 s: 2e-11} and the like",
@@ -203,7 +203,7 @@ class Oscillator(NamedTuple):
     spurs: Annotated[
         Points,
         Key(
-            Curve(
+            CurveReader(
                 Quantity(units.FREQUENCY, gt=0, ge=1e-3, le=1e12),
                 Quantity(units.TONE, ge=-250, le=0),
                 "{50 Hz: -90 dBc} and the like",

@@ -7,7 +7,7 @@ from typing import Annotated, Any, NamedTuple
 from bisar_budget import units
 from bisar_budget.faults import KeyPath, Problem
 from bisar_budget.geometry import Vector
-from bisar_budget.mission.curves import Curve, Points
+from bisar_budget.mission.curves import CurveReader, Points
 from bisar_budget.mission.readers import (
     INVALID,
     SIZE,
@@ -126,7 +126,7 @@ class Spectrum(NamedTuple):
 _STATED = {True: units.ACCELERATION_DENSITY, False: units.DISPLACEMENT_DENSITY}
 
 
-class _SpectrumReader(Curve):
+class _SpectrumReader(CurveReader):
     """A mapping of frequencies to densities that all are of acceleration, or all of displacement."""
 
     def __init__(self, dimension: Dimension, *, is_accelerated: bool, example: str) -> None:
