@@ -18,7 +18,7 @@ from bisar_budget.effects.vibration import SLOWEST, cubic_part, quadratic_part
 from bisar_budget.findings.row import Row
 from bisar_budget.mission.instruments import Oscillator
 from bisar_budget.mission.model import Mission, has_instruments
-from bisar_budget.mission.vibration import Vibration
+from bisar_budget.mission.vibrations import Vibration
 from bisar_budget.phrases import NOTHING, Note
 
 SENSITIVITY = "acceleration_sensitivity"

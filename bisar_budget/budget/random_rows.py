@@ -39,7 +39,7 @@ from bisar_budget.geometry import GroundVector
 from bisar_budget.mission.instruments import FORMS, Oscillator
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
-from bisar_budget.mission.vibration import Vibration
+from bisar_budget.mission.vibrations import Vibration
 from bisar_budget.phrases import NOTHING, Note
 
 ISLR = "islr"

@@ -37,7 +37,7 @@ from bisar_budget.mission.platforms import (
     least_baseline,
 )
 from bisar_budget.mission.readers import ListOf, OneOf, Quantity, Reader, Section, Triple
-from bisar_budget.mission.vibration import Spectrum
+from bisar_budget.mission.vibrations import Spectrum
 from bisar_budget.ranges.exact_ranges import Floats
 from bisar_budget.units import Dimension, parse_quantity
 

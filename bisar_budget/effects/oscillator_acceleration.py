@@ -36,7 +36,7 @@ from bisar_budget.effects.vibration_spectra import (
 from bisar_budget.geometry import PlatformState, norm
 from bisar_budget.mission.instruments import Oscillator
 from bisar_budget.mission.model import Mission
-from bisar_budget.mission.vibration import FeltVibration, Vibration
+from bisar_budget.mission.vibrations import FeltVibration, Vibration
 
 PHASE = (1.0, 2.0)  # S_φ = (Γ·f₀)²·S_a/f²
 _FELT = 1e-6  # m/s², below which an acceleration of a path is none

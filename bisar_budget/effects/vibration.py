@@ -32,7 +32,7 @@ from bisar_budget.effects.spectra import SLOW, tone
 from bisar_budget.geometry import FRAME_AXES, Vector, dot
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
-from bisar_budget.mission.vibration import AcceleratedSinusoid
+from bisar_budget.mission.vibrations import AcceleratedSinusoid
 from bisar_budget.phrases import Note
 from bisar_budget.units import format_quantity
 

@@ -16,7 +16,7 @@ from bisar_budget.effects.random_effect import RandomEffect, RandomError, Sensor
 from bisar_budget.effects.spectra import Floats, Parts, PowerLawPiece, parts, synchronized_parts
 from bisar_budget.effects.vibration import counted
 from bisar_budget.mission.model import Mission
-from bisar_budget.mission.vibration import FeltVibration, Spectrum, Vibration
+from bisar_budget.mission.vibrations import FeltVibration, Spectrum, Vibration
 
 DISPLACED = ((2 * math.pi) ** -4, 4.0)  # S_x = S_a/(2πf)⁴
 _STEEP = 20.0  # slope of a density beyond which its powers would overflow

@@ -14,5 +14,5 @@ __all__ = [
     "revision",
     "stacked",
     "tree",
-    "vibration",
+    "vibrations",
 ]

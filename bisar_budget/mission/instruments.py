@@ -23,7 +23,7 @@ from bisar_budget.mission.readers import (
     Text,
     Triple,
 )
-from bisar_budget.mission.vibration import FELT_VIBRATION, LEVEL, FeltVibration
+from bisar_budget.mission.vibrations import FELT_VIBRATION, LEVEL, FeltVibration
 
 IMU_KINDS = (
     "accelerometer_bias",

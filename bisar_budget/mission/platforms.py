@@ -50,7 +50,7 @@ from bisar_budget.mission.readers import (
     Triple,
     Whole,
 )
-from bisar_budget.mission.vibration import Vibration
+from bisar_budget.mission.vibrations import Vibration
 from bisar_budget.paths.instant import parse_instant
 
 LEAST_BASELINE = 1.0  # m, between platforms of which one hears the other

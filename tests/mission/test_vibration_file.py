@@ -10,7 +10,7 @@ from bisar_budget.design.varied import scaled
 from bisar_budget.faults import Fault, MissionError
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import Mission, mission_schema
-from bisar_budget.mission.vibration import AcceleratedSinusoid, Sinusoid
+from bisar_budget.mission.vibrations import AcceleratedSinusoid, Sinusoid
 from tests.conftest import mission_text
 
 G = STANDARD_GRAVITY

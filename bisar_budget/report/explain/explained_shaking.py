@@ -18,7 +18,7 @@ from bisar_budget.faults import printable
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import PlatformState
 from bisar_budget.mission.model import Mission
-from bisar_budget.mission.vibration import FeltVibration, Spectrum, Vibration
+from bisar_budget.mission.vibrations import FeltVibration, Spectrum, Vibration
 from bisar_budget.report.explain.explained_error import place
 from bisar_budget.report.explain.notation import Step, Sum, equation, number, step, with_unit
 

@@ -33,7 +33,7 @@ from bisar_budget.findings.status import STATUS
 from bisar_budget.geometry import dot, without_rounding
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import Platform
-from bisar_budget.mission.vibration import AcceleratedSinusoid
+from bisar_budget.mission.vibrations import AcceleratedSinusoid
 from bisar_budget.phrases import Note
 from bisar_budget.report.explain import notation
 from bisar_budget.report.explain.explained_error import (
