@@ -84,7 +84,7 @@ def test_diff(run, odd) -> None:
 
 def test_verdicts() -> None:
     """Every kind of row with its widest numbers, with and without autofocus."""
-    ids = [*(row.id for row in findings(**ODD).rows), "mission.vibrations.sinusoidal"]
+    ids = [*(row.id for row in findings(**ODD).rows), "mission.vibration.sinusoidal"]
     wide = {
         "boundary_error": 1.234e-15, "boundary_autofocus": 1.234e-15, "budget_rad": 12.345, "full_qpe_rad": 12.345,
         "predicted_qpe_rad": 123.456, "measured_qpe_rad": 123.456, "measured_residual_qpe_rad": 12.345,

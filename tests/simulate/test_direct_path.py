@@ -46,7 +46,7 @@ def test_vibration_is_imaged_as_the_change_of_range_less_distance() -> None:
     measured = []
     for synchronization in (HEARD, {**HEARD, **pulses}):
         mission = parse_mission(mission_text(**synchronization, **FULL, **lines, **requirements))
-        rows = verify_mission(mission, "mission.vibrations.*").rows
+        rows = verify_mission(mission, "mission.vibration.*").rows
         assert [row.verdict for row in rows] == ["confirmed", "confirmed"]
         measured.append([row.measured_db for row in rows])
     assert measured[0] == pytest.approx(measured[1], abs=0.05)  # dB: ways across the line of sight turn it a little

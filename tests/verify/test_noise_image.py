@@ -118,7 +118,7 @@ class TestVerdicts:
         for seed in range(1, 5):
             changes = {"allocation__model": model, "simulation": {"seed": seed, "window": window}}
             mission = parse_mission(mission_text(requirements__islr=-20, **changes))
-            (row,) = verify_mission(mission, "mission.vibrations.wideband").rows
+            (row,) = verify_mission(mission, "mission.vibration.wideband").rows
             assert row.verdict == "confirmed"
             assert row.measured_db + 20 == pytest.approx(excess, abs=0.01 + 4 * row.measured_db_error)
 

@@ -135,7 +135,7 @@ class TestVibration:
 
         An image shows another 0.44 dB, because its mainlobe holds 0.903 of the response.
         """
-        _, row = verdict_on("mission.vibrations.wideband", requirements__islr=-5)
+        _, row = verdict_on("mission.vibration.wideband", requirements__islr=-5)
         variance = 10**-0.5
         assert row.measured_db == pytest.approx(shown_db(variance), abs=0.01 + 4 * row.measured_db_error)
         assert row.verdict == "optimistic"

@@ -37,7 +37,7 @@ def verdicts(only: str = "*", **changes):
 def test_every_row_with_a_limit_has_a_verdict_or_a_reason(path) -> None:
     mission = load_mission(str(path))
     limited = [row.id for row in check_mission(mission, date(2026, 1, 1)).rows if row.allowable is not None]
-    assert [row_id for row_id in rows_to_verify(mission) if not row_id.startswith("mission.vibrations")] == limited
+    assert [row_id for row_id in rows_to_verify(mission) if not row_id.startswith("mission.vibration")] == limited
 
 
 def test_the_scenes_edge_has_a_reason() -> None:
@@ -139,13 +139,13 @@ def test_wideband_power_of_one_platform_at_the_published_limit() -> None:
 
 def test_both_platforms_in_phase_leave_3_db() -> None:
     """Amplitudes of √(PSLR/2)·λ/(2π) each add to a phase of 2·√(PSLR/2), echoes of √(PSLR/2)."""
-    row = verdicts("mission.vibrations.sinusoidal", requirements__pslr=-30)["mission.vibrations.sinusoidal"]
+    row = verdicts("mission.vibration.sinusoidal", requirements__pslr=-30)["mission.vibration.sinusoidal"]
     assert row.measured_db == pytest.approx(-33.01, abs=0.3)
     assert row.verdict == "conservative"
 
 
 def test_both_platforms_of_independent_noise_fill_the_requirement_and_the_same_motion_exceeds_it() -> None:
-    row = verdicts("mission.vibrations.wideband", requirements__islr=-20)["mission.vibrations.wideband"]
+    row = verdicts("mission.vibration.wideband", requirements__islr=-20)["mission.vibration.wideband"]
     assert row.verdict == "confirmed"
     assert row.measured_db == pytest.approx(shown_db(0.01), abs=0.01 + 4 * row.measured_db_error)
     common = float(re.search(r"the same motion of both adds (-[\d.]+) dB", row.reason)[1])

@@ -253,11 +253,11 @@ class TestCheckWithImages:
 
     def test_an_optimistic_limit_without_a_row_is_a_warning_of_the_file(self) -> None:
         verdict = Verdict(
-            id="mission.vibrations.wideband", model="published", boundary_error=1.0, unit="m", requirement_db=-20,
+            id="mission.vibration.wideband", model="published", boundary_error=1.0, unit="m", requirement_db=-20,
             measured_db=-17, verdict="optimistic",
         )  # fmt: skip
         (warning,) = [
-            w for w in with_verdicts(findings(), _verified(verdict)).warnings if "mission.vibrations" in w.message
+            w for w in with_verdicts(findings(), _verified(verdict)).warnings if "mission.vibration" in w.message
         ]
         assert "-17.0 dB" in warning.message
 

@@ -21,9 +21,9 @@ def verdicts(only: str, **changes):
 
 @pytest.mark.parametrize("split", ["equal", {"transmitter": 0.8, "receiver": 0.2}])
 def test_both_platforms_in_phase_at_the_full_limits_fill_the_requirement(split) -> None:
-    verdict = verdicts("mission.vibrations.sinusoidal", allocation={"model": "full", "split": split})
-    assert verdict["mission.vibrations.sinusoidal"].measured_db == pytest.approx(-30, abs=0.3)
-    assert verdict["mission.vibrations.sinusoidal"].verdict == "confirmed"
+    verdict = verdicts("mission.vibration.sinusoidal", allocation={"model": "full", "split": split})
+    assert verdict["mission.vibration.sinusoidal"].measured_db == pytest.approx(-30, abs=0.3)
+    assert verdict["mission.vibration.sinusoidal"].verdict == "confirmed"
 
 
 def test_one_platform_alone_at_its_full_limit_is_6_db_inside() -> None:
