@@ -107,16 +107,23 @@ class SetValue(NamedTuple):
         return f"--set {printable(self.key)}"
 
 
+_BY_UNIT = ("m/s^2", "(m/s^2)^2/Hz", "m^2/Hz")  # of keys whose readers tell by the unit what is meant
+
+
 class SetNumber(SetValue):
-    """A number in SI in the same place, as of a case of a sweep: readers take it as it is, the text is for people."""
+    """A number in SI in the same place, as of a case of a sweep: readers take it as it is, the text is for people.
+
+    A key that has several dimensions takes the text, which `is_by_unit`.
+    """
 
     number: float
+    is_by_unit: bool
 
     @classmethod
     def of(cls, key: str, number: float, unit: str) -> "SetNumber":
         """The number for a key; `unit` is the one of SI."""
         found = cls(key, f"{number!r} {unit}".rstrip())
-        found.number = number
+        found.number, found.is_by_unit = number, unit in _BY_UNIT
         return found
 
 

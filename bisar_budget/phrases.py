@@ -12,7 +12,7 @@ from datetime import date
 from functools import wraps
 from typing import ParamSpec
 
-from bisar_budget.units import format_limit, format_quantity
+from bisar_budget.units import format_in, format_limit, format_quantity
 
 P = ParamSpec("P")
 
@@ -117,7 +117,7 @@ _NEEDED_DECLARATIONS = {
     "quadratic_phase_error": "has a quadratic phase (position, velocity, acceleration, imu, timing)",
     "cubic_phase_error": "has a cubic phase (velocity, acceleration, imu, timing)",
     "location_error": "displaces the image (position, velocity, timing)",
-    "pslr": "makes echoes (vibration.sinusoidal, oscillator.spurs)",
+    "pslr": "makes echoes (vibration.sinusoidal, oscillator.spurs, oscillator.acceleration_sensitivity)",
     "islr": "spreads (vibration, random, oscillator)",
 }
 
@@ -585,6 +585,12 @@ def power_law_fits(misfit: float) -> str:
 
 
 @phrase
+def noise_is_shifted(level_db: float) -> str:
+    """Said of an oscillator whose noise the file shifts."""
+    return f"its noise is shifted by {level_db:g} dB"
+
+
+@phrase
 def left_by_exchanges(interval: float) -> str:
     """Said of an oscillator. [s]"""
     return f"only what synchronisation every {format_quantity(interval, 's')} leaves of it counts"
@@ -736,6 +742,60 @@ def seen_of_vibration(stated: str, along: float, has_direct_path: bool) -> str:
     """Said of a vibration that the line of sight sees a part of. [m]"""
     where = "in the range less the direct path" if has_direct_path else "along the line of sight"
     return f"{stated}: {format_quantity(along, 'm')} of it {where}"
+
+
+# ---------------------------------------------------------------------- vibration by its spectrum, and of oscillators
+@phrase
+def spectrum_shakes(rms: float, level_db: float) -> str:
+    """Said of the spectrum of a vibration. [m]"""
+    shift = f", shifted by {level_db:g} dB" if level_db else ""
+    return f"{format_quantity(rms, 'm')} rms along the line of sight{shift}, slow parts included"
+
+
+@phrase
+def amplitude_of_acceleration(amplitude: float) -> str:
+    """Said of a vibration that is stated in g. [m]"""
+    return f"an amplitude of {format_quantity(amplitude, 'm')}"
+
+
+@phrase
+def vibration_of_the_platform() -> str:
+    """Said of an oscillator without a vibration of its own."""
+    return (
+        "the oscillator is taken to feel motion_error.vibration, which is what navigation does not sense; it feels "
+        "all of it: oscillator.vibration states that"
+    )
+
+
+@phrase
+def oscillator_does_not_vibrate(turns: bool) -> str:
+    """Said of an oscillator whose platform has no vibration that can be converted."""
+    used = "counts for the turn only" if turns else "has nothing to act on"
+    return f"no sinusoidal vibration and no spectrum is stated: the acceleration sensitivity {used}"
+
+
+@phrase
+def wideband_has_no_spectrum() -> str:
+    """Said of an oscillator whose platform has a wideband vibration."""
+    return "wideband vibration has no spectrum: what it does to the oscillator is not counted; state a spectrum"
+
+
+@phrase
+def tones_have_rows(row_id: str) -> str:
+    """Said of an oscillator with vibrations that make echoes."""
+    return f"sinusoidal vibrations make echoes, in rows {row_id}.0 and on"
+
+
+@phrase
+def shakes_an_oscillator(acceleration: float, phase: float) -> str:
+    """Said of a vibration of an oscillator. [m/s², rad]"""
+    return f"{format_in(acceleration, 'm/s^2', 'g')} makes a phase of {phase:.3g} rad"
+
+
+@phrase
+def no_acceleration() -> str:
+    """Said of an oscillator that feels nothing."""
+    return "no vibration at random, no slow one and no turn: no phase"
 
 
 # ---------------------------------------------------------------------- images

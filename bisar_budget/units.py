@@ -143,6 +143,33 @@ ELECTRON_CONTENT = Dimension(
     usual=("TECU",),
 )
 PHASE_NOISE = Dimension("a phase noise L(f)", "dBc/Hz", {"dBc/Hz": 1.0}, usual=("dBc/Hz",))
+_G_DENSITIES = {"g^2/Hz": _G**2, "mg^2/Hz": (1e-3 * _G) ** 2, "ug^2/Hz": (1e-6 * _G) ** 2}
+ACCELERATION_DENSITY = Dimension(
+    "a spectral density of acceleration",
+    "(m/s^2)^2/Hz",
+    {**_G_DENSITIES, "(m/s^2)^2/Hz": 1.0, "m^2/s^4/Hz": 1.0, "m^2/s^3": 1.0},
+    usual=("g^2/Hz", "(m/s^2)^2/Hz"),
+)
+DISPLACEMENT_DENSITY = Dimension(
+    "a spectral density of displacement",
+    "m^2/Hz",
+    _scaled("m^2/Hz", "cmun", 2),
+    usual=("m^2/Hz", "mm^2/Hz"),
+)
+ACCELERATION_SENSITIVITY = Dimension(
+    "an acceleration sensitivity",
+    "s^2/m",
+    {
+        "/g": 1 / _G,
+        "1/g": 1 / _G,
+        "ppm/g": 1e-6 / _G,
+        "ppb/g": 1e-9 / _G,
+        "s^2/m": 1.0,
+        "/(m/s^2)": 1.0,
+        "1/(m/s^2)": 1.0,
+    },
+    usual=("/g",),
+)
 TONE = Dimension("the level of a tone", "dBc", {"dBc": 1.0}, usual=("dBc",))
 MEMORY = Dimension("an amount of memory", "B", _scaled("B", "kMGT") | {"KB": 1e3, "MiB": 2.0**20, "GiB": 2.0**30})
 
@@ -329,6 +356,8 @@ _SHEETS = {
     "rad/s": (_DEGREE / 3600, " deg/h"),
     "m/s/sqrt(s)": (_ROOT_HOUR, " m/s/√h"),
     "rad/sqrt(s)": (_DEGREE * _ROOT_HOUR, " deg/√h"),
+    "s^2/m": (1 / _G, " /g"),
+    "(m/s^2)^2/Hz": (_G**2, " g²/Hz"),
     "1": (1e-6, " ppm"),
     "1/m^2": (1e16, " TECU"),
 }

@@ -19,6 +19,7 @@ from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.constants import MAINLOBE_ENERGY
 from bisar_budget.effects.declared import CUBIC
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
+from bisar_budget.effects.oscillator_acceleration import accelerated_tones
 from bisar_budget.effects.oscillators import spurs_of
 from bisar_budget.effects.vibration import SLOWEST, counted, lines_of
 from bisar_budget.mission.model import Mission, Simulation, has_instruments
@@ -31,12 +32,16 @@ SMALLEST_CUBIC_RAD = 1e-3  # a power of -76 dB, which no image shows
 
 
 class Tone(NamedTuple):
-    """A vibration, or a spur of an oscillator: peak phase [rad] and cycles per aperture."""
+    """A vibration, a spur of an oscillator, or its own vibration: peak phase [rad] and cycles per aperture.
+
+    `in_quadrature` is the row of a tone from whose phase this one is a quarter of a turn away; None: of any phase.
+    """
 
     subject: Subject
     phase: Any
     cycles: Any
     is_there: Any = True  # in which cases a vibration is fast enough
+    in_quadrature: str | None = None
 
 
 class SpreadPhase(NamedTuple):
@@ -109,7 +114,7 @@ def spread_limit(mission: Mission, allocation: Allocation, owner: str, model: st
 
 
 def tones(mission: Mission, geometry: Any = None) -> list[Tone]:
-    """List what makes paired echoes: declared vibrations from one cycle per aperture on, and spurs.
+    """List what makes paired echoes: vibrations from one cycle per aperture on, their oscillators' tones, and spurs.
 
     `geometry` is that of many cases, where numbers of the mission are arrays.
     """
@@ -126,6 +131,11 @@ def tones(mission: Mission, geometry: Any = None) -> list[Tone]:
         for spur in spurs_of(mission, geometry):
             what = subject(spur.name, "oscillator", "spur", entry=spur.entry)
             found.append(Tone(what, spur.phase, spur.frequency * T))
+        for one in accelerated_tones(mission, geometry):
+            cycles = one.frequency * T
+            is_there = np.asarray(cycles >= SLOWEST)[()]
+            if np.any(is_there):
+                found.append(Tone(one.subject, one.phase, cycles, is_there, one.in_quadrature))
     return found
 
 

@@ -82,6 +82,12 @@ def level_of(phase: Any) -> Any:
     return np.where(phase <= LARGEST_ECHO, echo_level(np.minimum(phase, LARGEST_ECHO)), phase / 2)[()]
 
 
+def quadratures(tones: Sequence[Tone]) -> list[tuple[int, int]]:
+    """Places of the tones that are in quadrature to another, each with the place of that."""
+    places = {one.subject.id: place for place, one in enumerate(tones)}
+    return [(here, places[one.in_quadrature]) for here, one in enumerate(tones) if one.in_quadrature in places]
+
+
 def highest_echo(tones: Sequence[Tone], shape: tuple[int, ...] = ()) -> Echo | None:
     """Highest echo of all tones, each alone and those near each other together; None without any.
 
@@ -92,9 +98,12 @@ def highest_echo(tones: Sequence[Tone], shape: tuple[int, ...] = ()) -> Echo | N
     count = len(tones)
     phases, cycles, is_there = (
         np.array([np.broadcast_to(column, shape) for column in columns]).reshape(count, -1)
-        for columns in zip(*(one[1:] for one in tones), strict=True)
+        for columns in zip(*(one[1:4] for one in tones), strict=True)
     )
     phases = np.where(is_there, phases, 0.0)
+    pairs = quadratures(tones)
+    for one, other in pairs:  # at one frequency: the tone that it is with the other
+        phases[other], phases[one] = np.hypot(phases[one], phases[other]), 0.0
     number = near_groups(np.where(is_there, cycles, 0.0))
     here = np.arange(phases.shape[1])
     levels = level_of(phases)
@@ -110,6 +119,8 @@ def highest_echo(tones: Sequence[Tone], shape: tuple[int, ...] = ()) -> Echo | N
         some = some[is_higher]
         phase[some], place[some], level[some] = (one[is_higher] for one in (*worst, height))
         is_of[:, some] = members[:, some]
+    for one, other in pairs:
+        is_of[one] = is_of[other] & is_there[one].astype(bool)
     phase, place, level = (one.reshape(shape)[()] for one in (phase, place, level))
     return Echo(phase, place, level, is_of.reshape(count, *shape))
 

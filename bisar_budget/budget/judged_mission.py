@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from bisar_budget.analysis.analysis import Analysis, Case
 from bisar_budget.analysis.scene import SceneEdges, scene_edges
 from bisar_budget.analysis.spread import noise
+from bisar_budget.budget.acceleration_rows import accelerated_rows
 from bisar_budget.budget.aggregates import Aggregates, JudgedScene, Misplacing, effect_totals, misplacing
 from bisar_budget.budget.doubts import declared_position_error, is_in_doubt, least_doubt
 from bisar_budget.budget.error_rows import ErrorRows
@@ -178,6 +179,7 @@ class _Judgement:
         yield from self._random.rows(model)
         yield from self._random.stated_rows(model)
         yield from spur_rows(self.judging, self.analysis, model)
+        yield from accelerated_rows(self.judging, self.analysis, model)
         if needs.pslr is not None:
             yield pslr_row(self.judging, self.analysis.tones, needs.pslr)
         if needs.islr is not None:

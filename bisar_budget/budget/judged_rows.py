@@ -105,6 +105,10 @@ class Judged(NamedTuple):
         """The row with its factors of amplitude in decibel; its utilization stays that of amplitudes."""
         return self._of_columns(decibels, _IN_UNIT)
 
+    def in_unit(self, factor: Any) -> "Judged":
+        """The row with its sizes in a unit of which a factor is one of before."""
+        return self._of_columns(lambda column: column * factor, _IN_UNIT)
+
     def held_to(self, key: str) -> "Judged":
         """The row with the requirement that sets its allowable."""
         return self._replace(metric=key, binding=np.full_like(self.binding, REQUIREMENTS.index(key)))

@@ -25,6 +25,7 @@ from bisar_budget.analysis.spread import (
     spread_limit,
     stated_powers,
 )
+from bisar_budget.budget.acceleration_rows import evidence, notes_of_acceleration
 from bisar_budget.budget.judged_requirements import SMALL_RAD
 from bisar_budget.budget.judged_rows import BOUND, CODE, REQUIREMENTS, Floats, Judged, Judging, worded
 from bisar_budget.budget.pull_in import caps, needed_sentence
@@ -34,11 +35,14 @@ from bisar_budget.effects.navigation_errors import process_of
 from bisar_budget.effects.oscillators import POOR_FIT
 from bisar_budget.effects.propagation import CONTENT, dispersion
 from bisar_budget.effects.random_effect import RandomEffect, RandomError
+from bisar_budget.effects.vibration import counted, projected
+from bisar_budget.effects.vibration_spectra import displacement_rms, power_of
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import GroundVector
-from bisar_budget.mission.instruments import Oscillator, Synchronization
+from bisar_budget.mission.instruments import FORMS, Oscillator, Synchronization
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
+from bisar_budget.mission.vibrations import Vibration
 from bisar_budget.phrases import NOTHING, Note
 
 ISLR = "islr"
@@ -360,11 +364,14 @@ def _said(mission: Mission, error: RandomError) -> tuple[str, str | None, tuple[
     if sync is not None and kind == "synchronization":
         return "synchronisation", sync.source, () if sync.interval else (phrases.another_for_each_pulse(),)
     if kind == "oscillator":
-        return _said_of_oscillator(mission, error)
+        return _said_of_acceleration(mission, error) if figure else _said_of_oscillator(mission, error)
     if kind == "propagation":
         return _said_of_air(mission, error)
     if kind == "other":
         return "as declared", mission.other_errors[error.subject.entry or 0].source, ()
+    if kind == "vibration":
+        motion_error: MotionError = getattr(mission.platforms, error.owner).motion_error
+        return "spectrum of vibration", motion_error.source, _said_of_spectrum(mission, error.owner)
     if kind == "random":
         source, figure, equation = process_of(mission, error).source, "random", "Gauss-Markov"
         if error.owner not in PLATFORMS:
@@ -385,10 +392,27 @@ def _said(mission: Mission, error: RandomError) -> tuple[str, str | None, tuple[
     return equation, source or motion.evidence(figure), notes
 
 
+def _said_of_spectrum(mission: Mission, name: str) -> tuple[Note, ...]:
+    vibration: Vibration = getattr(mission.platforms, name).motion_error.vibration
+    spectrum, along = vibration.spectrum, float(counted(mission, name, 1.0, "islr"))
+    if spectrum is None:
+        return ()
+    rms = displacement_rms(spectrum, float(power_of(vibration)))
+    seen = projected(mission, rms, getattr(mission.platforms, name).motion_error, rms * along)
+    return (phrases.spectrum_shakes(rms, vibration.spectrum_level or 0.0), *seen)
+
+
+def _said_of_acceleration(mission: Mission, error: RandomError) -> tuple[str, str | None, tuple[Note, ...]]:
+    oscillator: Oscillator = getattr(mission.platforms, error.owner).oscillator
+    return "acceleration sensitivity", evidence(oscillator), notes_of_acceleration(mission, error.owner)
+
+
 def _said_of_oscillator(mission: Mission, error: RandomError) -> tuple[str, str | None, tuple[Note, ...]]:
     oscillator: Oscillator = getattr(mission.platforms, error.owner).oscillator
     own, sync = error.noise, mission.synchronization
-    notes = [*override_notes(error.owner, oscillator.overridden)]
+    notes = [*override_notes(error.owner, oscillator.overridden, *FORMS, "frequency")]
+    if oscillator.level:
+        notes.append(phrases.noise_is_shifted(oscillator.level))
     is_heard = not mission.has_direct_path or error.owner == "receiver"
     if own is not None and is_heard:
         notes += [note for note in (own.extrapolated, *own.notes) if note]
@@ -430,13 +454,15 @@ def _unlimited(mission: Mission, error: RandomError, effect: RandomEffect) -> No
 
 def no_effect(mission: Mission, error: RandomError) -> Note:
     """Say why an error does nothing."""
-    if error.subject.kind in ("imu", "random", "lever_arm"):
+    if error.subject.kind in ("imu", "random", "lever_arm", "vibration"):
         return phrases.across_the_line_of_sight()
     if error.subject.kind == "propagation":
         return phrases.below_the_ionosphere(error.owner)
     if error.subject.kind == "synchronization":
         return phrases.nothing_spreads()
-    return phrases.oscillators_drop_out() if mission.has_direct_path else phrases.no_phase_noise()
+    if mission.has_direct_path:
+        return phrases.oscillators_drop_out()
+    return phrases.no_acceleration() if error.subject.axis else phrases.no_phase_noise()
 
 
 def _over(mission: Mission, error: RandomError, model: str, binding: str | None, allocation: Allocation) -> Note:

@@ -7,7 +7,7 @@ from typing import Any
 from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Case
 from bisar_budget.analysis.spread import islr_db, mainlobe_energy, spread_limit
-from bisar_budget.analysis.vibration_limits import level_of
+from bisar_budget.analysis.vibration_limits import level_of, tone_limits
 from bisar_budget.budget.doubts import input_doubts, is_in_doubt
 from bisar_budget.budget.judged_mission import FamilyRow, JudgedMission
 from bisar_budget.budget.judged_requirements import (
@@ -180,9 +180,11 @@ def _sizes(row: Row, key: str, case: Case) -> tuple[float | None, float | None]:
         limit, use = spread_limit(mission, allocation, row.owner, model) or 0.0, row.utilization or 0.0
         sizes = [islr_db(rms**2, model, mainlobe_energy(mission)) if rms else None for rms in (limit, limit * use)]
         return sizes[0], sizes[1]
-    k = 2 * math.pi / mission.radar.wavelength
-    levels = [None if size is None else _echo_db(k * size) for size in (row.allowable, row.declared)]
-    return levels[0], levels[1]
+    limits = tone_limits(mission, allocation)[1].get(row.owner)
+    if limits is None:
+        return None, None
+    phase = 2 * math.pi / mission.radar.wavelength * float(limits.by(row.model or "full"))
+    return _echo_db(phase), None if row.utilization is None else _echo_db(phase * row.utilization)
 
 
 def _echo_db(phase: float) -> float | None:

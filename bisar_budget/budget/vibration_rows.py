@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -35,6 +35,7 @@ from bisar_budget.effects.vibration import (
     lines_of,
     near_groups,
     projected,
+    unit_of_line,
     worst_phases,
 )
 from bisar_budget.findings.row import Row
@@ -65,6 +66,7 @@ class Vibrations:
         self.amplitudes = {name: self._columns([one.amplitude for one in of_one]) for name, of_one in lines.items()}
         T = mission.collection.aperture_time
         self.cycles = {name: self._columns([one.frequency * T for one in of_one]) for name, of_one in lines.items()}
+        self.per_metre = {name: self._columns([one.per_metre for one in of_one]) for name, of_one in lines.items()}
 
     def _columns(self, numbers: Sequence[Any]) -> Floats:
         return np.array([self.array(number) for number in numbers]).reshape(-1, self.judging.cases)
@@ -79,9 +81,9 @@ class Vibrations:
             for index in range(self.count[name]):
                 is_slow = self.cycles[name][index] < SLOWEST
                 if is_slow.any():
-                    yield self._slow(name, index, is_slow)
+                    yield self._slow(name, index, is_slow).in_unit(self.per_metre[name][index])
                 if not is_slow.all():
-                    yield self._line(model, name, index, ~is_slow)
+                    yield self._line(model, name, index, ~is_slow).in_unit(self.per_metre[name][index])
             if not self.count[name]:
                 what = subject(name, "vibration", "sinusoidal", entry=0)
                 yield self._row(model, what, self.metric, None, self.tones.get(name), everywhere)
@@ -245,7 +247,7 @@ class VibrationRow:
     it `is_slow` it is judged by them, else `is_over_phase` says that they break what they may. `is_over_other`
     says that the model that does not gate fails it. `both` is the peak phase of one line with an echo as high as
     those of near frequencies on both platforms [rad], `level` the level of that echo [dB], and `is_over_both`
-    says that it is too high.
+    says that it is too high. Sizes of the row are `per_metre` times those in metres.
     """
 
     judged: Judged
@@ -262,6 +264,13 @@ class VibrationRow:
     is_over_phase: Any = False
     is_over_both: Any = False
     without_autofocus: Any = 0.0
+    per_metre: Any = 1.0
+
+    def in_unit(self, per_metre: Floats) -> "VibrationRow":
+        """The row in the unit that the file states its line in."""
+        if np.all(per_metre == 1):
+            return self
+        return replace(self, judged=self.judged.in_unit(per_metre), per_metre=per_metre)
 
     def in_words(self, case: Case, model: str) -> Row:
         """The row of one case, by the model that judges it."""
@@ -413,7 +422,7 @@ def _line_row(case: Case, one: VibrationRow, error: MotionError, model: str) -> 
         more.insert(0, phrases.slower_than_three_cycles(float(one.cycles[place]), qpe, limit, cubic, allowed))
         if one.is_over_phase[place]:
             doubt = phrases.phase_of_vibration_over(qpe, limit, cubic, allowed)
-    return _row(case, one, error, model, key, _seen(case, one, error, lines[index].amplitude), more, doubt)
+    return _row(case, one, error, model, key, _seen(case, one, error, lines[index].displacement), more, doubt)
 
 
 def _row(
@@ -436,11 +445,12 @@ def _row(
         notes = (*notes, phrases.published_rule_is_off(margin))
         if one.is_over_other[case.place]:
             other = "full" if model == "published" else "published"
-            doubt = phrases.other_model_allows(other, float(limits.by(other)), "m")
+            allowed = float(limits.by(other)) * case.number(one.per_metre)
+            doubt = phrases.other_model_allows(other, allowed, _unit(case, one))
     return worded(
         case,
         one.judged,
-        unit="m",
+        unit=_unit(case, one),
         path=("platforms", what.owner, "motion_error", "vibration", *key),
         equation=equation,
         over=phrases.share_of_power_over(metric, equation),
@@ -454,7 +464,15 @@ def _row(
 
 
 def _seen(case: Case, one: VibrationRow, error: MotionError, value: Any) -> tuple[Note, ...]:
-    return projected(case.mission, value, error, case.number(one.judged.declared))
+    metres = case.number(one.judged.declared) / case.number(one.per_metre)
+    seen = projected(case.mission, value, error, metres)
+    stated = () if seen or _unit(case, one) == "m" else (phrases.amplitude_of_acceleration(metres),)
+    return (*stated, *seen)
+
+
+def _unit(case: Case, one: VibrationRow) -> str:
+    what = one.judged.subject
+    return unit_of_line(case.mission, what.owner, what.entry or 0) if what.axis == "sinusoidal" else "m"
 
 
 def _lines_together(error: MotionError, members: Sequence[int], declared: float) -> Note:
@@ -480,7 +498,7 @@ def _slow_row(case: Case, one: VibrationRow, error: MotionError) -> Row:
     return worded(
         case,
         one.judged,
-        unit="m",
+        unit=_unit(case, one),
         path=("platforms", what.owner, "motion_error", "vibration", "sinusoidal", entry, "amplitude"),
         equation="first principles",
         over=over,
@@ -488,7 +506,7 @@ def _slow_row(case: Case, one: VibrationRow, error: MotionError) -> Row:
         without_autofocus=case.number(one.without_autofocus),
         evidence=error.source,
         remarks=(
-            *_seen(case, one, error, error.vibration.sinusoidal[entry].amplitude),
+            *_seen(case, one, error, error.vibration.sinusoidal[entry].displacement),
             phrases.slower_than_a_cycle(cycles, qpe, cubic),
         ),
         binding_requirement=CUBIC if is_cubic else QUADRATIC,

@@ -180,10 +180,12 @@ def compare_parts(
 def _with_silence(states: Sequence[PartState]) -> Iterator[PartState]:
     """Note of inertial sensors and GNSS which figures only others of their kind have."""
     for state in states:
-        if state.kind == "oscillator" or state.standing.status == "error":  # its figures stand in for each other
+        if state.standing.status == "error":
             yield state
             continue
         known = dict.fromkeys(figure for other in states if other.kind == state.kind for figure in other.figures)
+        if state.kind == "oscillator":  # whose forms of noise stand in for each other
+            known = {figure: None for figure in known if figure == "acceleration_sensitivity"}
         yield state._replace(silent_on=tuple(figure for figure in known if figure not in state.figures))
 
 
@@ -252,6 +254,7 @@ class _PartSearch:
         taken = {} if self.section == "oscillator" else dict(platform.motion_error.of_parts)
         if self.section == "oscillator":
             taken = dict.fromkeys(FIGURES["oscillator"], platform.oscillator.source)
+            taken |= dict(platform.oscillator.of_parts)
         figures = (figure for figure in FIGURES[part.kind] if getattr(part, figure))
         return tuple(figure for figure in figures if taken.get(figure) == evidence(part, figure))
 

@@ -239,11 +239,12 @@ def range_of(number: Number, between: str | None) -> Range:
             return Range(0.0, 2 * math.pi, is_log=False, is_circle=True)
         if number.reader in (ELEVATION, LATITUDE):
             return Range(ge, le, is_log=False)
-        if not number.value:
+        is_level = number.dimension in (units.POWER_RATIO, units.TONE, units.PHASE_NOISE)
+        if number.value is None or (number.value == 0 and not is_level):
             said = "is 0" if number.value == 0 else "has no value"
             raise QuestionError(f"{number.key}: {said} in the file; say where to look, --between A..B")
         ends = sorted((number.value / _DECADE, number.value * _DECADE))
-        if number.dimension in (units.POWER_RATIO, units.TONE, units.PHASE_NOISE):  # a level, its decades are 20 dB
+        if is_level:  # its decades are 20 dB
             ends = [number.value - 20.0, number.value + 20.0]
         low, high = max(ends[0], ge, gt), min(ends[1], le, lt)
         low, high = (low * (1 + 1e-9) if low == gt else low), (high * (1 - 1e-9) if high == lt else high)

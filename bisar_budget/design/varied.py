@@ -40,6 +40,7 @@ from bisar_budget.mission.platforms import (
 )
 from bisar_budget.mission.propagation import LEAST_ELEVATION_DEG, low_legs
 from bisar_budget.mission.readers import ListOf, OneOf, Quantity, Reader, Section, Triple
+from bisar_budget.mission.vibrations import Spectrum
 from bisar_budget.ranges.exact_ranges import Floats
 from bisar_budget.units import Dimension, parse_quantity
 
@@ -56,6 +57,7 @@ _CURVES: Mapping[str, Dimension] = {
     "phase_noise": units.FREQUENCY,
     "spurs": units.FREQUENCY,
     "allan_deviation": units.TIME,
+    "spectrum": units.FREQUENCY,
 }
 POWERS = dict(zip(("h-2", "h-1", "h0", "h1", "h2"), PowerLaw._fields, strict=True))
 
@@ -87,8 +89,10 @@ def _with_value(value: Any, parts: Sequence[str], number: Any) -> Any:
     return value._replace(**{part: _with_value(below, rest, number)})
 
 
-def _with_point(curve: Sequence[tuple[float, Any]], name: str, point: str, number: Any) -> Any:
+def _with_point(curve: Any, name: str, point: str, number: Any) -> Any:
     """A curve with another ordinate at one of its points."""
+    if isinstance(curve, Spectrum):
+        return curve._replace(points=_with_point(curve.points, name, point, number))
     here = parse_quantity(point, _CURVES[name])
     return tuple((at, number if at == here else ordinate) for at, ordinate in curve)
 
@@ -127,7 +131,7 @@ def is_held(mission: Mission, key: str, *, is_stated: bool) -> bool:
         if parts[1] == "oscillator":
             if platform.oscillator is None or (parts[2] == "frequency" and platform.oscillator.sensor is not None):
                 return False  # a part holds at the frequency of its own
-            return is_stated or parts[2] in ("frequency", "bandwidth")
+            return is_stated or parts[2] in ("frequency", "bandwidth", "level")
         return not flies_on_earth(mission) and _is_held_of_path(platform, parts[1], is_stated)
     if key == "collection.aperture_time" or (section == "scene" and parts[0] in PLACE_KEYS):
         return not flies_on_earth(mission)
@@ -139,6 +143,8 @@ def _is_held_of_error(error: MotionError, parts: Sequence[str], is_stated: bool)
         return parts[0] == "acceleration" or error.covariance is None  # which replaces the others
     if parts[0] == "covariance" and error.covariance is not None:
         return is_stated and not error.covariance.is_matrix  # an element of a matrix has a twin
+    if parts == ["vibration", "spectrum_level"]:
+        return error.vibration.spectrum is not None  # which it shifts
     return is_stated or parts[0] == "imu" or tuple(parts) in (("time_tag",), ("lever_arm", "uncertainty"))
 
 
@@ -278,7 +284,7 @@ def _scaled(value: Any, reader: Reader, factor: Any, is_clock: bool) -> tuple[An
     if isinstance(reader, Section):
         count = 0
         for name, below in reader.keys.items():
-            if name in _MEASURES:
+            if name in _MEASURES or name == "spectrum_level":  # the spectrum is scaled
                 continue
             inner, found = _scaled(getattr(value, name), below.reader, factor, is_clock or name in _TIMES)
             value, count = value._replace(**{name: inner}), count + found
@@ -293,6 +299,8 @@ def _scaled(value: Any, reader: Reader, factor: Any, is_clock: bool) -> tuple[An
         if reader.dimension in _KEPT and not is_clock:
             return value, 0
         return value * factor, int(np.any(value))
+    if isinstance(value, Spectrum):
+        return value.times(factor**2), 1
     if hasattr(value, "sigmas"):  # a covariance
         return value._replace(sigmas=tuple(sigma * factor for sigma in value.sigmas)), int(np.any(value.sigmas))
     return value, 0

@@ -7,6 +7,7 @@ __all__ = [
     "effect",
     "lever_arms",
     "navigation_errors",
+    "oscillator_acceleration",
     "oscillators",
     "other_errors",
     "propagation",
@@ -15,4 +16,5 @@ __all__ = [
     "sources",
     "spectra",
     "vibration",
+    "vibration_spectra",
 ]

@@ -30,7 +30,8 @@ def oscillator_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
     if oscillator is None:
         return
     found = _left_at_1_hz(seen, name, oscillator)
-    published, full = _of_clock(seen, Parts(*found * mission.radar.center_frequency**2))
+    scale = mission.radar.center_frequency**2 * 10 ** (np.asarray(oscillator.level) / 10)
+    published, full = _of_clock(seen, Parts(*found * scale))
     key = ("platforms", name, "oscillator")
     path = key if oscillator.sensor is None else (*key, "sensor")
     yield RandomError(
@@ -80,7 +81,7 @@ def _left_at_1_hz(seen: SensorCases, name: str, oscillator: Oscillator) -> Float
     if sync is not None and sync.is_direct_path and name == "transmitter":
         return found
     interval = None if sync is None else sync.interval
-    for (alike, exchanged), places in _groups_alike((oscillator._replace(aging=None), interval), seen.cases):
+    for (alike, exchanged), places in _groups_alike((oscillator.noise_alone, interval), seen.cases):
         spectra: dict[Any, list[int]] = {}
         for place in places.tolist():  # an Allan deviation may be fitted otherwise over another aperture
             spectra.setdefault(noise_of(alike, 1.0, float(times[place])).pieces, []).append(place)

@@ -12,7 +12,8 @@ from bisar_budget import evaluators, phrases
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.spectra import PowerLawPiece, held
 from bisar_budget.geometry import BistaticGeometry
-from bisar_budget.mission.instruments import Oscillator, Points, PowerLaw
+from bisar_budget.mission.curves import Points
+from bisar_budget.mission.instruments import Oscillator, PowerLaw
 from bisar_budget.mission.model import Mission
 from bisar_budget.phrases import NOTHING, Note
 
@@ -32,7 +33,8 @@ class Noise(NamedTuple):
 
 
 def noise_of(oscillator: Oscillator, center_frequency: float, aperture_time: float) -> Noise:
-    """Spectrum of an oscillator's phase, one-sided. [rad²/Hz]"""
+    """Spectrum of an oscillator's phase, one-sided, shifted by its level. [rad²/Hz]"""
+    center_frequency *= 10 ** (oscillator.level / 20)  # noise goes up as its square
     if oscillator.phase_noise is not None:
         return _of_mask(oscillator, center_frequency, aperture_time)
     bandwidth = BANDWIDTH if oscillator.bandwidth is None else oscillator.bandwidth
@@ -54,7 +56,7 @@ def noise_of(oscillator: Oscillator, center_frequency: float, aperture_time: flo
 
 def _of_mask(oscillator: Oscillator, center_frequency: float, aperture_time: float) -> Noise:
     points = oscillator.phase_noise or ()
-    scale = 2 * (center_frequency / (oscillator.frequency or center_frequency)) ** 2
+    scale = 2 * (center_frequency / (oscillator.frequency or 1.0)) ** 2
     densities = [(f, scale * 10 ** (level / 10)) for f, level in points]
     last, pieces = points[-1][0], []
     bandwidth = last if oscillator.bandwidth is None else oscillator.bandwidth
@@ -197,13 +199,13 @@ def spurs_of(mission: Mission, geometry: BistaticGeometry | None = None) -> list
         oscillator = getattr(mission.platforms, name).oscillator
         for index, (frequency, level) in enumerate(oscillator.spurs if oscillator is not None else ()):
             scale = mission.radar.center_frequency / oscillator.frequency
-            left = _left_of(frequency, mission, geometry or mission.geometry)
+            left = left_of_tone(frequency, mission, geometry or mission.geometry)
             # A sideband of a phase φ has the amplitude φ/2 of the carrier.
             found.append(Spur(name, index, frequency, 2 * 10 ** (level / 20) * scale * left, left))
     return found
 
 
-def _left_of(frequency: float, mission: Mission, geometry: BistaticGeometry) -> Any:
+def left_of_tone(frequency: Any, mission: Mission, geometry: BistaticGeometry) -> Any:
     """Largest part of a tone that exchanged pulses leave, at its own frequency or at one that it is folded to.
 
     A receiver that hears the transmitter has 2|sin(πfΔt)| of its own.

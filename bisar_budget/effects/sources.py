@@ -252,7 +252,15 @@ class ErrorListing:
         no_limit = (
             phrases.aging_is_followed() if sync is not None else phrases.no_quadratic_term_of_clock("quadratic")
         )
-        yield self._of_terms(what, "1/s", value, path, terms, no_limit, evidence=oscillator.source)
+        yield self._of_terms(
+            what,
+            "1/s",
+            value,
+            path,
+            terms,
+            no_limit,
+            evidence=dict(oscillator.of_parts).get("aging", oscillator.source),
+        )
 
     def _of_both_platforms(self) -> Iterator[ErrorSource]:
         """Errors that both platforms have in common: the effects of both legs add with their signs.

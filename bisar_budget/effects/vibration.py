@@ -32,6 +32,7 @@ from bisar_budget.effects.spectra import SLOW, tone
 from bisar_budget.geometry import FRAME_AXES, Vector, dot
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
+from bisar_budget.mission.vibrations import AcceleratedSinusoid
 from bisar_budget.phrases import Note
 from bisar_budget.units import format_quantity
 
@@ -170,10 +171,14 @@ def _heights(sizes: Floats, places: Floats, x: Floats) -> Floats:
 
 # ---------------------------------------------------------------------- along the line of sight
 class Line(NamedTuple):
-    """One sinusoid: amplitude along the line of sight, 0 to peak [m], and frequency [Hz]."""
+    """One sinusoid: amplitude along the line of sight, 0 to peak [m], and frequency [Hz].
+
+    `per_metre` is what the unit of its row has of a metre of it: (2πf)² where the file states its acceleration.
+    """
 
     amplitude: Any
     frequency: Any
+    per_metre: Any = 1.0
 
 
 def along_line_of_sight(value: Any, error: MotionError, state: Any, metric: str, sight: Vector | None = None) -> Any:
@@ -211,7 +216,16 @@ def lines_of(mission: Mission, name: str, geometry: Any = None) -> list[Line]:
     """Sinusoids of one platform, along the line of sight."""
     error: MotionError = getattr(mission.platforms, name).motion_error
     lines = error.vibration.sinusoidal
-    return [Line(counted(mission, name, line.amplitude, "pslr", geometry), line.frequency) for line in lines]
+    return [
+        Line(counted(mission, name, line.displacement, "pslr", geometry), line.frequency, 1 / line.scale)
+        for line in lines
+    ]
+
+
+def unit_of_line(mission: Mission, name: str, entry: int) -> str:
+    """Unit of the row of a sinusoid: that of its acceleration where the file states that."""
+    lines = getattr(mission.platforms, name).motion_error.vibration.sinusoidal
+    return "m/s^2" if entry < len(lines) and isinstance(lines[entry], AcceleratedSinusoid) else "m"
 
 
 def projected(mission: Mission, value: float | Vector, error: MotionError, along: float) -> tuple[Note, ...]:
@@ -284,7 +298,7 @@ def _largest_displacement(mission: Mission, name: str, index: int, line: Line, g
     one is 1/(|s| sin γ) on the ground and a metre per second of the other 1/(|ṡ| sin γ).
     """
     T = mission.collection.aperture_time
-    stated: Any = getattr(mission.platforms, name).motion_error.vibration.sinusoidal[index].amplitude
+    stated: Any = getattr(mission.platforms, name).motion_error.vibration.sinusoidal[index].displacement
     x = math.pi * line.frequency * T
     mean = np.sin(x) / x
     slope = np.where(x > SLOW, 3 * (mean - np.cos(x)) / x, x)  # 3·j₁(x), which is below x

@@ -4,6 +4,7 @@
 __all__ = [
     "changes",
     "covariance",
+    "curves",
     "instruments",
     "load",
     "model",
@@ -14,4 +15,5 @@ __all__ = [
     "revision",
     "stacked",
     "tree",
+    "vibrations",
 ]

@@ -6,8 +6,9 @@ from itertools import pairwise
 from typing import Annotated, Any, NamedTuple
 
 from bisar_budget import units
-from bisar_budget.faults import InvalidValueError, KeyPath, Problem
+from bisar_budget.faults import KeyPath, Problem
 from bisar_budget.geometry import Vector
+from bisar_budget.mission.curves import CurveReader, Points
 from bisar_budget.mission.readers import (
     INVALID,
     Choice,
@@ -21,6 +22,7 @@ from bisar_budget.mission.readers import (
     Text,
     Triple,
 )
+from bisar_budget.mission.vibrations import FELT_VIBRATION, LEVEL, FeltVibration
 
 IMU_KINDS = (
     "accelerometer_bias",
@@ -113,50 +115,6 @@ class LeverArm(NamedTuple):
             yield Problem("is empty", "accepted: arm, uncertainty or both")
 
 
-class _Curve(Reader):
-    """A mapping of abscissas to ordinates, in any order of the file, read into pairs in rising order."""
-
-    def __init__(self, abscissa: Quantity, ordinate: Quantity, what: str, fewest: int, most: int = 100) -> None:
-        self.abscissa, self.ordinate, self.what, self.fewest, self.most = abscissa, ordinate, what, fewest, most
-
-    def read(self, value: Any, path: KeyPath, report: Report) -> Any:
-        """Read each point at its own place."""
-        if not isinstance(value, dict) or not self.fewest <= len(value) <= self.most:
-            given = f", {len(value)} given" if isinstance(value, dict) else ""
-            report(path, Problem(f"must be {self.fewest} to {self.most} points{given}", f"accepted: {self.what}"))
-            return INVALID
-        points = {}
-        is_valid = True
-        for key, item in value.items():
-            here = (*path, key)
-            try:
-                at = self.abscissa.leaf(key)
-            except InvalidValueError as error:
-                report(here, error.problem)
-                is_valid = False
-                continue
-            if at in points:
-                report(here, Problem("is in the list twice"))
-                is_valid = False
-            points[at] = item if item is INVALID else self.ordinate.read(item, here, report)
-        if INVALID in points.values() or not is_valid:
-            return INVALID
-        return tuple(sorted(points.items()))
-
-    def below(self, part: str) -> Reader | None:
-        """Give the reader of an ordinate."""
-        return self.ordinate
-
-    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
-        """Object of points."""
-        return {
-            "type": "object",
-            "additionalProperties": self.ordinate.schema(definitions),
-            "minProperties": self.fewest,
-            "maxProperties": self.most,
-        }
-
-
 class PowerLaw(NamedTuple):
     """One-sided spectrum of the fractional frequency, S_y = h₋₂/f² + h₋₁/f + h₀ + h₁·f + h₂·f². SI."""
 
@@ -203,18 +161,22 @@ class _PowerLawReader(Reader):
         return {"type": "object", "properties": properties, "additionalProperties": False, "minProperties": 1}
 
 
-Points = tuple[tuple[float, float], ...]
 FORMS = ("phase_noise", "allan_deviation", "power_law")
 STEEPEST = 60.0  # dB a decade; noise of an oscillator falls by 40 at most
 RISE = 20.0  # dB a decade; a mask that rises by more is a tone, or a slip
 _OR_SENSOR = ", or sensor: a part of the catalogue"
+NOT_SENSITIVE = Problem(
+    "does nothing to an oscillator without acceleration_sensitivity",
+    "accepted: acceleration_sensitivity beside it, such as 1e-9 /g",
+    at=("vibration",),
+)
 
 
 Frequency = Annotated[float | None, Key(Quantity(units.FREQUENCY, gt=0, ge=1, le=1e15), "At which a mask is stated.")]
 PhaseNoise = Annotated[
     Points | None,
     Key(
-        _Curve(
+        CurveReader(
             Quantity(units.FREQUENCY, gt=0, ge=1e-6, le=1e12),
             Quantity(units.PHASE_NOISE, ge=-250, le=60),
             "{1 Hz: -95 dBc/Hz, 10 Hz: -125 dBc/Hz} and the like",
@@ -226,7 +188,7 @@ PhaseNoise = Annotated[
 AllanDeviation = Annotated[
     Points | None,
     Key(
-        _Curve(
+        CurveReader(
             Quantity(units.TIME, gt=0, ge=1e-6, le=1e9),
             Quantity(units.RATIO, gt=0, ge=1e-20, le=1e-3),
             "{1 s: 6e-12, 10 s: 2e-11} and the like",
@@ -242,12 +204,20 @@ Aging = Annotated[
 PowerLawFigures = Annotated[
     PowerLaw | None, Key(_PowerLawReader(), "h-2 … h2 of the one-sided spectrum of fractional frequency.")
 ]
+AccelerationSensitivity = Annotated[
+    float | None,
+    Key(
+        Quantity(units.ACCELERATION_SENSITIVITY, ge=0, le=1e-3),
+        "Γ, by which part its frequency changes with acceleration, in the direction where it is largest.",
+    ),
+]
 
 
 class Oscillator(NamedTuple):
     """An oscillator and its noise, in one of three forms or as a part of the catalogue.
 
-    `overridden` are the figures of the part that keys beside it replace.
+    `overridden` are the figures of the part that keys beside it replace, `of_parts` says where its acceleration
+    sensitivity comes from, where that is the part's.
     """
 
     frequency: Frequency = None
@@ -264,7 +234,7 @@ class Oscillator(NamedTuple):
     spurs: Annotated[
         Points,
         Key(
-            _Curve(
+            CurveReader(
                 Quantity(units.FREQUENCY, gt=0, ge=1e-3, le=1e12),
                 Quantity(units.TONE, ge=-250, le=0),
                 "{50 Hz: -90 dBc} and the like",
@@ -274,16 +244,32 @@ class Oscillator(NamedTuple):
         ),
     ] = ()
     aging: Aging = None
+    level: Annotated[float, Key(LEVEL, "Shifts the whole spectrum of its noise; spurs stay.")] = 0.0
+    acceleration_sensitivity: AccelerationSensitivity = None
+    vibration: Annotated[
+        FeltVibration | None,
+        Key(
+            FELT_VIBRATION,
+            "What it feels where it is mounted; omitted: motion_error.vibration of its platform, which is what "
+            "navigation does not sense.",
+        ),
+    ] = None
     sensor: Annotated[
         str | None, Key(Reference(), "A part of the catalogue, or a file; keys beside it override.")
     ] = None
     source: Annotated[str | None, Key(Text(), "Where the values come from; shown as evidence.")] = None
     overridden: tuple[Overridden, ...] = ()
+    of_parts: tuple[tuple[str, str], ...] = ()
 
     @property
     def needs_frequency(self) -> bool:
         """Whether what it says is stated at its own frequency: a power law is of fractional frequency."""
         return self.phase_noise is not None or bool(self.spurs)
+
+    @property
+    def noise_alone(self) -> "Oscillator":
+        """The same without its level, without aging and without what it feels."""
+        return self._replace(level=0.0, aging=None, acceleration_sensitivity=None, vibration=None)
 
     @staticmethod
     def problems(values: Mapping[str, Any], or_else: str = _OR_SENSOR) -> Iterator[Problem]:
@@ -299,6 +285,9 @@ class Oscillator(NamedTuple):
                 yield Problem("is missing", "accepted: the frequency at which the mask is stated", at=("frequency",))
         if values.get("spurs") and values.get("sensor") is None and values.get("frequency", 0.0) is None:
             yield Problem("is missing", "accepted: the frequency at which the tones are stated", at=("frequency",))
+        is_insensitive = "acceleration_sensitivity" in values and values["acceleration_sensitivity"] is None
+        if values.get("vibration") is not None and values.get("sensor") is None and is_insensitive:
+            yield NOT_SENSITIVE
         for (f, level), (g, next_level) in pairwise(values.get("phase_noise") or ()):
             slope = (next_level - level) / math.log10(g / f)
             if slope < -STEEPEST or slope > RISE:

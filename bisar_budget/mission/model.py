@@ -453,7 +453,7 @@ class Mission(NamedTuple):
 
 
 def has_instruments(mission: Mission) -> bool:
-    """Whether a mission says anything of inertial sensors, position noise, lever arms, or oscillators and links."""
+    """Whether a mission says anything of sensors, lever arms, clocks or spectra: what is random over an aperture."""
     return (
         mission.synchronization is not None
         or any(
@@ -461,6 +461,7 @@ def has_instruments(mission: Mission) -> bool:
             or platform.motion_error.imu is not None
             or platform.motion_error.random
             or platform.motion_error.lever_arm is not None
+            or platform.motion_error.vibration.spectrum is not None
             for platform in mission.platforms
         )
         or bool(mission.common_motion_error is not None and mission.common_motion_error.random)

@@ -24,7 +24,9 @@ from bisar_budget.geometry import Vector
 from bisar_budget.mission.instruments import (
     FORMS,
     IMU_KINDS,
+    NOT_SENSITIVE,
     OSCILLATOR,
+    AccelerationSensitivity,
     AccelerometerBias,
     AccelerometerScaleFactor,
     Aging,
@@ -128,6 +130,7 @@ class OscillatorPart(NamedTuple):
     allan_deviation: AllanDeviation = None
     power_law: PowerLawFigures = None
     aging: Aging = None
+    acceleration_sensitivity: AccelerationSensitivity = None
     says: Annotated[str | None, _SAYS] = None
 
     @staticmethod
@@ -144,7 +147,7 @@ SECTIONS: dict[str, Section] = {
     "gnss": Section(GnssPart),
     "oscillator": Section(OscillatorPart),
 }
-BESIDE_NOISE = ("aging",)  # figures of an oscillator that a mission's own override one by one
+BESIDE_NOISE = ("aging", "acceleration_sensitivity")  # figures of an oscillator that stand for themselves
 FIGURES = {"imu": IMU_KINDS, "gnss": _GNSS_KINDS, "oscillator": ("frequency", *FORMS, *BESIDE_NOISE)}
 
 
@@ -485,6 +488,9 @@ def _with_sensor(oscillator: Oscillator, path: KeyPath, find: Find, report: Repo
         problem = f"{shown(parts[0].part.name)} states no frequency, at which the mask or the tones are stated"
         report(path, Problem(problem, "accepted: oscillator.frequency", at=("frequency",)))
         return INVALID
+    if found is not INVALID and found.vibration is not None and found.acceleration_sensitivity is None:
+        report(path, NOT_SENSITIVE)
+        return INVALID
     return found
 
 
@@ -590,7 +596,7 @@ def taken_figures(mission: Mission) -> Iterator[TakenFigure]:
             path = ("platforms", name, "oscillator", "frequency")
             is_own = {"frequency": path in mission.places}
             is_own |= {form: oscillator.source != evidence(entry.part, form) for form in FORMS}
-            is_own |= {figure: (*path[:-1], figure) in mission.places for figure in BESIDE_NOISE}
+            is_own |= {figure: figure not in dict(oscillator.of_parts) for figure in BESIDE_NOISE}
             for figure in entry.figures:
                 if not is_own[figure]:
                     key = f"platforms.{name}.oscillator.{figure}"
@@ -621,12 +627,15 @@ def _oscillator_of(oscillator: Oscillator, entry: Entry, path: KeyPath, report: 
             report(path, Problem(problem, "accepted: no frequency, or phase_noise beside it", at=("frequency",)))
             return INVALID
         overridden.append(Overridden("frequency", "oscillator.frequency", part.name, at))
+    of_parts = []
     for figure in BESIDE_NOISE:
-        if getattr(oscillator, figure) is None:
-            taken[figure] = getattr(part, figure)
-        elif figure in figures:
+        value = getattr(part, figure)
+        if value is not None and getattr(oscillator, figure) is None:
+            taken[figure] = value
+            of_parts.append((figure, evidence(part, figure)))
+        elif value is not None:
             overridden.append(Overridden(figure, f"oscillator.{figure}", part.name, figures[figure]))
-    return oscillator._replace(**taken, overridden=tuple(overridden))
+    return oscillator._replace(**taken, of_parts=tuple(of_parts), overridden=tuple(overridden))
 
 
 # ---------------------------------------------------------------------- JSON Schema of a part

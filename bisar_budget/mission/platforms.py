@@ -43,14 +43,11 @@ from bisar_budget.mission.readers import (
     LATER_FORMATS,
     LATITUDE,
     RANGE,
-    SIZE,
     SNAP,
     SPEED,
     VELOCITY,
-    VIBRATION_FREQUENCY,
     Choice,
     Key,
-    ListOf,
     OneOf,
     Quantity,
     Reader,
@@ -62,50 +59,15 @@ from bisar_budget.mission.readers import (
     Triple,
     Whole,
 )
+from bisar_budget.mission.vibrations import Vibration
 from bisar_budget.paths.instant import parse_instant
 
 LEAST_BASELINE = 1.0  # m, between platforms of which one hears the other
 FARTHEST_BY = 3  # times the least baseline, that they move by in half an aperture: so far a fit of 16 nodes is true
 
 _UPRIGHT = 1e-3  # of the speed: of less than that over the ground a velocity has no direction there
-
-SIZES = Triple(SIZE)
 # A 32nd of the way from one place to the next, the distance between is not smaller by as much as matters.
 _PLACES = np.linspace(-1, 1, 65)[:, None]
-
-ALONG_SIGHT_OR_AXES = OneOf(lambda value: SIZES if isinstance(value, list) else SIZE, (SIZE, SIZES))
-
-
-class Sinusoid(NamedTuple):
-    """One sinusoidal vibration."""
-
-    amplitude: Annotated[
-        float | Vector,
-        Key(ALONG_SIGHT_OR_AXES, "0 to peak, along the line of sight; a vector: along each axis of the frame."),
-    ]
-    frequency: Annotated[float, Key(VIBRATION_FREQUENCY)]
-
-
-class Wideband(NamedTuple):
-    """Noise-like vibration."""
-
-    rms: Annotated[
-        float | Vector,
-        Key(ALONG_SIGHT_OR_AXES, "Root mean square, along the line of sight; a vector: along each axis."),
-    ]
-
-
-class Vibration(NamedTuple):
-    """High-frequency motion that the navigation does not measure."""
-
-    sinusoidal: Annotated[tuple[Sinusoid, ...], Key(ListOf(Sinusoid), "One entry per line.")] = ()
-    wideband: Annotated[Wideband | None, Key(Section(Wideband))] = None
-
-    @property
-    def is_stated(self) -> bool:
-        """Whether the file says anything of it; a zero does."""
-        return bool(self.sinusoidal) or self.wideband is not None
-
 
 FRAMES = Choice("scene", "track", "look", "ric")
 TIME_TAG = Quantity(units.TIME, ge=-1e3, le=1e3)

@@ -448,10 +448,10 @@ class Section(Reader):
 
 
 class ListOf(Reader):
-    """A list of sections."""
+    """A list of sections, of one kind or of several forms."""
 
-    def __init__(self, kind: type[Any]) -> None:
-        self.section = Section(kind)
+    def __init__(self, kind: "type[Any] | Reader") -> None:
+        self.section: Reader = kind if isinstance(kind, Reader) else Section(kind)
 
     def read(self, value: Any, path: KeyPath, report: Report) -> Any:
         """Read each entry at its own place."""
@@ -541,13 +541,9 @@ DISTRIBUTIONS = "normal: the values are one sigma; uniform, bound: they are not 
 NOT_COMPUTED = "is not computed by this version yet"
 _LEAVE = "accepted: leave it out"
 _OSCILLATOR = f"{_LEAVE}, and state the noise with it, as phase_noise or spurs"
-_SPECTRUM = f"{_LEAVE}, and state sinusoidal lines and the rms of wideband"
 
 # By the name of the section, as its class has it, and the key: what is accepted instead.
 LATER: Mapping[str, Mapping[str, str]] = {
-    "Vibration": {"spectrum": _SPECTRUM, "spectrum_level": _SPECTRUM},
-    "Oscillator": dict.fromkeys(("acceleration_sensitivity", "vibration", "level"), _OSCILLATOR),
-    "OscillatorPart": dict.fromkeys(("acceleration_sensitivity", "vibration", "level"), _OSCILLATOR),
     "OrbitSource": dict.fromkeys(("eof", "sp3"), "accepted: the same orbit as tle, omm or oem"),
     "TrajectorySource": dict.fromkeys(
         ("time_scale", "geoid_separation"), f"{_LEAVE}; a log in CSV has UTC, and heights above the ellipsoid"

@@ -33,7 +33,7 @@ from bisar_budget.simulate.phase_history import (
     cell_centres,
     phase_history,
 )
-from bisar_budget.simulate.realisations import drawn_errors
+from bisar_budget.simulate.realisations import drawn_errors, oscillator_sinusoids
 from bisar_budget.simulate.targets import Target, Targets
 from bisar_budget.workers import Progress, unseen
 
@@ -366,7 +366,7 @@ def declared_errors(mission: Mission) -> Errors:
             error = error.plus(of_both._replace(time_tag=factor * (common.time_tag or 0.0)))
         wideband = declared.vibration.wideband
         error = error._replace(
-            sinusoids=tuple(PathSinusoid(*line) for line in lines_of(mission, name)),
+            sinusoids=_sinusoids(mission, name),
             wideband_rms=counted(mission, name, wideband.rms, "islr") if wideband else 0.0,
             course=getattr(errors, name).course,
         )
@@ -437,7 +437,7 @@ def _plan(
     time = cell_centres(T, left.size)
     walk = float(np.abs(left - slope * time).max()) * radar.bandwidth / SPEED_OF_LIGHT
     apart = np.abs(former.offsets(shown, centre)).max(axis=0)
-    echoes = sorted(line.frequency * T for name in PLATFORMS for line in lines_of(mission, name) if line.amplitude)
+    echoes = sorted({line.frequency * T for line in _flown_lines(mission)})
     given = mission.collection.pulses
     room = _ECHO_CELLS if given is None else min(_ECHO_CELLS, given / 4 - reach - apart[1] - _MARGIN_CELLS - 1)
     seen = [cycles for cycles in echoes if cycles <= room]
@@ -472,11 +472,21 @@ def _plan(
     return Plan(rotated, in_scene, pulses, frequencies, own, outside, held)
 
 
+def _flown_lines(mission: Mission) -> list[PathSinusoid]:
+    """Declared vibrations, and what they do to oscillators."""
+    return [line for name in PLATFORMS for line in _sinusoids(mission, name) if line.amplitude]
+
+
+def _sinusoids(mission: Mission, name: str) -> tuple[PathSinusoid, ...]:
+    """Those of one platform."""
+    lines = (PathSinusoid(line.amplitude, line.frequency) for line in lines_of(mission, name))
+    return (*lines, *oscillator_sinusoids(mission, name))
+
+
 def pulses_for(mission: Mission, cells: int) -> int:
     """Pulses that sample the patch and every declared vibration twice over."""
     given = mission.collection.pulses
-    lines = [line for name in PLATFORMS for line in lines_of(mission, name) if line.amplitude]
-    cycles = max((line.frequency for line in lines), default=0.0) * mission.collection.aperture_time
+    cycles = max((line.frequency for line in _flown_lines(mission)), default=0.0) * mission.collection.aperture_time
     if given is not None and given <= 2 * cycles:
         raise SimulationError(
             f"collection.pulses is {given}, but a declared vibration makes {cycles:.4g} cycles in the aperture and "

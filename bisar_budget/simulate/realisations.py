@@ -15,17 +15,25 @@ from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.lever_arms import arm_at, body_axes
 from bisar_budget.effects.navigation_errors import TILTS, acceleration_errors, process_of, specific_force
+from bisar_budget.effects.oscillator_acceleration import (
+    accelerated_tones,
+    flies_a_turn,
+    pieces_by_acceleration,
+    turn_courses,
+)
 from bisar_budget.effects.oscillators import noise_of
 from bisar_budget.effects.propagation import CONTENT, DELAY, group_delay
 from bisar_budget.effects.random_effect import RandomError
 from bisar_budget.effects.random_errors import random_errors
 from bisar_budget.effects.spectra import PowerLawPiece
+from bisar_budget.effects.vibration import SLOWEST, counted
+from bisar_budget.effects.vibration_spectra import pieces_of_vibration
 from bisar_budget.geometry import PlatformState
 from bisar_budget.mission.instruments import GaussMarkov
 from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.mission.platforms import MotionError
 from bisar_budget.mission.propagation import DELAYS
-from bisar_budget.simulate.phase_history import Course, Errors, Floats, PathError
+from bisar_budget.simulate.phase_history import Course, Errors, Floats, PathError, PathSinusoid
 
 _STEPS = 512  # from mid-aperture to the end of it, in which a walk is summed up
 _SLOW_TONES = 80  # over logarithms, below a tone per two apertures
@@ -163,9 +171,10 @@ def drawn_errors(analysis: Analysis) -> Errors:
     seed, factor = (mission.simulation or Simulation()).seed, mission.allocation.coverage_factor
     half = mission.collection.aperture_time / 2
     times: Floats = np.linspace(-half, half, _FLOWN)
-    fastest = max((piece.high for one in analysis.random if one.noise for piece in one.noise.pieces), default=0.0)
+    fastest = max((_fastest(mission, error) for error in analysis.random), default=0.0)
     count = min(max(_FLOWN, math.ceil(4 * _PER_CYCLE * half * fastest)), _MOST_FLOWN)
     moments: Floats = np.linspace(-half, half, count)
+    flown = moments if any(error.subject.kind == "vibration" for error in analysis.random) else times
     moved: dict[str, Floats] = {}
     phase: Floats = np.zeros(moments.size)
     air = dict.fromkeys(DELAYS, np.zeros(times.size))
@@ -175,15 +184,21 @@ def drawn_errors(analysis: Analysis) -> Errors:
         rng = np.random.default_rng([seed, *error.id.encode()])
         if error.subject.kind in MOVING:
             for name, drawn in position_courses(mission, error, times, 1, rng).items():
-                moved[name] = moved.get(name, 0.0) + factor * drawn[0]
+                moved[name] = moved.get(name, 0.0) + Course(times, factor * drawn[0]).at(flown)
         elif error.subject.kind == "propagation":
             (group,) = factor * delay_courses(mission, error, times, 1, rng)
             air[error.subject.axis] = air[error.subject.axis] + group
-        elif error.published.spread:
+        elif error.subject.kind == "vibration":
+            along = phase_courses(mission, error, moments, 1, rng)[0] * mission.radar.wavelength / (2 * math.pi)
+            part = float(counted(mission, error.owner, 1.0, "islr"))
+            places = np.array(getattr(mission.platforms, error.owner).state.place(moments))
+            sight = places / np.linalg.norm(places, axis=0)
+            shaken = (factor * along / part * sight).T if part else np.zeros((moments.size, 3))
+            moved[error.owner] = moved.get(error.owner, 0.0) + shaken
+        elif error.published.spread or error.published.quadratic or error.full.displacement > 0:
             drawn = factor * phase_courses(mission, error, moments, 1, rng)[0]
-            phase = phase + (
-                drawn if error.full.displacement > 0 else drawn - Course(moments, drawn).smooth(1).values
-            )
+            is_set = error.full.displacement > 0
+            phase = phase + (drawn if is_set else drawn - Course(moments, drawn).smooth(1).values)
     transmitter, receiver = (
         PathError(course=Course(times, moved[name]) if name in moved else None) for name in PLATFORMS
     )
@@ -292,26 +307,38 @@ def phase_courses(
             joined.append(np.interp(times, knots, rng.standard_normal(knots.size)))
         # More exchanges than are drawn: of the same spectrum where it is flat.
         return size * math.sqrt(sync.interval / drawn_at) * np.stack(joined)
-    oscillator = getattr(mission.platforms, error.owner).oscillator
-    pieces = noise_of(oscillator, mission.radar.center_frequency, T).pieces
+    bend: _Bend | None = None
+    if error.subject.kind == "vibration":
+        pieces, sync = pieces_of_vibration(mission, error.owner), None
+    elif error.subject.axis == "acceleration":
+        pieces, bend = pieces_by_acceleration(mission, error.owner), _Bend(mission, error.owner)
+        size /= mission.allocation.coverage_factor
+    else:
+        oscillator = getattr(mission.platforms, error.owner).oscillator
+        pieces = noise_of(oscillator, mission.radar.center_frequency, T).pieces
     interval = None if sync is None else sync.interval
     if interval is None:
         pieces = _below(pieces, highest)
-    if mission.has_direct_path:
+    if sync is not None and sync.is_direct_path:
         return _heard_twice(mission, error, size, _Tones(pieces, T), times, draws, rng)
-    setting = None if sync is None or sync.age is None else _Setting(pieces, T, sync.age, sync.averaging or T)
+    is_set = sync is not None and sync.is_holdover and not error.subject.axis
+    setting = _Setting(pieces, T, sync.age or T, sync.averaging or T) if sync is not None and is_set else None
     tones = _Tones(pieces, T) if setting is None else setting.tones
     waves = _slow_waves(tones.slow, times) if times.size <= _FLOWN else None
     found = np.empty((draws, times.size))
     for index in range(draws):
         drawn = tones.draw(rng)
+        bent = bend.draw(rng) if bend is not None else None
         found[index] = drawn.at(times, waves)
+        if bent is not None:
+            found[index] += bent(times)
         if setting is not None:
             found[index] -= setting.line(drawn, times, rng)
         if interval is not None:
             # Pulses that follow each other faster take the phase away to nothing that an image shows.
             knots = _knots(times, max(interval, T / _MOST_KNOTS), rng)
-            found[index] -= np.interp(times, knots, drawn.at(knots))
+            sampled = drawn.at(knots) + (0.0 if bent is None else bent(knots))
+            found[index] -= np.interp(times, knots, sampled)
     return size * found
 
 
@@ -338,6 +365,75 @@ def _heard_twice(
         drawn = tones.draw(rng)
         found[index] = drawn.at(later) - drawn.at(times)
     return size * found
+
+
+def _fastest(mission: Mission, error: RandomError) -> float:
+    """Highest frequency of an error by a spectrum; 0 of other errors. [Hz]"""
+    own = max((piece.high for piece in error.noise.pieces), default=0.0) if error.noise else 0.0
+    return max(own, fastest_shake(mission, error))
+
+
+def fastest_shake(mission: Mission, error: RandomError) -> float:
+    """Highest frequency of a vibration by its spectrum, or of an oscillator's by it; 0 of other errors. [Hz]"""
+    pieces: tuple[PowerLawPiece, ...] = ()
+    if error.subject.kind == "vibration":
+        pieces = pieces_of_vibration(mission, error.owner)
+    elif error.subject.kind == "oscillator" and error.subject.axis == "acceleration":
+        pieces = pieces_by_acceleration(mission, error.owner)
+    return max((piece.high for piece in pieces), default=0.0)
+
+
+def slowest_shake(mission: Mission, error: RandomError) -> float:
+    """Lowest frequency likewise. [Hz]"""
+    pieces = pieces_of_vibration if error.subject.kind == "vibration" else pieces_by_acceleration
+    return min((piece.low for piece in pieces(mission, error.owner)), default=0.0)
+
+
+def oscillator_sinusoids(mission: Mission, name: str) -> tuple[PathSinusoid, ...]:
+    """Motions of a platform that make the phases of its oscillator's tones, from one cycle per aperture on.
+
+    A quarter of a turn from the motion that makes them. Slower ones are drawn, see `phase_courses`.
+    """
+    metres, T = mission.radar.wavelength / (2 * math.pi), mission.collection.aperture_time
+    return tuple(
+        PathSinusoid(metres * one.phase, one.frequency, 0.0 if one.in_quadrature is None else math.pi / 2)
+        for one in accelerated_tones(mission)
+        if one.name == name and one.frequency * T >= SLOWEST
+    )
+
+
+class _Bend:
+    """Phase of an oscillator by slow tones and by the turn of its platform, of a unit of sensitivity.
+
+    Each direction of the sensitivity is as likely, and each phase of a tone; one sigma is the most that they do.
+    """
+
+    def __init__(self, mission: Mission, name: str) -> None:
+        self.scale, T = 2 * math.pi * mission.radar.center_frequency, mission.collection.aperture_time
+        self.state = getattr(mission.platforms, name).state
+        self.turns = not mission.has_direct_path and flies_a_turn(mission, name)
+        sync = mission.synchronization
+        is_linked = sync is not None and sync.interval is not None
+        # What exchanges leave of a tone is in its phase already.
+        self.slow = [
+            (one.frequency, one.per_unit / one.left if is_linked and one.left else one.per_unit)
+            for one in accelerated_tones(mission)
+            if one.name == name and one.frequency * T < SLOWEST
+        ]
+
+    def draw(self, rng: np.random.Generator) -> Callable[[Floats], Floats]:
+        """One of them: the phase at any times. [rad]"""
+        direction, starts = rng.standard_normal(3), rng.uniform(0, 2 * math.pi, len(self.slow))
+
+        def at(times: Floats) -> Floats:
+            found = np.zeros(times.size)
+            if self.turns:
+                found += self.scale * direction @ turn_courses(self.state, times)
+            for (frequency, phase), start in zip(self.slow, starts, strict=True):
+                found += math.sqrt(2) * phase * np.cos(2 * math.pi * frequency * times + start)
+            return found
+
+        return at
 
 
 def _knots(times: Floats, interval: float, rng: np.random.Generator) -> Floats:
@@ -379,8 +475,7 @@ class _Tones:
     """A spectrum as tones: those that turn within the aperture at even distances, the others by logarithms."""
 
     def __init__(self, pieces: tuple[PowerLawPiece, ...], aperture_time: float, slow: Floats | None = None) -> None:
-        """Take tones of a spectrum over an aperture; `slow` are the edges of those below half the finest step."""
-        high, fine = max(piece.high for piece in pieces), 1 / (_PERIODS * aperture_time)
+        high, fine = max((piece.high for piece in pieces), default=0.0), 1 / (_PERIODS * aperture_time)
         if slow is None:
             slow = np.geomspace(_SLOWEST / aperture_time, fine / 2, _SLOW_TONES + 1)
         self.slow: Floats = (slow[1:] + slow[:-1]) / 2

@@ -34,7 +34,7 @@ from sympy import (
 )
 
 from bisar_budget.theory.published import Equation, Table, TableRow, one_way_phase
-from bisar_budget.theory.symbols import T, positive, real
+from bisar_budget.theory.symbols import T, center_frequency, positive, real
 
 ORDERS = 4  # 0 to 3; what is left of a history after them spreads
 LEADING = (1, 1, Rational(3, 2), Rational(5, 2))  # coefficient of xⁿ in Pₙ: the order's value at the aperture edge
@@ -304,6 +304,29 @@ def interpolated_noise() -> Expr:
     return integrate((1 - part) ** 2 + part**2, (part, 0, 1))
 
 
+# ---------------------------------------------------------------------- vibration
+sensitivity = positive("Gamma")  # of an oscillator, y = Γ·a [s²/m]
+_acceleration, _frequency, _time = positive("a"), positive("f"), real("t")
+
+
+def vibrating_oscillator() -> Expr:
+    """Peak phase at the centre frequency of an oscillator that is accelerated by a·cos(2πft): ∫2πf₀·y dt. [rad]"""
+    y = sensitivity * _acceleration * cos(2 * pi * _frequency * _time)
+    phase = integrate(2 * pi * center_frequency * y, _time)
+    return simplify(phase / sin(2 * pi * _frequency * _time))
+
+
+def vibrating_path() -> Expr:
+    """Amplitude of the displacement of what is accelerated by a·cos(2πft), less uniform motion. [m]"""
+    wave = cos(2 * pi * _frequency * _time)
+    return simplify(-integrate(integrate(_acceleration * wave, _time), _time) / wave)
+
+
+def of_spectrum(amplitude: Expr) -> Expr:
+    """Spectrum of what a tone of acceleration does with an amplitude, of one with the spectrum S_a."""
+    return amplitude.subs(_acceleration, 1) ** 2 * positive("S_a")
+
+
 # ---------------------------------------------------------------------- for a reader
 @cache
 def table() -> Table:
@@ -334,7 +357,7 @@ def table() -> Table:
 
 
 def equations() -> tuple[Equation, ...]:
-    """Parts of a tone, integrals of power laws, and what synchronisation leaves."""
+    """Parts of a tone, integrals of power laws, what synchronisation leaves, and what vibration does."""
     quadratic, cubic, left = tone()
     names = (("quadratic", "phi_2", quadratic), ("cubic", "phi_3", cubic))
     laws = (
@@ -350,4 +373,9 @@ def equations() -> tuple[Equation, ...]:
         Equation("", "Share of a tone's power that they leave, at all frequencies", real("L_s"), interpolated()),
         Equation("", "Mean square of noise of the link with straight lines between, of σ² each time",
                  positive("sigma_L") ** 2, interpolated_noise() * positive("sigma") ** 2),
+        Equation("", "Amplitude of a motion whose acceleration is a·cos(2πft)", positive("A"), vibrating_path()),
+        Equation("", "Spectrum of displacement", positive("S_x"), of_spectrum(vibrating_path())),
+        Equation("", "Peak phase of an oscillator so accelerated, a quarter of a turn away", positive("phi"),
+                 vibrating_oscillator()),
+        Equation("", "Spectrum of an oscillator's phase", positive("S"), of_spectrum(vibrating_oscillator())),
     )  # fmt: skip

@@ -31,6 +31,7 @@ _GREEK = {
     "kappa": "κ",
     "psi": "ψ",
     "epsilon": "ε",
+    "Gamma": "Γ",
 }
 _ACCENTS = {
     "prime": "′",

@@ -18,8 +18,9 @@ from bisar_budget.budget.random_rows import RandomRows
 from bisar_budget.budget.verdicts import rows_worth_showing
 from bisar_budget.effects.declared import QUADRATIC
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
+from bisar_budget.effects.oscillator_acceleration import accelerated_tones
 from bisar_budget.effects.oscillators import spurs_of
-from bisar_budget.effects.vibration import SLOWEST, lines_of
+from bisar_budget.effects.vibration import SLOWEST, lines_of, unit_of_line
 from bisar_budget.faults import printable
 from bisar_budget.findings.images import FLOOR_DB, ImageEvidence, PointImage, Verdict, VerifiedMission
 from bisar_budget.findings.mission import MissionFindings
@@ -32,6 +33,7 @@ from bisar_budget.verify.spread_cases import (
     UNDECLARED_CYCLES,
     Case,
     limits_of,
+    verify_accelerated_tone,
     verify_islr,
     verify_pslr,
     verify_random,
@@ -147,11 +149,11 @@ def _of_tones_by_islr(study: Study) -> Iterator[tuple[Subject, Case]]:
     metric, limits = tone_limits(study.mission, study.allocation)
     for name, limit in limits.items() if metric == "islr" else ():
         T, size = study.collection.aperture_time, limit.by(study.model)
-        cycles = [line.frequency * T for line in lines_of(study.mission, name)] or [UNDECLARED_CYCLES]
-        for index, turns in enumerate(cycles):
+        lines = [(line.frequency * T, line.per_metre) for line in lines_of(study.mission, name)]
+        for index, (turns, per_metre) in enumerate(lines or [(UNDECLARED_CYCLES, 1.0)]):
             if turns >= SLOWEST:
                 one = subject(name, "vibration", "sinusoidal", entry=index)
-                blank = study.blank(one.id, size, "m")
+                blank = study.blank(one.id, size * per_metre, unit_of_line(study.mission, name, index))
                 yield one, partial(verify_spread_tone, study, blank, name, size, turns)
 
 
@@ -180,6 +182,18 @@ def _of_instruments(study: Study) -> Iterator[tuple[str, Case]]:
             blank = study.blank(row_id, level, "dB")
             cycles = spur.frequency * study.collection.aperture_time
             yield row_id, partial(verify_spread_tone, study, blank, spur.name, size, cycles)
+    for one in accelerated_tones(study.mission):
+        limit, cycles = limits.get(one.name), one.frequency * study.collection.aperture_time
+        if limit is None or cycles < SLOWEST or not one.per_unit:
+            continue
+        size = limit.by(study.model)
+        sensitivity = 2 * math.pi / study.collection.wavelength * size / one.per_unit
+        needed = study.mission.requirements.pslr if metric == "pslr" else None
+        blank = study.blank(one.subject.id, sensitivity, "s^2/m", requirement_db=needed)
+        if metric == "pslr":
+            yield one.subject.id, partial(verify_accelerated_tone, study, one, blank, size)
+        else:
+            yield one.subject.id, partial(verify_spread_tone, study, blank, one.name, size, cycles)
     if study.mission.requirements.pslr is not None:
         yield "mission.pslr", partial(verify_pslr, study)
     if study.mission.requirements.islr is not None:
@@ -202,7 +216,7 @@ def _cases(study: Study) -> Iterator[tuple[str, Case]]:
         for index, line in enumerate(lines_of(mission, name)):
             if line.frequency * study.collection.aperture_time < SLOWEST:
                 one = subject(name, "vibration", "sinusoidal", entry=index)
-                slow[one] = partial(phase_cases.slow_vibration, study, one.id, name, line)
+                slow[one] = partial(phase_cases.slow_vibration, study, one, line)
     swaying = slow | dict(_of_tones_by_islr(study)) | dict(vibration_cases(study))
     for owner in (*PLATFORMS, "mission"):
         for one in sorted((one for one in swaying if one.owner == owner), key=_order):

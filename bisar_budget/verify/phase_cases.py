@@ -9,8 +9,8 @@ from bisar_budget.analysis.vibration_limits import slow_limits
 from bisar_budget.budget.doubts import COARSE_CELL_RAD, phase_across_a_cell
 from bisar_budget.budget.pull_in import ROOM
 from bisar_budget.effects.declared import CUBIC
-from bisar_budget.effects.effect import ErrorSource
-from bisar_budget.effects.vibration import Line
+from bisar_budget.effects.effect import ErrorSource, Subject
+from bisar_budget.effects.vibration import Line, unit_of_line
 from bisar_budget.findings.images import Verdict
 from bisar_budget.geometry import GroundVector
 from bisar_budget.phrases import Note
@@ -44,12 +44,13 @@ def quadratic(study: Study, source: ErrorSource) -> Verdict:
     return verdict._replace(boundary_autofocus=farther, **refocused(study, [(source, farther)], budget))
 
 
-def slow_vibration(study: Study, row_id: str, name: str, line: Line) -> Verdict:
+def slow_vibration(study: Study, of: Subject, line: Line) -> Verdict:
     """Limit of a vibration below one cycle per aperture, in its worst phase: its turning point at mid-aperture."""
-    allocation, budget = study.allocation, study.allocation.qpe_limit(name)
+    name, allocation, budget = of.owner, study.allocation, study.allocation.qpe_limit(of.owner)
     limits = slow_limits(study.mission, allocation, name, line.frequency * study.collection.aperture_time)
     size = limits.quadratic / allocation.autofocus_gain
-    blank = study.blank(row_id, size, "m", budget_rad=budget)
+    unit = unit_of_line(study.mission, name, of.entry or 0)
+    blank = study.blank(of.id, size * line.per_metre, unit, budget_rad=budget)
     try:
         both = [
             Errors().of(name, PathError(sinusoids=(PathSinusoid(size, line.frequency, phase),)))

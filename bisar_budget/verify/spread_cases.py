@@ -21,10 +21,11 @@ from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.declared import CUBIC, LOCATION
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.navigation_errors import process_of
+from bisar_budget.effects.oscillator_acceleration import AcceleratedTone
 from bisar_budget.effects.oscillators import Spur
 from bisar_budget.effects.propagation import CONTENT, seen_course
 from bisar_budget.effects.random_effect import RandomError
-from bisar_budget.effects.vibration import SLOWEST, Line, lines_of, near_lines, sight_of, worst_phases
+from bisar_budget.effects.vibration import SLOWEST, Line, lines_of, near_lines, sight_of, unit_of_line, worst_phases
 from bisar_budget.findings.images import Verdict
 from bisar_budget.mission.model import Simulation
 from bisar_budget.phrases import Note
@@ -46,8 +47,10 @@ from bisar_budget.simulate.realisations import (
     clock_seconds,
     delay_courses,
     electrons_at_1_hz,
+    fastest_shake,
     phase_courses,
     position_courses,
+    slowest_shake,
 )
 from bisar_budget.verify import reasons
 from bisar_budget.verify.aperture_reading import measured_shift
@@ -64,6 +67,8 @@ _COMMON_RUNS = 32
 _DRAWS, _CLOCK_DRAWS = 4000, 1000  # know a sigma to 1.1 %, and to 2.2 %
 _SYNCHRONIZED_DRAWS = 400  # whose fast tones are drawn too, because they are folded
 _TURNS = 100  # of a tone per aperture, beyond which it has no quadratic phase to speak of
+_OCTAVES = 16  # times the lowest frequency of a vibration, beyond which it adds less than 3 % to a phase
+_PER_TURN, _MOST_MOMENTS = 8, 1 << 17  # moments of a fast tone, and in all
 _SURE_SIGMA = 3.0  # standard errors of a sigma
 _IMAGES = 6
 _FINE = 513  # moments of a time series in an image
@@ -100,18 +105,19 @@ def vibration_cases(study: Study) -> Iterator[tuple[Subject, Case]]:
     )
     lines = {name: lines_of(mission, name) for name in PLATFORMS}
 
-    def blank(of: Subject, limits: Mapping[str, float], requirement_db: float) -> Verdict:
+    def blank(of: Subject, limits: Mapping[str, float], requirement_db: float, per_metre: float = 1.0) -> Verdict:
         # Both together: the larger of two limits stands for the row.
-        return study.blank(of.id, max(limits.values()), "m", requirement_db=requirement_db)
+        unit = unit_of_line(mission, of.owner, of.entry or 0) if of.axis == "sinusoidal" and len(limits) == 1 else "m"
+        return study.blank(of.id, max(limits.values()) * per_metre, unit, requirement_db=requirement_db)
 
     for name in PLATFORMS:
         if pslr is not None:
             alone = {name: amplitude[name]}
-            for index, frequency in enumerate([line.frequency for line in lines[name]] or [None]):
+            for index, (_, frequency, per_metre) in enumerate(lines[name] or [Line(0.0, None)]):
                 if frequency is not None and frequency * T < SLOWEST:
                     continue  # a phase, which `phase_cases` looks at
                 one = subject(name, "vibration", "sinusoidal", entry=index)
-                yield one, partial(_sinusoidal, study, blank(one, alone, pslr), alone, frequency)
+                yield one, partial(_sinusoidal, study, blank(one, alone, pslr, per_metre), alone, frequency)
             for index, members in enumerate(near_lines([line.frequency * T for line in lines[name]])):
                 one = subject(name, "vibration", "sinusoidal.sum", entry=index)
                 near = [lines[name][member] for member in members]
@@ -258,6 +264,11 @@ def verify_spur(study: Study, spur: Spur, row_id: str, amplitude: float) -> Verd
     return echo(study, blank, sinusoids, "the tone alone")
 
 
+def verify_accelerated_tone(study: Study, tone: AcceleratedTone, blank: Verdict, amplitude: float) -> Verdict:
+    """A tone of an oscillator that vibrates, at its limit: the motion [m] that makes the same phase."""
+    return echo(study, blank, {tone.name: (PathSinusoid(amplitude, tone.frequency),)}, "the tone alone")
+
+
 def verify_spread_tone(study: Study, blank: Verdict, owner: str, amplitude: float, cycles: float) -> Verdict:
     """A tone where ISLR holds it, at its limit: a motion [m] of so many cycles per aperture."""
     phase = 2 * math.pi * amplitude / study.collection.wavelength
@@ -277,6 +288,7 @@ def verify_pslr(study: Study) -> Verdict:
     sinusoids: dict[str, tuple[PathSinusoid, ...]] = {}
     for one in [one for one, is_in in zip(found, highest.is_of, strict=True) if is_in]:
         turned = 0.0 if np.sinc(highest.cycles - one.cycles) >= 0 else math.pi
+        turned += 0.0 if one.in_quadrature is None else math.pi / 2
         tone = PathSinusoid(scale * one.phase, one.cycles / study.collection.aperture_time, turned)
         sinusoids[one.subject.owner] = (*sinusoids.get(one.subject.owner, ()), tone)
     return echo(study, blank, sinusoids, "the tones together in their worst phases")
@@ -409,12 +421,21 @@ def _courses(study: Study, error: RandomError, rng: np.random.Generator) -> dict
 
 def _fits(study: Study, error: RandomError, rng: np.random.Generator) -> tuple[Floats, int]:
     """Legendre coefficients of time series of a clock's phase, (4, draws) [rad], and the number of draws."""
-    times = _moments(study, 257)
-    sync = study.mission.synchronization
-    draws = _CLOCK_DRAWS if sync is None or sync.interval is None else _SYNCHRONIZED_DRAWS
-    phases = phase_courses(study.mission, error, times, draws, rng, _TURNS / study.collection.aperture_time)
-    found = np.polynomial.legendre.legfit(2 * times / study.collection.aperture_time, phases.T, _ORDER)
-    return np.asarray(found, float), draws
+    mission, T = study.mission, study.collection.aperture_time
+    draws, highest, count = _CLOCK_DRAWS, _TURNS / T, 257
+    if mission.synchronization is not None and mission.synchronization.interval is not None:
+        draws = _SYNCHRONIZED_DRAWS
+    if fastest_shake(mission, error):  # which may begin far beyond what else has a quadratic phase
+        draws, highest = _SYNCHRONIZED_DRAWS, max(highest, _OCTAVES * slowest_shake(mission, error))
+        highest = min(highest, fastest_shake(mission, error))
+        count = min(_MOST_MOMENTS, max(count, math.ceil(_PER_TURN * highest * T)))
+    times, found = _moments(study, count), list[Floats]()
+    together = max(1, _AT_ONCE * _FINE // count)
+    for first in range(0, draws, together):
+        some = min(together, draws - first)
+        phases = phase_courses(mission, error, times, some, rng, highest)
+        found.append(np.asarray(np.polynomial.legendre.legfit(2 * times / T, phases.T, _ORDER), float))
+    return np.concatenate(found, axis=1), draws
 
 
 def _smooth_noise(study: Study, error: RandomError, rng: np.random.Generator) -> dict[str, Floats]:

@@ -194,13 +194,14 @@ def _all_sections(root: readers.Section = MISSION) -> dict[str, readers.Section]
     def walk(path: str, section: readers.Section) -> None:
         if any(section.kind is each.kind for each in found.values()):
             return
+        path += ", second form" * (path in found)
         found[path] = section
         for name, key in section.keys.items():
             for reader in _forms(key.reader):
-                inner = reader.section if isinstance(reader, readers.ListOf) else reader
-                if isinstance(inner, readers.Section):
-                    mark = "[]" if isinstance(reader, readers.ListOf) else ""
-                    walk(f"{path}.{name}{mark}".lstrip("."), inner)
+                mark = "[]" if isinstance(reader, readers.ListOf) else ""
+                for inner in _entries(reader):
+                    if isinstance(inner, readers.Section):
+                        walk(f"{path}.{name}{mark}".lstrip("."), inner)
 
     walk("", root)
     return found
@@ -212,6 +213,11 @@ def _forms(reader: readers.Reader) -> list[readers.Reader]:
     return [reader]
 
 
+def _entries(reader: readers.Reader) -> list[readers.Reader]:
+    """Forms of each entry of a list; of anything else itself."""
+    return _forms(reader.section) if isinstance(reader, readers.ListOf) else [reader]
+
+
 def _sections(sections: Mapping[str, readers.Section]) -> str:
     parts = []
     places = {section.kind: path for path, section in sections.items()}
@@ -221,7 +227,7 @@ def _sections(sections: Mapping[str, readers.Section]) -> str:
             inner = _inner(key.reader)
             takes = " or ".join(dict.fromkeys(_form(form) for form in _forms(key.reader)))
             for kind in inner:
-                takes = takes.replace("section", f"[section](#{_anchor(places[kind])})", 1)
+                takes = re.sub(r"(?<!\[)section", f"[section](#{_anchor(places[kind])})", takes, count=1)
             means = key.description or " ".join(_first_line(kind) for kind in inner)
             rows.append((f"`{name}`", takes, _default(section, name), means))
         title, about = (f"`{path}`", _first_line(section.kind)) if path else ("The file", "")
@@ -232,7 +238,7 @@ def _sections(sections: Mapping[str, readers.Section]) -> str:
 
 def _inner(reader: readers.Reader) -> list[type[Any]]:
     """The sections that a key takes."""
-    forms = [form.section if isinstance(form, readers.ListOf) else form for form in _forms(reader)]
+    forms = [entry for form in _forms(reader) for entry in _entries(form)]
     return [form.kind for form in forms if isinstance(form, readers.Section)]
 
 
@@ -269,7 +275,7 @@ def _form(reader: readers.Reader) -> str:
     if isinstance(reader, readers.Whole):
         return f"whole number, {_quantity(reader.low, '')} to {_quantity(reader.high, '')}"
     if isinstance(reader, readers.ListOf):
-        return "list, each a section"
+        return f"list, each {' or '.join('a section' for _ in _entries(reader))}"
     words = {
         readers.Section: "section",
         readers.Version: "`1`",

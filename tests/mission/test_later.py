@@ -34,12 +34,6 @@ def faults(**changes: object) -> tuple[Fault, ...]:
 @pytest.mark.parametrize(
     ("changes", "key"),
     [
-        ({f"{ERROR}vibration__spectrum": {"20 Hz": "1 g^2/Hz"}}, f"{OF_RECEIVER}motion_error.vibration.spectrum"),
-        ({f"{ERROR}vibration__spectrum_level": "3 dB"}, "platforms.receiver.motion_error.vibration.spectrum_level"),
-        *(
-            ({f"{RECEIVER}oscillator": NOISE | {key: "1"}}, f"platforms.receiver.oscillator.{key}")
-            for key in ("acceleration_sensitivity", "vibration", "level")
-        ),
         ({"platforms__receiver": {"orbit": {"eof": "a.EOF"}}}, "platforms.receiver.orbit.eof"),
         ({"platforms__receiver": {"orbit": {"sp3": "a.sp3", "object": "G05"}}}, "platforms.receiver.orbit.sp3"),
         *(

@@ -112,7 +112,7 @@ def _numbers(found: MissionFindings) -> Iterator[tuple[str, str, float | None]]:
 
 # ---------------------------------------------------------------------- what is looser
 _SUMS = (*NAMES, "autofocus_pull_in")  # kinds of rows that are no error
-_COMPUTED = ("oscillator", "spatial_variance")  # the file states no such number: a zero is a result
+_COMPUTED = ("oscillator", "spatial_variance")  # the file states no such number: a zero is a result, as a level is
 # Each asks for more than the one before it.
 _RULES = {"combine": ("each", "rss", "sum"), "model": ("published", "full", "strictest")}
 
@@ -253,7 +253,7 @@ def _declared(found: MissionFindings) -> dict[str, bool]:
     for row in found.rows:
         if row.declared is not None:
             name = _error(row)
-            is_more = row.declared != 0 or row.subject.kind in _COMPUTED
+            is_more = row.declared != 0 or row.unit == "dB" or row.subject.kind in _COMPUTED
             declared[name] = declared.get(name, False) or is_more
     return declared
 

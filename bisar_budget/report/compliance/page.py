@@ -687,7 +687,8 @@ def _validity(mission: Mission, found: MissionFindings) -> Iterator[tuple[str, s
         )
     for row in found.rows:
         if row.subject.kind == "oscillator" and row.remarks:
-            yield f"Oscillator of the {row.owner}", "; ".join(row.remarks)
+            shaken = " under acceleration" if row.subject.axis == "acceleration" else ""
+            yield f"Oscillator of the {row.owner}{shaken}", "; ".join(row.remarks)
 
 
 def _inputs(mission: Mission, found: MissionFindings, file: str) -> Iterator[Input]:

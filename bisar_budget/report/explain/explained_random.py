@@ -7,8 +7,15 @@ import numpy as np
 
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.analysis.spread import declared_powers, mainlobe_energy, spread_phase, tones
-from bisar_budget.analysis.vibration_limits import LARGEST_ECHO, Echo, bessel, highest_echo, tone_limits
+from bisar_budget.analysis.spread import Tone, declared_powers, mainlobe_energy, spread_phase, tones
+from bisar_budget.analysis.vibration_limits import (
+    LARGEST_ECHO,
+    Echo,
+    bessel,
+    highest_echo,
+    quadratures,
+    tone_limits,
+)
 from bisar_budget.budget.random_rows import held_effect, no_effect
 from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.effect import subject
@@ -67,6 +74,10 @@ def explained_random(analysis: Analysis, allocation: Allocation, error: RandomEr
         yield from _lever_arm(analysis, error)
     elif kind == "random":
         yield from _position(analysis, error)
+    elif kind == "vibration" or error.subject.axis == "acceleration":
+        from bisar_budget.report.explain.explained_shaking import explained_shaking
+
+        yield from explained_shaking(mission, error)
     elif kind == "oscillator":
         yield from _oscillator(mission, error)
     elif kind == "propagation":
@@ -296,7 +307,7 @@ def _oscillator(mission: Mission, error: RandomError) -> Iterator[Step]:
     if not error.published.quadratic:
         yield Step(no_effect(mission, error))
         return
-    yield from _integrals(pieces, mission)
+    yield from integrals(pieces, mission, sync)
     if sync is not None and sync.is_holdover:
         yield from _setting(pieces, mission, sync)
     k = mission.allocation.coverage_factor
@@ -325,11 +336,12 @@ def _setting(pieces: Sequence[PowerLawPiece], mission: Mission, sync: Synchroniz
     )
 
 
-def _integrals(pieces: Sequence[PowerLawPiece], mission: Mission) -> Iterator[Step]:
+def integrals(
+    pieces: Sequence[PowerLawPiece], mission: Mission, sync: Synchronization | None, unit: str = "rad"
+) -> Iterator[Step]:
     """The parts that each piece of a spectrum adds to the mean squares."""
-    T, sync = mission.collection.aperture_time, mission.synchronization
-    interval = None if sync is None else sync.interval
-    if mission.has_direct_path:
+    T, interval = mission.collection.aperture_time, None if sync is None else sync.interval
+    if sync is not None and sync.is_direct_path:
         delay = mission.geometry.echo_delay
         each, density = [heard_parts((piece,), T, delay) for piece in pieces], "S_left"
         yield from step(
@@ -344,7 +356,7 @@ def _integrals(pieces: Sequence[PowerLawPiece], mission: Mission) -> Iterator[St
             f"Exchanges each T_s = {interval:.6g} s, straight lines between: "
             "S_left = S·(1 − sinc²(f·T_s))² + sinc⁴(f·T_s)·Σ S(|f + m/T_s|), m ≠ 0"
         )
-    k = mission.allocation.coverage_factor
+    k = 1.0 if unit != "rad" else mission.allocation.coverage_factor  # else it is in what is declared
     for index, (symbol, transfer) in enumerate(
         (
             ("QPE/unit", "[7.5·j₂(πfT)]²"),
@@ -358,7 +370,7 @@ def _integrals(pieces: Sequence[PowerLawPiece], mission: Mission) -> Iterator[St
         text = " + ".join(number(term) for term in terms)
         text = f"sqrt({text})" if factor == 1 else f"{number(factor)}*sqrt({text})"
         yield from step(
-            f"∫ {density}·{transfer} df of each piece", Sum(f"{symbol} = {text} = {with_unit(total, 'rad')}")
+            f"∫ {density}·{transfer} df of each piece", Sum(f"{symbol} = {text} = {with_unit(total, unit)}")
         )
 
 
@@ -560,13 +572,19 @@ def explained_pslr(mission: Mission, row: Row) -> Iterator[Step]:
         listed = [f"{one.subject.id:<{width}}  {one.phase:.6g} rad, {one.cycles:.6g} cells" for one in found]
         yield from step("Tones: peak phase, and distance of their echoes from the response", *listed)
         together = [one for one, is_in in zip(found, echo.is_of, strict=True) if is_in]
+        pairs = {together[other].subject.id: together[one] for one, other in quadratures(together)}
+        apart = {one.subject.id for one in pairs.values()}
         terms = " + ".join(
-            f"{number(one.phase)}*{number(abs(np.sinc(echo.cycles - one.cycles)))}" for one in together
+            f"{_with_its_pair(one, pairs.get(one.subject.id))}*{number(abs(np.sinc(echo.cycles - one.cycles)))}"
+            for one in together
+            if one.subject.id not in apart
         )
         title = (
             f"Highest echo: at x = {number(echo.cycles)} cells, of {', '.join(one.subject.id for one in together)}"
         )
-        if len(together) > 1:
+        if pairs:
+            title += "; motion and oscillator are a quarter of a turn apart, so that squares of the two add"
+        if len(together) - len(pairs) > 1:
             title += ", each φ·|sinc(x − f·T)| in the worst phases, sinc(x) = sin(πx)/(πx)"
         yield from step(title, Sum(f"φ = {terms} = {with_unit(echo.phase, 'rad')}"))
         yield from _echo_level(echo)
@@ -578,6 +596,11 @@ def explained_pslr(mission: Mission, row: Row) -> Iterator[Step]:
     lines = equation("allowable", "required", {"required": row.allowable}, row.allowable, "dB")
     yield from step(f"requirements.pslr, all of it, {place(mission, ('requirements', 'pslr'))}", *lines)
     yield from _use_of_amplitudes(row)
+
+
+def _with_its_pair(one: Tone, other: Tone | None) -> str:
+    """Peak phase of a tone, or with that of one a quarter of a turn away."""
+    return number(one.phase) if other is None else f"sqrt({number(one.phase)}^2 + {number(other.phase)}^2)"
 
 
 def _echo_level(echo: Echo) -> Iterator[Step]:

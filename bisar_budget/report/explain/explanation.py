@@ -33,6 +33,7 @@ from bisar_budget.findings.status import STATUS
 from bisar_budget.geometry import dot, without_rounding
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import Platform
+from bisar_budget.mission.vibrations import AcceleratedSinusoid
 from bisar_budget.phrases import Note
 from bisar_budget.report.explain import notation
 from bisar_budget.report.explain.explained_error import (
@@ -122,6 +123,10 @@ def _to_utilization(mission: Mission, found: MissionFindings, row: Row) -> Itera
         from bisar_budget.report.explain.explained_random import explained_random
 
         yield from explained_random(analysis, found.allocation, random, row)
+    elif row.subject.kind == "oscillator" and row.subject.axis == "acceleration":
+        from bisar_budget.report.explain.explained_shaking import explained_tone
+
+        yield from explained_tone(mission, found.allocation, row)
     elif row.subject.axis == "spur":
         from bisar_budget.report.explain.explained_random import explained_spur
 
@@ -139,7 +144,7 @@ def _to_utilization(mission: Mission, found: MissionFindings, row: Row) -> Itera
 
         yield from explained_islr(analysis, found.allocation, row)
     elif row.subject.kind == "vibration":
-        yield from _vibration(mission, found.allocation, row)
+        yield from _vibration_in_its_unit(mission, found.allocation, row)
     elif row.subject.kind in (QUADRATIC, "autofocus_pull_in"):
         yield from _phase_aggregate(together, found, row)
     elif row.subject.kind == CUBIC:
@@ -220,6 +225,23 @@ def _budget(analysis: Analysis, source: ErrorSource, row: Row) -> Iterator[Step]
     yield from smallest_size(row, sizes)
 
 
+def _vibration_in_its_unit(mission: Mission, allocation: Allocation, row: Row) -> Iterator[Step]:
+    """The same of a line in metres; of one that the file states in g, with the way from there and back."""
+    lines = lines_of(mission, row.owner)
+    entry = row.subject.entry or 0
+    if row.unit == "m" or row.declared is None:
+        yield from _vibration(mission, allocation, row)
+        return
+    line = lines[entry]
+    sizes = ("declared", "allowable", "allowable_published", "allowable_full")
+    metres = {name: getattr(row, name) and getattr(row, name) / line.per_metre for name in sizes}
+    yield from _vibration(mission, allocation, row._replace(unit="m", **metres))
+    for name in ("declared", "allowable"):
+        if (size := getattr(row, name)) is not None:
+            values = {"A": metres[name], "f": line.frequency}
+            yield from step(f"As an acceleration, {name}", *equation(name, "A*(2*π*f)^2", values, size, row.unit))
+
+
 def _vibration(mission: Mission, allocation: Allocation, row: Row) -> Iterator[Step]:
     """From the file to the limits of both models, for one line, lines near each other, or noise."""
     platform, entry = row.owner, row.subject.entry or 0
@@ -232,6 +254,8 @@ def _vibration(mission: Mission, allocation: Allocation, row: Row) -> Iterator[S
     else:
         path = (*path, entry, "amplitude") if is_sinusoid else (*path, "rms")
         yield from step(f"Declared in {place(mission, path)}", as_written(mission, path))
+        if is_sinusoid:
+            yield from _displacement(mission, platform, entry)
         yield from _line_of_sight(mission, platform, is_sinusoid, entry, row.declared)
     if row.evidence:
         yield from step("Evidence", printable(row.evidence))
@@ -337,11 +361,24 @@ def _slow_vibration(mission: Mission, allocation: Allocation, row: Row, cycles: 
     yield from step("Allowable, the smallest", *equation("allowable", smallest, sizes, limits.smallest, "m"))
 
 
+def _displacement(mission: Mission, platform: str, entry: int) -> Iterator[Step]:
+    """Amplitudes in metres of a line that the file states in g."""
+    line = getattr(mission.platforms, platform).motion_error.vibration.sinusoidal[entry]
+    if not isinstance(line, AcceleratedSinusoid):
+        return
+    both = zip(
+        *((one if isinstance(one, tuple) else (one,)) for one in (line.amplitude, line.displacement)), strict=True
+    )
+    for amplitude, displacement in both:
+        values = {"a": amplitude, "f": line.frequency}
+        yield from step("As a displacement", *equation("A", "a/(2*π*f)^2", values, displacement, "m"))
+
+
 def _line_of_sight(mission: Mission, platform: str, is_sinusoid: bool, entry: int, declared: float) -> Iterator[Step]:
     """The part of a vibration along three axes in the line of sight; of any, in the range less the direct path."""
     body = getattr(mission.platforms, platform)
     vibration = body.motion_error.vibration
-    value = vibration.sinusoidal[entry].amplitude if is_sinusoid else vibration.wideband.rms
+    value = vibration.sinusoidal[entry].displacement if is_sinusoid else vibration.wideband.rms
     sight, whither = sight_of(mission, platform), "Along the line of sight"
     if mission.has_direct_path:
         whither = "In the range less the direct path, u_t − b or u_r + b in place of the line of sight"

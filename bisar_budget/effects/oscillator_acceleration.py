@@ -1,0 +1,224 @@
+"""Oscillators under acceleration: what vibration and turns of their platform do to their phase.
+
+The fractional frequency of an oscillator changes by y = Γ·a, with its acceleration sensitivity Γ. Γ is a vector that
+points anywhere: of what it may do the most counts, that is, its length, and the length of an acceleration.
+
+- A tone of a at f has the peak phase f₀·Γ·a/f. Of the motion itself it is a quarter of a turn away, so that powers of
+  the two add.
+- Random vibration has the phase S_φ = (Γ·f₀/f)²·S_a (Filler 1988).
+- A turn: specific force changes by the acceleration of the path against level flight, in which a clock is set. The
+  range error is c·∫Γ·a dτ = c·Γ·(v(τ) − v(0)): a constant acceleration is a frequency, which displaces, and what it
+  changes by within the aperture defocuses. Along three axes the root-sum-square of what each does is the most that a
+  Γ of that length does, in any direction. What falls freely feels nothing.
+"""
+
+import math
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.effects.effect import PLATFORMS, Subject, subject
+from bisar_budget.effects.navigation_errors import specific_force
+from bisar_budget.effects.oscillators import left_of_tone
+from bisar_budget.effects.random_effect import RandomEffect, RandomError, SensorCases
+from bisar_budget.effects.spectra import Floats, Parts, PowerLawPiece, tone
+from bisar_budget.effects.vibration import SLOWEST
+from bisar_budget.effects.vibration_spectra import (
+    added,
+    effects_of,
+    power_of,
+    spectrum_parts,
+    spectrum_pieces,
+    times,
+)
+from bisar_budget.geometry import BistaticGeometry, PlatformState, norm
+from bisar_budget.mission.instruments import Oscillator
+from bisar_budget.mission.model import Mission
+from bisar_budget.mission.vibrations import FeltVibration, Vibration
+
+PHASE = (1.0, 2.0)  # S_φ = (Γ·f₀)²·S_a/f²
+_FELT = 1e-6  # m/s², below which an acceleration of a path is none
+_STARTS = 8  # of exchanges within an interval, over which what they leave of a turn is a mean
+
+
+class Felt(NamedTuple):
+    """What an oscillator feels: its own vibration, or that of its platform, and its sensitivity. [s²/m]"""
+
+    vibration: Vibration | FeltVibration
+    sensitivity: Any
+    is_own: bool
+
+
+def felt(mission: Mission, name: str) -> Felt | None:
+    """Vibration that the oscillator of a platform feels; None where the file says nothing of its sensitivity."""
+    platform = getattr(mission.platforms, name)
+    oscillator: Oscillator | None = platform.oscillator
+    if oscillator is None or oscillator.acceleration_sensitivity is None:
+        return None
+    own = oscillator.vibration
+    vibration = platform.motion_error.vibration if own is None else own
+    return Felt(vibration, oscillator.acceleration_sensitivity, own is not None)
+
+
+class AcceleratedTone(NamedTuple):
+    """A vibration as an oscillator's tone: platform, entry, frequency [Hz], peak phase by a unit of Γ [rad/(s²/m)].
+
+    `in_quadrature` is the row of the vibration of the platform that makes it, from which it is a quarter of a turn
+    away; None of one along several axes, and of one that the oscillator alone is said to feel. `left` is the part
+    that exchanged pulses leave.
+    """
+
+    name: str
+    entry: int
+    frequency: Any
+    per_unit: Any
+    sensitivity: Any
+    left: Any
+    in_quadrature: str | None
+
+    @property
+    def subject(self) -> Subject:
+        """That of its row."""
+        return subject(self.name, "oscillator", "acceleration", entry=self.entry)
+
+    @property
+    def phase(self) -> Any:
+        """Peak phase at the centre frequency. [rad]"""
+        return self.per_unit * self.sensitivity
+
+
+def accelerated_tones(mission: Mission, geometry: BistaticGeometry | None = None) -> list[AcceleratedTone]:
+    """Tones of oscillators that vibrate; with a direct path as clock those of the receiver alone, heard twice.
+
+    `geometry` is that of many cases, where numbers of the mission are arrays.
+    """
+    found = []
+    for name in PLATFORMS[mission.has_direct_path :]:
+        one = felt(mission, name)
+        if one is None:
+            continue
+        for index, line in enumerate(one.vibration.sinusoidal):
+            left = left_of_tone(line.frequency, mission, geometry or mission.geometry)
+            phase = mission.radar.center_frequency * _length(line.acceleration) / line.frequency * left
+            # Axes may vibrate in any phase: then a quarter of a turn is not certain.
+            is_apart = one.is_own or isinstance(line.amplitude, tuple)
+            shared = None if is_apart else subject(name, "vibration", "sinusoidal", entry=index).id
+            found.append(AcceleratedTone(name, index, line.frequency, phase, one.sensitivity, left, shared))
+    return found
+
+
+def _length(acceleration: Any) -> Any:
+    return norm(acceleration) if isinstance(acceleration, tuple) else acceleration
+
+
+def oscillator_acceleration(seen: SensorCases, name: str) -> Iterator[RandomError]:
+    """Random vibration of an oscillator, its tones below one cycle per aperture, and the turns of its platform.
+
+    Its unit is that of the sensitivity. Faster tones have rows of their own.
+    """
+    one = felt(seen.mission, name)
+    if one is None:
+        return
+    found, turn = Parts(*np.zeros((len(Parts._fields), seen.cases))), None
+    if not seen.mission.has_direct_path or name == "receiver":  # else it drops out
+        found = _vibrating(seen, name, one)
+    if not seen.mission.has_direct_path:  # from direct path to echo a turn changes next to nothing
+        turn = _turning(seen, name)
+    published, full = effects_of(seen, found)
+    if turn is not None:
+        published, full = _together(published, turn[0]), _together(full, turn[1])
+    published, full = (effect._replace(spread=effect.spread / seen.factor) for effect in (published, full))
+    path = ("platforms", name, "oscillator", "acceleration_sensitivity")
+    what = subject(name, "oscillator", "acceleration")
+    yield RandomError(what, "s^2/m", one.sensitivity * seen.factor + np.zeros(seen.cases), path, published, full)
+
+
+def _vibrating(seen: SensorCases, name: str, one: Felt) -> Parts:
+    """Parts of the range error by a unit of Γ: of a spectrum, and of slow tones in their worst phases. [m²/unit²]"""
+    mission, found = seen.mission, [Parts(*np.zeros((len(Parts._fields), seen.cases)))]
+    sync, vibration = mission.synchronization, one.vibration
+    if vibration.spectrum is not None:
+        interval = None if sync is None else sync.interval
+        delay = seen.geometry.echo_delay if mission.has_direct_path else None
+        random = spectrum_parts(vibration.spectrum, PHASE, seen.aperture_time, interval, delay)
+        found.append(times(random, power_of(vibration) * np.square(mission.radar.center_frequency)))
+    for line in accelerated_tones(mission, seen.geometry):
+        cycles = line.frequency * seen.aperture_time
+        if line.name == name and np.any(cycles < SLOWEST):
+            power = np.where(cycles < SLOWEST, np.square(line.per_unit), 0.0)
+            found.append(times(_worst(tone(math.pi * cycles)), power))
+    return times(added(found), np.square(mission.radar.wavelength) / (4 * math.pi**2))
+
+
+def _worst(parts: Floats) -> Parts:
+    """Parts of a tone of amplitude 1, each in the phase where it is largest; orders n and n + 2 have other signs."""
+    quadratic, cubic, left, constant, linear = parts
+    both = -constant * quadratic, -linear * cubic
+    return Parts(quadratic**2, cubic**2, left, constant**2, linear**2, *both)
+
+
+def _turning(seen: SensorCases, name: str) -> tuple[RandomEffect, RandomEffect] | None:
+    """Effects of a unit of Γ by the acceleration of a path; None where it has none."""
+    state: PlatformState = getattr(seen.geometry, name)
+    if not (state.bends or np.any(norm(state.acceleration) > _FELT)):
+        return None
+    felt_part = np.where(_falls(seen.mission, state), 0.0, 1.0)
+    if not np.any(felt_part):
+        return None
+    sync = seen.mission.synchronization
+    interval = None if sync is None else sync.interval
+    courses = SPEED_OF_LIGHT * felt_part * turn_courses(state, seen.exact.times, interval)
+    return seen.of_courses(courses, courses)
+
+
+def turn_courses(state: PlatformState, moments: Floats, interval: Any = None) -> Floats:
+    """Time error by a unit of Γ along each axis of the scene, v(τ) − v(0), or what exchanges leave, (n, moments, …).
+
+    Those begin anywhere in their interval: of several beginnings each has its part of the mean square.
+    """
+
+    def gained(tau: Any) -> Floats:
+        now, middle = state.at(tau)[1], state.velocity
+        return np.array([np.broadcast_to(a - b, np.shape(tau)) for a, b in zip(now, middle, strict=True)])
+
+    if interval is None:
+        return gained(moments)
+    found = []
+    for start in range(_STARTS):
+        offset = interval * start / _STARTS
+        before = np.floor((moments - offset) / interval) * interval + offset
+        part = (moments - before) / interval
+        joined = gained(before) * (1 - part) + gained(before + interval) * part
+        found.append((gained(moments) - joined) / math.sqrt(_STARTS))
+    return np.concatenate(found)
+
+
+def _falls(mission: Mission, state: PlatformState) -> Any:
+    """Whether a platform falls freely: what accelerometers measure is less than how its path bends."""
+    return norm(specific_force(mission, state)) < norm(state.acceleration)
+
+
+def flies_a_turn(mission: Mission, name: str) -> bool:
+    """Whether an oscillator feels the path of its platform."""
+    state: PlatformState = getattr(mission.platforms, name).state
+    return bool(state.bends or norm(state.acceleration) > _FELT) and not _falls(mission, state)
+
+
+def _together(one: RandomEffect, other: RandomEffect) -> RandomEffect:
+    """Effect of two independent errors that grow alike."""
+    quadratic, cubic, spread, east, north = (np.hypot(*both) for both in zip(one[:5], other[:5], strict=True))
+    is_known = one.covariance is not None and other.covariance is not None
+    covariance = one.covariance + other.covariance if is_known else None
+    return RandomEffect(quadratic, cubic, spread, east, north, covariance)
+
+
+def pieces_by_acceleration(mission: Mission, name: str) -> tuple[PowerLawPiece, ...]:
+    """Spectrum of an oscillator's phase by random vibration, of a unit of Γ; empty without one. [rad²/Hz/unit²]"""
+    one = felt(mission, name)
+    is_heard = not mission.has_direct_path or name == "receiver"
+    if one is None or one.vibration.spectrum is None or not is_heard:
+        return ()
+    factor = mission.radar.center_frequency**2 * float(power_of(one.vibration))
+    return spectrum_pieces(one.vibration.spectrum, (factor, PHASE[1]))
