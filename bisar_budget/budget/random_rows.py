@@ -405,7 +405,8 @@ def no_effect(mission: Mission, error: RandomError) -> Note:
     if error.subject.kind in ("imu", "random"):
         return phrases.across_the_line_of_sight()
     if error.subject.kind == "propagation":
-        return phrases.below_the_ionosphere(error.owner)
+        is_content = error.subject.axis == CONTENT
+        return (phrases.below_the_ionosphere if is_content else phrases.runs_along_the_ground)(error.owner)
     if error.subject.kind == "synchronization":
         return phrases.nothing_spreads()
     return phrases.oscillators_drop_out() if mission.has_direct_path else phrases.no_phase_noise()
