@@ -28,11 +28,11 @@ from bisar_budget.analysis.spread import (
 from bisar_budget.budget.judged_requirements import SMALL_RAD
 from bisar_budget.budget.judged_rows import BOUND, CODE, REQUIREMENTS, Floats, Judged, Judging, worded
 from bisar_budget.budget.pull_in import caps, needed_sentence
+from bisar_budget.effects.air_delays import CONTENT, dispersion
 from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.effect import override_notes, subject
 from bisar_budget.effects.navigation_errors import process_of
 from bisar_budget.effects.oscillators import POOR_FIT
-from bisar_budget.effects.propagation import CONTENT, dispersion
 from bisar_budget.effects.random_effect import RandomEffect, RandomError
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import GroundVector

@@ -2,13 +2,12 @@
 
 # What other rooms may use.
 __all__ = [
+    "air_delays",
     "combined",
     "declared",
     "effect",
     "navigation_errors",
     "oscillators",
-    "other_errors",
-    "propagation",
     "random_effect",
     "random_errors",
     "sources",

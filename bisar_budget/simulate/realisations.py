@@ -12,10 +12,10 @@ import numpy as np
 
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.effects.air_delays import CONTENT, DELAY, group_delay
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.navigation_errors import acceleration_errors, process_of, specific_force
 from bisar_budget.effects.oscillators import noise_of
-from bisar_budget.effects.propagation import CONTENT, DELAY, group_delay
 from bisar_budget.effects.random_effect import RandomError
 from bisar_budget.effects.random_errors import random_errors
 from bisar_budget.effects.spectra import PowerLawPiece
