@@ -423,6 +423,12 @@ def below_the_ionosphere(platform: str) -> str:
 
 
 @phrase
+def runs_along_the_ground(platform: str) -> str:
+    """Said of the delay on a leg that is seen too low, and of which nothing may be stated."""
+    return f"the leg of the {platform} runs along the ground: no delay follows from that of the zenith"
+
+
+@phrase
 def disperses_over_the_band(phase: float) -> str:
     """Said of an electron content."""
     return f"bends the phase by {phase:.3g} rad at the ends of the band, which no requirement takes"

@@ -29,11 +29,11 @@ from bisar_budget.budget.acceleration_rows import evidence, notes_of_acceleratio
 from bisar_budget.budget.judged_requirements import SMALL_RAD
 from bisar_budget.budget.judged_rows import BOUND, CODE, REQUIREMENTS, Floats, Judged, Judging, worded
 from bisar_budget.budget.pull_in import caps, needed_sentence
+from bisar_budget.effects.air_delays import CONTENT, dispersion
 from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.effect import PLATFORMS, override_notes, subject
 from bisar_budget.effects.navigation_errors import process_of
 from bisar_budget.effects.oscillators import POOR_FIT
-from bisar_budget.effects.propagation import CONTENT, dispersion
 from bisar_budget.effects.random_effect import RandomEffect, RandomError
 from bisar_budget.effects.vibration import counted, projected
 from bisar_budget.effects.vibration_spectra import displacement_rms, power_of
@@ -457,7 +457,8 @@ def no_effect(mission: Mission, error: RandomError) -> Note:
     if error.subject.kind in ("imu", "random", "lever_arm", "vibration"):
         return phrases.across_the_line_of_sight()
     if error.subject.kind == "propagation":
-        return phrases.below_the_ionosphere(error.owner)
+        is_content = error.subject.axis == CONTENT
+        return (phrases.below_the_ionosphere if is_content else phrases.runs_along_the_ground)(error.owner)
     if error.subject.kind == "synchronization":
         return phrases.nothing_spreads()
     if mission.has_direct_path:

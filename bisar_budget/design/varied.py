@@ -38,7 +38,7 @@ from bisar_budget.mission.platforms import (
     has_body_axes,
     least_baseline,
 )
-from bisar_budget.mission.propagation import LEAST_ELEVATION_DEG, low_legs
+from bisar_budget.mission.propagation import LEAST_ELEVATION_DEG, least_elevations
 from bisar_budget.mission.readers import ListOf, OneOf, Quantity, Reader, Section, Triple
 from bisar_budget.mission.vibrations import Spectrum
 from bisar_budget.ranges.exact_ranges import Floats
@@ -186,7 +186,7 @@ def is_image(mission: Mission, geometries: BistaticGeometry, cases: int) -> NDAr
         is_one &= spans
     if mission.propagation is not None:
         legs = dict(zip(PLATFORMS, geometries.both, strict=True))
-        for _, _, degrees in low_legs(mission.propagation, legs, mission.collection.aperture_time):
+        for _, _, degrees in least_elevations(mission.propagation, legs, mission.collection.aperture_time):
             is_one &= degrees > LEAST_ELEVATION_DEG * SAFE
     if mission.has_direct_path:
         is_one &= _has_baseline(geometries.apart, np.broadcast_to(half, (cases,)))

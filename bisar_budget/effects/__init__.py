@@ -2,6 +2,7 @@
 
 # What other rooms may use.
 __all__ = [
+    "air_delays",
     "combined",
     "declared",
     "effect",
@@ -9,8 +10,6 @@ __all__ = [
     "navigation_errors",
     "oscillator_acceleration",
     "oscillators",
-    "other_errors",
-    "propagation",
     "random_effect",
     "random_errors",
     "sources",

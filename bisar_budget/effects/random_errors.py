@@ -1,5 +1,6 @@
 """Every random error of sensors, clocks and the air that a mission names, in one case or in many."""
 
+from bisar_budget.effects.air_delays import delay_errors
 from bisar_budget.effects.clock_errors import link_noise, oscillator_noise
 from bisar_budget.effects.effect import PLATFORMS, plain
 from bisar_budget.effects.lever_arms import lever_arm_errors
@@ -7,7 +8,6 @@ from bisar_budget.effects.navigation_errors import common_noise, inertial_errors
 from bisar_budget.effects.oscillator_acceleration import oscillator_acceleration
 from bisar_budget.effects.oscillators import noise_of
 from bisar_budget.effects.other_errors import stated_effects
-from bisar_budget.effects.propagation import delay_errors
 from bisar_budget.effects.random_effect import RandomError, SensorCases
 from bisar_budget.effects.vibration_spectra import vibration_spectrum
 from bisar_budget.geometry import BistaticGeometry

@@ -86,7 +86,13 @@ def height_of(position: Vectors) -> Any:
     return np.sqrt(x * x + y * y + (z + EARTH_RADIUS) ** 2) - EARTH_RADIUS
 
 
-def low_legs(
+def elevation_deg(position: Vectors) -> Any:
+    """Elevation of places (…) as the scene centre sees them. [deg]"""
+    x, y, z = position
+    return np.degrees(np.arctan2(z, np.hypot(x, y)))
+
+
+def least_elevations(
     propagation: Propagation, paths: Mapping[str, PlatformState], aperture_time_s: Any
 ) -> Iterator[tuple[str, str, Any]]:
     """Least elevation of the legs of which a delay is stated: platform, figure, and its degrees in the aperture."""
@@ -94,8 +100,7 @@ def low_legs(
         leg = propagation.leg(name)
         if leg is None:
             continue
-        x, y, z = path.place(_PLACES * (np.asarray(aperture_time_s, dtype=float) / 2))
-        least = np.degrees(np.arctan2(z, np.hypot(x, y))).min(axis=0)
+        least = elevation_deg(path.place(_PLACES * (np.asarray(aperture_time_s, dtype=float) / 2))).min(axis=0)
         if leg.zenith_delay is not None:
             yield name, DELAYS[0], least
         if leg.zenith_electron_content is not None:
@@ -106,7 +111,7 @@ def low_legs(
 def too_low(propagation: Propagation, platforms: Platforms, aperture_time_s: float) -> Iterator[Problem]:
     """Refuse delays of legs that run along the ground."""
     paths = dict(zip(Platforms._fields, platforms.geometry.both, strict=True))
-    for name, delay, least in low_legs(propagation, paths, aperture_time_s):
+    for name, delay, least in least_elevations(propagation, paths, aperture_time_s):
         (degrees,) = least.tolist()
         if degrees < LEAST_ELEVATION_DEG:
             yield Problem(

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bisar_budget.constants import SPEED_OF_LIGHT
-from bisar_budget.effects.propagation import CONTENT, seen_course
+from bisar_budget.effects.air_delays import CONTENT, seen_course
 from bisar_budget.geometry import BistaticGeometry, GroundVector
 from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.ranges.exact_ranges import aperture_nodes

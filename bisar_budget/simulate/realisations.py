@@ -12,6 +12,7 @@ import numpy as np
 
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.effects.air_delays import CONTENT, DELAY, group_delay
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.lever_arms import arm_at, body_axes
 from bisar_budget.effects.navigation_errors import TILTS, acceleration_errors, process_of, specific_force
@@ -22,7 +23,6 @@ from bisar_budget.effects.oscillator_acceleration import (
     turn_courses,
 )
 from bisar_budget.effects.oscillators import noise_of
-from bisar_budget.effects.propagation import CONTENT, DELAY, group_delay
 from bisar_budget.effects.random_effect import RandomError
 from bisar_budget.effects.random_errors import random_errors
 from bisar_budget.effects.spectra import PowerLawPiece

@@ -18,12 +18,12 @@ from bisar_budget.analysis.spread import declared_powers, islr_db, mainlobe_ener
 from bisar_budget.analysis.vibration_limits import echo_phase, highest_echo, vibration_limits
 from bisar_budget.budget.random_rows import HELD, ISLR, held_effect, limits_for, sizes_at
 from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.effects.air_delays import CONTENT, seen_course
 from bisar_budget.effects.declared import CUBIC, LOCATION
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.navigation_errors import process_of
 from bisar_budget.effects.oscillator_acceleration import AcceleratedTone
 from bisar_budget.effects.oscillators import Spur
-from bisar_budget.effects.propagation import CONTENT, seen_course
 from bisar_budget.effects.random_effect import RandomError
 from bisar_budget.effects.vibration import SLOWEST, Line, lines_of, near_lines, sight_of, unit_of_line, worst_phases
 from bisar_budget.findings.images import Verdict

@@ -380,3 +380,13 @@ def test_what_is_left_out_is_looser(run: Callable, tmp_path: Path) -> None:
     ):
         assert f"{row_id}: declared -> not declared" in refused
     assert "propagation.source" not in refused  # there is nothing left to have one
+
+
+def test_a_leg_along_the_ground_has_no_allowable() -> None:
+    """Nothing is stated of it: neither of a receiver on the ground, nor of one that is seen at 2 degrees."""
+    for height in ("0 m", "300 m"):
+        receiver = {"position": ["6 km", "6 km", height], "velocity": ["-40 m/s", "40 m/s", 0]}
+        found = findings(platforms__receiver=receiver, propagation={"zenith_electron_content": "1 TECU"})
+        one = row(found, "propagation.receiver.zenith_delay")
+        assert (one.status, one.allowable) == ("not_declared", None)
+        assert one.reason == "the leg of the receiver runs along the ground: no delay follows from that of the zenith"

@@ -12,7 +12,7 @@ import pytest
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.constants import EARTH_RADIUS, SPEED_OF_LIGHT
 from bisar_budget.design.varied import varied
-from bisar_budget.effects.propagation import TROPOSPHERE, group_delay, metres_per_unit, obliquity
+from bisar_budget.effects.air_delays import TROPOSPHERE, group_delay, metres_per_unit, obliquity
 from bisar_budget.effects.random_effect import RandomError, SensorCases
 from bisar_budget.effects.random_errors import random_errors
 from bisar_budget.geometry import PlatformState

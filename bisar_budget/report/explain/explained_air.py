@@ -6,7 +6,7 @@ from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.spread import mainlobe_energy, spread_limit, stated_powers
 from bisar_budget.constants import EARTH_RADIUS
-from bisar_budget.effects.propagation import (
+from bisar_budget.effects.air_delays import (
     CONTENT,
     DELAY,
     ELECTRONS,

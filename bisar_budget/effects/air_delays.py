@@ -20,7 +20,13 @@ from bisar_budget.effects.effect import PLATFORMS, subject
 from bisar_budget.effects.random_effect import RandomError, SensorCases
 from bisar_budget.geometry import PlatformState, Vectors, norm
 from bisar_budget.mission.model import Mission
-from bisar_budget.mission.propagation import ABOVE_THE_AIR, DELAYS, height_of
+from bisar_budget.mission.propagation import (
+    ABOVE_THE_AIR,
+    DELAYS,
+    LEAST_ELEVATION_DEG,
+    elevation_deg,
+    height_of,
+)
 
 ELECTRONS = 40.308  # m³/s²: e²/(8π²ε₀mₑ), the group delay of 1/m² is so much over f² (CODATA 2018)
 TROPOSPHERE = 7e3  # m, height at which a spherical troposphere is crossed as a whole
@@ -47,12 +53,15 @@ def obliquity(position: Vectors, shell: Any) -> Any:
 def leg_factor(delay: str, position: Vectors, middle: Vectors) -> Any:
     """Delay of a leg over that of the zenith, for positions (…) of a platform that is at `middle` at mid-aperture.
 
-    One within the air has a flat Earth below it, and no free electrons on its leg.
+    One within the air has a flat Earth below it, and no free electrons on its leg. A leg along the ground, of which
+    the file may not state a delay, has none.
     """
     height = np.asarray(height_of(middle))
     is_above = height >= ABOVE_THE_AIR
     if delay == DELAY:
-        return obliquity(position, np.where(is_above, TROPOSPHERE, 0.0))
+        is_low = elevation_deg(middle) < LEAST_ELEVATION_DEG
+        with np.errstate(divide="ignore"):
+            return np.where(is_low, 0.0, obliquity(position, np.where(is_above, TROPOSPHERE, 0.0)))
     return np.where(is_above, obliquity(position, np.minimum(IONOSPHERE, np.maximum(height, 0.0))), 0.0)
 
 
