@@ -341,10 +341,8 @@ class _Beside:
         self.values = {one.key: one.value for one in varied.values()}
         mission, names = variation.mission, dict.fromkeys(name for name in (worst, row) if name is not None)
         columns = tuple(f"{name}.utilization" for name in names)
-        question = Question(
-            mission.data, mission.file, mission.changes, tuple(varied), columns, variation.model, today
-        )
-        self.table = Table(question._replace(breaks=frozenset()), mission, tuple(varied.values()))
+        asked = Question.of(mission, list(varied), variation.model, today, columns=columns, breaks=frozenset())
+        self.table = Table(asked, mission, tuple(varied.values()))
 
     def uses(self, cases: Sequence[tuple[Stated | None, int]], progress: Progress = unseen) -> list[_Uses | str]:
         """Utilizations with one number some steps aside in each case; why there is no mission as text."""

@@ -291,8 +291,9 @@ class _Search:
                 yield judged_mission(Analysis(last), today)
 
         hold_to_decisions(list(judged()), row)
-        question = Question(mission.data, mission.file, mission.changes, (key,), (), model, today)
-        self.table = Table(question._replace(row=row, breaks=self.breaks), mission, [of_table])
+        self.table = Table(
+            Question.of(mission, [key], model, today, row=row, breaks=self.breaks), mission, [of_table]
+        )
         self.levels = _LEVELS_READ if self.table.to_read else _LEVELS
 
     def places(self) -> list[float]:

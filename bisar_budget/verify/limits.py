@@ -3,7 +3,7 @@
 import math
 import time
 from collections.abc import Iterable, Iterator
-from contextlib import nullcontext, suppress
+from contextlib import suppress
 from fnmatch import fnmatchcase
 from functools import partial
 
@@ -39,7 +39,7 @@ from bisar_budget.verify.spread_cases import (
     vibration_cases,
 )
 from bisar_budget.verify.study import Responses, Study
-from bisar_budget.workers import MapBlocks, Progress, unseen, worker_pool
+from bisar_budget.workers import MapBlocks, Progress, in_processes, unseen
 
 __all__ = ["Study", "form_image_evidence", "rows_to_verify", "seconds_to_verify", "verify_mission"]
 
@@ -84,18 +84,15 @@ def verify_mission(
     known = cases(Study(mission))
     wanted = [row_id for row_id in known if fnmatchcase(row_id, only)]
     jobs = min(jobs, len(wanted))
-    with worker_pool(jobs, "spawn") if jobs > 1 and mapped is None else nullcontext() as pool:
-        found: Iterable[tuple[str, Verdict]]
-        if mapped is not None:
-            found = mapped(_verify_row, mission, wanted, f"{{}} of {printable(mission.name)}".format)
-        elif pool is not None:
-            found = zip(wanted, pool.map(partial(_verify_row, mission), wanted), strict=True)
-        else:
-            found = ((row_id, known[row_id]()) for row_id in wanted)
-        rows = {}
-        for row_id, verdict in found:
-            rows[row_id] = verdict
-            progress(len(rows), len(wanted))
+    if mapped is None and jobs > 1:
+        mapped = in_processes(jobs)
+    found: Iterable[tuple[str, Verdict]] = ((row_id, known[row_id]()) for row_id in wanted)
+    if mapped is not None:
+        found = mapped(_verify_row, mission, wanted, f"{{}} of {printable(mission.name)}".format)
+    rows = {}
+    for row_id, verdict in found:
+        rows[row_id] = verdict
+        progress(len(rows), len(wanted))
     return VerifiedMission(
         file=mission.file,
         name=mission.name,
