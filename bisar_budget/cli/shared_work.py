@@ -1,8 +1,7 @@
 """Work that others do, or that is kept: workers of a scheduler, the parts of a sweep, the draws of a Monte Carlo."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from dataclasses import dataclass
 from functools import partial
 from time import perf_counter
 from typing import TYPE_CHECKING
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from bisar_budget.cli.streams import complain
-from bisar_budget.cli.waiting import LONG, lasting, watched
+from bisar_budget.cli.waiting import foreseen, foretell, watched
 from bisar_budget.constants import MAX_DRAWS, MAX_DRAWS_HERE
 from bisar_budget.faults import printable
 
@@ -19,73 +18,10 @@ if TYPE_CHECKING:
     from bisar_budget.cluster.scheduler import Workers
     from bisar_budget.design.sweep import Asked
     from bisar_budget.design.table import Swept
-    from bisar_budget.monte_carlo.draws import Drawing, DrawsPiece, Tally
+    from bisar_budget.monte_carlo.draws import Drawing, DrawsPiece, Share, Tally
 
 _MANY = 1_000_000  # draws from which on it is measured how long they will take
-_TRIAL = 0.3  # s; a shorter one is too short to measure
 _FEW = 1 << 12  # draws of the first trial
-
-
-@dataclass(frozen=True)
-class Keeping:
-    """How the parts of a sweep are kept, beside its output; workers of a scheduler find them, or processes here."""
-
-    output: str
-    is_resumed: bool
-    jobs: int
-    workers: "Workers | None" = None
-
-    @contextmanager
-    def swept(self, asked: "Asked") -> "Iterator[Swept]":
-        """Give the sweep when all its parts are kept, and take them away when the table is written.
-
-        What ends it before leaves the parts, and says how to go on.
-        """
-        from bisar_budget.cluster.parts_folder import parts_folder, question_of
-
-        chunks, count = asked.chunks(), asked.cases.count
-        question = question_of(asked, chunks)
-        with parts_folder(f"{self.output}.parts", question, chunks, is_resumed=self.is_resumed) as folder:
-
-            def kept() -> str:
-                return f"{len(folder.done)} of {len(chunks.starts)} parts"
-
-            try:
-                if folder.done:
-                    complain(f"{folder.path} has {kept()}.")
-                left = [start for start in chunks.starts if start not in folder.done]
-                done = sum(chunks.stop(start) - start for start in folder.done)
-                with watched("Checking cases", count, done) as progress:
-                    mapped = self.workers.mapped if self.workers else None
-                    for part in asked.shared_out(chunks, left, self.jobs, mapped):
-                        folder.put(part)
-                        done += part.stop - part.start
-                        progress(done, count)
-                yield asked.swept(folder.parts(chunks.starts))
-            except BaseException:
-                dated = f" --date {question['--date was']}" if question["--date was"] else ""
-                complain(f"{folder.path} keeps {kept()}; the same command with --resume{dated} goes on from there.")
-                raise
-            folder.remove()
-
-
-@contextmanager
-def keeping(
-    output: str | None, scheduler: str | None, patience: int, is_resumed: bool, jobs: int
-) -> Iterator[Keeping | None]:
-    """Say how parts are kept, with the workers of a scheduler at hand; None where nobody asks for that."""
-    if scheduler is None and not is_resumed:
-        yield None
-        return
-    if output is None or output == "-":
-        raise click.UsageError("--scheduler and --resume need -o FILE: parts are kept in FILE.parts.")
-    if scheduler is None:
-        from bisar_budget.cluster.parts_folder import check_libraries
-        from bisar_budget.memory import OF_TABLES
-
-        check_libraries("--resume", OF_TABLES, "tables", "pyarrow")
-    with workers_of(scheduler, patience) as workers:
-        yield Keeping(output, is_resumed, jobs, workers)
 
 
 def workers_of(scheduler: str | None, patience: int) -> "AbstractContextManager[Workers | None]":
@@ -95,6 +31,39 @@ def workers_of(scheduler: str | None, patience: int) -> "AbstractContextManager[
     from bisar_budget.cluster.scheduler import connected
 
     return connected(scheduler, patience, complain)
+
+
+@contextmanager
+def kept(asked: "Asked", output: str, jobs: int, workers: "Workers | None", *, is_resumed: bool) -> "Iterator[Swept]":
+    """Give a sweep when all its parts are kept beside its output, and take them away when the table is written.
+
+    Workers of a scheduler find them, or processes here. What ends it before leaves the parts, and says how to go on.
+    """
+    from bisar_budget.cluster.parts_folder import parts_folder, question_of
+
+    chunks, count = asked.chunks(), asked.cases.count
+    question = question_of(asked, chunks)
+    with parts_folder(f"{output}.parts", question, chunks, is_resumed=is_resumed) as folder:
+
+        def said() -> str:
+            return f"{len(folder.done)} of {len(chunks.starts)} parts"
+
+        try:
+            if folder.done:
+                complain(f"{folder.path} has {said()}.")
+            left = [start for start in chunks.starts if start not in folder.done]
+            done = sum(chunks.stop(start) - start for start in folder.done)
+            with watched("Checking cases", count, done) as progress:
+                for part in asked.shared_out(chunks, left, jobs, workers.mapped if workers else None):
+                    folder.put(part)
+                    done += part.stop - part.start
+                    progress(done, count)
+            yield asked.swept(folder.parts(chunks.starts))
+        except BaseException:
+            dated = f" --date {question['--date was']}" if question["--date was"] else ""
+            complain(f"{folder.path} keeps {said()}; the same command with --resume{dated} goes on from there.")
+            raise
+        folder.remove()
 
 
 def check_draws(draws: int | None, scheduler: str | None) -> None:
@@ -122,43 +91,29 @@ def drawn_by(
 
     with workers_of(scheduler, patience) as workers:
         if workers is not None:
-            share = partial(shared_out, mapped=workers.mapped)
-            yield Draws(draws, seed, _Watched(share, lambda: workers.threads))
+            yield Draws(draws, seed, partial(_watched, partial(shared_out, mapped=workers.mapped), workers))
         else:  # files that processes share out draw for themselves
-            yield Draws(draws, seed, None if files >= MANY else _Watched(in_turn, lambda: 1))
+            yield Draws(draws, seed, None if files >= MANY else partial(_watched, in_turn, None))
 
 
-class _Watched:
-    """Passes on the pieces of draws that `make` gives; says how long they will take, and how far they are."""
-
-    def __init__(
-        self, make: "Callable[[Drawing], Iterator[tuple[DrawsPiece, Tally]]]", threads: Callable[[], int]
-    ) -> None:
-        self._make, self._threads = make, threads
-
-    def __call__(self, drawing: "Drawing") -> "Iterator[tuple[DrawsPiece, Tally]]":
-        if drawing.draws > _MANY and drawing.judged:
-            seconds = _seconds(drawing) / max(self._threads(), 1)
-            if seconds > LONG:
-                complain(f"{drawing.draws:,} draws of {printable(drawing.name)} will take about {lasting(seconds)}.")
-        done = 0
-        with watched("Drawing errors", drawing.draws) as progress:
-            for piece, tally in self._make(drawing):
-                yield piece, tally
-                done += piece.stop - piece.start
-                progress(done, drawing.draws)
-
-
-def _seconds(drawing: "Drawing") -> float:
-    """Measure how long all draws will take in one thread, by some of them."""
+def _watched(make: "Share", workers: "Workers | None", drawing: "Drawing") -> "Iterator[tuple[DrawsPiece, Tally]]":
+    """Pass on the pieces of draws that `make` gives; say how long they will take, and how far they are."""
     from bisar_budget.monte_carlo.draws import Drawer, DrawsPiece
 
-    drawer, tried = Drawer(drawing), _FEW
-    drawer.tally(DrawsPiece(0, tried))  # it makes what the others find
-    while True:
-        began = perf_counter()
-        drawer.tally(DrawsPiece(0, tried))
-        seconds = perf_counter() - began
-        if seconds > _TRIAL or tried >= min(drawing.chunk, drawing.draws):
-            return seconds * drawing.draws / tried
-        tried *= 4
+    if drawing.draws > _MANY and drawing.judged:
+        drawer = Drawer(drawing)
+
+        def trial(count: int) -> float:
+            began = perf_counter()
+            drawer.tally(DrawsPiece(0, count))
+            return perf_counter() - began
+
+        seconds = foreseen(drawing.draws, trial, _FEW, min(drawing.chunk, drawing.draws))
+        threads = max(workers.threads, 1) if workers else 1
+        foretell(seconds / threads, f"{drawing.draws:,} draws of {printable(drawing.name)}")
+    done = 0
+    with watched("Drawing errors", drawing.draws) as progress:
+        for piece, tally in make(drawing):
+            yield piece, tally
+            done += piece.stop - piece.start
+            progress(done, drawing.draws)

@@ -1,7 +1,7 @@
 """Announcements and progress of work that takes long."""
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from io import StringIO
 from time import monotonic
@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 LONG = 60.0  # s; what takes longer is announced
 FORMING = "Forming images"  # label of a bar
 _MOMENT = 1.0  # s
+_TRIAL = 0.3  # s; a shorter one is too short to measure
+_LARGER = 3  # times as much, the next trial
 
 
 def lasting(seconds: float) -> str:
@@ -28,10 +30,23 @@ def lasting(seconds: float) -> str:
     return f"{max(seconds, 1):.0f} s"
 
 
-def foretell(seconds: float, doing: str, advice: str) -> None:
+def foretell(seconds: float, doing: str, advice: str = "") -> None:
     """Say on standard error that something will take long, and what to change."""
     if seconds > LONG:
-        complain(f"{doing} will take about {lasting(seconds)}; {advice}.")
+        complain(f"{doing} will take about {lasting(seconds)}{'; ' if advice else ''}{advice}.")
+
+
+def foreseen(count: int, trial: Callable[[int], float], few: int, most: int) -> float:
+    """How long so many of something will take, by trials of `few` to `most`, which say how long they took. [s]"""
+    trial(few)  # it imports and makes what the others find
+    tried, seconds = few, trial(few)
+    while True:
+        before, tried = seconds, _LARGER * tried
+        seconds = trial(tried)
+        if seconds > _TRIAL or _LARGER * tried > most:
+            break
+    # Few take their time too, but not once more for each part of them all.
+    return count * max((seconds - before) / (tried - tried / _LARGER), seconds / tried / 10)
 
 
 @contextmanager

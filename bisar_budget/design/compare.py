@@ -47,6 +47,11 @@ class PartState(NamedTuple):
     reason: str = ""
     silent_on: tuple[str, ...] = ()
 
+    @property
+    def complies(self) -> bool:
+        """Whether the mission does with it."""
+        return self.standing.complies
+
 
 class Comparison(NamedTuple):
     """Parts for one key of one mission.
@@ -74,7 +79,7 @@ class Comparison(NamedTuple):
     @property
     def complying(self) -> tuple[PartState, ...]:
         """The parts with which the mission complies."""
-        return tuple(part for part in self.parts if part.standing.complies)
+        return tuple(part for part in self.parts if part.complies)
 
     @property
     def status(self) -> str:
@@ -166,11 +171,10 @@ def _with_silence(states: Sequence[PartState]) -> Iterator[PartState]:
 
 def _order(state: PartState) -> tuple[bool, float, float, str]:
     """Sort key: what complies first, the smallest margin first; then the nearest miss, at last what is no mission."""
-    complies = state.standing.complies
-    sign = -1 if complies else 1
+    sign = -1 if state.complies else 1
     uses = (state.standing.utilization, state.own_utilization)
     worst, own = (math.inf if use is None else sign * use for use in uses)
-    return not complies, worst, own, state.id
+    return not state.complies, worst, own, state.id
 
 
 class _Candidate(NamedTuple):

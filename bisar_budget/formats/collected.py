@@ -123,17 +123,8 @@ def fitted(times: Floats, places: Floats, aperture_time_s: float, wavelength_m: 
     mission states position, velocity, acceleration, jerk and snap. Where that is not reached, the lowest order is
     kept that no higher one betters clearly: what is left is noise of the places, or motion that is faster.
 
-    Parameters
-    ----------
-    times : (n,) ndarray
-        Slow time; what is outside the aperture is not used. [s]
-    places : (n, 3) ndarray
-        In the scene's axes. [m]
-
-    Raises
-    ------
-    NoPathError
-        Fewer than five places within the aperture, or places or an aperture beyond what a mission takes.
+    Slow times (n,) are in seconds, places (n, 3) in metres of the scene's axes. A `NoPathError` says that there are
+    fewer than five places within the aperture, or places or an aperture beyond what a mission takes.
     """
     if not 0 < aperture_time_s <= LONGEST:
         raise NoPathError(f"an aperture of {aperture_time_s:g} s is none; accepted: up to {LONGEST:g} s")
@@ -171,6 +162,10 @@ def fitted(times: Floats, places: Floats, aperture_time_s: float, wavelength_m: 
 # A tree of keys, and that tree with comments.
 _WIDTH = 110
 _KINDS = ("position", "velocity")
+_BENDS = (
+    ("jerk", "m/s^3", 6.0),
+    ("snap", "m/s^4", 24.0),
+)  # of a path, each a term of its Taylor series times so much
 
 
 def mission_tree(imported: Imported) -> dict[str, Any]:
@@ -198,12 +193,8 @@ def mission_tree(imported: Imported) -> dict[str, Any]:
     if imported.common_error is not None:
         tree["common_motion_error"] = _error(imported, imported.common_error)
         del tree["common_motion_error"]["frame"]
-    timing = {"constant": imported.timing_constant, "linear": imported.timing_linear}
-    declared = {
-        key: _quantity(value, "s" if key == "constant" else "").strip()
-        for key, value in timing.items()
-        if value is not None
-    }
+    timing = {"constant": (imported.timing_constant, "s"), "linear": (imported.timing_linear, "")}
+    declared = {key: _quantity(value, unit).strip() for key, (value, unit) in timing.items() if value is not None}
     if declared:
         tree["timing_error"] = declared
     return tree
@@ -212,8 +203,8 @@ def mission_tree(imported: Imported) -> dict[str, Any]:
 def mission_text(imported: Imported) -> str:
     """Return a mission file, with what the reader has to know in comments."""
     tree = mission_tree(imported)
-    lines = [line for paragraph in _head(imported) for line in _comment(paragraph)]
-    lines += [f"schema_version: {tree.pop('schema_version')}", f"name: {_text(tree.pop('name'))}"]
+    paragraphs = [wrap(printable(paragraph), _WIDTH - 2) or [""] for paragraph in _head(imported)]
+    lines = [f"# {line}".rstrip() for paragraph in paragraphs for line in paragraph]
     notes = {
         ("scene",): "the scene's axes are east, north and up here, WGS-84",
         ("platforms", "transmitter"): _fit(imported.transmitter),
@@ -250,16 +241,10 @@ def _head(imported: Imported) -> list[str]:
 def _fit(track: Fitted) -> str:
     if not track.samples:
         return "as the file states it, a straight path"
-    words = f"order {track.order} through {track.samples} places, at most {_small(track.farthest)} from them"
-    return (
-        words
-        if track.order < 4 or track.farthest < 1e-3
-        else f"{words}: what is left is faster than a mission states"
-    )
-
-
-def _small(length: float) -> str:
-    return f"{length * 1e3:.3g} mm" if length < 1 else f"{length:.4g} m"
+    away = f"{track.farthest * 1e3:.3g} mm" if track.farthest < 1 else f"{track.farthest:.4g} m"
+    words = f"order {track.order} through {track.samples} places, at most {away} from them"
+    is_faster = track.order >= 4 and track.farthest >= 1e-3
+    return f"{words}: what is left is faster than a mission states" if is_faster else words
 
 
 def _platform(imported: Imported, track: Fitted, error: DeclaredMotionError | None) -> dict[str, Any]:
@@ -270,9 +255,8 @@ def _platform(imported: Imported, track: Fitted, error: DeclaredMotionError | No
     }
     if state.acceleration != STRAIGHT:
         platform["acceleration"] = _triple(state.acceleration, "m/s^2")
-    for key, bend, factor in zip(("jerk", "snap"), state.bends, (6.0, 24.0), strict=False):
-        unit = "m/s^3" if key == "jerk" else "m/s^4"
-        platform[key] = _triple((bend[0] * factor, bend[1] * factor, bend[2] * factor), unit)
+    for bend, (key, per, factor) in zip(state.bends, _BENDS, strict=False):
+        platform[key] = _triple((bend[0] * factor, bend[1] * factor, bend[2] * factor), per)
     if error is not None:
         platform["motion_error"] = _error(imported, error)
     return platform
@@ -307,22 +291,9 @@ def _quantity(value: float, unit: str, digits: int = 12) -> str:
 
 def _triple(vector: Vector, unit: str, decimals: int | None = None) -> list[str]:
     if decimals is None:
-        return [f"{value:.12g} {unit}" for value in vector]
-    return [f"{_trimmed(f'{value:.{decimals}f}')} {unit}" for value in vector]
-
-
-def _trimmed(text: str) -> str:
-    text = text.rstrip("0").rstrip(".")
-    return "0" if text in ("", "-0") else text
-
-
-def _comment(paragraph: str) -> list[str]:
-    """Lines of a comment; what a file says stays on them."""
-    return [f"# {line}".rstrip() for line in wrap(printable(paragraph), _WIDTH - 2) or [""]]
-
-
-def _text(text: str) -> str:
-    return json.dumps(text, ensure_ascii=False)
+        return [_quantity(value, unit) for value in vector]
+    trimmed = (f"{value:.{decimals}f}".rstrip("0").rstrip(".") for value in vector)
+    return [f"{'0' if text in ('', '-0') else text} {unit}" for text in trimmed]
 
 
 def _write(lines: list[str], tree: dict[str, Any], path: tuple[str, ...], notes: dict[tuple[str, ...], str]) -> None:
@@ -335,7 +306,6 @@ def _write(lines: list[str], tree: dict[str, Any], path: tuple[str, ...], notes:
             _write(lines, value, here, notes)
         elif isinstance(value, list):
             lines.append(f"{indent}{key}: [{', '.join(value)}]{note}")
-        elif key in ("source", "center_time"):
-            lines.append(f"{indent}{key}: {_text(value)}{note}")
         else:
-            lines.append(f"{indent}{key}: {value}{note}")
+            text = json.dumps(value, ensure_ascii=False) if key in ("name", "source", "center_time") else value
+            lines.append(f"{indent}{key}: {text}{note}")

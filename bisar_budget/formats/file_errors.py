@@ -140,7 +140,10 @@ def _of_one(mono: Element, seen: Seen) -> FileErrors:
             constant = 2 * sensor.number("RangeBias") / SPEED_OF_LIGHT
             remarks.append("timing_error.constant is 2 RangeBias/c: the range of a monostatic file is half the way.")
             remarks += _decorrelation(sensor, "range bias")
-    remarks += _atmosphere(mono)
+    for name in ("TropoError", "IonoError"):
+        if (found := mono.maybe(name)) is not None:
+            values = (f"{one.tag} = {one.number():.6g}" for one in found.all("*") if not len(one.node))
+            remarks.append(f"{name} has no key in a mission: {', '.join(values)}")
     return replace(_common(whole, remarks), timing_constant=constant, at=mono.path)
 
 
@@ -230,16 +233,8 @@ def of_matrices(
 ) -> FileErrors:
     """Errors of CRSD's `ErrorParameters/SARImage`, or of SICD's `ErrorStatistics` with bistatic components.
 
-    Parameters
-    ----------
-    parameters : Element or None
-        Has `Monostatic` or `Bistatic`, or is the bistatic part itself.
-    seen : Seen
-        Both platforms.
-    names : (str, str)
-        Of the element with covariances and of that with times and frequencies.
-    clocks : (int, int)
-        Rows of both clocks' frequencies in the matrix of times and frequencies.
+    `parameters` has `Monostatic` or `Bistatic`, or is the bistatic part itself. `names` are those of the element with
+    covariances and of that with times and frequencies, `clocks` the rows of both clocks' frequencies in its matrix.
     """
     if parameters is None:
         return FileErrors(remarks=("The file declares no errors (ErrorParameters).",))
@@ -293,15 +288,4 @@ def _rest_of_sensor(sensor: Element, names: tuple[str, ...], where: str) -> list
         f"{where}/{name} = {sensor.number(name):.6g} has no key in a mission."
         for name in names
         if sensor.maybe(name) is not None and sensor.number(name) != 0
-    ]
-
-
-def _atmosphere(mono: Element) -> list[str]:
-    return [
-        f"{name} has no key in a mission: "
-        + ", ".join(
-            f"{Element(one.file, one.node).tag} = {one.number():.6g}" for one in found.all("*") if not len(one.node)
-        )
-        for name in ("TropoError", "IonoError")
-        if (found := mono.maybe(name)) is not None
     ]

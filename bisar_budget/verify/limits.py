@@ -60,25 +60,10 @@ def verify_mission(
     progress: Progress = unseen,
     mapped: MapBlocks | None = None,
 ) -> VerifiedMission:
-    """Verify every limit of a mission whose row id matches a glob.
+    """Verify every limit of a mission whose row id matches a glob, in the order of `check`.
 
-    Parameters
-    ----------
-    mission : Mission
-        As loaded.
-    only : str
-        Glob of row ids.
-    jobs : int
-        Processes; the verdicts do not depend on it.
-    progress : callable
-        Told, after each row, how many are done, and how many there are.
-    mapped : callable, optional
-        Has others form the images instead of processes here.
-
-    Returns
-    -------
-    VerifiedMission
-        Rows with a limit, in the order of `check`, and both platforms' vibration together.
+    The verdicts do not depend on the number of processes. `progress` is told, after each row, how many are done, and
+    how many there are; `mapped` has others form the images instead of processes here.
     """
     mission = mission._replace(places={})  # the parser's marks cannot go to another process, and nobody asks here
     known = cases(Study(mission))
@@ -93,11 +78,15 @@ def verify_mission(
     for row_id, verdict in found:
         rows[row_id] = verdict
         progress(len(rows), len(wanted))
+    # Of what images the verdicts are, and which keys of the file have no part in them.
+    settings, pulses = mission.simulation or Simulation(), mission.collection.pulses
+    noise = "" if settings.noise is None else " (simulation.noise is for `simulate`)"
+    given = f" (the {pulses} of collection.pulses must not alias)" if pulses else ""
     return VerifiedMission(
         file=mission.file,
         name=mission.name,
         rows=tuple(rows[row_id] for row_id in wanted),
-        conditions=", ".join(_conditions(mission)),
+        conditions=f"one point, exact ranges, {settings.window} window, no noise{noise}, pulses as needed{given}",
         changes=mission.changes,
     )
 
@@ -124,31 +113,25 @@ def _verify_row(mission: Mission, row_id: str) -> Verdict:
     return cases(Study(mission))[row_id]()
 
 
-def _conditions(mission: Mission) -> Iterator[str]:
-    """Say of what images the verdicts are, and which keys of the file have no part in them."""
-    settings = mission.simulation or Simulation()
-    yield f"one point, exact ranges, {settings.window} window"
-    yield "no noise" if settings.noise is None else "no noise (simulation.noise is for `simulate`)"
-    given = mission.collection.pulses
-    yield "pulses as needed" + (f" (the {given} of collection.pulses must not alias)" if given else "")
-
-
-def _order(one: Subject) -> tuple[int, int]:
-    """Sort key of a platform's vibrations, in the order of `check`: lines, lines together, noise."""
-    return (("sinusoidal", "sinusoidal.sum", "wideband").index(one.axis), one.entry or 0)
-
-
-def _of_tones_by_islr(study: Study) -> Iterator[tuple[Subject, Case]]:
-    """Lines of vibration where ISLR holds their power."""
+def _of_vibration(study: Study) -> dict[Subject, Case]:
+    """Lines below one cycle per aperture, lines where ISLR holds their power, and all else that vibrates."""
+    T, found = study.collection.aperture_time, dict[Subject, Case]()
     metric, limits = tone_limits(study.mission, study.allocation)
-    for name, limit in limits.items() if metric == "islr" else ():
-        T, size = study.collection.aperture_time, limit.by(study.model)
-        cycles = [line.frequency * T for line in lines_of(study.mission, name)] or [UNDECLARED_CYCLES]
-        for index, turns in enumerate(cycles):
+    for name in PLATFORMS:
+        lines = lines_of(study.mission, name)
+        for index, line in enumerate(lines):
+            if line.frequency * T < SLOWEST:
+                one = subject(name, "vibration", "sinusoidal", entry=index)
+                found[one] = partial(phase_cases.slow_vibration, study, one.id, name, line)
+        if metric != "islr" or name not in limits:
+            continue
+        size = limits[name].by(study.model)
+        for index, turns in enumerate([line.frequency * T for line in lines] or [UNDECLARED_CYCLES]):
             if turns >= SLOWEST:
                 one = subject(name, "vibration", "sinusoidal", entry=index)
                 blank = study.blank(one.id, size, "m")
-                yield one, partial(verify_spread_tone, study, blank, name, size, turns)
+                found[one] = partial(verify_spread_tone, study, blank, name, size, turns)
+    return found | dict(vibration_cases(study))
 
 
 def _of_instruments(study: Study) -> Iterator[tuple[str, Case]]:
@@ -186,16 +169,10 @@ def _cases(study: Study) -> Iterator[tuple[str, Case]]:
             yield source.id, partial(phase_cases.other, study, source)
         elif study.allowed(source)[0] is not None:
             yield source.id, partial(phase_cases.quadratic, study, source)
-    slow: dict[Subject, Case] = {}
-    for name in PLATFORMS:
-        for index, line in enumerate(lines_of(mission, name)):
-            if line.frequency * study.collection.aperture_time < SLOWEST:
-                one = subject(name, "vibration", "sinusoidal", entry=index)
-                slow[one] = partial(phase_cases.slow_vibration, study, one.id, name, line)
-    swaying = slow | dict(_of_tones_by_islr(study)) | dict(vibration_cases(study))
-    for owner in (*PLATFORMS, "mission"):
-        for one in sorted((one for one in swaying if one.owner == owner), key=_order):
-            yield one.id, swaying[one]
+    swaying, owners = _of_vibration(study), (*PLATFORMS, "mission")
+    kinds = ("sinusoidal", "sinusoidal.sum", "wideband")
+    for one in sorted(swaying, key=lambda one: (owners.index(one.owner), kinds.index(one.axis), one.entry or 0)):
+        yield one.id, swaying[one]
     yield from _of_instruments(study)
     requirements = mission.requirements
     if mission.allocation.combine == "each":
@@ -203,10 +180,8 @@ def _cases(study: Study) -> Iterator[tuple[str, Case]]:
             row_id = subject("mission", QUADRATIC).id
             yield row_id, partial(phase_cases.total, study, row_id, "mission")
     else:
-        owners = ["transmitter", "receiver", "mission"]
-        if allocation.qpe.clock is not None:
-            owners.insert(2, "clock")
-        for owner in owners:
+        clock = () if allocation.qpe.clock is None else ("clock",)
+        for owner in (*PLATFORMS, *clock, "mission"):
             row_id = subject(owner, QUADRATIC).id
             yield row_id, partial(phase_cases.total, study, row_id, owner)
     if requirements.cubic_phase_error is not None:
@@ -297,39 +272,28 @@ def _seconds(study: Study, cells: int) -> float:
 
 # ---------------------------------------------------------------------- images that a report shows
 def form_image_evidence(mission: Mission, findings: MissionFindings) -> tuple[ImageEvidence, ...]:
-    """Form the images of the rows that decide most about a verified mission.
+    """Form the images of the rows that decide most about a mission, with the verdicts of its images in `findings`.
 
-    Parameters
-    ----------
-    mission : Mission
-        As loaded.
-    findings : MissionFindings
-        About it, with the verdicts of its images.
-
-    Returns
-    -------
-    tuple of ImageEvidence
-        The worst row first; empty where no row has an image.
+    The worst row stands first; empty where no row has an image.
     """
     verdicts = rows_worth_showing(findings)
     if not verdicts:
         return ()
-    study = Study(mission, findings.analysis)
+    study, evidence = Study(mission, findings.analysis), []
     subjects = {row.id: row.subject for row in findings.rows}
-    return tuple(_evidence(study, findings.file, subjects[verdict.id], verdict) for verdict in verdicts)
-
-
-def _evidence(study: Study, file: str, subject: Subject, verdict: Verdict) -> ImageEvidence:
-    found = ImageEvidence(
-        file=file,
-        verdict=verdict,
-        look_azimuth_rad=study.geometry.look_azimuth,
-        at_limit=_shown(study.at_limit(subject, verdict.boundary_error)),
-    )
-    if verdict.boundary_autofocus is None or verdict.measured_residual_qpe_rad is None:
-        return found
-    images = study.at_limit(subject, verdict.boundary_autofocus, ROOM[study.mission.autofocus.algorithm])
-    return found._replace(before_autofocus=_shown(images), after_autofocus=_shown(study.focused(images)))
+    for verdict in verdicts:
+        of = subjects[verdict.id]
+        found = ImageEvidence(
+            file=findings.file,
+            verdict=verdict,
+            look_azimuth_rad=study.geometry.look_azimuth,
+            at_limit=_shown(study.at_limit(of, verdict.boundary_error)),
+        )
+        if verdict.boundary_autofocus is not None and verdict.measured_residual_qpe_rad is not None:
+            images = study.at_limit(of, verdict.boundary_autofocus, ROOM[mission.autofocus.algorithm])
+            found = found._replace(before_autofocus=_shown(images), after_autofocus=_shown(study.focused(images)))
+        evidence.append(found)
+    return tuple(evidence)
 
 
 def _shown(images: Responses) -> PointImage:

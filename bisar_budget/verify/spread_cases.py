@@ -57,6 +57,7 @@ _SYNCHRONIZED_DRAWS = 400  # whose fast tones are drawn too, because they are fo
 _TURNS = 100  # of a tone per aperture, beyond which it has no quadratic phase to speak of
 _SURE_SIGMA = 3.0  # standard errors of a sigma
 _IMAGES = 6
+_MOVING = ("imu", "random")  # kinds of errors that are positions of a platform; the others are phases of a clock
 _FINE = 513  # moments of a time series in an image
 _AT_ONCE = 250  # draws in memory
 _ORDER = 3  # up to which a phase moves and defocuses; the rest spreads
@@ -119,7 +120,7 @@ def vibration_cases(study: Study) -> Iterator[tuple[Subject, Case]]:
 
 
 def _sinusoidal(study: Study, blank: Verdict, limits: Mapping[str, float], declared: float | None) -> Verdict:
-    """Measure the paired echo on the difference from the error-free image, which its sidelobes would bury."""
+    """Echoes of one line of vibration at a limit, of one platform or of both in phase."""
     frequency = UNDECLARED_CYCLES / study.collection.aperture_time if declared is None else declared
     sinusoids = {name: (PathSinusoid(amplitude=size, frequency=frequency),) for name, size in limits.items()}
     who = "one platform alone" if len(limits) == 1 else "both platforms in phase"
@@ -148,7 +149,10 @@ def echo(
     *,
     is_assumed: bool = False,
 ) -> Verdict:
-    """Measure the paired echoes of sinusoids against the requirement of a verdict that is yet blank."""
+    """Measure the paired echoes of sinusoids against the requirement of a verdict that is yet blank.
+
+    They are read on the difference from the error-free image, whose sidelobes would bury them.
+    """
     collection = study.collection
     every = [sinusoid.frequency * collection.aperture_time for those in sinusoids.values() for sinusoid in those]
     slowest, cycles = min(every), max(every)
@@ -229,15 +233,12 @@ def measured_power(
 # ---------------------------------------------------------------------- sensors and clocks
 def limits_of(study: Study, error: RandomError) -> dict[str, float]:
     """Size at which each requirement that an error touches is reached, autofocus left out; empty: none limits it."""
-    model = _model(study, error)
+    model = max(
+        (one.name for one in study.models), key=lambda name: max(error.effect(name)[:2])
+    )  # that has it do more
     effect = held_effect(study.mission, error.effect(model))
     sizes = map(float, sizes_at(effect, limits_for(study.mission, study.allocation, error.owner, model)))
     return {name: size for name, size in zip(HELD, sizes, strict=True) if math.isfinite(size)}
-
-
-def _model(study: Study, error: RandomError) -> str:
-    """The gating model by which an error does more."""
-    return max((one.name for one in study.models), key=lambda name: max(error.effect(name)[:2]))
 
 
 def verify_spur(study: Study, spur: Spur, row_id: str, amplitude: float) -> Verdict:
@@ -293,8 +294,12 @@ def _phase(study: Study, blank: Verdict, error: RandomError, binding: str, rng: 
     required = study.mission.requirements.cubic_phase_error
     budget = (required or 0.0) if is_cubic else study.allocation.qpe_limit(error.owner)
     factor = study.mission.allocation.coverage_factor
-    sigma, draws = _sigma(study, error, rng, is_cubic)
-    predicted = factor * sigma
+    if error.subject.kind in _MOVING:
+        draws, found = _DRAWS, study.exact_effects(error.owner, _courses(study, error, rng))
+        predicted = factor * float(np.nanstd(found.cubic if is_cubic else found.quadratic))
+    else:
+        fit, draws = _fits(study, error, rng)
+        predicted = factor * float(np.std(2.5 * fit[3] if is_cubic else 1.5 * fit[2]))
     drawn, seen = [], []
     try:
         for errors in _series(study, error, rng):
@@ -322,7 +327,7 @@ def _place(study: Study, blank: Verdict, error: RandomError, rng: np.random.Gene
     """Sigma of the displacement at the limit, coverage factor included, against the requirement."""
     required = study.mission.requirements.location_error or 0.0
     factor, draws = study.mission.allocation.coverage_factor, _DRAWS
-    if error.subject.kind in ("imu", "random"):
+    if error.subject.kind in _MOVING:
         found = study.exact_effects(error.owner, _courses(study, error, rng))
     else:
         fit, draws = _fits(study, error, rng)
@@ -357,20 +362,26 @@ def _stream(study: Study, row_id: str) -> np.random.Generator:
     return np.random.default_rng([(study.mission.simulation or Simulation()).seed, *row_id.encode()])
 
 
-def _sigma(study: Study, error: RandomError, rng: np.random.Generator, is_cubic: bool) -> tuple[float, int]:
-    """Standard deviation of a phase over many time series, and their number. [rad]"""
-    if error.subject.kind in ("imu", "random"):
-        found = study.exact_effects(error.owner, _courses(study, error, rng))
-        return float(np.nanstd(found.cubic if is_cubic else found.quadratic)), _DRAWS
-    fit, draws = _fits(study, error, rng)
-    return float(np.std(2.5 * fit[3] if is_cubic else 1.5 * fit[2])), draws
-
-
 def _courses(study: Study, error: RandomError, rng: np.random.Generator) -> Floats:
-    """Position errors of a platform at the nodes of exact ranges, (draws, nodes, 3). [m]"""
-    if error.subject.kind == "random":  # not smooth between the nodes, as what is integrated is
-        return _smooth_noise(study, error, rng)
-    return position_courses(study.mission, error, aperture_nodes(study.collection.aperture_time), _DRAWS, rng)
+    """Position errors of a platform at the nodes of exact ranges, (draws, nodes, 3). [m]
+
+    Correlated noise is not smooth between the nodes, as what is integrated is: at the nodes alone noise of a short
+    correlation time would pass for a larger phase. What they cannot tell is taken out of it.
+    """
+    T, nodes = study.collection.aperture_time, aperture_nodes(study.collection.aperture_time)
+    if error.subject.kind != "random":
+        return position_courses(study.mission, error, nodes, _DRAWS, rng)
+    times, time = _moments(study, _FINE), process_of(study.mission, error).correlation_time
+    legendre = np.polynomial.legendre
+    fit = np.linalg.pinv(legendre.legvander(2 * times / T, SMOOTH))
+    at_nodes = legendre.legvander(2 * nodes / T, SMOOTH) @ fit
+    drawn = (position_courses(study.mission, error, times, _AT_ONCE, rng) for _ in range(_DRAWS // _AT_ONCE))
+    found = np.concatenate([at_nodes @ one for one in drawn])
+    # Samples a step Δ apart have more power at low frequencies than the noise: Δ·coth(Δ/2τ_c), not 2τ_c.
+    step = float(times[1] - times[0])
+    power = 2 * time / step * math.tanh(step / (2 * time))
+    courses: Floats = found * math.sqrt(power)
+    return courses
 
 
 def _fits(study: Study, error: RandomError, rng: np.random.Generator) -> tuple[Floats, int]:
@@ -382,25 +393,6 @@ def _fits(study: Study, error: RandomError, rng: np.random.Generator) -> tuple[F
     return np.asarray(found, float), draws
 
 
-def _smooth_noise(study: Study, error: RandomError, rng: np.random.Generator) -> Floats:
-    """Correlated noise at the nodes of exact ranges, (draws, nodes, 3), without what they cannot tell. [m]
-
-    At the nodes alone noise of a short correlation time would pass for a larger phase.
-    """
-    T, time = study.collection.aperture_time, process_of(study.mission, error).correlation_time
-    times = _moments(study, _FINE)
-    legendre = np.polynomial.legendre
-    fit = np.linalg.pinv(legendre.legvander(2 * times / T, SMOOTH))
-    at_nodes = legendre.legvander(2 * aperture_nodes(T) / T, SMOOTH) @ fit
-    drawn = (position_courses(study.mission, error, times, _AT_ONCE, rng) for _ in range(_DRAWS // _AT_ONCE))
-    found = np.concatenate([at_nodes @ one for one in drawn])
-    # Samples a step Δ apart have more power at low frequencies than the noise: Δ·coth(Δ/2τ_c), not 2τ_c.
-    step = float(times[1] - times[0])
-    power = 2 * time / step * math.tanh(step / (2 * time))
-    courses: Floats = found * math.sqrt(power)
-    return courses
-
-
 def _moments(study: Study, count: int) -> Floats:
     half = study.collection.aperture_time / 2
     moments: Floats = np.linspace(-half, half, count)
@@ -410,7 +402,7 @@ def _moments(study: Study, count: int) -> Floats:
 def _series(study: Study, error: RandomError, rng: np.random.Generator) -> list[Errors]:
     """A few time series as errors of an image, up to the cubic phase: what is left spreads, and would hide it."""
     times = _moments(study, _FINE)
-    if error.subject.kind in ("imu", "random"):
+    if error.subject.kind in _MOVING:
         courses = position_courses(study.mission, error, times, _IMAGES, rng)
         return [Errors().of(error.owner, PathError(course=Course(times, one).smooth(_ORDER))) for one in courses]
     phases = phase_courses(study.mission, error, times, _IMAGES, rng)
@@ -470,7 +462,7 @@ def _power(
         """Phases without what moves and defocuses the response."""
         phases = white * rng.standard_normal((draws, times.size))
         for error in members:
-            if error.subject.kind in ("imu", "random"):
+            if error.subject.kind in _MOVING:
                 moved = position_courses(mission, error, times, draws, rng)
                 phases += 2 * math.pi / collection.wavelength * moved @ np.array(sight_of(mission, error.owner))
             else:
@@ -523,10 +515,7 @@ class AddedIslr:
 class Mainlobe:
     """The part of an error-free response that lies within its first nulls.
 
-    Parameters
-    ----------
-    weights : (moments,) ndarray
-        Window over the aperture, at the centres of equal cells.
+    `weights` (moments,) are the window over the aperture, at the centres of equal cells.
     """
 
     def __init__(self, weights: Floats) -> None:
@@ -554,16 +543,9 @@ class Mainlobe:
 
 
 def added_islr(weights: Floats, draw: Callable[[int], Floats], required_db: float) -> AddedIslr:
-    """Draw phases until their interval has one verdict against what is required, or there are too many.
+    """ISLR that phases add; they are drawn until their interval has one verdict, or there are too many.
 
-    Parameters
-    ----------
-    weights : (moments,) ndarray
-        Window over the aperture.
-    draw : callable
-        Gives so many phases, (draws, moments). [rad]
-    required_db : float
-        ISLR that may be added.
+    `weights` (moments,) are the window over the aperture; `draw` gives so many phases, (draws, moments). [rad]
     """
     mainlobe = Mainlobe(weights)
     lost: Floats = np.empty(0)
