@@ -26,7 +26,7 @@ _MODULES = {
     "import": "mission_files",
     "init": "mission_files",
     "schema": "mission_files",
-    "sensitivity": "sensitivity",
+    "sensitivity": "solve",
     "sensors": "sensors",
     "simulate": "simulate",
     "solve": "solve",
