@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from bisar_budget import units
 from bisar_budget.design.quantities import QuestionError
 from bisar_budget.effects.effect import MOTION, PLATFORMS
-from bisar_budget.geometry import STILL, BistaticGeometry, PlatformState, norm
+from bisar_budget.geometry import STILL, BistaticGeometry, norm
 from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.covariance import EIGENVALUE_TOLERANCE, KINDS, Covariance, error_index
 from bisar_budget.mission.instruments import RISE, STEEPEST, Imu, PowerLaw
@@ -32,12 +32,10 @@ from bisar_budget.mission.platforms import (
     FARTHEST_BY,
     LEAST_BASELINE,
     CommonMotionError,
-    MotionError,
     Platform,
     least_baseline,
 )
 from bisar_budget.mission.readers import ListOf, OneOf, Quantity, Reader, Section, Triple
-from bisar_budget.ranges.exact_ranges import Floats
 from bisar_budget.units import Dimension, parse_quantity
 
 # Sections that a file may leave out, and keys whose scalar stands for each of three axes.
@@ -58,8 +56,7 @@ POWERS = dict(zip(("h-2", "h-1", "h0", "h1", "h2"), PowerLaw._fields, strict=Tru
 
 def varied(mission: Mission, key: str, number: Any) -> Mission:
     """Put a number, or an array of numbers, into a mission in the place of a key."""
-    found: Mission = _with_value(mission, parts_of(key), number)
-    return found
+    return cast(Mission, _with_value(mission, parts_of(key), number))
 
 
 def _with_value(value: Any, parts: Sequence[str], number: Any) -> Any:
@@ -72,8 +69,10 @@ def _with_value(value: Any, parts: Sequence[str], number: Any) -> Any:
     if part.isdigit():
         place = int(part)
         return (*value[:place], _with_value(value[place], rest, number), *value[place + 1 :])
-    if part in _CURVES:
-        return value._replace(**{part: _with_point(getattr(value, part), part, ".".join(rest), number)})
+    if part in _CURVES:  # another ordinate at one of its points
+        here = parse_quantity(".".join(rest), _CURVES[part])
+        points = tuple((at, number if at == here else ordinate) for at, ordinate in getattr(value, part))
+        return value._replace(**{part: points})
     part = POWERS.get(part, part)
     below = getattr(value, part)
     if below is None and rest:
@@ -81,12 +80,6 @@ def _with_value(value: Any, parts: Sequence[str], number: Any) -> Any:
     if below is None and part in _TRIPLES:
         below = ()
     return value._replace(**{part: _with_value(below, rest, number)})
-
-
-def _with_point(curve: Sequence[tuple[float, Any]], name: str, point: str, number: Any) -> Any:
-    """A curve with another ordinate at one of its points."""
-    here = parse_quantity(point, _CURVES[name])
-    return tuple((at, number if at == here else ordinate) for at, ordinate in curve)
 
 
 def _with_element(covariance: Covariance, parts: Sequence[str], number: Any) -> Covariance:
@@ -119,29 +112,24 @@ def is_held(mission: Mission, key: str, *, is_stated: bool) -> bool:
     if section == "platforms":
         platform: Platform = getattr(mission.platforms, parts[0])
         if parts[1] == "motion_error":
-            return _is_held_of_error(platform.motion_error, parts[2:], is_stated)
+            kind, covariance = parts[2], platform.motion_error.covariance
+            if kind in MOTION:
+                return kind == "acceleration" or covariance is None  # which replaces the others
+            if kind == "covariance" and covariance is not None:
+                return is_stated and not covariance.is_matrix  # an element of a matrix has a twin
+            return is_stated or kind == "imu"
         if parts[1] == "oscillator":
             if platform.oscillator is None or (parts[2] == "frequency" and platform.oscillator.sensor is not None):
                 return False  # a part holds at the frequency of its own
             return is_stated or parts[2] in ("frequency", "bandwidth")
-        return not flies_on_earth(mission) and _is_held_of_path(platform, parts[1], is_stated)
+        if flies_on_earth(mission):
+            return False
+        if parts[1] == "speed":
+            return is_stated and platform.motion_azimuth is not None  # a fixed one has no direction
+        return is_stated or (parts[1] == "climb" and platform.slant_range is not None)
     if key == "collection.aperture_time" or (section == "scene" and parts[0] in PLACE_KEYS):
         return not flies_on_earth(mission)
     return is_stated or section in _FREE or key in _FREE
-
-
-def _is_held_of_error(error: MotionError, parts: Sequence[str], is_stated: bool) -> bool:
-    if parts[0] in MOTION:
-        return parts[0] == "acceleration" or error.covariance is None  # which replaces the others
-    if parts[0] == "covariance" and error.covariance is not None:
-        return is_stated and not error.covariance.is_matrix  # an element of a matrix has a twin
-    return is_stated or parts[0] == "imu"
-
-
-def _is_held_of_path(platform: Platform, name: str, is_stated: bool) -> bool:
-    if name == "speed":
-        return is_stated and platform.motion_azimuth is not None  # a fixed one has no direction
-    return is_stated or (name == "climb" and platform.slant_range is not None)
 
 
 # Sections and keys that a file may leave out and that may be stated by themselves.
@@ -170,16 +158,11 @@ def is_image(mission: Mission, geometries: BistaticGeometry, cases: int) -> NDAr
     is_one &= ~np.asarray(still)
     for spans in geometries.spans_ground(SAFE):
         is_one &= spans
-    if mission.has_direct_path:
-        is_one &= _has_baseline(geometries.apart, np.broadcast_to(half, (cases,)))
+    if mission.has_direct_path:  # there is a path to follow
+        apart, halves = geometries.apart, np.broadcast_to(half, (cases,))
+        least = np.maximum(LEAST_BASELINE, apart.travelled(halves) / FARTHEST_BY)
+        is_one &= np.asarray(least_baseline(apart, halves) > SAFE * least)
     return is_one & (np.asarray(mission.radar.bandwidth) * SAFE < 2 * np.asarray(mission.radar.center_frequency))
-
-
-def _has_baseline(apart: PlatformState, half: Floats) -> NDArray[np.bool_]:
-    """Whether there is a direct path to follow, with room to spare."""
-    return np.asarray(
-        least_baseline(apart, half) > SAFE * np.maximum(LEAST_BASELINE, apart.travelled(half) / FARTHEST_BY)
-    )
 
 
 def _has_possible_figures(mission: Mission, cases: int) -> NDArray[np.bool_]:
@@ -218,12 +201,8 @@ _ACCEPTED = (
 def scaled(mission: Mission, key: str, factor: Any) -> Mission:
     """Multiply every error that stands below a key: amplitudes and sigmas, those of parts of the catalogue too.
 
-    Frequencies, correlation times and correlations stay. The factor may be an array (cases,).
-
-    Raises
-    ------
-    QuestionError
-        The key holds no errors, or the mission states none there.
+    Frequencies, correlation times and correlations stay. The factor may be an array (cases,). A `QuestionError` says
+    that the key holds no errors, or that the mission states none there.
     """
     parts = parts_of(key)
     if not any(part in _ERRORS for part in parts[:3]):

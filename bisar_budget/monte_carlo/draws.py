@@ -23,7 +23,7 @@ from bisar_budget.constants import SPEED_OF_LIGHT, UTILIZATION_TOLERANCE
 from bisar_budget.effects.effect import CLOCK_UNITS, PLATFORMS, ErrorSource
 from bisar_budget.faults import printable
 from bisar_budget.memory import is_spacious
-from bisar_budget.ranges.exact_ranges import STILL, ExactRanges, Floats, Found, Truths, followed
+from bisar_budget.ranges.exact_ranges import STILL, ExactRanges, Floats, Found, followed
 
 if TYPE_CHECKING:
     from bisar_budget.workers import MapBlocks
@@ -65,11 +65,6 @@ class HeldSum(NamedTuple):
     limit: float
     owners: tuple[str, ...]
     columns: tuple[int, ...]  # of the effects: one phase, or east and north
-
-    def holds(self, square: Floats) -> Truths:
-        """Whether sums whose squares are given are within the limit."""
-        held: Truths = square <= (self.limit * (1 + UTILIZATION_TOLERANCE)) ** 2
-        return held
 
 
 class DrawsPiece(NamedTuple):
@@ -134,15 +129,14 @@ def drawing_of(
     given = (analysis.mission.name, tuple(variables), tuple(judged), analysis.exact)
     drawing = Drawing(*given, draws, seed, False, CHUNK)
     is_exact = bool(variables and judged) and _needs_exact_ranges(drawing)
-    drawn = tuple(variable for variable in variables if _counts(variable, judged, is_exact))
-    return drawing._replace(variables=drawn, is_exact=is_exact)
 
+    def counts(variable: Variable) -> bool:
+        """Whether it does anything that is judged; each has a stream of its own, so that none misses it."""
+        if is_exact and variable.parts:
+            return any(size for _, size in variable.parts)
+        return any(variable.effects[column] for one in judged for column in one.columns)
 
-def _counts(variable: Variable, judged: Sequence[HeldSum], is_exact: bool) -> bool:
-    """Whether a variable does anything that is judged; each has a stream of its own, so that none misses it."""
-    if is_exact and variable.parts:
-        return any(size for _, size in variable.parts)
-    return any(variable.effects[column] for one in judged for column in one.columns)
+    return drawing._replace(variables=tuple(filter(counts, variables)), is_exact=is_exact)
 
 
 def joined(tallies: Iterable[Tally], count: int) -> Counted:
@@ -185,16 +179,8 @@ class Sums:
 
     By owner, if kept: `motion` is position, velocity and acceleration error of both platforms, (2, 3, 3, draws),
     `clock` its coefficients (4, draws), `alone` what is known by its effects only: quadratic and cubic phase,
-    displacement east and north (4, draws).
-
-    Parameters
-    ----------
-    drawing : Drawing
-        Says what will be added, and what will be asked for.
-    size : int
-        Draws.
-    adds, keeps_motion : bool
-        Whether `square`, and whether `exact_square` will be asked for.
+    displacement east and north (4, draws). Where it `adds`, `square` can be asked for, where it `keeps_motion`,
+    `exact_square`.
     """
 
     def __init__(self, drawing: Drawing, size: int, *, adds: bool, keeps_motion: bool) -> None:
@@ -325,7 +311,8 @@ class Drawer:
             together = np.ones(size, dtype=bool)
             for index, one in enumerate(drawing.judged):
                 square = sums.exact_square(one) if drawing.is_exact else sums.square(one)
-                held = one.holds(square)  # what has no image holds nothing: it is not a number
+                # What has no image holds nothing: it is not a number.
+                held = square <= (one.limit * (1 + UTILIZATION_TOLERANCE)) ** 2
                 holds[index] += int(np.count_nonzero(held))
                 if drawing.is_exact:
                     square = square[np.isfinite(square)]

@@ -48,8 +48,6 @@ def monte_carlo(
 
     Parameters
     ----------
-    analysis : Analysis
-        Of the mission.
     draws : int
         From 1 to `MAX_DRAWS`; memory does not grow with it.
     seed : int, optional
@@ -92,15 +90,6 @@ def monte_carlo(
     )
 
 
-def _distribution(mission: Mission, source: ErrorSource) -> str:
-    if source.owner in PLATFORMS:
-        return str(getattr(mission.platforms, source.owner).motion_error.distribution)
-    if source.is_common and mission.common_motion_error is not None:
-        return mission.common_motion_error.distribution
-    # A clock's values are one sigma, as the coverage factor on them says; what has none is a bound.
-    return "normal" if source.owner == "clock" else "bound"
-
-
 def _variables(analysis: Analysis) -> Iterator[Variable]:
     mission, full = analysis.mission, analysis.full
     factor = mission.allocation.coverage_factor
@@ -114,7 +103,12 @@ def _variables(analysis: Analysis) -> Iterator[Variable]:
             parts = [(s, (s.declared or 0.0) * vectors[i][index] * scale) for i, s in enumerate(members)]
             yield _variable(f"{group.id}.{index}", group.id, group.platform, "normal", parts, full)
     for source in left.values():
-        distribution = _distribution(mission, source)
+        # A clock's values are one sigma, as the coverage factor on them says; what has none is a bound.
+        distribution = "normal" if source.owner == "clock" else "bound"
+        if source.owner in PLATFORMS:
+            distribution = getattr(mission.platforms, source.owner).motion_error.distribution
+        elif source.is_common and mission.common_motion_error is not None:
+            distribution = mission.common_motion_error.distribution
         is_covered = source.owner != "mission" or source.is_common
         size = abs(source.declared or 0.0) / (factor if is_covered else 1.0)
         if distribution == "uniform":
@@ -207,25 +201,14 @@ class _Predictions:
                 found[variable.of] = found.get(variable.of, 0.0) + square
         return found
 
-    def is_normal(self, name: str) -> bool:
-        """Whether an error has a normal distribution; a covariance, which is no single variable, always has."""
-        return all(v.distribution == "normal" for v in self.variables if v.id == name)
-
     def probability_normal(self, judged: HeldSum) -> float:
         """Probability that a normal distribution with these variances stays within the limit."""
         members = [variable.effects for variable in self.variables if variable.owner in judged.owners]
-        covariance = [
-            math.fsum(effects[a] * effects[b] for effects in members)
-            for a, b in ((judged.columns[0],) * 2, (judged.columns[-1],) * 2, (judged.columns[0], judged.columns[-1]))
-        ]
-        return (
-            _within(judged.limit, *covariance) if len(judged.columns) == 2 else _between(judged.limit, covariance[0])
-        )
-
-
-def _between(limit: float, variance: float) -> float:
-    """Probability that a normal variable about zero lies within ±limit."""
-    return math.erf(limit / math.sqrt(2 * variance)) if variance else 1.0
+        a, b = judged.columns[0], judged.columns[-1]
+        xx, yy, xy = (math.fsum(one[i] * one[j] for one in members) for i, j in ((a, a), (b, b), (a, b)))
+        if len(judged.columns) == 2:
+            return _within(judged.limit, xx, yy, xy)
+        return math.erf(judged.limit / math.sqrt(2 * xx)) if xx else 1.0
 
 
 def _within(radius: float, xx: float, yy: float, xy: float) -> float:
@@ -284,7 +267,9 @@ def _requirement(
 
 def _doubts(found: Requirement, holds: int, draws: int, predictions: _Predictions) -> Iterator[str]:
     """Say where root-sum-square and the normal distribution do not describe the sum."""
-    if found.dominant_share > DOMINANT and not predictions.is_normal(found.dominant):
+    # A covariance, which is no single variable, is always normal.
+    is_normal = all(v.distribution == "normal" for v in predictions.variables if v.id == found.dominant)
+    if found.dominant_share > DOMINANT and not is_normal:
         yield (
             f"{found.dominant}, which is not normal, has {100 * found.dominant_share:.3g} % of the variance: the "
             "sum has its shape, and no multiple of sigma is the bound it would be of a normal distribution"
