@@ -28,10 +28,10 @@ _MODULES = {
     "schema": "mission_files",
     "sensitivity": "solve",
     "sensors": "sensors",
-    "simulate": "simulate",
+    "simulate": "images",
     "solve": "solve",
     "sweep": "sweep",
-    "verify": "verify",
+    "verify": "images",
 }
 _FRUGAL = ("init", "schema")  # without NumPy
 

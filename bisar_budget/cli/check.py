@@ -11,6 +11,7 @@ import click
 from click.core import ParameterSource
 
 from bisar_budget import __version__
+from bisar_budget.cli.long_work import check_draws, drawn_by
 from bisar_budget.cli.options import (
     DAY_OF_RUN,
     FILE,
@@ -264,10 +265,7 @@ def check(
     given = click.get_current_context().get_parameter_source
     if seed is not None and draws is None and given("seed") is ParameterSource.COMMANDLINE:
         raise click.UsageError("--seed needs --monte-carlo N.")
-    if draws is not None or scheduler is not None:
-        from bisar_budget.cli.shared_work import check_draws
-
-        check_draws(draws, scheduler)
+    check_draws(draws, scheduler)
     if explain is not None:
         excluded = ("format_name", "reports", "draws", "scheduler", "swept")
         if any(given(name) is ParameterSource.COMMANDLINE for name in excluded):
@@ -300,8 +298,6 @@ def check(
         deliver(joined(format_name, pieces, __version__, style), output, format_name)
         statuses = {piece.status for piece in pieces}
     else:
-        from bisar_budget.cli.shared_work import drawn_by
-
         with drawn_by(scheduler, patience, draws, seed, len(files)) as drawn:
             report = check_all(files, judged_on, model, verifying, illustrated, drawn, changes, from_outside)
         # The day that somebody gave, or that decides: with no other a report is reproducible.
@@ -389,7 +385,7 @@ def _with_images(
     """Add the verdicts of images, and the images of the rows that decide most."""
     from bisar_budget.budget.check import without_analysis
     from bisar_budget.budget.verdicts import with_verdicts
-    from bisar_budget.cli.verify import verify_all
+    from bisar_budget.cli.images import verify_all
     from bisar_budget.findings.mission import MissionFindings
 
     usable = {place: found for place, found in enumerate(missions) if isinstance(found, MissionFindings)}

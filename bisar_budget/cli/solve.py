@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from bisar_budget.cli.long_work import FORMING, foretell, watched, watched_checks
 from bisar_budget.cli.options import DATE, FILE, MISSIONS, MODEL, OUTPUT, SET, TEXT_OR_JSON, day, outside
 from bisar_budget.cli.streams import (
     EXIT_BROKEN,
@@ -20,7 +21,6 @@ from bisar_budget.cli.streams import (
     spare,
     write_file,
 )
-from bisar_budget.cli.waiting import FORMING, foretell, watched, watched_checks
 
 if TYPE_CHECKING:
     from bisar_budget.design.compare import Comparison
@@ -130,7 +130,7 @@ def _answers(
 
 def _imaged(mission: "Mission", found: "Solution | Comparison", model: str | None) -> "Solution | Comparison":
     """Add what images say of the solution."""
-    from bisar_budget.cli.verify import faster
+    from bisar_budget.cli.images import faster
     from bisar_budget.design.imaged import imaged, to_image
 
     asked = to_image(mission, found, model)

@@ -8,8 +8,8 @@ from functools import partial
 import click
 
 from bisar_budget import __version__
+from bisar_budget.cli.long_work import watched
 from bisar_budget.cli.streams import fail
-from bisar_budget.cli.waiting import watched
 from bisar_budget.design.cases import Cases, Grid, grid
 from bisar_budget.design.quantities import QuestionError, tree_of
 from bisar_budget.design.sweep import sweep

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 import click
 
 from bisar_budget import __version__
+from bisar_budget.cli.long_work import foreseen, foretell, kept, lasting, watched, workers_of
 from bisar_budget.cli.options import DATE, FILE, MODEL, SET, day, outside, scheduler_options
-from bisar_budget.cli.shared_work import kept, workers_of
 from bisar_budget.cli.streams import (
     EXIT_BROKEN,
     complain,
@@ -27,7 +27,6 @@ from bisar_budget.cli.streams import (
     spare,
     write_file,
 )
-from bisar_budget.cli.waiting import foreseen, foretell, lasting, watched
 from bisar_budget.faults import printable
 from bisar_budget.resources import cores
 

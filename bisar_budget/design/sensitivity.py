@@ -409,7 +409,7 @@ def stated_numbers(tree: dict[str, Any], nearest_m: float) -> tuple[list[Stated]
         elif isinstance(reader, Quantity) and isinstance(value, str):
             found = _stated(as_number(key, reader, value), value, nearest_m, above)
             (numbers if isinstance(found, Stated) else skipped).append(found)  # type: ignore[arg-type]
-        elif reason := _no_number(key, reader, value):
+        elif reason := _no_number(key, reader):
             skipped.append(Skipped(key, ", ".join(map(str, value if isinstance(value, list) else [value])), reason))
     return numbers, skipped
 
@@ -458,19 +458,16 @@ def _stated(number: Number, text: str, nearest_m: float, shares: Mapping[str, An
     return Stated(number, text, value, step, 0.01 * value, "1 %", others=others)
 
 
-def _no_number(key: str, reader: Reader, value: Any) -> str:
+def _no_number(key: str, reader: Reader) -> str:
     """Say what a key holds instead of a number; empty for names and remarks, which change nothing."""
-    if isinstance(reader, Whole | Version):
-        return "is a whole number"
-    if isinstance(reader, Choice):
-        return "is a choice"
-    if key.rpartition(".")[2] == "sensor" or ".sensor." in key:
-        return "is a part of the catalogue; solve --for compares parts"
-    if key == "collection.center_time":
-        return "is an instant"
-    if key.endswith(".correlation"):
-        return "is a matrix: its elements do not change alone"
-    return ""
+    kinds = (
+        ("is a whole number", isinstance(reader, Whole | Version)),
+        ("is a choice", isinstance(reader, Choice)),
+        ("is a part of the catalogue; solve --for compares parts", "sensor" in key.split(".")),
+        ("is an instant", key == "collection.center_time"),
+        ("is a matrix: its elements do not change alone", key.endswith(".correlation")),
+    )
+    return next((words for words, is_so in kinds if is_so), "")
 
 
 # ---------------------------------------------------------------- shares that follow what is declared

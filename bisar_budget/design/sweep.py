@@ -159,10 +159,9 @@ class Asked:
             words = [SetValue(key, values[key][0]) for key in self.question.choices]
             try:
                 self.table.variation.at({number: float(values[number.key][0])}, words)
+                return
             except MissionError as error:
                 problems.add(f"{error.faults[0].key} {_said(error.faults[0])}")
-            else:
-                return
         if len(problems) == 1:
             raise QuestionError(f"{number.key}: no value of it makes a mission: {problems.pop()}")
 

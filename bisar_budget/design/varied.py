@@ -60,7 +60,7 @@ def varied(mission: Mission, key: str, number: Any) -> Mission:
 
 
 def _with_value(value: Any, parts: Sequence[str], number: Any) -> Any:
-    """The same below a value; a scalar for each axis goes into all."""
+    """Put a number into a value, below some keys of it; a scalar for each axis goes into all."""
     if not parts:
         return (number, number, number) if isinstance(value, tuple) else number
     if isinstance(value, Covariance):

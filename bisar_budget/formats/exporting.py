@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from bisar_budget import __version__
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.faults import printable
+from bisar_budget.formats.collected import ADDED, KINDS, correlated
 from bisar_budget.formats.containers import check_extra
-from bisar_budget.formats.file_errors import ADDED, KINDS, correlated
 from bisar_budget.geometry import Axes, PlatformState, Vector
 from bisar_budget.mission.model import Mission, Simulation, has_instruments
 from bisar_budget.paths.earth import Geodetic, SceneAxes, axes_at, geodetic

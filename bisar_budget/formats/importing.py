@@ -15,15 +15,17 @@ from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.faults import printable, shown
 from bisar_budget.formats.collected import (
     LONGEST,
+    FileErrors,
     Imported,
     NoPathError,
     ReferenceGeometry,
     Seen,
     fitted,
+    of_matrices,
+    of_sigmas,
     reference_of,
 )
 from bisar_budget.formats.containers import Container, Element, FormatError, check_extra, open_container
-from bisar_budget.formats.file_errors import FileErrors, of_matrices, of_sigmas
 from bisar_budget.geometry import PlatformState, Vector
 from bisar_budget.paths.earth import SceneAxes, axes_at, geodetic
 from bisar_budget.paths.flight import Fitted
@@ -495,12 +497,7 @@ def _imported(
         receiver=seen.receiver,
         is_monostatic=is_monostatic,
         reference=reference,
-        transmitter_error=errors.transmitter,
-        receiver_error=errors.receiver,
-        common_error=errors.common,
-        timing_constant=errors.timing_constant,
-        timing_linear=errors.timing_linear,
-        errors_at=errors.at,
+        errors=errors,
         remarks=(*([f"{unused.capitalize()}."] if unused else []), *remarks, *errors.remarks),
         unused=unused,
     )

@@ -254,7 +254,7 @@ class Sums:
         return square
 
     def exact_square(self, judged: HeldSum) -> Floats:
-        """The same by exact ranges; not a number for a draw without an image."""
+        """Square of it by exact ranges, (draws,); not a number for a draw without an image."""
         owners = judged.owners
         if owners not in self._exact:
             self._exact[owners] = self._by_exact_ranges(owners)
@@ -364,7 +364,7 @@ def _fill_normal(generator: np.random.Generator, out: Floats) -> None:
 
 @cache
 def _compiled() -> Callable[[np.random.Generator, Floats], None]:
-    """The same, compiled where Numba is there, has room and can keep what it compiles."""
+    """Filling by compiled code, where Numba is there, has room and can keep what it compiles."""
     if not is_spacious():
         return _fill_normal
     try:
@@ -377,7 +377,7 @@ def _compiled() -> Callable[[np.random.Generator, Floats], None]:
 
 
 def _fill_each(generator: np.random.Generator, out: Floats) -> None:
-    """What Numba compiles: normal draws, those of NumPy to the last bit, in two thirds of the time."""
+    """Fill with normal draws, compiled by Numba: those of NumPy to the last bit, in two thirds of the time."""
     for index in range(out.size):
         out[index] = generator.standard_normal()
 

@@ -152,7 +152,7 @@ def _variable(
 def _requirements(
     mission: Mission, allocation: Allocation, variables: Sequence[Variable], *, is_placed: bool
 ) -> Iterator[HeldSum]:
-    """Those of `check` that declared errors count against; the location where it is known (`is_placed`)."""
+    """Requirements of `check` that declared errors count against; the location where it is known (`is_placed`)."""
     present = {variable.owner for variable in variables}
     every = ("transmitter", "receiver", "clock", "mission")
     wanted = {
