@@ -42,7 +42,7 @@ class MissingExtraError(Exception):
 def check_extra() -> None:
     """Raise a `MissingExtraError` where the extra `formats` is not installed."""
     try:
-        for module in ("lxml.etree", "sarkit.cphd"):
+        for module in ("lxml.etree", "sarkit", "sarkit.cphd"):
             import_module(module)
     except ImportError:
         raise MissingExtraError from None

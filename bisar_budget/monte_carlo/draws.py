@@ -11,7 +11,6 @@ the draws.
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -109,19 +108,6 @@ class Tally(NamedTuple):
     all_hold: int
 
 
-@dataclass(frozen=True, slots=True)
-class Counted:
-    """Counts and mean squares of all draws.
-
-    For each requirement the draws in which it held and the mean square, over draws that have an image; the draws in
-    which all held.
-    """
-
-    holds: list[int]
-    mean_squares: list[float]
-    all_hold: int
-
-
 def drawing_of(
     analysis: Analysis, variables: Sequence[Variable], judged: Sequence[HeldSum], draws: int, seed: int
 ) -> Drawing:
@@ -139,8 +125,12 @@ def drawing_of(
     return drawing._replace(variables=tuple(filter(counts, variables)), is_exact=is_exact)
 
 
-def joined(tallies: Iterable[Tally], count: int) -> Counted:
-    """Join what pieces give about so many requirements, in any order: integers, and fractions that do not round."""
+def joined(tallies: Iterable[Tally], count: int) -> tuple[list[int], list[float], int]:
+    """Join what pieces give about so many requirements, in any order: integers, and fractions that do not round.
+
+    For each requirement the draws in which it held and the mean square, over draws that have an image; the draws in
+    which all held.
+    """
     holds, imaged, all_hold = [0] * count, [0] * count, 0
     squares = [Fraction()] * count
     for tally in tallies:
@@ -150,7 +140,7 @@ def joined(tallies: Iterable[Tally], count: int) -> Counted:
             imaged[index] += tally.imaged[index]
             squares[index] += Fraction(tally.squares[index])
     means = [float(square / number) if number else math.nan for square, number in zip(squares, imaged, strict=True)]
-    return Counted(holds, means, all_hold)
+    return holds, means, all_hold
 
 
 Share = Callable[[Drawing], Iterable[tuple[DrawsPiece, Tally]]]  # gives every piece once, in any order

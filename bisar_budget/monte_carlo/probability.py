@@ -69,20 +69,19 @@ def monte_carlo(
     is_placed = not any(displaces_unknown(error) for error in analysis.random)
     judged = list(_requirements(mission, analysis.allocation, variables, is_placed=is_placed))
     drawing = drawing_of(analysis, variables, judged, draws, seed)
-    counted = joined((tally for _, tally in (share or in_turn)(drawing)), len(judged))
+    holds, mean_squares, all_hold = joined((tally for _, tally in (share or in_turn)(drawing)), len(judged))
     predictions = _Predictions(analysis, variables)
     requirements = tuple(
-        _requirement(one, holds, mean_square, draws, predictions)
-        for one, holds, mean_square in zip(judged, counted.holds, counted.mean_squares, strict=True)
+        _requirement(*one, draws, predictions) for one in zip(judged, holds, mean_squares, strict=True)
     )
-    low, high = _wilson(counted.all_hold, draws, _QUANTILE) if judged else (None, None)
+    low, high = _wilson(all_hold, draws, _QUANTILE) if judged else (None, None)
     return MonteCarlo(
         draws=draws,
         seed=seed,
         model="full",
         confidence=CONFIDENCE,
         requirements=requirements,
-        probability=counted.all_hold / draws if judged else None,
+        probability=all_hold / draws if judged else None,
         probability_low=low,
         probability_high=high,
         is_exact=drawing.is_exact,
