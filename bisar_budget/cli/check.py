@@ -11,7 +11,6 @@ import click
 from click.core import ParameterSource
 
 from bisar_budget import __version__
-from bisar_budget.cli.long_work import check_draws, drawn_by
 from bisar_budget.cli.options import (
     DAY_OF_RUN,
     FILE,
@@ -265,7 +264,10 @@ def check(
     given = click.get_current_context().get_parameter_source
     if seed is not None and draws is None and given("seed") is ParameterSource.COMMANDLINE:
         raise click.UsageError("--seed needs --monte-carlo N.")
-    check_draws(draws, scheduler)
+    if draws is not None or scheduler is not None:
+        from bisar_budget.cli.long_work import check_draws
+
+        check_draws(draws, scheduler)
     if explain is not None:
         excluded = ("format_name", "reports", "draws", "scheduler", "swept")
         if any(given(name) is ParameterSource.COMMANDLINE for name in excluded):
@@ -298,6 +300,8 @@ def check(
         deliver(joined(format_name, pieces, __version__, style), output, format_name)
         statuses = {piece.status for piece in pieces}
     else:
+        from bisar_budget.cli.long_work import drawn_by
+
         with drawn_by(scheduler, patience, draws, seed, len(files)) as drawn:
             report = check_all(files, judged_on, model, verifying, illustrated, drawn, changes, from_outside)
         # The day that somebody gave, or that decides: with no other a report is reproducible.
