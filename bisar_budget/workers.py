@@ -4,6 +4,7 @@ import os
 import signal
 import threading
 import warnings
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -31,17 +32,8 @@ def unseen(done: int, total: int) -> None:
 def worker_pool(count: int, start: str | None = None) -> Iterator[ProcessPoolExecutor]:
     """Give a pool of processes that leaves none behind.
 
-    Parameters
-    ----------
-    count : int
-        Processes.
-    start : str, optional
-        `spawn` for fresh interpreters: a fork would copy the threads of a numerical library half way.
-
-    Raises
-    ------
-    WorkerLostError
-        Something ended a worker: the system does when memory runs out.
+    `start` is `spawn` for fresh interpreters: a fork would copy the threads of a numerical library half way. A
+    `WorkerLostError` says that something ended a worker: the system does when memory runs out.
     """
     others = set(threading.enumerate())
     pool = ProcessPoolExecutor(count, mp_context=get_context(start), initializer=_begin)
@@ -59,6 +51,25 @@ def worker_pool(count: int, start: str | None = None) -> Iterator[ProcessPoolExe
             raise WorkerLostError("a worker process was ended from outside, as when memory runs out") from None
         raise
     pool.shutdown()
+
+
+def in_processes(count: int) -> MapBlocks:
+    """Processes of its own for blocks, which come in their order; none is far ahead of what has been asked for."""
+
+    def mapped(
+        function: Callable[[Any, Any], Any], common: Any, blocks: Iterable[Any], about: Callable[[Any], str]
+    ) -> Iterator[tuple[Any, Any]]:
+        with worker_pool(count, "spawn") as pool:
+            waiting: deque[tuple[Any, Any]] = deque()
+            for block in blocks:
+                waiting.append((block, pool.submit(function, common, block)))
+                if len(waiting) > 3 * count:
+                    first, future = waiting.popleft()
+                    yield first, future.result()
+            for left, future in waiting:
+                yield left, future.result()
+
+    return mapped
 
 
 def _begin() -> None:

@@ -26,12 +26,12 @@ _MODULES = {
     "import": "mission_files",
     "init": "mission_files",
     "schema": "mission_files",
-    "sensitivity": "sensitivity",
+    "sensitivity": "solve",
     "sensors": "sensors",
-    "simulate": "simulate",
+    "simulate": "images",
     "solve": "solve",
     "sweep": "sweep",
-    "verify": "verify",
+    "verify": "images",
 }
 _FRUGAL = ("init", "schema")  # without NumPy
 
@@ -86,7 +86,9 @@ class _Commands(click.Group):
                 fail(f"cannot write standard output: {error.strerror}")
             if error.errno in (errno.EMFILE, errno.ENFILE, errno.EAGAIN):
                 fail(f"the system refuses: {error.strerror}")
-            if not _has_folder():
+            try:
+                os.getcwd()
+            except OSError:
                 fail("the current folder is gone; a name that does not start with / leads nowhere")
             _own_fault(error)
         except ClusterError as error:
@@ -97,15 +99,6 @@ class _Commands(click.Group):
             _own_fault(error)
         finally:
             release_files()
-
-
-def _has_folder() -> bool:
-    """Whether the folder that relative names start from is still there."""
-    try:
-        os.getcwd()
-    except OSError:
-        return False
-    return True
 
 
 def _own_fault(error: BaseException) -> NoReturn:

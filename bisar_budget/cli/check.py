@@ -257,6 +257,7 @@ def check(
     from bisar_budget.report import Style, joined, piece
 
     written = [(name, _format_of(name)) for name in reports]
+    formats = [format_name, *(its_format for _, its_format in written)]
     files = expand(missions)
     folders = [_folder_of_pictures(name, its_format) for name, its_format in [*written, (output or "-", format_name)]]
     spare(files, [output, *reports, _step_summary(format_name)], [*filter(None, folders)])
@@ -264,7 +265,7 @@ def check(
     if seed is not None and draws is None and given("seed") is ParameterSource.COMMANDLINE:
         raise click.UsageError("--seed needs --monte-carlo N.")
     if draws is not None or scheduler is not None:
-        from bisar_budget.cli.shared_work import check_draws
+        from bisar_budget.cli.long_work import check_draws
 
         check_draws(draws, scheduler)
     if explain is not None:
@@ -279,8 +280,8 @@ def check(
     if swept:
         from bisar_budget.cli.studies import check_options
 
-        check_options(swept, [format_name, *(name for _, name in written)])
-    illustrated = any(FORMATS[name].is_illustrated for name in (format_name, *(name for _, name in written)))
+        check_options(swept, formats)
+    illustrated = any(FORMATS[name].is_illustrated for name in formats)
     judged_on, from_outside = day(today), outside(today)
     use_color = color == "always" or (color == "auto" and output is None and wants_color())
     verbosity = -1 if quiet else 1 if verbose else 0
@@ -299,11 +300,14 @@ def check(
         deliver(joined(format_name, pieces, __version__, style), output, format_name)
         statuses = {piece.status for piece in pieces}
     else:
-        from bisar_budget.cli.shared_work import drawn_by
+        from bisar_budget.cli.long_work import drawn_by
 
         with drawn_by(scheduler, patience, draws, seed, len(files)) as drawn:
             report = check_all(files, judged_on, model, verifying, illustrated, drawn, changes, from_outside)
-        shown_day = _given_day(today) or (judged_on if _has_waivers(report.missions) else None)
+        # The day that somebody gave, or that decides: with no other a report is reproducible.
+        is_given = today is not None or os.environ.get("SOURCE_DATE_EPOCH")
+        told = [one.name for mission in report.missions for one in getattr(mission, "overrides", ())]
+        shown_day = judged_on if is_given or "--date" in told else None
         if swept:
             from bisar_budget.cli.studies import with_studies
 
@@ -321,14 +325,6 @@ def check(
     sys.exit(0 if exit_zero and code == EXIT_BROKEN else code)
 
 
-def _has_waivers(missions: "Iterable[MissionFindings | UnusableMission]") -> bool:
-    """Whether the day decides anything."""
-    from bisar_budget.findings.mission import MissionFindings
-
-    usable = [mission for mission in missions if isinstance(mission, MissionFindings)]
-    return any(one.name == "--date" for mission in usable for one in mission.overrides)
-
-
 def _options(judged_on: date | None, today: datetime | None) -> "Iterator[Option]":
     """Say what the options that bear on the result are, and where each came from."""
     from bisar_budget.findings.mission import Option
@@ -337,32 +333,26 @@ def _options(judged_on: date | None, today: datetime | None) -> "Iterator[Option
     for parameter in context.command.params:
         name, value = str(parameter.name), context.params[str(parameter.name)]
         origin = origin_of(parameter)
+        said = None
         if name == "model":
-            yield Option("--model", value or "as each file says", origin)
+            said = value or "as each file says"
         elif name == "today":
             if value is None and judged_on is not None:
                 origin = day_origin(today)
-            unrecorded = "the day of the run (not recorded: no waiver depends on it)"
-            yield Option("--date", judged_on.isoformat() if judged_on else unrecorded, origin)
+            said = "the day of the run (not recorded: no waiver depends on it)"
+            said = judged_on.isoformat() if judged_on else said
         elif name == "changes":
-            if value:
-                yield Option("--set", ", ".join(f"{change.key}={change.text}" for change in value), origin)
+            said = ", ".join(f"{change.key}={change.text}" for change in value)
         elif name == "swept":
-            if value:
-                yield Option("--sweep", ", ".join(value), origin)
+            said = ", ".join(value)
         elif name == "draws":
-            yield Option("--monte-carlo", "no" if value is None else f"{value:,} draws", origin)
+            said = "no" if value is None else f"{value:,} draws"
         elif name == "seed" and context.params["draws"] is not None:
-            yield Option("--seed", "of each file" if value is None else str(value), origin)
+            said = "of each file" if value is None else str(value)
         elif name in ("strict", "exit_zero", "verifying"):
-            yield Option(parameter.opts[0], "yes" if value else "no", origin)
-
-
-def _given_day(today: datetime | None) -> date | None:
-    """The day that the command line or the environment gives; a report has no other, so as to be reproducible."""
-    if today is not None:
-        return today.date()
-    return day(today) if os.environ.get("SOURCE_DATE_EPOCH") else None
+            said = "yes" if value else "no"
+        if said:
+            yield Option(parameter.opts[0], said, origin)
 
 
 def check_all(
@@ -399,7 +389,7 @@ def _with_images(
     """Add the verdicts of images, and the images of the rows that decide most."""
     from bisar_budget.budget.check import without_analysis
     from bisar_budget.budget.verdicts import with_verdicts
-    from bisar_budget.cli.verify import verify_all
+    from bisar_budget.cli.images import verify_all
     from bisar_budget.findings.mission import MissionFindings
 
     usable = {place: found for place, found in enumerate(missions) if isinstance(found, MissionFindings)}

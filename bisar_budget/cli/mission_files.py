@@ -70,27 +70,25 @@ def import_file(file: str, output: str | None, channel: str | None, force: bool)
     has the scene point, the band, the aperture by the dwell on that point, both platforms' paths, and the errors that
     the file declares. What a mission has no key for stands in its comments. Needs the extra `formats`.
     """
+    from bisar_budget.constants import SPEED_OF_LIGHT
+    from bisar_budget.faults import MissionError
     from bisar_budget.formats.collected import mission_text
     from bisar_budget.formats.containers import FormatError, MissingExtraError
     from bisar_budget.formats.importing import import_collection
+    from bisar_budget.mission.load import parse_mission
+    from bisar_budget.units import format_quantity
 
     if output is not None and output != "-" and os.path.exists(output):
         if not force:
             fail(f"{output} exists; --force replaces it")
         if os.path.exists(file) and os.path.samefile(file, output):
             fail(f"{output} is the file to read")
-    from bisar_budget.constants import SPEED_OF_LIGHT
-    from bisar_budget.faults import MissionError
-    from bisar_budget.mission.load import parse_mission
-    from bisar_budget.units import format_quantity
-
     try:
         found = import_collection(file, channel)
         text = mission_text(found)
+        parse_mission(text, "the mission")
     except (FormatError, MissingExtraError) as error:
         fail(str(error))
-    try:
-        parse_mission(text, "the mission")
     except MissionError as error:
         fail(f"{file}: no mission can be made of it: {error.faults[0]}")
     tracks = {"transmitter": found.transmitter, "receiver": found.receiver}

@@ -1,7 +1,7 @@
 """Options that commands share; where values come from: the command line, the environment, a project's settings."""
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from datetime import UTC, date, datetime
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
     from bisar_budget.budget.waivers import Outside
     from bisar_budget.faults import SetValue
-    from bisar_budget.findings.requirement import Override
     from bisar_budget.settings import Settings
 else:
 
@@ -133,10 +132,8 @@ def origin_of(parameter: click.Parameter) -> str:
         return "command line"
     if source is ParameterSource.ENVIRONMENT:
         return f"environment, {parameter.envvar}"
-    return _settings_file() if source is ParameterSource.DEFAULT_MAP else "default"
-
-
-def _settings_file() -> str:
+    if source is not ParameterSource.DEFAULT_MAP:
+        return "default"
     found = settings_here()
     return os.path.relpath(found.file) if found else "pyproject.toml"
 
@@ -156,8 +153,16 @@ def settings_here(files: Files = DISK) -> "Settings | None":
 def outside(today: datetime | None) -> "Outside":
     """Gather the options of the command that bear on verdicts; `today` is the value of --date."""
     from bisar_budget.budget.waivers import Outside
+    from bisar_budget.findings.requirement import Override
 
-    return Outside(tuple(_options()), day_origin(today), today is not None)
+    context, found = click.get_current_context(), []
+    for parameter in context.command.params:
+        name, origin = str(parameter.name), origin_of(parameter)
+        value = context.params.get(name)
+        if name in _BEARING and origin != "default" and value is not None:
+            said = ("yes" if value else "no") if isinstance(value, bool) else value
+            found.append(Override(parameter.opts[0], said, origin))
+    return Outside(tuple(found), day_origin(today), today is not None)
 
 
 def day_origin(today: datetime | None) -> str:
@@ -180,16 +185,3 @@ def day(today: datetime | None) -> date:
         return datetime.fromtimestamp(int(epoch), UTC).date()
     except (ValueError, OverflowError, OSError):
         raise click.UsageError(f"SOURCE_DATE_EPOCH must be seconds since 1970 (got {printable(epoch)!r})") from None
-
-
-def _options() -> "Iterator[Override]":
-    from bisar_budget.findings.requirement import Override
-
-    context = click.get_current_context()
-    for parameter in context.command.params:
-        name, origin = str(parameter.name), origin_of(parameter)
-        value = context.params.get(name)
-        if name in _BEARING and origin != "default" and value is not None:
-            yield Override(
-                parameter.opts[0], ("yes" if value else "no") if isinstance(value, bool) else value, origin
-            )

@@ -47,7 +47,11 @@ def sensors(patterns: Sequence[str], kind: str | None, checking: bool, format_na
         _check(patterns, format_name)
         return
     chosen = _listed(patterns or ("*",), kind)
-    deliver(_as_json(chosen) if format_name == "json" else _as_text(chosen), None, format_name)
+    if format_name == "json":
+        text = _document({"format": "bisar-budget/sensors/1", "parts": [_item(one) for one in chosen]})
+    else:
+        text = _as_text(chosen)
+    deliver(text, None, format_name)
 
 
 def _listed(patterns: Sequence[str], kind: str | None) -> "list[Entry]":
@@ -107,16 +111,13 @@ def _check(names: Sequence[str], format_name: str) -> None:
         if isinstance(found, PartError):
             say_faults(file, found.faults)
         else:
-            lines.append(f"{_fine(file, found)}\n")
+            count = len(found.figures)
+            figures = f"{count} figures, each with a source" if count > 1 else "1 figure, with a source"
+            what = f"{printable(found.part.name)}, {_KINDS[found.part.kind]}, {figures}"
+            lines.append(f"{printable(file)}: fine: {what}\n")
     deliver(_checked_as_json(checked) if format_name == "json" else "".join(lines), None, format_name)
     if len(lines) < len(checked):
         sys.exit(EXIT_USAGE)
-
-
-def _fine(file: str, entry: "Entry") -> str:
-    count = len(entry.figures)
-    figures = f"{count} figures, each with a source" if count > 1 else "1 figure, with a source"
-    return f"{printable(file)}: fine: {printable(entry.part.name)}, {_KINDS[entry.part.kind]}, {figures}"
 
 
 def _checked_as_json(checked: "Mapping[str, Entry | PartError]") -> str:
@@ -131,8 +132,11 @@ def _checked_as_json(checked: "Mapping[str, Entry | PartError]") -> str:
         else:
             parts.append({"file": file, "status": "pass", "errors": []} | _item(found))
     status = "error" if any(part["status"] == "error" for part in parts) else "pass"
-    document = {"format": "bisar-budget/sensors-check/1", "status": status, "parts": parts}
-    return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
+    return _document({"format": "bisar-budget/sensors-check/1", "status": status, "parts": parts})
+
+
+def _document(content: dict[str, Any]) -> str:
+    return json.dumps(content, indent=2, ensure_ascii=False) + "\n"
 
 
 def _as_text(chosen: "list[Entry]") -> str:
@@ -156,11 +160,6 @@ def _as_text(chosen: "list[Entry]") -> str:
                 lines += wrapped(f"    source: {printable(said)}", "        ")
             lines.append("")
     return "\n".join(lines)
-
-
-def _as_json(chosen: "list[Entry]") -> str:
-    document = {"format": "bisar-budget/sensors/1", "parts": [_item(one) for one in chosen]}
-    return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
 
 
 def _item(one: "Entry") -> dict[str, Any]:

@@ -1,15 +1,26 @@
-"""`bisar-budget solve`: where a number of a mission begins or ceases to comply."""
+"""`bisar-budget solve` and `sensitivity`: where a number of a mission begins to comply, and what each number does."""
 
+import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from datetime import datetime
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from bisar_budget.cli.options import DATE, MISSIONS, MODEL, OUTPUT, SET, TEXT_OR_JSON, day, outside
-from bisar_budget.cli.streams import EXIT_BROKEN, deliver_found, expand, fail, load_all, spare
-from bisar_budget.cli.waiting import FORMING, foretell, watched, watched_checks
+from bisar_budget.cli.long_work import FORMING, foretell, watched, watched_checks
+from bisar_budget.cli.options import DATE, FILE, MISSIONS, MODEL, OUTPUT, SET, TEXT_OR_JSON, day, outside
+from bisar_budget.cli.streams import (
+    EXIT_BROKEN,
+    deliver_found,
+    expand,
+    fail,
+    hold_to_suffixes,
+    load_all,
+    spare,
+    write_file,
+)
 
 if TYPE_CHECKING:
     from bisar_budget.design.compare import Comparison
@@ -74,43 +85,52 @@ def solve(
     1 if no value of the range or no part complies or if the image refutes the limit (--verify), 2 for wrong usage or
     an unusable mission file.
     """
-    from bisar_budget.budget.waivers import overrides
-    from bisar_budget.design import compare
-    from bisar_budget.design import solve as solving
-    from bisar_budget.design.quantities import QuestionError
+    from bisar_budget.design.compare import compare_parts, is_of_parts
+    from bisar_budget.design.solve import solve as solved
     from bisar_budget.report.formats import answers
 
-    is_of_parts = compare.is_of_parts(key)
-    if is_of_parts and (between is not None or is_scale):
+    of_parts = is_of_parts(key)
+    if of_parts and (between is not None or is_scale):
         option = "--scale" if is_scale else "--between"
         raise click.UsageError(f"{option}: {key} names parts of the catalogue, which are compared one by one.")
     files = expand(missions)
     spare(files, [output])
+
+    def ask(mission: "Mission", **asked: Any) -> "Solution | Comparison":
+        asked |= {"row": row, "target": target}
+        if of_parts:
+            return compare_parts(mission, key, **asked)
+        return solved(mission, key, between=between, is_scale=is_scale, **asked)
+
+    found = [
+        _imaged(mission, answer, model) if is_imaged else answer
+        for mission, answer in _answers(load_all(files, model, changes), model, today, ask)
+    ]
+    deliver_found(answers, found, format_name, output)
+    is_broken = any(one.status == "none" or (one.imaged and one.imaged.is_optimistic) for one in found)
+    sys.exit(EXIT_BROKEN if is_broken else 0)
+
+
+def _answers(
+    missions: "Sequence[Mission]", model: str | None, today: datetime | None, ask: Callable[..., Any]
+) -> "Iterator[tuple[Mission, Any]]":
+    """Ask each mission in turn, with a bar; exits where one cannot be asked."""
+    from bisar_budget.budget.waivers import overrides
+    from bisar_budget.design.quantities import QuestionError
+
     judged_on, from_outside = day(today), outside(today)
-    solved: list[Solution | Comparison] = []
-    for mission in load_all(files, model, changes):
+    for mission in missions:
         try:
-            found: Solution | Comparison
             with watched_checks(mission.name) as progress:
-                asked: dict[str, Any] = {
-                    "row": row, "target": target, "model": model, "today": judged_on, "progress": progress
-                }  # fmt: skip
-                if is_of_parts:
-                    found = compare.compare_parts(mission, key, **asked)
-                else:
-                    found = solving.solve(mission, key, between=between, is_scale=is_scale, **asked)
+                found = ask(mission, model=model, today=judged_on, progress=progress)
         except QuestionError as error:
             fail(f"{mission.file}: {error}")
-        found = found._replace(overrides=overrides(mission, from_outside, judged_on))
-        solved.append(_imaged(mission, found, model) if is_imaged else found)
-    deliver_found(answers, solved, format_name, output)
-    is_broken = any(one.status == "none" or (one.imaged and one.imaged.is_optimistic) for one in solved)
-    sys.exit(EXIT_BROKEN if is_broken else 0)
+        yield mission, found._replace(overrides=overrides(mission, from_outside, judged_on))
 
 
 def _imaged(mission: "Mission", found: "Solution | Comparison", model: str | None) -> "Solution | Comparison":
     """Add what images say of the solution."""
-    from bisar_budget.cli.verify import faster
+    from bisar_budget.cli.images import faster
     from bisar_budget.design.imaged import imaged, to_image
 
     asked = to_image(mission, found, model)
@@ -119,3 +139,47 @@ def _imaged(mission: "Mission", found: "Solution | Comparison", model: str | Non
     foretell(asked.seconds, f"Forming the images of {asked.row}", "without --verify none is formed" + faster())
     with watched(FORMING) as progress:
         return found._replace(imaged=imaged(asked, progress))
+
+
+@click.command()
+@MISSIONS
+@click.option("--row", metavar="ID", help="A row to follow too; numbers are ordered by what they do to it.")
+@MODEL
+@SET
+@DATE
+@TEXT_OR_JSON
+@OUTPUT
+@click.option("--plot", type=FILE, metavar="FILE", help="Draw the effects of a mission as bars: .svg, .png, .pdf.")
+def sensitivity(
+    missions: Sequence[str],
+    row: str | None,
+    model: str | None,
+    changes: "tuple[SetValue, ...]",
+    today: datetime | None,
+    format_name: str,
+    output: str | None,
+    plot: str | None,
+) -> None:
+    """Rank the numbers of a mission by what they do to its worst utilization.
+
+    Each number that the file states, or takes from a part of the catalogue, is changed by itself and the mission
+    checked anew: by 1 % of it to both sides,
+    directions and levels by a quarter of what is said, a degree or a decibel, places on the Earth by 1 % of the
+    smaller slant range. With balanced shares a second table says what relaxing an error costs the others. Exit code:
+    0, or 2 for wrong usage or an unusable mission file.
+    """
+    from bisar_budget.design.sensitivity import sensitivity as asked
+    from bisar_budget.report.formats import answers
+
+    hold_to_suffixes(plot, (".svg", ".png", ".pdf"))
+    files = expand(missions)
+    if plot is not None and len(files) > 1:
+        raise click.UsageError("--plot draws one mission.")
+    spare(files, [output, plot])
+    loaded = load_all(files, model, changes)
+    found = [answer for _, answer in _answers(loaded, model, today, partial(asked, row=row))]
+    if plot is not None:
+        from bisar_budget.report.drawing.tornado import tornado
+
+        write_file(plot, tornado(found[0], os.path.splitext(plot)[1][1:].lower()))
+    deliver_found(answers, found, format_name, output)

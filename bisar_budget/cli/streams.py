@@ -120,15 +120,6 @@ def _is_same(one: str | int, other: str) -> bool:
         return False
 
 
-def _was_read(path: str) -> bool:
-    """Whether a path leads to a file that a mission, or the project, names: an orbit, a log, a part, a list."""
-    try:
-        found = os.stat(path)
-    except OSError:
-        return False
-    return (found.st_dev, found.st_ino) in FILES_READ
-
-
 def is_terminal() -> bool:
     """Whether somebody sees both standard streams."""
     return all(stream is not None and stream.isatty() for stream in (sys.stdout, sys.stderr))
@@ -252,14 +243,16 @@ def replacing(path: str) -> Iterator[str]:
     temporary = lock = None
     try:
         target = os.path.realpath(path)
-        if _was_read(target):
-            fail(f"{path} was read by this command; a result would replace it")
+        with suppress(OSError):  # a file that a mission, or the project, names: an orbit, a log, a part, a list
+            there = os.stat(target)
+            if (there.st_dev, there.st_ino) in FILES_READ:
+                fail(f"{path} was read by this command; a result would replace it")
         if os.path.exists(target) and not os.path.isfile(target):
             yield target
             return
         folder = os.path.dirname(target)
         os.makedirs(folder, exist_ok=True)
-        remove_left(folder)
+        _remove_left(folder)
         temporary, lock = _own_folder(folder)
         file = os.path.join(temporary, f"output{os.path.splitext(target)[1]}")
         yield file
@@ -298,7 +291,7 @@ def _own_folder(folder: str) -> tuple[str, int | None]:
             os.close(lock)
 
 
-def remove_left(folder: str) -> None:
+def _remove_left(folder: str) -> None:
     """Remove temporary folders of commands that are no more: nobody has their lock."""
     import shutil
 

@@ -1,18 +1,20 @@
 """Sweeps that reports of `check` show: `--sweep KEY=VALUES`."""
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from datetime import date
+from functools import partial
 
 import click
 
 from bisar_budget import __version__
+from bisar_budget.cli.long_work import watched
 from bisar_budget.cli.streams import fail
-from bisar_budget.cli.waiting import watched
-from bisar_budget.design.cases import Grid, grid
+from bisar_budget.design.cases import Cases, Grid, grid
 from bisar_budget.design.quantities import QuestionError, tree_of
 from bisar_budget.design.sweep import sweep
 from bisar_budget.findings.mission import MissionFindings, UnusableMission
-from bisar_budget.findings.status import STATUS
+from bisar_budget.findings.status import complying
 from bisar_budget.findings.trade import TradeStudy
 from bisar_budget.mission.model import Mission
 from bisar_budget.report import FORMATS
@@ -60,10 +62,25 @@ def with_studies(
                 result.append(found)
                 continue
             mission = found.analysed().mission
+            cases = asked[mission.file]
+            again = partial(gathered, mission, cases, model, today)
             try:
-                study = _study(mission, asked[mission.file], texts, model, today, advance)
+                trade = again((), advance).trade()
+                rows = uses_of_rows(trade, again)
             except QuestionError as error:
                 fail(f"{mission.file}: {error}")
+            counts = Counter(trade.values["status"].ravel().tolist())
+            study = TradeStudy(
+                asked=tuple(texts),
+                trade=trade,
+                rows=rows,
+                cases=cases.count,
+                complying=complying(counts),
+                unevaluated=counts["not_evaluated"],
+                missing=counts["error"],
+                day=today,
+                model=model,
+            )
             result.append(found._replace(study=study))
     return result
 
@@ -82,35 +99,19 @@ def _cases(mission: Mission, texts: Sequence[str]) -> Grid:
     return cases
 
 
-def _study(
+def gathered(
     mission: Mission,
-    cases: Grid,
-    texts: Sequence[str],
+    cases: Cases,
     model: str | None,
     today: date,
-    advance: Callable[[int], None],
-) -> TradeStudy:
-    """Check all cases; over one key also the utilizations of the rows that are the worst somewhere."""
-
-    def gathered(columns: Sequence[str]) -> Gathered:
-        swept = sweep(mission, cases, columns=columns, model=model, today=today, jobs=cores())
-        found = Gathered(Described(swept, cases, mission, __version__), ("binding_requirement", *columns))
-        for part in swept.parts:
-            found.add(part)
-            if not columns:
-                advance(part.stop - part.start)
-        return found
-
-    trade = gathered(()).trade()
-    statuses = trade.values["status"].ravel().tolist()
-    return TradeStudy(
-        asked=tuple(texts),
-        trade=trade,
-        rows=uses_of_rows(trade, gathered),
-        cases=cases.count,
-        complying=sum(name != "error" and not STATUS[name].fails for name in statuses),
-        unevaluated=statuses.count("not_evaluated"),
-        missing=statuses.count("error"),
-        day=today,
-        model=model,
-    )
+    columns: Sequence[str],
+    advance: Callable[[int], None] = lambda _: None,
+    jobs: int | None = None,
+) -> Gathered:
+    """Check all cases, and gather what a drawing needs, and some columns; `advance` is told how many are done."""
+    swept = sweep(mission, cases, columns=columns, model=model, today=today, jobs=jobs or cores())
+    found = Gathered(Described(swept, cases, mission, __version__), ("binding_requirement", *columns))
+    for part in swept.parts:
+        found.add(part)
+        advance(part.stop - part.start)
+    return found

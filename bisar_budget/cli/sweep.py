@@ -2,18 +2,20 @@
 
 import os
 import sys
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import date, datetime
+from functools import partial
 from time import perf_counter
 from typing import TYPE_CHECKING
 
 import click
 
 from bisar_budget import __version__
+from bisar_budget.cli.long_work import foreseen, foretell, kept, lasting, watched, workers_of
 from bisar_budget.cli.options import DATE, FILE, MODEL, SET, day, outside, scheduler_options
-from bisar_budget.cli.shared_work import Keeping, keeping
 from bisar_budget.cli.streams import (
     EXIT_BROKEN,
     complain,
@@ -25,11 +27,11 @@ from bisar_budget.cli.streams import (
     spare,
     write_file,
 )
-from bisar_budget.cli.waiting import LONG, lasting, watched
 from bisar_budget.faults import printable
 from bisar_budget.resources import cores
 
 if TYPE_CHECKING:
+    from bisar_budget.cluster.scheduler import Workers
     from bisar_budget.design.cases import Cases
     from bisar_budget.design.sweep import Asked
     from bisar_budget.design.table import Part, Swept
@@ -41,8 +43,7 @@ if TYPE_CHECKING:
 
 MAX_CASES = 100_000_000  # that are started without being asked twice: tens of gigabytes
 _MANY = 20_000  # cases from which on it is measured how long they will take
-_TRIAL = 0.3  # s; a shorter one is too short to measure
-_LARGER = 3  # times as many cases, the next trial
+_FEW = 100  # cases of the first trial
 
 
 @click.command()
@@ -121,7 +122,12 @@ def sweep(
     reason. CSV goes to standard output without -o and --plot. Statuses do not change the exit code, as long as some
     case is judged: 0; 1 if none is; 2 for wrong usage or an unusable mission file.
     """
-    _usable(output, plot, plot_column, is_polar)
+    hold_to_suffixes(None if output == "-" else output, (".csv", ".parquet", ".nc"))
+    if plot == "-":
+        raise click.UsageError("--plot needs the name of a file.")
+    hold_to_suffixes(plot, (".svg", ".png", ".pdf"))
+    if plot is None and (plot_column is not None or is_polar):
+        raise click.UsageError("--plot-column and --polar say how to draw; --plot says to which file.")
     if (cases_file is None) == (not varied):
         raise click.UsageError("say which cases there are: either --vary or --cases.")
     if cases_file is not None and sample is not None:
@@ -140,8 +146,16 @@ def sweep(
             check_plot(cases, is_polar=is_polar)
         judged_on = day(today)
         said = overrides(loaded, outside(today), judged_on)
-        with keeping(output, scheduler, patience, is_resumed, jobs or cores()) as kept:
-            run = _Run(loaded, cases, columns, model, judged_on, jobs or cores(), kept, said)
+        if scheduler is not None or is_resumed:
+            if output is None or output == "-":
+                raise click.UsageError("--scheduler and --resume need -o FILE: parts are kept in FILE.parts.")
+            if scheduler is None:
+                from bisar_budget.cluster.parts_folder import check_libraries
+                from bisar_budget.memory import OF_TABLES
+
+                check_libraries("--resume", OF_TABLES, "tables", "pyarrow")
+        with workers_of(scheduler, patience) as workers:
+            run = _Run(loaded, cases, columns, model, judged_on, jobs or cores(), said, workers, is_resumed)
             run.foresee(force)
             run.write(output, plot, plot_column, is_polar)
         sys.exit(EXIT_BROKEN if run.is_unjudged else 0)
@@ -151,16 +165,6 @@ def sweep(
         sys.exit(2)
     except (QuestionError, MissingTablesError) as error:
         fail(f"{mission}: {error}")
-
-
-def _usable(output: str | None, plot: str | None, plot_column: str | None, is_polar: bool) -> None:
-    """Refuse names of files that no format has, and options of a plot without one."""
-    hold_to_suffixes(None if output == "-" else output, (".csv", ".parquet", ".nc"))
-    if plot == "-":
-        raise click.UsageError("--plot needs the name of a file.")
-    hold_to_suffixes(plot, (".svg", ".png", ".pdf"))
-    if plot is None and (plot_column is not None or is_polar):
-        raise click.UsageError("--plot-column and --polar say how to draw; --plot says to which file.")
 
 
 def _cases(mission: "Mission", varied: Sequence[str], cases_file: str | None, sample: str | None) -> "Cases":
@@ -185,7 +189,7 @@ def _cases(mission: "Mission", varied: Sequence[str], cases_file: str | None, sa
 
 @dataclass
 class _Run:
-    """One sweep on its way to a table and a plot; counts what it finds."""
+    """One sweep on its way to a table and a plot; counts the statuses that it finds."""
 
     mission: "Mission"
     cases: "Cases"
@@ -193,12 +197,16 @@ class _Run:
     model: str | None
     day: date
     jobs: int
-    kept: Keeping | None
     overrides: "tuple[Override, ...]"
-    done: int = 0
-    complying: int = 0
-    unevaluated: int = 0
-    missing: int = 0
+    workers: "Workers | None"
+    is_resumed: bool
+    statuses: Counter[str] = field(default_factory=Counter)
+
+    def asked(self, columns: Sequence[str]) -> "Asked":
+        """The question, with some columns."""
+        from bisar_budget.design.sweep import Asked
+
+        return Asked(self.mission, self.cases, columns=columns, model=self.model, today=self.day)
 
     def swept(self, cases: "Cases", columns: Sequence[str]) -> "Swept":
         """Ask the engine."""
@@ -208,45 +216,28 @@ class _Run:
 
     def foresee(self, force: bool) -> None:
         """Say how many cases there are if they take long, and begin too many only by force."""
+        from bisar_budget.design.cases import some_of
+
         count = self.cases.count
         if count <= _MANY:
             return
-        seconds = self._seconds()
+
+        def trial(some: int) -> float:
+            parts = self.swept(some_of(self.cases, some), self.columns).parts
+            began = perf_counter()
+            for _ in parts:
+                pass
+            return perf_counter() - began
+
+        seconds = foreseen(count, trial, _FEW, count)
+        if self.asked(self.columns).chunks().is_slow:  # else processes are no faster than arrays
+            seconds /= self.workers.threads if self.workers else min(self.jobs, cores())
         if count > MAX_CASES and not force:
             fail(
                 f"{self.mission.file}: {count} cases will take about {lasting(seconds)}; "
                 f"accepted: up to {MAX_CASES}, or more with --force"
             )
-        if seconds > LONG:
-            complain(f"{count} cases will take about {lasting(seconds)}.")
-
-    def _seconds(self) -> float:
-        """Measure how long all cases will take, by some of them."""
-        tried = 100
-        self._trial(tried)  # it imports what it needs
-        before = self._trial(tried)
-        while True:
-            tried *= _LARGER
-            seconds = self._trial(tried)
-            if seconds > _TRIAL or _LARGER * tried > self.cases.count:
-                break
-            before = seconds
-        # Arrays take their time for few cases too, but not once more for each part of the cases.
-        each = max((seconds - before) / (tried - tried / _LARGER), seconds / tried / 10)
-        workers = self.kept.workers if self.kept else None
-        threads = workers.threads if workers else min(self.jobs, cores())
-        is_slow = self._asked(self.columns).chunks().is_slow
-        return each * self.cases.count / (threads if is_slow else 1)  # processes: arrays are faster alone
-
-    def _trial(self, count: int) -> float:
-        """How long it takes to check some of the cases. [s]"""
-        from bisar_budget.design.cases import some_of
-
-        parts = self.swept(some_of(self.cases, count), self.columns).parts
-        began = perf_counter()
-        for _ in parts:
-            pass
-        return perf_counter() - began
+        foretell(seconds, f"{count} cases")
 
     def write(self, output: str | None, plot: str | None, plot_column: str | None, is_polar: bool) -> None:
         """Check the cases, write the table as they come, then the plot, and say what was found."""
@@ -256,14 +247,19 @@ class _Run:
         columns = self.columns
         if plot_column is not None and "." in plot_column and plot_column not in columns:
             columns = (*columns, plot_column)
-        gathered = None
-        with self._kept(columns) as swept:
+        found: AbstractContextManager[Swept]
+        gathered, is_kept = None, self.workers is not None or self.is_resumed
+        if is_kept:
+            found = kept(self.asked(columns), str(output), self.jobs, self.workers, is_resumed=self.is_resumed)
+        else:
+            found = nullcontext(self.swept(self.cases, columns))
+        with found as swept:
             described = Described(swept, self.cases, self.mission, __version__, self.overrides)
             if plot is not None:
                 from bisar_budget.report.drawing.trades import Gathered
 
                 gathered = Gathered(described, column=plot_column)
-            with watched("Writing" if self.kept else "Checking cases", self.cases.count) as progress:
+            with watched("Writing" if is_kept else "Checking cases", self.cases.count) as progress:
                 parts = self._counted(swept.parts, progress, gathered)
                 if writer is not None:
                     with replacing(str(output)) as name:
@@ -277,52 +273,26 @@ class _Run:
             self._draw(plot, gathered, is_polar)
         complain(self._summary())
 
-    def _kept(self, columns: Sequence[str]) -> "AbstractContextManager[Swept]":
-        """The sweep, with its parts kept where that is asked for."""
-        if self.kept is None:
-            return nullcontext(self.swept(self.cases, columns))
-        return self.kept.swept(self._asked(columns))
-
-    def _asked(self, columns: Sequence[str]) -> "Asked":
-        """The question that the parts answer."""
-        from bisar_budget.design.sweep import Asked
-
-        return Asked(self.mission, self.cases, columns=columns, model=self.model, today=self.day)
-
     def _counted(
         self, parts: "Iterator[Part]", progress: "Progress", gathered: "Gathered | None"
     ) -> "Iterator[Part]":
         """Hand the parts on, and take what is counted or drawn."""
-        from bisar_budget.findings.status import STATUS
-
         for part in parts:
-            statuses = part.values["status"].tolist()
-            for name in set(statuses):
-                times = statuses.count(name)
-                self.missing += times * (name == "error")
-                self.unevaluated += times * (name == "not_evaluated")
-                self.complying += times * (name != "error" and not STATUS[name].fails)
-            self.done += part.stop - part.start
+            self.statuses.update(part.values["status"].tolist())
             if gathered is not None:
                 gathered.add(part)
             yield part
-            progress(self.done, self.cases.count)
+            progress(self.statuses.total(), self.cases.count)
 
-    def _draw(self, plot: str, gathered: "Gathered", is_polar: bool) -> None:
+    def _draw(self, plot: str, found: "Gathered", is_polar: bool) -> None:
         """Draw what was gathered; over one key also the rows that are the worst somewhere."""
+        from bisar_budget.cli.studies import gathered
         from bisar_budget.report.drawing.figure import drawing_file
         from bisar_budget.report.drawing.trade_drawing import head_of, trade_drawing
-        from bisar_budget.report.drawing.trades import Gathered, uses_of_rows
-        from bisar_budget.report.tables import Described
+        from bisar_budget.report.drawing.trades import uses_of_rows
 
-        def again(columns: Sequence[str]) -> Gathered:
-            swept = self.swept(self.cases, columns)
-            found = Gathered(Described(swept, self.cases, self.mission, __version__), columns)
-            for part in swept.parts:
-                found.add(part)
-            return found
-
-        trade = gathered.trade(is_polar=is_polar)
+        trade = found.trade(is_polar=is_polar)
+        again = partial(gathered, self.mission, self.cases, self.model, self.day, jobs=self.jobs)
         drawing = trade_drawing(
             trade,
             uses_of_rows(trade, again),
@@ -337,20 +307,23 @@ class _Run:
     @property
     def is_unjudged(self) -> bool:
         """Whether no case that is a mission could be judged."""
-        return 0 < self.unevaluated == self.done - self.missing
+        return self.statuses.keys() - {"error"} == {"not_evaluated"}
 
     def _summary(self) -> str:
         """One line: how many cases, and how many comply."""
-        if not self.done:
+        from bisar_budget.findings.status import complying
+
+        done, comply = self.statuses.total(), complying(self.statuses)
+        if not done:
             return f"{printable(self.mission.name)}: no case was checked"
-        said = [f"{self.done} case{'' if self.done == 1 else 's'}"]
-        if self.done < self.cases.count:
+        said = [f"{done} case{'' if done == 1 else 's'}"]
+        if done < self.cases.count:
             said[0] += f" of {self.cases.count}"
-        said.append(f"{self.complying} comply ({_part(self.complying, self.done)})")
-        if self.unevaluated:
-            said.append(f"{self.unevaluated} not evaluated")
-        if self.missing:
-            said.append(f"{self.missing} without a mission")
+        said.append(f"{comply} comply ({_part(comply, done)})")
+        if self.statuses["not_evaluated"]:
+            said.append(f"{self.statuses['not_evaluated']} not evaluated")
+        if self.statuses["error"]:
+            said.append(f"{self.statuses['error']} without a mission")
         return f"{printable(self.mission.name)}: {', '.join(said)}"
 
 

@@ -16,7 +16,7 @@ from importlib import import_module
 import numpy as np
 
 from bisar_budget import __version__
-from bisar_budget.design.cases import Cases, CaseTable, Grid
+from bisar_budget.design.cases import Cases, Grid
 from bisar_budget.design.sweep import Asked, Chunks
 from bisar_budget.design.table import Part
 from bisar_budget.faults import ClusterError, changes_words
@@ -59,7 +59,7 @@ def question_of(asked: Asked, chunks: Chunks) -> Question:
 def _hash_of(cases: Cases) -> str:
     """SHA-256 of what the cases are made from: the values of each key."""
     whole = sha256(repr((type(cases).__name__, cases.shape, cases.count)).encode())
-    for values in cases.axes if isinstance(cases, Grid) else cases.columns if isinstance(cases, CaseTable) else ():
+    for values in cases.axes if isinstance(cases, Grid) else cases.columns:
         is_words = values.dtype == object
         whole.update(json.dumps(values.tolist()).encode() if is_words else np.ascontiguousarray(values, "<f8").data)
     return whole.hexdigest()
@@ -69,20 +69,17 @@ def _hash_of(cases: Cases) -> str:
 def parts_folder(path: str, question: Question, chunks: Chunks, *, is_resumed: bool) -> "Iterator[PartsFolder]":
     """Give a folder to this command alone, to go on from what is there or, where not `is_resumed`, to begin in.
 
-    Raises
-    ------
-    ClusterError
-        Parts are there and should not be, or are of another question; the folder cannot be written, or another
-        command has it.
+    A `ClusterError` says that parts are there and should not be, or are of another question; that the folder cannot
+    be written, or that another command has it.
     """
     lock = None
     try:
         try:
             os.makedirs(path, exist_ok=True)
             lock = locked(os.path.realpath(path))
-            left = [name for name in os.listdir(path) if name.startswith(".part-") and lock is not None]
-            for name in left:  # a command that was killed was writing it
-                os.unlink(os.path.join(path, name))
+            for name in os.listdir(path):
+                if name.startswith(".part-") and lock is not None:  # a command that was killed was writing it
+                    os.unlink(os.path.join(path, name))
             folder = PartsFolder(path, question)
             folder.find(chunks, is_resumed)
         except BlockingIOError:
@@ -103,6 +100,9 @@ class PartsFolder:
 
     def find(self, chunks: Chunks, is_resumed: bool) -> None:
         """Look which parts are there; refuses those of another question, and all where none should be there."""
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
         other: Question | None = None
         for name in filter(_NAME.fullmatch, os.listdir(self.path)):
             if not is_resumed:
@@ -111,25 +111,22 @@ class PartsFolder:
                     "or remove the folder"
                 )
             start = int(name[5:17])
-            question, of, rows = self._said(start)
-            if question != self.question:
-                other = other if question is None else question
-            elif start in chunks.starts and (of, rows) == (start, chunks.stop(start) - start):
-                self.done.add(start)
-        if other is not None and not self.done:
-            raise ClusterError(f"{self.path} is of another sweep: {_differences(other, self.question)}")
-
-    def _said(self, start: int) -> tuple[Question | None, int, int]:
-        """Question that a part answers, its first case and how many it has; no question where it cannot be read."""
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-
-        with suppress(OSError, TypeError, ValueError, pa.ArrowException):  # a machine stopped before its disk had it
-            if os.path.isfile(self._file(start)):  # a pipe would be waited for, and a device never ends
+            if not os.path.isfile(self._file(start)):  # a pipe would be waited for, and a device never ends
+                continue
+            with suppress(
+                OSError, TypeError, ValueError, pa.ArrowException
+            ):  # a machine stopped, its disk without it
                 found = pq.read_metadata(self._file(start))
                 said = found.metadata or {}
-                return dict(json.loads(said.get(b"question", b"{}"))), int(said.get(b"start", -1)), found.num_rows
-        return None, 0, 0
+                question, of = dict(json.loads(said.get(b"question", b"{}"))), int(said.get(b"start", -1))
+                if question != self.question:
+                    other = question
+                elif start in chunks.starts and (of, found.num_rows) == (start, chunks.stop(start) - start):
+                    self.done.add(start)
+        if other is not None and not self.done:
+            words = ((one, other.get(one) or "not there", new or "not there") for one, new in self.question.items())
+            differ = "; ".join(f"{one} {old}, and now {new}" for one, old, new in words if old != new)
+            raise ClusterError(f"{self.path} is of another sweep: {differ}")
 
     def put(self, part: Part) -> None:
         """Keep a part; a `ClusterError` says that it cannot be written."""
@@ -163,7 +160,6 @@ class PartsFolder:
             try:
                 table = pq.ParquetFile(file, page_checksum_verification=True).read(use_threads=False)
                 values = {name: table.column(name).to_numpy() for name in table.column_names}
-                part = Part(start, start + table.num_rows, values)
             except (OSError, KeyError, ValueError, pa.ArrowException) as error:
                 if getattr(error, "errno", None) is None:  # what it holds is at fault, not the system
                     self.done.discard(start)
@@ -171,7 +167,7 @@ class PartsFolder:
                         os.unlink(file)
                 said = f"{file} cannot be read: {error}; the same command with --resume goes on"
                 raise ClusterError(said) from None
-            yield part
+            yield Part(start, start + table.num_rows, values)
 
     def remove(self) -> None:
         """Take away what is done with; what else somebody put there stays."""
@@ -183,8 +179,3 @@ class PartsFolder:
 
     def _file(self, start: int) -> str:
         return os.path.join(self.path, f"part-{start:012d}.parquet")
-
-
-def _differences(there: Question, here: Question) -> str:
-    said = ((words, there.get(words) or "not there", new or "not there") for words, new in here.items())
-    return "; ".join(f"{words} {old}, and now {new}" for words, old, new in said if old != new)

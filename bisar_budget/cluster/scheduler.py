@@ -15,6 +15,7 @@ import socket
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass
 from itertools import islice
 from multiprocessing import resource_tracker
 from queue import Empty, SimpleQueue
@@ -45,20 +46,9 @@ class UnlikeWorkerError(Exception):
 def connected(address: str, patience: float, tell: Callable[[str], None]) -> "Iterator[Workers]":
     """Give the workers of a scheduler; `local:N` starts N here, and ends them.
 
-    Parameters
-    ----------
-    address : str
-        Of a scheduler.
-    patience : float
-        How long it may have no worker before it is given up. [s]
-    tell : callable
-        Takes what somebody who waits should know.
-
-    Raises
-    ------
-    ClusterError
-        It cannot be reached, has no worker, or one with another version of bisar-budget; a `MemoryError` says that
-        there is no room for its libraries.
+    `patience` is how long it may have no worker before it is given up [s]; `tell` takes what somebody who waits is to
+    know. A `ClusterError` says that it cannot be reached, has no worker, or one with another version of bisar-budget,
+    a `MemoryError` that there is no room for its libraries.
     """
     local = _LOCAL.fullmatch(address)
     if not (local or _ADDRESS.fullmatch(address)):
@@ -81,7 +71,11 @@ def connected(address: str, patience: float, tell: Callable[[str], None]) -> "It
         client.loop.asyncio_loop.set_exception_handler(lambda *_: None)  # it would write of what is given up
         workers = Workers(client, address, patience, tell)
         workers.look()
-        workers.check_versions()
+        # By a function of Python's own, which a worker of any version has.
+        found = client.run(pydoc.locate, "bisar_budget.__version__", on_error="return")
+        for worker, version in sorted(found.items()):
+            if version != __version__:
+                raise ClusterError(f"--scheduler {address}: {_unlike(worker, version, __version__)}")
         yield workers
 
 
@@ -157,11 +151,15 @@ def _greet(address: str) -> None:
         raise OSError(f"a Dask {kind.lower()} answers, no scheduler")
 
 
+@dataclass
 class Workers:
     """Workers of a scheduler; `threads` is how many they had at the last look."""
 
-    def __init__(self, client: Any, address: str, patience: float, tell: Callable[[str], None]) -> None:
-        self.client, self.address, self.patience, self.tell, self.threads = client, address, patience, tell, 0
+    client: Any
+    address: str
+    patience: float
+    tell: Callable[[str], None]
+    threads: int = 0
 
     def look(self) -> None:
         """Look who works; where nobody does, wait for a worker, and raise a `ClusterError` where none comes."""
@@ -181,27 +179,14 @@ class Workers:
             raise self._gone() from None
         self.threads = sum(self.client.nthreads().values())
 
-    def check_versions(self) -> None:
-        """Refuse workers that have another version of bisar-budget, or none."""
-        # By a function of Python's own, which a worker of any version has.
-        found = self.client.run(pydoc.locate, "bisar_budget.__version__", on_error="return")
-        for worker, version in sorted(found.items()):
-            if version != __version__:
-                raise ClusterError(f"--scheduler {self.address}: {_unlike(worker, version, __version__)}")
-
     def mapped(
         self, function: Callable[[Any, Any], Any], common: Any, blocks: Iterable[Any], about: Callable[[Any], str]
     ) -> Iterator[tuple[Any, Any]]:
         """Have workers call `function(common, block)`; gives each block with what came of it, in any order.
 
-        `about` says of a block what it is, for messages. Few blocks are given out ahead.
-
-        Raises
-        ------
-        ClusterError
-            The scheduler went away, or all workers; a block ended every worker that had it, or one cannot do it.
-        RuntimeError
-            The function raised; says what and where.
+        `about` says of a block what it is, for messages. Few blocks are given out ahead. A `ClusterError` says that
+        the scheduler went away, or all workers, that a block ended every worker that had it, or that one cannot do
+        it; a `RuntimeError` what the function raised, and where.
         """
         finished: SimpleQueue[Any] = SimpleQueue()
         # A task gives what is common, not the client: Dask makes it again where a worker that has it is lost.
@@ -270,7 +255,7 @@ def _why(error: BaseException, about: str) -> Exception:
             f"{about} ended {error.allowed_failures + 1} workers, the last of them {last}, as when memory runs out"
         )
     said = f"{about}, on a worker: {type(error).__name__}: {_first_line(error)}"
-    return ClusterError(said) if isinstance(error, ImportError | MemoryError) else RuntimeError(said)
+    return (ClusterError if isinstance(error, ImportError | MemoryError) else RuntimeError)(said)
 
 
 def _first_line(error: BaseException) -> str:

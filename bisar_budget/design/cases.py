@@ -1,11 +1,12 @@
 """The cases of a sweep: which keys of a mission vary, and their values in each case."""
 
+import io
 import math
 import re
 from array import array
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -32,31 +33,9 @@ _LATIN = "accepted: latin:COUNT:SEED, such as latin:10000:1"
 _HEADER = re.compile(r"^([^\[\]\s]+(?:\[\d+\][^\[\]\s]*)*)\s*(?:\[([^\[\]]*)\])?$", re.ASCII)
 
 
-class Cases(Protocol):
-    """Cases by their number, from 0 to `count`.
-
-    `shape` has one entry for each key where all combinations are cases, the last key the fastest; else it is None.
-    """
-
-    @property
-    def varied(self) -> tuple[Varied, ...]:
-        """The keys that vary, numbers each with the unit that its values were given in."""
-
-    @property
-    def count(self) -> int:
-        """Number of cases."""
-
-    @property
-    def shape(self) -> tuple[int, ...] | None:
-        """Number of values of each key of a grid."""
-
-    def values(self, start: int, stop: int) -> Mapping[str, Values]:
-        """Value of each key, in SI, or its words, of some cases: (stop - start,) by the key."""
-
-
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """Every combination of the values of each key; the last key is the fastest."""
+    """Every combination of the values of each key, in SI, or of its words; the last key is the fastest."""
 
     varied: tuple[Varied, ...]
     axes: tuple[Values, ...]
@@ -72,7 +51,7 @@ class Grid:
         return math.prod(self.shape)
 
     def values(self, start: int, stop: int) -> Mapping[str, Values]:
-        """Value of each key, in SI, or its words, of some cases: (stop - start,) by the key."""
+        """Values of some cases: (stop - start,) by the key."""
         places = np.unravel_index(np.arange(start, stop), self.shape)
         return {one.key: axis[place] for one, axis, place in zip(self.varied, self.axes, places, strict=True)}
 
@@ -91,8 +70,11 @@ class CaseTable:
         return self.columns[0].size
 
     def values(self, start: int, stop: int) -> Mapping[str, Values]:
-        """Value of each key, in SI, or its words, of some cases: (stop - start,) by the key."""
+        """Values of some cases: (stop - start,) by the key."""
         return {one.key: column[start:stop] for one, column in zip(self.varied, self.columns, strict=True)}
+
+
+Cases = Grid | CaseTable
 
 
 class TableError(QuestionError):
@@ -103,20 +85,89 @@ class TableError(QuestionError):
         super().__init__("\n".join(self.lines))
 
 
-class _AskedWords(NamedTuple):
-    """One `--vary` of a key that has words."""
+# ---------------------------------------------------------------- cases at hand as arrays
+def grid_of(tree: dict[str, Any], values: Mapping[str, ArrayLike]) -> Grid:
+    """Every combination of values that are at hand as arrays; the last key is the fastest.
 
-    option: str
-    varied: Choices
-    words: Values
+    Parameters
+    ----------
+    tree : dict
+        What the mission file says, as text.
+    values : mapping
+        Of each key its values: (n,) numbers in SI, or words. Whether a key can have a number is seen when the case is
+        checked.
+
+    Raises
+    ------
+    QuestionError
+        No such key, no number or word for it, no value.
+    """
+    return Grid(*_at_hand(tree, values))
 
 
+def table_of(tree: dict[str, Any], values: Mapping[str, ArrayLike]) -> CaseTable:
+    """Cases of which each takes one value of every array; arguments and faults are those of `grid_of`.
+
+    Raises
+    ------
+    QuestionError
+        Also where arrays differ in length.
+    """
+    varied, arrays = _at_hand(tree, values)
+    if len({array.size for array in arrays}) > 1:
+        raise QuestionError(f"{', '.join(values)}: differ in length; accepted: one value of each for every case")
+    return CaseTable(varied, arrays)
+
+
+def _at_hand(tree: dict[str, Any], values: Mapping[str, ArrayLike]) -> tuple[tuple[Varied, ...], tuple[Values, ...]]:
+    varied: list[Varied] = []
+    arrays: list[Values] = []
+    for key, given in values.items():
+        array = np.asarray(given)
+        if array.ndim != 1 or not array.size:
+            raise QuestionError(f"{key}: has values of the shape {array.shape}; accepted: (n,), n at least 1")
+        if array.dtype.kind not in "US":
+            varied.append(number_of(tree, key))
+            arrays.append(array.astype(float))
+            continue
+        words = [str(word) for word in array.tolist()]
+        choices = choices_of(tree, key, words[0])
+        if choices is None:
+            number_of(tree, key)  # says it of what is neither
+            raise QuestionError(f"{key}: has words; accepted: numbers in SI")
+        arrays.append(_texts(key, choices, words))
+        varied.append(choices)
+    if not varied:
+        raise QuestionError(f"no key: nothing would vary; {_FORMS}")
+    return tuple(varied), tuple(arrays)
+
+
+def _texts(option: str, choices: Choices, words: Sequence[str]) -> Values:
+    """Words as an array; names of parts and files are looked for when the mission is read with them."""
+    for word in dict.fromkeys(words):
+        if problem := _wrong_word(choices, word):
+            raise QuestionError(f"{option}: {problem}")
+    return np.array([*words, None], object)[:-1]  # words alone would be made a str array
+
+
+def _wrong_word(choices: Choices, word: str) -> str:
+    """Problem with a word; empty if there is none, or if reading the mission says it."""
+    if word.startswith("[") or isinstance(choices.reader, TextList):
+        return ""
+    try:
+        choices.reader.leaf(word)
+    except InvalidValueError as error:
+        return f"{shown(word)!r} {error.problem.words}"
+    return ""
+
+
+# ---------------------------------------------------------------- cases of options
 class _Asked(NamedTuple):
-    """One `--vary`: the number, and its listed values in SI, or its ends, the text of its count and how it goes."""
+    """One `--vary`: what varies, and its words or values in SI, or of a range its ends and the text of its count."""
 
     option: str
-    varied: Number
-    listed: tuple[float, ...] = ()
+    varied: Varied
+    listed: Values | None = None
     ends: tuple[float, float] = (0.0, 0.0)
     size: str = ""
     is_log: bool = False
@@ -142,86 +193,22 @@ def grid(tree: dict[str, Any], texts: Sequence[str], name: str = "--vary") -> Gr
     QuestionError
         No such key, no number, no range, an empty or reversed one, values that the key cannot have, a key twice.
     """
-    varied: list[Varied] = []
-    axes: list[Values] = []
-    for asked in _all_asked(tree, texts, name):
-        varied.append(asked.varied)
-        if isinstance(asked, _AskedWords):
-            axes.append(asked.words)
-            continue
-        if asked.listed:
-            axes.append(np.array(asked.listed))
-            continue
-        if not asked.size:
-            raise QuestionError(f"{asked.option}: has no count of values; {_RANGE.format(key=asked.varied.key)}")
-        count = _count(asked.size, f"{asked.option}: the count of values", 2, "; KEY=VALUE is a single value")
-        if count > MAX_VALUES:
-            raise QuestionError(
-                f"{asked.option}: {count} values of one key; accepted: up to {MAX_VALUES}, "
-                "which are as many cases for each combination of the other keys"
-            )
-        axes.append(_spread(asked, np.arange(count) / (count - 1)))
-    return Grid(tuple(varied), tuple(axes))
+    every = [(asked.varied, _axis(asked)) for asked in _all_asked(tree, texts, name)]
+    return Grid(tuple(varied for varied, _ in every), tuple(axis for _, axis in every))
 
 
-def grid_of(tree: dict[str, Any], values: Mapping[str, ArrayLike]) -> Grid:
-    """Every combination of values that are at hand as arrays; the last key is the fastest.
-
-    Parameters
-    ----------
-    tree : dict
-        What the mission file says, as text.
-    values : mapping
-        Of each key its values: (n,) numbers in SI, or words. Whether a key can have a number is seen when the case is
-        checked.
-
-    Raises
-    ------
-    QuestionError
-        No such key, no number or word for it, no value.
-    """
-    varied, arrays = _at_hand(tree, values)
-    return Grid(varied, arrays)
-
-
-def table_of(tree: dict[str, Any], values: Mapping[str, ArrayLike]) -> CaseTable:
-    """Cases of which each takes one value of every array; arguments and faults are those of `grid_of`.
-
-    Raises
-    ------
-    QuestionError
-        Also where arrays differ in length.
-    """
-    varied, arrays = _at_hand(tree, values)
-    if len({array.size for array in arrays}) > 1:
-        raise QuestionError(f"{', '.join(values)}: differ in length; accepted: one value of each for every case")
-    return CaseTable(varied, arrays)
-
-
-def _at_hand(tree: dict[str, Any], values: Mapping[str, ArrayLike]) -> tuple[tuple[Varied, ...], tuple[Values, ...]]:
-    varied: list[Varied] = []
-    arrays: list[Values] = []
-    for key, given in values.items():
-        array = np.asarray(given)
-        if array.ndim != 1 or not array.size:
-            raise QuestionError(f"{key}: has values of the shape {array.shape}; accepted: (n,), n at least 1")
-        if array.dtype.kind in "US":
-            words = [str(word) for word in array.tolist()]
-            choices = choices_of(tree, key, words[0])
-            if choices is None:
-                number_of(tree, key)  # says it of what is neither
-                raise QuestionError(f"{key}: has words; accepted: numbers in SI")
-            for word in dict.fromkeys(words):
-                if problem := _wrong_word(choices, word):
-                    raise QuestionError(f"{key}: {problem}")
-            varied.append(choices)
-            arrays.append(np.array([*words, None], object)[:-1])
-        else:
-            varied.append(number_of(tree, key))
-            arrays.append(array.astype(float))
-    if not varied:
-        raise QuestionError(f"no key: nothing would vary; {_FORMS}")
-    return tuple(varied), tuple(arrays)
+def _axis(asked: _Asked) -> Values:
+    if asked.listed is not None:
+        return asked.listed
+    if not asked.size:
+        raise QuestionError(f"{asked.option}: has no count of values; {_RANGE.format(key=asked.varied.key)}")
+    count = _count(asked.size, f"{asked.option}: the count of values", 2, "; KEY=VALUE is a single value")
+    if count > MAX_VALUES:
+        raise QuestionError(
+            f"{asked.option}: {count} values of one key; accepted: up to {MAX_VALUES}, "
+            "which are as many cases for each combination of the other keys"
+        )
+    return _spread(asked, np.arange(count) / (count - 1))
 
 
 def sample(tree: dict[str, Any], texts: Sequence[str], how: str) -> CaseTable:
@@ -241,62 +228,69 @@ def sample(tree: dict[str, Any], texts: Sequence[str], how: str) -> CaseTable:
     QuestionError
         As for a grid; no such way to draw; no count or seed.
     """
+    option = f"--sample {shown(how)}"
     kind, *parts = (part.strip() for part in how.split(":"))
     if kind != "latin" or len(parts) != 2:
-        raise QuestionError(f"--sample {shown(how)}: is no way to draw cases; {_LATIN}")
-    count = _count(parts[0], f"--sample {shown(how)}: the count of cases", 1)
+        raise QuestionError(f"{option}: is no way to draw cases; {_LATIN}")
+    count = _count(parts[0], f"{option}: the count of cases", 1)
     if not (parts[1].isascii() and parts[1].isdigit() and len(parts[1]) <= 18):
-        raise QuestionError(f"--sample {shown(how)}: the seed must be a whole number; {_LATIN}")
+        raise QuestionError(f"{option}: the seed must be a whole number; {_LATIN}")
     rng = np.random.default_rng(int(parts[1]))
-    all_asked = list(_all_asked(tree, texts, "--vary"))
-    if count * len(all_asked) > MAX_VALUES:
-        most = MAX_VALUES // len(all_asked)
+    every = list(_all_asked(tree, texts, "--vary"))
+    if count * len(every) > MAX_VALUES:
         raise QuestionError(
-            f"--sample {shown(how)}: {count} cases of {len(all_asked)} keys do not fit into memory; accepted: up to "
-            f"{most} cases. Samples of other seeds go on from there"
+            f"{option}: {count} cases of {len(every)} keys do not fit into memory; accepted: up to "
+            f"{MAX_VALUES // len(every)} cases. Samples of other seeds go on from there"
         )
     columns: list[Values] = []
-    for asked in all_asked:
-        if isinstance(asked, _AskedWords):
-            columns.append(asked.words[rng.permutation(count) * asked.words.size // count])
-            continue
-        if asked.listed:
+    for asked in every:
+        if asked.listed is None:
+            columns.append(_spread(asked, (rng.permutation(count) + rng.random(count)) / count))
+        elif isinstance(asked.varied, Choices):
+            columns.append(asked.listed[rng.permutation(count) * asked.listed.size // count])
+        else:
             raise QuestionError(f"{asked.option}: --sample draws from a range; {_RANGE.format(key=asked.varied.key)}")
-        columns.append(_spread(asked, (rng.permutation(count) + rng.random(count)) / count))
-    return CaseTable(tuple(asked.varied for asked in all_asked), tuple(columns))
+    return CaseTable(tuple(asked.varied for asked in every), tuple(columns))
 
 
-def _all_asked(tree: dict[str, Any], texts: Sequence[str], name: str) -> Iterator[_Asked | _AskedWords]:
+def _all_asked(tree: dict[str, Any], texts: Sequence[str], name: str) -> Iterator[_Asked]:
     if not texts:
         raise QuestionError(f"no {name}: nothing would vary; {_FORMS}")
-    seen: dict[tuple[str, ...], str] = {}
+    seen: set[tuple[str, ...]] = set()
     for text in texts:
         asked = _asked(tree, text, name)
-        parts = parts_of(asked.varied.key)
+        parts = tuple(parts_of(asked.varied.key))
         if parts in seen:
             raise QuestionError(f"{name} {asked.varied.key}: varies twice; accepted: each key once")
-        seen[parts] = text
+        seen.add(parts)
         yield asked
 
 
-def _asked(tree: dict[str, Any], text: str, name: str) -> _Asked | _AskedWords:
+def _asked(tree: dict[str, Any], text: str, name: str) -> _Asked:
     """Read one option, and hold its values to the bounds of the key."""
     key, equals, given = (part.strip() for part in text.partition("="))
     option = f"{name} {shown(text)}"
     if not (key and equals and given):
         raise QuestionError(f"{option}: does not say which values; {_FORMS}")
+    varied: Varied
     if (choices := choices_of(tree, key, given)) is not None:
-        return _AskedWords(option, choices, _words(option, choices, _WORDS.split(given)))
-    number = number_of(tree, key)
-    parts = [part.strip() for part in given.split(":")]
-    if len(parts) == 1:
+        varied, values = choices, _texts(option, choices, [word.strip() for word in _WORDS.split(given)])
+    else:
+        number = number_of(tree, key)
+        parts = [part.strip() for part in given.split(":")]
+        if len(parts) > 1:
+            return _range(option, number, parts)
         texts = given.split(",")
         if len(texts) > MAX_VALUES:
             raise QuestionError(f"{option}: {len(texts)} values; accepted: up to {MAX_VALUES}")
-        number, listed = _read(option, number, texts)
-        if len(set(listed)) < len(listed):
-            raise QuestionError(f"{option}: has a value twice; accepted: each once")
-        return _Asked(option, number, listed=listed)
+        varied, listed = _read(option, number, texts)
+        values = np.array(listed)
+    if len(set(values.tolist())) < values.size:
+        raise QuestionError(f"{option}: has a value twice; accepted: each once")
+    return _Asked(option, varied, values)
+
+
+def _range(option: str, number: Number, parts: list[str]) -> _Asked:
     if is_log := len(parts) > 2 and parts[-1] == "log":
         parts.pop()
     if len(parts) > 3 or "" in parts:
@@ -309,29 +303,7 @@ def _asked(tree: dict[str, Any], text: str, name: str) -> _Asked | _AskedWords:
         raise QuestionError(f"{option}: the range is {kind}; accepted: FROM < TO{hint}")
     if is_log and low <= 0:
         raise QuestionError(f"{option}: equal ratios begin above 0; accepted: FROM > 0, or no :log")
-    return _Asked(option, number, (), (low, high), parts[2] if len(parts) == 3 else "", is_log)
-
-
-def _words(option: str, choices: Choices, texts: Sequence[str]) -> Values:
-    """Read words; names of parts and files are looked for when the mission is read with them."""
-    words = [text.strip() for text in texts]
-    for word in words:
-        if problem := _wrong_word(choices, word):
-            raise QuestionError(f"{option}: {problem}")
-    if len(set(words)) < len(words):
-        raise QuestionError(f"{option}: has a value twice; accepted: each once")
-    return np.array([*words, None], object)[:-1]  # words alone would be made a str array
-
-
-def _wrong_word(choices: Choices, word: str) -> str:
-    """Problem with a word; empty if there is none, or if reading the mission says it."""
-    if word.startswith("[") or isinstance(choices.reader, TextList):
-        return ""  # reading the mission says it
-    try:
-        choices.reader.leaf(word)
-    except InvalidValueError as error:
-        return f"{shown(word)!r} {error.problem.words}"
-    return ""
+    return _Asked(option, number, None, (low, high), parts[2] if len(parts) == 3 else "", is_log)
 
 
 def _read(option: str, number: Number, texts: Sequence[str]) -> tuple[Number, tuple[float, ...]]:
@@ -361,7 +333,7 @@ def _count(text: str, what: str, least: int, hint: str = "") -> int:
 def _spread(asked: _Asked, parts: Floats) -> Floats:
     """Values at parts of the way from one end to the other, both ends as they were given."""
     low, high = asked.ends
-    factor, divisor = _scale(asked.varied)
+    factor, divisor = asked.varied.scale
     first, last = low / factor * divisor, high / factor * divisor
     given = first * (last / first) ** parts if asked.is_log else first + (last - first) * parts
     values = np.clip(_rounded(given) * factor / divisor, low, high)
@@ -369,10 +341,7 @@ def _spread(asked: _Asked, parts: Floats) -> Floats:
     return values
 
 
-def _scale(number: Number) -> tuple[float, float]:
-    return number.dimension.scales.get(number.unit) or (1.0, 1.0)
-
-
+# ---------------------------------------------------------------- values of cases
 def some_of(cases: Cases, count: int) -> CaseTable:
     """Some cases, spread over all of them in short stretches, that stand for the others."""
     length = max(1, count // _STRETCHES)
@@ -384,7 +353,7 @@ def some_of(cases: Cases, count: int) -> CaseTable:
 
 def words_of(cases: Cases) -> Iterator[tuple[Choices, list[str]]]:
     """Keys that have words, and the words that occur."""
-    values = cases.axes if isinstance(cases, Grid) else cases.columns if isinstance(cases, CaseTable) else ()
+    values = cases.axes if isinstance(cases, Grid) else cases.columns
     for one, words in zip(cases.varied, values, strict=True):
         if isinstance(one, Choices):
             yield one, list(dict.fromkeys(words.tolist()))
@@ -392,7 +361,7 @@ def words_of(cases: Cases) -> Iterator[tuple[Choices, list[str]]]:
 
 def in_unit(number: Number, values: Floats) -> Floats:
     """Values in the unit that the number is said in, with the fewest digits that give the same SI value again."""
-    factor, divisor = _scale(number)
+    factor, divisor = number.scale
     given: Floats = values / factor * divisor
     rounded = _rounded(given)
     return np.where(rounded * factor / divisor == values, rounded, given)
@@ -407,6 +376,7 @@ def _rounded(values: Floats) -> Floats:
     return np.where(np.isfinite(found), found, values)
 
 
+# ---------------------------------------------------------------- cases of a file
 def table(tree: dict[str, Any], text: str, file: str) -> CaseTable:
     """Read a CSV of cases: a header `KEY [unit]` for each column, then one case in each line.
 
@@ -429,12 +399,12 @@ def table(tree: dict[str, Any], text: str, file: str) -> CaseTable:
         no number or none of the key's words, no case, too many; has every fault, up to twenty.
     """
     lines = (
-        (place, line)
-        for place, line in enumerate(_line_ends(text.removeprefix("\ufeff")).split("\n"), 1)
+        (place, line.rstrip("\n"))
+        for place, line in enumerate(io.StringIO(text.removeprefix("\ufeff"), newline=None), 1)
         if line.strip() and not line.lstrip().startswith("#")
     )
     place, header = next(lines, (1, ""))
-    varied, scales = _headed(tree, header, place, file)
+    varied = _headed(tree, header, place, file)
     words: list[dict[str, int]] = [{} for _ in varied]  # of each column, with the number that stands for it
     given = array("d")
     faults: list[Fault] = []
@@ -453,18 +423,14 @@ def table(tree: dict[str, Any], text: str, file: str) -> CaseTable:
         faults.append(Fault(place, 1, "", "the table has no case", accepted="accepted: lines below the header"))
     if faults:
         raise TableError(file, faults)
-    columns = np.array(given).reshape(-1, len(varied)).T
     values: list[Values] = []
-    for one, column, (factor, divisor), known in zip(varied, columns, scales, words, strict=True):
+    for one, column, known in zip(varied, np.array(given).reshape(-1, len(varied)).T, words, strict=True):
         if isinstance(one, Choices):
             values.append(np.array([*known, None], object)[column.astype(int)])
         else:
+            factor, divisor = one.scale
             values.append(column * factor / divisor)
     return CaseTable(varied, tuple(values))
-
-
-def _line_ends(text: str) -> str:
-    return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
 def _cells(line: str) -> Iterator[tuple[int, str]]:
@@ -477,35 +443,26 @@ def _cells(line: str) -> Iterator[tuple[int, str]]:
         at += len(cell) + 1
 
 
-def _headed(
-    tree: dict[str, Any], header: str, place: int, file: str
-) -> tuple[tuple[Varied, ...], list[tuple[float, float]]]:
-    """Keys and units of the header."""
-    varied: list[Varied] = []
-    scales: list[tuple[float, float]] = []
-    faults: list[Fault] = []
-    seen: set[tuple[str, ...]] = set()
+def _headed(tree: dict[str, Any], header: str, place: int, file: str) -> tuple[Varied, ...]:
+    """Keys of the header, numbers each with its unit."""
     if not header:
-        raise TableError(
-            file, [Fault(place, 1, "", "has no header", accepted="accepted: KEY [unit], KEY [unit], ...")]
-        )
+        accepted = "accepted: KEY [unit], KEY [unit], ..."
+        raise TableError(file, [Fault(place, 1, "", "has no header", accepted=accepted)])
+    varied: dict[tuple[str, ...], Varied] = {}
+    faults: list[Fault] = []
     for column, cell in _cells(header):
         try:
             one = _column(tree, cell)
-            if parts_of(one.key) in seen:
+            if varied.setdefault(tuple(parts_of(one.key)), one) is not one:
                 raise InvalidValueError("stands twice", "accepted: each key once")
         except InvalidValueError as error:
             wrong = error.problem
             faults.append(Fault(place, column, shown(cell), wrong.problem, "", wrong.accepted, wrong.hint))
         except QuestionError as error:
             faults.append(Fault(place, column, "", str(error)))
-        else:
-            seen.add(parts_of(one.key))
-            varied.append(one)
-            scales.append((1.0, 1.0) if isinstance(one, Choices) else _scale(one))
     if faults:
         raise TableError(file, faults[:_FAULTS])
-    return tuple(varied), scales
+    return tuple(varied.values())
 
 
 def _column(tree: dict[str, Any], cell: str) -> Varied:
@@ -514,15 +471,15 @@ def _column(tree: dict[str, Any], cell: str) -> Varied:
     if match is None:
         hint = "Cells are separated by commas" if ";" in cell or "\t" in cell else ""
         raise InvalidValueError("is no header of a column", "accepted: KEY [unit]", hint)
-    unit = normal_unit((match[2] or "").strip())
-    if (choices := choices_of(tree, match[1], "")) is not None:
+    key, unit = match[1], normal_unit((match[2] or "").strip())
+    if (choices := choices_of(tree, key, "")) is not None:
         if unit:
-            raise InvalidValueError("has words, which have no unit", f"accepted: {match[1]}")
+            raise InvalidValueError("has words, which have no unit", f"accepted: {key}")
         return choices
-    number = number_of(tree, match[1])
+    number = number_of(tree, key)
     if not unit and "" not in number.dimension.units:
         usual = number.dimension.usual or (number.dimension.si,)
-        example = " or ".join(f"'{match[1]} [{one}]'" for one in usual)
+        example = " or ".join(f"'{key} [{one}]'" for one in usual)
         raise InvalidValueError(
             "has no unit", number.dimension.accepted.partition(";")[0], f"Did you mean {example}?"
         )
@@ -537,7 +494,7 @@ def _row(line: str, varied: Sequence[Varied], words: Sequence[dict[str, int]], p
         behind = min(len(texts), len(varied) + 1)
         column = list(_cells(line))[behind - 1][0]
         return Fault(place, column, "", f"has {len(texts)} cells", "", f"accepted: {len(varied)}, as the header has")
-    try:
+    try:  # of many lines most are numbers alone
         if line.isascii() and "_" not in line and not any(isinstance(one, Choices) for one in varied):
             row = [float(text) for text in texts]
             if all(map(math.isfinite, row)):
@@ -545,18 +502,18 @@ def _row(line: str, varied: Sequence[Varied], words: Sequence[dict[str, int]], p
     except ValueError:
         pass
     row = []
-    for number, known, (column, cell) in zip(varied, words, _cells(line), strict=True):
-        if isinstance(number, Choices):
-            if cell not in known and (problem := _wrong_word(number, cell)):
-                return Fault(place, column, number.key, problem)
+    for one, known, (column, cell) in zip(varied, words, _cells(line), strict=True):
+        if isinstance(one, Choices):
+            if cell not in known and (problem := _wrong_word(one, cell)):
+                return Fault(place, column, one.key, problem)
             row.append(float(known.setdefault(cell, len(known))))
             continue
         try:
-            row.append(parse_quantity(f"{cell} {number.unit}".rstrip(), number.dimension) if cell else math.nan)
+            is_number = math.isfinite(parse_quantity(f"{cell} {one.unit}".rstrip(), one.dimension)) if cell else False
         except InvalidValueError:
-            row.append(math.nan)
-        if not math.isfinite(row[-1]):
-            accepted = f"accepted: a number of {number.unit}" if number.unit else "accepted: a number"
-            return Fault(place, column, number.key, "is no number", shown(cell) or "nothing", accepted)
-        row[-1] = float(cell)
+            is_number = False
+        if not is_number:
+            accepted = f"accepted: a number of {one.unit}" if one.unit else "accepted: a number"
+            return Fault(place, column, one.key, "is no number", shown(cell) or "nothing", accepted)
+        row.append(float(cell))
     return row

@@ -18,6 +18,7 @@ from bisar_budget.faults import MissionError, SetValue
 from bisar_budget.findings.requirement import Override
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.changes import parts_of
+from bisar_budget.mission.load import folder_of
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.parts import FIGURES, Part, PartError, entries, evidence, find_part, folders
 from bisar_budget.workers import Progress, unseen
@@ -89,14 +90,7 @@ class Comparison(NamedTuple):
 
 def is_of_parts(key: str) -> bool:
     """Whether a key names parts of the catalogue, which are compared and not solved for."""
-    parts = parts_of(key)
-    return (
-        len(parts) == 4
-        and parts[0] == "platforms"
-        and parts[1] in PLATFORMS
-        and parts[2] in _KINDS
-        and (parts[3] == "sensor")
-    )
+    return parts_of(key) in {("platforms", name, section, "sensor") for name in PLATFORMS for section in _KINDS}
 
 
 def compare_parts(
@@ -109,27 +103,15 @@ def compare_parts(
     today: date,
     progress: Progress = unseen,
 ) -> Comparison:
-    """Check a mission with every part of the catalogue that a key can name.
+    """Check a mission with every part of the catalogue that a key can name; other arguments are those of `solve`.
 
     A part takes the place of the file's part of its kind; parts of other kinds stay. Without one in the file, parts
     of every kind that the key takes are tried alone.
 
     Parameters
     ----------
-    mission : Mission
-        As loaded; the file that it came from is read anew for each part, with the options that changed it.
     key : str
         `platforms.NAME.motion_error.sensor` or `platforms.NAME.oscillator.sensor`.
-    row : str, optional
-        Id of the row that has to comply, instead of the whole mission.
-    target : str
-        fail: what `check` exits with 0 on complies; warn: what `check --strict` does.
-    model : str, optional
-        Gating model in place of the mission's own.
-    today : date
-        Day on which waivers are judged, UTC.
-    progress : callable, optional
-        Is told how many parts are done, and how many there are.
 
     Returns
     -------
@@ -151,17 +133,17 @@ def compare_parts(
         raise QuestionError(f"{key}: {error}") from None
     tried = []
     for done, one in enumerate(search.candidates, 1):
-        tried.append((one, search.checked(one, today)))
+        tried.append(search.checked(one, today))
         progress(done, len(search.candidates))
-    found = [checked.judged for _, checked in tried if checked.judged is not None]
+    found = [one.judged for one in tried if one.judged is not None]
     if not found:
-        why = tried[0][1].reason if tried else "the catalogue has none of its kind"
+        why = tried[0].reason if tried else "the catalogue has none of its kind"
         raise QuestionError(f"{key}: no part makes a mission: {why}")
     hold_to_decisions(found, row)
-    if not any(checked.figures for _, checked in tried):
+    if not any(one.figures for one in tried):
         raise QuestionError(f"{key}: the file states every figure itself; nothing of a part would be taken")
-    breaks = breaking(target)
-    states = [search.state(one, checked, row, breaks) for one, checked in tried]
+    states = [search.state(one, row, breaking(target)) for one in tried]
+    offered = {figure for one in tried for figure in FIGURES[one.part.kind] if getattr(one.part, figure)}
     return Comparison(
         file=mission.file,
         name=mission.name,
@@ -170,8 +152,8 @@ def compare_parts(
         row=row,
         model=variation.read().gating_model,
         kinds=search.kinds,
-        kept=search.kept,
-        overridden=search.overridden(states),
+        kept=tuple(search.given) if len(search.given) > 1 else (),
+        overridden=tuple(sorted(offered.difference(*(state.figures for state in states)))),
         parts=tuple(sorted(_with_silence(states), key=_order)),
         changes=mission.changes,
     )
@@ -198,67 +180,61 @@ def _order(state: PartState) -> tuple[bool, float, float, str]:
 
 
 class _Candidate(NamedTuple):
+    """A part; of the mission with it what was judged, or why there is none, and the figures that it takes."""
+
     id: str
     file: str
     part: Part
-
-
-class _CheckedPart(NamedTuple):
-    """The mission with a part, judged; the figures that it takes of the part; why there is no mission."""
-
-    judged: JudgedMission | None
+    judged: JudgedMission | None = None
     figures: tuple[str, ...] = ()
     reason: str = ""
 
 
 class _PartSearch:
-    """The parts that one key of a mission can name; raises `PartError`."""
+    """The parts that one key of a mission can name, and those that its file names; raises `PartError`."""
 
     def __init__(self, variation: Variation, key: str) -> None:
         self.variation, self.key = variation, key
         _, self.platform, self.section, _ = parts_of(key)
-        file = variation.mission.file
-        beside = os.path.dirname(file) if file != "-" else ""
-        self.given = {name: find_part(name, beside) for name in _names(tree_of(variation.mission), parts_of(key))}
+        beside = folder_of(variation.mission.file)
+        named: Any = tree_of(variation.mission)
+        for name in parts_of(key):
+            named = named.get(name) if isinstance(named, dict) else None
+        names = named if isinstance(named, list) else [named] if isinstance(named, str) else []
+        self.given = {name: find_part(name, beside) for name in names}
         of_given = {part.kind for part in self.given.values()}
         self.kinds = tuple(kind for kind in _KINDS[self.section] if not of_given or kind in of_given)
         listed = {entry.id: _Candidate(entry.id, entry.file, entry.part) for entry in entries(folders(beside))}
-        own = {
-            name: _Candidate(name, os.path.join(beside, name), part)
+        own = [
+            _Candidate(name, os.path.join(beside, name), part)
             for name, part in self.given.items()
             if name not in listed
-        }
-        self.candidates = [one for one in (own | listed).values() if one.part.kind in self.kinds]
-
-    @property
-    def kept(self) -> tuple[str, ...]:
-        """Names of the file's parts of which another kind is compared too: each stays while the others change."""
-        return tuple(self.given) if len(self.given) > 1 else ()
+        ]
+        self.candidates = [one for one in (*own, *listed.values()) if one.part.kind in self.kinds]
 
     def value(self, name: str, kind: str) -> str:
         """Write the key's value with a part, as the file would have it."""
         others = [other for other, part in self.given.items() if part.kind != kind]
         return json.dumps([*others, name] if others else name, ensure_ascii=False)
 
-    def checked(self, one: _Candidate, today: date) -> _CheckedPart:
+    def checked(self, one: _Candidate, today: date) -> _Candidate:
         """Check the mission with a part."""
         try:
             mission = self.variation.read([SetValue(self.key, self.value(one.id, one.part.kind))])
         except MissionError as error:
             fault = error.faults[0]
-            return _CheckedPart(None, reason=f"{fault.key}: {fault.problem}")
-        return _CheckedPart(judged_mission(Analysis(mission), today), self._taken(mission, one.part))
-
-    def _taken(self, mission: Mission, part: Part) -> tuple[str, ...]:
+            return one._replace(reason=f"{fault.key}: {fault.problem}")
         platform = getattr(mission.platforms, self.platform)
-        taken = {} if self.section == "oscillator" else dict(platform.motion_error.of_parts)
         if self.section == "oscillator":
             taken = dict.fromkeys(FIGURES["oscillator"], platform.oscillator.source)
             taken |= dict(platform.oscillator.of_parts)
-        figures = (figure for figure in FIGURES[part.kind] if getattr(part, figure))
-        return tuple(figure for figure in figures if taken.get(figure) == evidence(part, figure))
+        else:
+            taken = dict(platform.motion_error.of_parts)
+        figures = (figure for figure in FIGURES[one.part.kind] if getattr(one.part, figure))
+        of_part = tuple(figure for figure in figures if taken.get(figure) == evidence(one.part, figure))
+        return one._replace(judged=judged_mission(Analysis(mission), today), figures=of_part)
 
-    def state(self, one: _Candidate, checked: _CheckedPart, row: str | None, breaks: frozenset[str]) -> PartState:
+    def state(self, one: _Candidate, row: str | None, breaks: frozenset[str]) -> PartState:
         """Say how the mission stands with a part."""
         state = PartState(
             id=one.id,
@@ -266,18 +242,18 @@ class _PartSearch:
             kind=one.part.kind,
             file=one.file,
             is_given=one.id in self.given,
-            figures=checked.figures,
+            figures=one.figures,
             standing=Standing(complies=False, status="error"),
-            reason=checked.reason,
+            reason=one.reason,
         )
-        found = checked.judged
+        found = one.judged
         if found is None:
             return state
         stands = standing(found, row, breaks)
         if row is not None and not STATUS[stands.status].is_judged:
             reason = f"{row} is {STATUS[stands.status].words} with it"
             return state._replace(standing=stands._replace(complies=False), reason=reason)
-        texts = {evidence(one.part, figure) for figure in checked.figures}
+        texts = {evidence(one.part, figure) for figure in one.figures}
         own = [
             (each.utilization, each.id)
             for each in rows_in_words(found, Case(found.analysis))
@@ -285,21 +261,6 @@ class _PartSearch:
         ]
         use, own_row = max(own, default=(None, None))
         return state._replace(standing=stands, own_row=own_row, own_utilization=use)
-
-    def overridden(self, states: Sequence[PartState]) -> tuple[str, ...]:
-        """Figures that parts have, and that the mission takes of none."""
-        offered = {
-            figure for one in self.candidates for figure in FIGURES[one.part.kind] if getattr(one.part, figure)
-        }
-        taken = {figure for state in states for figure in state.figures}
-        return tuple(sorted(offered - taken))
-
-
-def _names(tree: Any, parts: Sequence[str]) -> list[str]:
-    """Parts that the file names at a key."""
-    for part in parts:
-        tree = tree.get(part) if isinstance(tree, dict) else None
-    return tree if isinstance(tree, list) else [tree] if isinstance(tree, str) else []
 
 
 def mission_with(variation: Variation, key: str, part: PartState) -> Mission:

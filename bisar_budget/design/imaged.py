@@ -27,21 +27,9 @@ class ToImage(NamedTuple):
 
 
 def to_image(mission: Mission, solution: Solution | Comparison, model: str | None) -> ToImage | None:
-    """Put a solution into its mission.
+    """Put a solution into its mission; None where nothing complies, or everything does, or no row binds.
 
-    Parameters
-    ----------
-    mission : Mission
-        That the question was asked of.
-    solution : Solution or Comparison
-        The largest value at which compliance ends or begins is taken, or the part with the smallest margin.
-    model : str or None
-        The one that decided, where it was not the mission's own.
-
-    Returns
-    -------
-    ToImage or None
-        None where nothing complies, or where everything does, or where no row binds.
+    The largest value at which compliance ends or begins is taken, or the part with the smallest margin.
     """
     variation = Variation(mission, model)
     if isinstance(solution, Comparison):

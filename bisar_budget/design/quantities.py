@@ -49,9 +49,14 @@ class Number(NamedTuple):
         """Kind of quantity that it is."""
         return self.reader.dimension
 
+    @property
+    def scale(self) -> tuple[float, float]:
+        """Factor and divisor that make SI of a value in its unit."""
+        return self.dimension.scales.get(self.unit) or (1.0, 1.0)
+
     def text(self, value: float, *, is_up: bool | None = None) -> str:
         """Write a value as the file would have it, with `DIGITS` digits, rounded up or down; None: to the nearest."""
-        factor, divisor = self.dimension.scales.get(self.unit) or (1.0, 1.0)
+        factor, divisor = self.scale
         number = value / factor * divisor
         if is_up is not None:
             context = Context(prec=DIGITS, rounding=ROUND_CEILING if is_up else ROUND_FLOOR)
@@ -78,6 +83,7 @@ class Choices(NamedTuple):
     reader: Reader
     value: str | None
     unit: str = ""
+    scale: tuple[float, float] = (1.0, 1.0)
 
 
 Varied = Number | Choices
@@ -92,23 +98,13 @@ def tree_of(mission: Mission) -> dict[str, Any]:
 
 
 def number_of(tree: dict[str, Any], key: str, of_all: str = "") -> Number:
-    """Find the number that a key names.
+    """Find the number that a key names; a scalar that stands for each axis is one.
 
-    Parameters
-    ----------
-    tree : dict
-        What the file says, as text.
-    key : str
-        Path of the number; a scalar that stands for each axis is one number.
-    of_all : str
-        What else is accepted where a key has three numbers.
-
-    Raises
-    ------
-    QuestionError
-        No such key, or no number.
+    `tree` is what the file says, as text, `of_all` what else is accepted where a key has three numbers. A
+    `QuestionError` says that there is no such key, or no number.
     """
-    reader, value = reader_of(tree, key)
+    reader, value = _found(tree, key)
+    reader = form_of(reader, value)
     if isinstance(reader, Triple):
         if isinstance(value, list) or not reader.or_scalar:
             more = of_all if reader.or_scalar else ""
@@ -126,19 +122,8 @@ def number_of(tree: dict[str, Any], key: str, of_all: str = "") -> Number:
 def choices_of(tree: dict[str, Any], key: str, text: str) -> Choices | None:
     """Find the key that a word can be given for; None where it has a number, or anything else.
 
-    Parameters
-    ----------
-    tree : dict
-        What the file says, as text.
-    key : str
-        Path of the key.
-    text : str
-        What is to be given: of shares of a budget the rule, of parts a list.
-
-    Raises
-    ------
-    QuestionError
-        No such key.
+    `text` is what is to be given: of shares of a budget the rule, of parts a list. A `QuestionError` says that there
+    is no such key.
     """
     reader, value = _found(tree, key)
     reader = form_of(reader, [] if text.startswith("[") else text)
@@ -164,14 +149,8 @@ def as_number(key: str, reader: Quantity, value: Any) -> Number:
     return Number(key, reader, number, unit if unit in dimension.scales else "")
 
 
-def reader_of(tree: dict[str, Any], key: str) -> tuple[Reader, Any]:
-    """Go down to a key: its reader, and what the file says there, None if nothing."""
-    reader, value = _found(tree, key)
-    return form_of(reader, value), value
-
-
 def _found(tree: dict[str, Any], key: str) -> tuple[Reader, Any]:
-    """Go down to a key: its reader, of whatever form, and what the file says there."""
+    """Go down to a key: its reader, of whatever form, and what the file says there, None if nothing."""
     reader: Reader = MISSION
     value: Any = tree
     parts = parts_of(key)
@@ -249,29 +228,23 @@ def range_of(number: Number, between: str | None) -> Range:
         low, high = max(ends[0], ge, gt), min(ends[1], le, lt)
         low, high = (low * (1 + 1e-9) if low == gt else low), (high * (1 - 1e-9) if high == lt else high)
     else:
-        first, dots, last = between.partition("..")
+        option = f"--between {shown(between)}"
+        first, dots, last = (part.strip() for part in between.partition(".."))
         if not dots:
-            raise QuestionError(
-                f"--between {shown(between)}: is no range; accepted: A..B, such as {_example(number)}"
-            )
-        first, last = first.strip(), last.strip()
-        if _UNIT.sub("", first) == "" and first:  # 1..10 km starts at 1 km
+            example = (1.0, 10.0) if number.value is None else (number.value / 2, number.value * 2)
+            said = "..".join(map(number.text, example)).replace(" ", "")
+            raise QuestionError(f"{option}: is no range; accepted: A..B, such as {said}")
+        if first and not _UNIT.sub("", first):  # 1..10 km starts at 1 km
             first += f" {_UNIT.sub('', last)}".rstrip()
-        low, high = (_end(number, between, end) for end in (first, last))
+        found = []
+        for text in (first, last):
+            try:
+                found.append(number.reader.leaf(text))
+            except InvalidValueError as error:
+                raise QuestionError(f"{option}: {shown(text)!r} {error.problem.words}") from None
+        low, high = found
     if not low < high:
         raise QuestionError(
             f"--between {shown(between or '')}: is {'empty' if low == high else 'reversed'}; accepted: A < B"
         )
     return Range(low, high, is_log=low > 0 and high / low >= 4)
-
-
-def _end(number: Number, between: str, text: str) -> float:
-    try:
-        return number.reader.leaf(text)
-    except InvalidValueError as error:
-        raise QuestionError(f"--between {shown(between)}: {shown(text)!r} {error.problem.words}") from None
-
-
-def _example(number: Number) -> str:
-    low, high = (1.0, 10.0) if number.value is None else (number.value / 2, number.value * 2)
-    return f"{number.text(low)}..{number.text(high)}".replace(" ", "")

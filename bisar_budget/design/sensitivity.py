@@ -21,7 +21,7 @@ from bisar_budget.budget.judged_rows import Judged
 from bisar_budget.design.quantities import FACTOR, Number, QuestionError, as_number, form_of, tree_of
 from bisar_budget.design.table import Question, Table, Variation, hold_to_decisions, standing
 from bisar_budget.design.varied import scaled
-from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.effects.effect import MOTION, PLATFORMS
 from bisar_budget.faults import SetValue
 from bisar_budget.findings.requirement import Override
 from bisar_budget.findings.status import STATUS
@@ -201,8 +201,8 @@ class Stated(NamedTuple):
 
     `step` is half of the difference that is taken, `per` the change that an effect is said for, in SI, and `per_text`
     the same in words. `part` is how much of a change that is, by one measure for all: a part of the number, of a
-    radian, of a power, or of the smaller slant range. `others` are numbers that change with it: shares sum to 1.
-    `is_scale` marks the elements of a covariance, of which the value is a factor on all sigmas.
+    radian, of a power, or of the smaller slant range. `others` are numbers that change with it: shares sum to 1. Of a
+    covariance the value is a factor on all sigmas.
     """
 
     number: Number
@@ -213,7 +213,6 @@ class Stated(NamedTuple):
     per_text: str
     part: float = 0.01
     others: tuple[Number, ...] = ()
-    is_scale: bool = False
 
     def at(self, value: float) -> Mapping[Number, float]:
         """Give the numbers of the mission where this one has another value."""
@@ -234,20 +233,8 @@ def sensitivity(
 
     Each number is changed by itself, to both sides, and the mission is checked anew: no effect is left out. Numbers
     change by 1 % of themselves, directions by a degree, levels by a decibel, latitudes and longitudes by 1 % of the
-    smaller slant range.
-
-    Parameters
-    ----------
-    mission : Mission
-        As loaded; the file that it came from is read anew for each value, with the options that changed it.
-    row : str, optional
-        Id of a row whose utilization is followed too.
-    model : str, optional
-        Gating model in place of the mission's own.
-    today : date
-        Day on which waivers are judged, UTC.
-    progress : callable, optional
-        Is told how many values are done, and how many there are.
+    smaller slant range. Arguments are those of `solve`, but that the utilization of a `row` is followed beside that
+    of the mission.
 
     Returns
     -------
@@ -260,8 +247,12 @@ def sensitivity(
     QuestionError
         Nothing is declared or judged, the row is not there, or a part cannot be read any more.
     """
-    variation, of_parts = _stating_its_parts(Variation(mission, model))
+    variation = Variation(mission, model)
     base = variation.read()
+    if taken := list(taken_figures(base)):  # as if the file stated the figures that it takes from parts
+        stated = variation.read([SetValue(one.key, json.dumps(one.value)) for one in taken])
+        variation = Variation(stated, model)
+        base = variation.read()
     found = judged_mission(Analysis(base), today)
     hold_to_decisions([found], row)
     stands = standing(found, None, frozenset())
@@ -280,7 +271,8 @@ def sensitivity(
         ):
             unchanging.append(slope.key)
         else:
-            slopes.append(slope._replace(part=_part_of(slope.key, of_parts)))
+            parts = (one.part for one in taken if f"{slope.key}.".startswith(f"{one.key}."))
+            slopes.append(slope._replace(part=next(parts, "")))
     slopes.sort(key=lambda slope: -abs(slope.even_effect))
     balanced = is_balanced(base)
     return Sensitivity(
@@ -300,20 +292,6 @@ def sensitivity(
         relaxed=tuple(relaxed_errors(base, found, today)) if balanced else (),
         changes=mission.changes,
     )
-
-
-def _stating_its_parts(variation: Variation) -> tuple[Variation, Mapping[str, str]]:
-    """The same mission as if its file stated the figures that it takes from parts; the part by the key of each."""
-    mission = variation.read()
-    taken = list(taken_figures(mission))
-    if not taken:
-        return variation, {}
-    stated = variation.read([SetValue(one.key, json.dumps(one.value)) for one in taken])
-    return Variation(stated, variation.model), {one.key: one.part for one in taken}
-
-
-def _part_of(key: str, of_parts: Mapping[str, str]) -> str:
-    return next((part for figure, part in of_parts.items() if f"{key}.".startswith(f"{figure}.")), "")
 
 
 class _Uses(NamedTuple):
@@ -342,10 +320,8 @@ class _Beside:
         self.values = {one.key: one.value for one in varied.values()}
         mission, names = variation.mission, dict.fromkeys(name for name in (worst, row) if name is not None)
         columns = tuple(f"{name}.utilization" for name in names)
-        question = Question(
-            mission.data, mission.file, mission.changes, tuple(varied), columns, variation.model, today
-        )
-        self.table = Table(question._replace(breaks=frozenset()), mission, tuple(varied.values()))
+        asked = Question.of(mission, list(varied), variation.model, today, columns=columns, breaks=frozenset())
+        self.table = Table(asked, mission, tuple(varied.values()))
 
     def uses(self, cases: Sequence[tuple[Stated | None, int]], progress: Progress = unseen) -> list[_Uses | str]:
         """Utilizations with one number some steps aside in each case; why there is no mission as text."""
@@ -357,19 +333,14 @@ class _Beside:
         found = self.table.watched(values, progress)
         texts = ("worst_row", "binding_requirement", "reason")
         asked = [found[f"{name}.utilization"] if name else [None] * len(cases) for name in (self.row, self.worst)]
-        return [
-            self._of_case(*line)
-            for line in zip(*(found[name] for name in texts), found["utilization"].tolist(), *asked, strict=True)
-        ]
-
-    def _of_case(
-        self, worst_row: str, requirement: str, reason: str, worst: float, row: float | None, of_worst: float
-    ) -> "_Uses | str":
-        if reason:
-            return reason
-        if not math.isfinite(worst) or (row is not None and not math.isfinite(row)):
-            return "no utilization has a value there"
-        return _Uses(worst_row, requirement, worst, row, 0.0 if math.isnan(of_worst) else of_worst)
+        uses: list[_Uses | str] = []
+        for line in zip(*(found[name] for name in texts), found["utilization"].tolist(), *asked, strict=True):
+            worst_row, requirement, reason, worst, row, of_worst = line
+            if not reason and (not math.isfinite(worst) or (row is not None and not math.isfinite(row))):
+                reason = "no utilization has a value there"
+            known = _Uses(worst_row, requirement, worst, row, 0.0 if math.isnan(of_worst) else of_worst)
+            uses.append(reason or known)
+        return uses
 
     def slopes(self, here: _Uses, progress: Progress) -> Iterator[Slope | Skipped]:
         """Take the difference to both sides of each number, or to the one side where there is a mission."""
@@ -400,8 +371,10 @@ class _Beside:
         self, number: Stated, here: _Uses, kind: str, uses: Sequence[_Uses], weights: Sequence[float]
     ) -> Slope:
         """Slope for a number, by utilizations at rising values and their weights."""
-        scale = number.per / number.step
-        in_row = [use.row for use in uses if use.row is not None]
+
+        def change(values: Iterator[float]) -> float:
+            return number.per / number.step * math.fsum(map(math.prod, zip(weights, values, strict=True)))
+
         return Slope(
             key=number.number.key,
             text=number.text,
@@ -412,39 +385,32 @@ class _Beside:
             measure=number.part,
             step=abs(number.step),
             difference=kind,
-            change=scale * _sum(weights, [use.worst for use in uses]),
-            row_change=None if self.row is None else scale * _sum(weights, in_row),
+            change=change(use.worst for use in uses),
+            row_change=None if self.row is None else change(use.row or 0.0 for use in uses),
             row_below=uses[0].worst_row,
             row_above=uses[-1].worst_row,
             is_mixed=any(use.is_passed for use in uses),
         )
 
 
-def _sum(weights: Sequence[float], values: Sequence[float]) -> float:
-    return math.fsum(weight * value for weight, value in zip(weights, values, strict=True))
-
-
 # ---------------------------------------------------------------- numbers of the file
 def stated_numbers(tree: dict[str, Any], nearest_m: float) -> tuple[list[Stated], list[Skipped]]:
-    """Find every number of a mission file, in the order of the file, and what is none.
+    """Find every number of a mission file, in its order, and what is none; `tree` is what it says, as text.
 
-    Parameters
-    ----------
-    tree : dict
-        What the file says, as text.
-    nearest_m : float
-        Slant range of the nearer platform: a place on the Earth changes by a part of it. [m]
+    A place on the Earth changes by a part of the slant range of the nearer platform. [m]
     """
     numbers: list[Stated] = []
     skipped: list[Skipped] = []
     for key, reader, value, above in _leaves(MISSION, tree, (), None):
-        if key.endswith(".covariance"):  # a matrix
-            numbers.append(_of_sigmas(key))
-            continue
-        if isinstance(reader, Quantity) and isinstance(value, str):
+        if isinstance(reader, Triple):  # a scalar that stands for each axis
+            reader = reader.component
+        if key.endswith(".covariance"):  # a matrix: its elements do not change alone
+            one = Number(key, FACTOR, 1.0, "")
+            numbers.append(Stated(one, "its sigmas", 1.0, RELATIVE_STEP, 0.01, "1 %"))
+        elif isinstance(reader, Quantity) and isinstance(value, str):
             found = _stated(as_number(key, reader, value), value, nearest_m, above)
             (numbers if isinstance(found, Stated) else skipped).append(found)  # type: ignore[arg-type]
-        elif reason := _no_number(key, reader, value):
+        elif reason := _no_number(key, reader):
             skipped.append(Skipped(key, ", ".join(map(str, value if isinstance(value, list) else [value])), reason))
     return numbers, skipped
 
@@ -463,16 +429,11 @@ def _leaves(reader: Reader, value: Any, path: tuple[str, ...], above: Mapping[st
     below = [(name, reader.below(name), item) for name, item in parts]
     if not any(inner for _, inner, _ in below):
         if value is not INVALID:
-            yield ".".join(path), _component(reader), value, above
+            yield ".".join(path), reader, value, above
         return
     for name, inner, item in below:
         if inner is not None:
             yield from _leaves(inner, item, (*path, name), value if reader is SHARES else None)
-
-
-def _component(reader: Reader) -> Reader:
-    """One reader of a scalar that stands for each axis."""
-    return reader.component if isinstance(reader, Triple) else reader
 
 
 def _stated(number: Number, text: str, nearest_m: float, shares: Mapping[str, Any] | None) -> Stated | Skipped:
@@ -498,39 +459,21 @@ def _stated(number: Number, text: str, nearest_m: float, shares: Mapping[str, An
     return Stated(number, text, value, step, 0.01 * value, "1 %", others=others)
 
 
-def _of_sigmas(key: str) -> Stated:
-    """All sigmas of a covariance matrix: its elements do not change alone."""
-    return Stated(Number(key, FACTOR, 1.0, ""), "its sigmas", 1.0, RELATIVE_STEP, 0.01, "1 %", is_scale=True)
-
-
-def _no_number(key: str, reader: Reader, value: Any) -> str:
+def _no_number(key: str, reader: Reader) -> str:
     """Say what a key holds instead of a number; empty for names and remarks, which change nothing."""
-    if isinstance(reader, Whole | Version):
-        return "is a whole number"
-    if isinstance(reader, Choice):
-        return "is a choice"
-    if key.rpartition(".")[2] == "sensor" or ".sensor." in key:
-        return "is a part of the catalogue; solve --for compares parts"
-    if key == "collection.center_time":
-        return "is an instant"
-    if key.endswith(".correlation"):
-        return "is a matrix: its elements do not change alone"
-    return ""
+    kinds = (
+        ("is a whole number", isinstance(reader, Whole | Version)),
+        ("is a choice", isinstance(reader, Choice)),
+        ("is a part of the catalogue; solve --for compares parts", "sensor" in key.split(".")),
+        ("is an instant", key == "collection.center_time"),
+        ("is a matrix: its elements do not change alone", key.endswith(".correlation")),
+    )
+    return next((words for words, is_so in kinds if is_so), "")
 
 
 # ---------------------------------------------------------------- shares that follow what is declared
 def relaxed_errors(mission: Mission, found: JudgedMission, today: date) -> Iterator[Relaxed]:
-    """Double one declared error after the other, and see what that leaves to the others.
-
-    Parameters
-    ----------
-    mission : Mission
-        Its phase is divided by `balanced`.
-    found : JudgedMission
-        The same, as judged.
-    today : date
-        Day on which waivers are judged, UTC.
-    """
+    """Double one declared error after the other, and see what that leaves to the others; `found` is without that."""
     for key in _declared_errors(mission):
         try:
             doubled = scaled(mission, key, _RELAXED)
@@ -548,34 +491,24 @@ def relaxed_errors(mission: Mission, found: JudgedMission, today: date) -> Itera
 
 def _declared_errors(mission: Mission) -> Iterator[str]:
     """Keys of the declared errors: of each platform by kind, with those of parts of the catalogue."""
+    sections: list[tuple[str, Any, Sequence[str], int]] = []  # key, section, its keys, and how many a list has
     for name in PLATFORMS:
-        error = getattr(mission.platforms, name).motion_error
-        yield from _keys_of(error, f"platforms.{name}.motion_error", ("covariance", "position", "velocity"))
-        yield from _keys_of(error, f"platforms.{name}.motion_error", ("acceleration", "vibration"))
+        error, key = getattr(mission.platforms, name).motion_error, f"platforms.{name}.motion_error"
+        sections.append((key, error, ("covariance", *MOTION, "vibration"), 0))
         if error.imu is not None:
-            figures = [figure for figure in error.imu._fields if figure != "source"]
-            yield from _keys_of(error.imu, f"platforms.{name}.motion_error.imu", figures)
-        yield from (f"platforms.{name}.motion_error.random.{index}" for index in range(len(error.random)))
-        yield from _keys_of(error, f"platforms.{name}.motion_error", ("time_tag",))
-        if error.lever_arm is not None:
-            yield from _keys_of(error.lever_arm, f"platforms.{name}.motion_error.lever_arm", ("uncertainty",))
-    if mission.common_motion_error is not None:
-        yield from _keys_of(
-            mission.common_motion_error, "common_motion_error", ("position", "velocity", "acceleration", "time_tag")
-        )
-        count = len(mission.common_motion_error.random)
-        yield from (f"common_motion_error.random.{index}" for index in range(count))
-    yield from _keys_of(mission.timing_error, "timing_error", mission.timing_error._fields)
-    if mission.propagation is not None:
-        legs = ("transmitter", "receiver")
-        stated = [leg for leg in legs if getattr(mission.propagation, leg) is not None]
-        yield from (f"propagation.{leg}" for leg in stated)
-        yield from _keys_of(mission.propagation, "propagation", DELAYS)
-    yield from (f"other_errors.{index}" for index in range(len(mission.other_errors)))
-
-
-def _keys_of(section: Any, key: str, names: Sequence[str]) -> Iterator[str]:
-    yield from (f"{key}.{name}" for name in names if getattr(section, name) is not None)
+            sections.append((f"{key}.imu", error.imu, [one for one in error.imu._fields if one != "source"], 0))
+        sections.append((f"{key}.random", None, (), len(error.random)))
+        sections.append((key, error, ("time_tag",), 0))
+        sections.append((f"{key}.lever_arm", error.lever_arm, ("uncertainty",), 0))
+    common, air = mission.common_motion_error, mission.propagation
+    sections.append(("common_motion_error", common, (*MOTION, "time_tag"), 0))
+    sections.append(("common_motion_error.random", None, (), 0 if common is None else len(common.random)))
+    sections.append(("timing_error", mission.timing_error, mission.timing_error._fields, 0))
+    sections.append(("propagation", air, (*PLATFORMS, *DELAYS), 0))
+    sections.append(("other_errors", None, (), len(mission.other_errors)))
+    for key, section, names, count in sections:
+        yield from (f"{key}.{name}" for name in names if getattr(section, name, None) is not None)
+        yield from (f"{key}.{index}" for index in range(count))
 
 
 def _shares(found: JudgedMission) -> tuple[float, float]:

@@ -224,7 +224,9 @@ def solve(
         given=given,
         crossings=crossings,
         nearest=nearest,
-        is_constant=_is_constant(missions),
+        is_constant=all(
+            one.row == missions[0].row and _is_alike(one.utilization, missions[0].utilization) for one in missions[1:]
+        ),
         skipped=sum(bool(state.reason) for state in scanned),
         changes=mission.changes,
         texts=search.texts(crossings, nearest),
@@ -246,12 +248,6 @@ def _nearest(states: Sequence[State]) -> State:
         ]
         decides = min(uses)
     return next(state for state, use in zip(states, uses, strict=True) if _is_alike(use, decides))
-
-
-def _is_constant(states: Sequence[State]) -> bool:
-    """Whether one row decides, with one utilization."""
-    first, *others = states
-    return all(state.row == first.row and _is_alike(state.utilization, first.utilization) for state in others)
 
 
 def _is_alike(one: float | None, other: float | None) -> bool:
@@ -291,41 +287,38 @@ class _Search:
                 yield judged_mission(Analysis(last), today)
 
         hold_to_decisions(list(judged()), row)
-        question = Question(mission.data, mission.file, mission.changes, (key,), (), model, today)
-        self.table = Table(question._replace(row=row, breaks=self.breaks), mission, [of_table])
+        self.table = Table(
+            Question.of(mission, [key], model, today, row=row, breaks=self.breaks), mission, [of_table]
+        )
         self.levels = _LEVELS_READ if self.table.to_read else _LEVELS
 
-    def places(self) -> list[float]:
-        """Values that the scan looks at, in rising order; that of the file is among them."""
+    def scanned(self, progress: Progress) -> tuple[list[State], State | None]:
+        """Look at every place of the range, and where the utilization turns; beside it the state of the file."""
         places = self.range.places(PLACES_OF_CIRCLE if self.range.is_circle else PLACES)
         value = self.number.value
         if value is not None and self.range.low < value < self.range.high:
             places = sorted({*places, value})
-        return places
-
-    def scanned(self, progress: Progress) -> tuple[list[State], State | None]:
-        """Look at every place of the range, and where the utilization turns; beside it the state of the file."""
-        places, value = self.places(), self.number.value
         states = self.states(places if value is None else [*places, value], progress)
         given = None if value is None else states.pop()
-        return sorted([*states, *self._turned(states)], key=lambda state: state.value), given
+        # Between places without a change of compliance it may change there and back, where the utilization turns.
+        searches = [partial(_turn, *turn, self.levels - 1) for turn in _turns(states)[:_TURNS]]
+        turned = [state for state in self._searched(searches) if state is not None]
+        return sorted([*states, *turned], key=lambda state: state.value), given
 
     def states(self, values: Sequence[float], progress: Progress = unseen) -> list[State]:
         """Check the mission with each of many values."""
         (number,) = self.table.numbers
         found = self.table.watched({number.key: np.array(values)}, progress)
         columns = (*VERDICT, *GEOMETRY[:2], REASON)
-        lines = zip(values, *(found[column.name].tolist() for column in columns), strict=True)
-        return [self._of_line(*line) for line in lines]
-
-    def _of_line(
-        self, value: float, status: str, row: str, use: float, bound_by: str, range_m: float, cross_m: float, why: str
-    ) -> State:
-        """State of a value by the columns of a sweep."""
-        if why:
-            return State(value, complies=False, status=status, reason=why)
-        complies, utilization = status not in self.breaks, None if math.isnan(use) else use
-        return State(value, complies, status, row or None, bound_by or None, utilization, range_m, cross_m)
+        states = []
+        for value, *line in zip(values, *(found[column.name].tolist() for column in columns), strict=True):
+            status, row, use, requirement, *resolutions, why = line
+            if why:
+                states.append(State(value, complies=False, status=status, reason=why))
+                continue
+            complies, utilization = status not in self.breaks, None if math.isnan(use) else use
+            states.append(State(value, complies, status, row or None, requirement or None, utilization, *resolutions))
+        return states
 
     def crossings(self, borders: Sequence[tuple[State, State]]) -> tuple[Crossing, ...]:
         """Bracket borders between two places, write both sides with few digits, check them as they are written."""
@@ -338,11 +331,6 @@ class _Search:
         ]
         written = iter(self.states([self.number.read(text) for text in texts]) if texts else ())
         return tuple(_crossing(low, high, next(written), next(written)) for low, high in narrow)
-
-    def _turned(self, states: Sequence[State]) -> list[State]:
-        """Where the utilization turns between places without a change of compliance, a state that differs in it."""
-        searches = [partial(_turn, *turn, self.levels - 1) for turn in _turns(states)[:_TURNS]]
-        return [state for state in self._searched(searches) if state is not None]
 
     def _searched(self, searches: Sequence[Search]) -> list[Any]:
         """Go on with all searches at once, until each has what it looks for."""
@@ -372,18 +360,26 @@ def _bracketed(
         if not low.value < middle < high.value:
             break
         if middle not in known:
-            return _halves(low.value, high.value, levels)
+            return _ahead(_middle, low.value, high.value, levels)
         state = known[middle]
         low, high = (state, high) if state.complies == low.complies else (low, state)
     return low, high
 
 
-def _halves(low: float, high: float, levels: int) -> set[float]:
-    """Every value that so many halvings may look at."""
-    middle = (low + high) / 2
-    if not levels or not low < middle < high:
+def _ahead(points: Callable[[float, float], tuple[float, ...]], low: float, high: float, levels: int) -> set[float]:
+    """Every value that so many steps may look at: each goes on below its last point, or above its first."""
+    found = points(low, high)
+    if not levels or not low < found[0] < high:
         return set()
-    return {middle, *_halves(low, middle, levels - 1), *_halves(middle, high, levels - 1)}
+    return {*found, *_ahead(points, low, found[-1], levels - 1), *_ahead(points, found[0], high, levels - 1)}
+
+
+def _middle(low: float, high: float) -> tuple[float]:
+    return ((low + high) / 2,)
+
+
+def _golden(low: float, high: float) -> tuple[float, float]:
+    return high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
 
 
 def _turns(states: Sequence[State]) -> list[tuple[float, float, State]]:
@@ -407,7 +403,7 @@ def _turn(
     for _ in range(_STEPS_TO_TURN):
         values = _golden(low, high)
         if not known.keys() >= set(values):
-            return _sections(low, high, levels)
+            return _ahead(_golden, low, high, levels)
         left, right = (known[value] for value in values)
         for state in (left, right):
             if state.complies != here.complies and not state.reason:
@@ -417,18 +413,6 @@ def _turn(
         is_left = _sign(here) * left.utilization > _sign(here) * right.utilization
         low, high = (low, right.value) if is_left else (left.value, high)
     return None
-
-
-def _golden(low: float, high: float) -> tuple[float, float]:
-    return high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
-
-
-def _sections(low: float, high: float, levels: int) -> set[float]:
-    """Every value that so many golden sections may look at."""
-    if not levels:
-        return set()
-    left, right = _golden(low, high)
-    return {left, right, *_sections(low, right, levels - 1), *_sections(left, high, levels - 1)}
 
 
 def _crossing(low: State, high: State, below: State, above: State) -> Crossing:

@@ -3,29 +3,36 @@
 Memory does not grow with the number of cases: they are checked in parts, as they are asked for.
 """
 
-from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date
 from functools import cached_property, lru_cache
 from hashlib import sha256
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from bisar_budget.budget.check import check_mission
 from bisar_budget.design.cases import Cases, words_of
 from bisar_budget.design.quantities import Choices, Number, QuestionError
-from bisar_budget.design.table import GEOMETRY, IN_UNIT, REASON, VERDICT, Column, Part, Question, Swept, Table
+from bisar_budget.design.table import (
+    GEOMETRY,
+    IN_UNIT,
+    REASON,
+    VERDICT,
+    Column,
+    Part,
+    Question,
+    Swept,
+    Table,
+    is_status,
+)
 from bisar_budget.faults import Fault, MissionError, SetValue, fault_words, shown
 from bisar_budget.findings.row import Row, unknown_id
 from bisar_budget.mission.load import mission_of, named_by
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.tree import read_tree
-from bisar_budget.workers import MapBlocks, worker_pool
-
-if TYPE_CHECKING:
-    from concurrent.futures import Future
+from bisar_budget.workers import MapBlocks, in_processes
 
 _SLOW = 1 / 8  # of cases that are read one by one, from which processes share them out
 _MANY = 8  # parts, from which processes of their own are worth their start
@@ -49,13 +56,7 @@ _FIELDS = {
     "cubic_rad": "Cubic phase of {0}.",
     "islr_db": "ISLR that {0} adds.",
 }
-_UNITS = {
-    "qpe_published_rad": "rad",
-    "qpe_full_rad": "rad",
-    "qpe_exact_rad": "rad",
-    "cubic_rad": "rad",
-    "islr_db": "dB",
-}
+_UNITS = {"rad": "rad", "db": "dB"}  # by what a field's name ends with
 
 
 def sweep(
@@ -116,7 +117,7 @@ class Asked:
         if model is not None and "allocation.model" in choices:
             raise QuestionError("allocation.model: --model stands in for it; accepted: one of the two")
         each = tuple(dict.fromkeys(columns))  # Parquet could not be read with a column twice
-        self.question = Question(mission.data, mission.file, mission.changes, keys, each, model, today, choices)
+        self.question = Question.of(mission, keys, model, today, columns=each, choices=choices)
         self.mission, self.cases, self.table = mission, cases, Table(self.question, mission)
         missions = [self.table.mission, *self._chosen()]
         self.columns = tuple(self._columns(missions) if columns else ())
@@ -158,10 +159,9 @@ class Asked:
             words = [SetValue(key, values[key][0]) for key in self.question.choices]
             try:
                 self.table.variation.at({number: float(values[number.key][0])}, words)
+                return
             except MissionError as error:
                 problems.add(f"{error.faults[0].key} {_said(error.faults[0])}")
-            else:
-                return
         if len(problems) == 1:
             raise QuestionError(f"{number.key}: no value of it makes a mission: {problems.pop()}")
 
@@ -170,22 +170,20 @@ class Asked:
         rows: dict[str, Row] = {}
         for mission in missions:
             rows = {row.id: row for row in check_mission(mission, self.question.today).rows} | rows
-        for one in self.table.asked:
-            if one.field not in _FIELDS:
+        for name, (row, field) in self.table.fields.items():
+            if field not in _FIELDS:
                 raise QuestionError(
-                    f"--column {one.name}: {one.field!r} is no field of a row; accepted: {', '.join(_FIELDS)}"
+                    f"--column {name}: {field!r} is no field of a row; accepted: {', '.join(_FIELDS)}"
                 )
-            if one.row not in rows:
-                raise QuestionError(f"--column {one.name}: {unknown_id(one.row, rows, self.question.file)}")
-            unit = rows[one.row].unit if one.field in IN_UNIT else _UNITS.get(one.field, "")
-            yield Column(one.name, unit, _FIELDS[one.field].format(one.row), is_text=one.is_text)
+            if row not in rows:
+                raise QuestionError(f"--column {name}: {unknown_id(row, rows, self.question.file)}")
+            unit = rows[row].unit if field in IN_UNIT else _UNITS.get(field.rpartition("_")[2], "")
+            yield Column(name, unit, _FIELDS[field].format(row), is_text=is_status(name))
 
     def swept(self, parts: Iterator[Part]) -> Swept:
         """The sweep that has these parts."""
         varied = [
-            Column(one.key, "", "Varies.", is_text=True)
-            if isinstance(one, Choices)
-            else Column(one.key, one.dimension.si, "Varies.")
+            Column(one.key, one.dimension.si if isinstance(one, Number) else "", "Varies.", isinstance(one, Choices))
             for one in self.cases.varied
         ]
         return Swept(
@@ -200,21 +198,16 @@ class Asked:
 
     def chunks(self) -> "Chunks":
         """How the cases are cut: into few where many are read by themselves, which some of them show."""
-        is_slow = self.cases.count > _FEW and self._share_read() > _SLOW
-        return Chunks(self.cases.count, _FEW if is_slow else _TOGETHER, is_slow)
-
-    def _share_read(self) -> float:
-        """Share of cases that are read by themselves, by a few of them that are spread over all."""
-        cases = self.cases
-        places = np.linspace(0, cases.count - 1, _FEW).astype(int)
-        some = [cases.values(place, place + 1) for place in places.tolist()]
-        return (
-            self.table.reads({one.key: np.concatenate([each[one.key] for each in some]) for one in cases.varied})
-            / _FEW
-        )
+        cases, is_slow = self.cases, False
+        if cases.count > _FEW:
+            places = np.linspace(0, cases.count - 1, _FEW).astype(int)
+            some = [cases.values(place, place + 1) for place in places.tolist()]
+            values = {one.key: np.concatenate([each[one.key] for each in some]) for one in cases.varied}
+            is_slow = self.table.reads(values) > _SLOW * _FEW
+        return Chunks(cases.count, _FEW if is_slow else _TOGETHER, is_slow)
 
     @cached_property
-    def travelling(self) -> "Question":
+    def travelling(self) -> Question:
         """The question with all that the mission names: other processes see what this one saw."""
         words = [SetValue(one.key, word) for one, chosen in words_of(self.cases) for word in chosen]
         return self.question._replace(named=named_by(self.mission, words))
@@ -227,30 +220,15 @@ class Asked:
         What arrays hold takes less time than to send it from one process to another. Where `mapped` has others do it,
         they do all, and parts come in any order.
         """
-        if mapped is not None:
-            blocks = (self.block(chunks, start) for start in starts)
-            for _, part in mapped(
-                part_of, self.travelling, blocks, lambda block: f"cases {block[0]} to {block[1] - 1}"
-            ):
-                yield part
-            return
-        if not chunks.is_slow or jobs == 1 or len(starts) < _MANY:
-            for start in starts:
-                yield self.table.part(*self.block(chunks, start))
-            return
-        with worker_pool(jobs, "spawn") as pool:
-            waiting: deque[Future[Part]] = deque()
-            for start in starts:
-                waiting.append(pool.submit(part_of, self.travelling, self.block(chunks, start)))
-                if len(waiting) > 3 * jobs:  # none is far ahead of what has been asked for
-                    yield waiting.popleft().result()
-            while waiting:
-                yield waiting.popleft().result()
-
-    def block(self, chunks: "Chunks", start: int) -> Block:
-        """The chunk that begins at a case: what `part_of` takes besides the question."""
-        stop = chunks.stop(start)
-        return start, stop, self.cases.values(start, stop)
+        stops = ((start, chunks.stop(start)) for start in starts)
+        blocks = ((start, stop, self.cases.values(start, stop)) for start, stop in stops)
+        if mapped is None and chunks.is_slow and jobs > 1 and len(starts) >= _MANY:
+            mapped = in_processes(jobs)
+        if mapped is None:
+            yield from (self.table.part(*block) for block in blocks)
+        else:
+            found = mapped(part_of, self.travelling, blocks, lambda block: f"cases {block[0]} to {block[1] - 1}")
+            yield from (part for _, part in found)
 
 
 @dataclass(frozen=True)

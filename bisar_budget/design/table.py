@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from datetime import date
 from functools import cached_property
 from itertools import pairwise
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -107,35 +107,48 @@ def breaking(target: str) -> frozenset[str]:
     return frozenset(name for name, one in STATUS.items() if (one.fails if target == "fail" else one.fails_strict))
 
 
-def deciding(kinds: Sequence[str], codes: Any, uses: Any, whole: Any, breaks: Container[str]) -> NDArray[np.intp]:
-    """Find the row that binds in each case: of the rows that are judged the one that uses most of its limit.
+def _verdict(
+    judged: JudgedMission, by_id: Mapping[str, Judged], row_id: str | None, breaks: Container[str]
+) -> dict[str, Any]:
+    """Status of each case, or of the row that is asked for; the row that binds, its utilization and requirement.
 
-    Of rows that use as much of it, but for rounding, the first. One that is not evaluated and has no number binds
-    nothing. Where the whole does not comply, only rows that break are looked at.
-
-    Parameters
-    ----------
-    kinds : sequence of str
-        What kind of row each is, in the order of the contract.
-    codes, uses : array
-        Places of their statuses in `STATUS`, and their utilizations, NaN where there is none, (rows, cases).
-    whole : array
-        Status of the mission, or of the row that is asked for, (cases,).
-    breaks : container of str
-        Statuses that do not comply.
-
-    Returns
-    -------
-    array
-        Place of the row, -1 where none binds, (cases,).
+    Of the rows that are judged the one binds that uses most of its limit; of those that use as much of it, but for
+    rounding, the first. One that is not evaluated and has no number binds nothing. Where the whole does not comply,
+    only rows that break are looked at.
     """
+    rows = list(judged.rows) if row_id is None else [by_id[row_id]] if row_id in by_id else []
+    if not rows:
+        nothing = ("not_evaluated", "", math.nan, "")
+        return dict(zip((column.name for column in VERDICT), nothing, strict=True))
     does_break = np.array([name in breaks for name in STATUS])
+    codes, uses = np.array([one.status for one in rows]), np.array([one.utilization for one in rows])  # (rows, cases)
+    status = judged.status if row_id is None else codes[0]
     # What only ever warns decides nothing, unless a warning does.
-    may_decide = np.array([["warn" in breaks or kind != "autofocus_pull_in"] for kind in kinds])
-    decides = may_decide & _IS_JUDGED[codes] & (does_break[codes] | ~does_break[whole])
+    may_decide = np.array([["warn" in breaks or one.subject.kind != "autofocus_pull_in"] for one in rows])
+    decides = may_decide & _IS_JUDGED[codes] & (does_break[codes] | ~does_break[status])
     decides &= ~np.isnan(uses) | (codes != RANK["not_evaluated"])
-    uses = np.where(decides, np.where(np.isnan(uses), -1.0, uses), -2.0)
-    return np.where(decides.any(axis=0), first_highest(uses), -1)
+    known = np.where(decides, np.where(np.isnan(uses), -1.0, uses), -2.0)
+    has_one = decides.any(axis=0)
+    place = (
+        np.where(has_one, first_highest(known), -1),
+        np.arange(has_one.size),
+    )  # of the row that binds, and the case
+    ids, metrics = (
+        np.array(names, dtype=object)[place[0]]
+        for names in ([one.subject.id for one in rows], [one.metric for one in rows])
+    )
+    binding = np.array([one.binding for one in rows])[place]
+    requirement = np.where(binding >= 0, np.array(REQUIREMENTS, dtype=object)[binding], metrics)
+    unmet = np.full(status.shape, "", dtype=object)  # where no row decides, the requirement that breaks
+    if row_id is None:
+        for one in reversed(judged.requirements):
+            unmet = np.where((one.status == status) & does_break[status], one.key, unmet)
+    return {
+        "status": statuses(status),
+        "worst_row": np.where(has_one, ids, ""),
+        "utilization": np.where(has_one, uses[place], math.nan),
+        "binding_requirement": np.where(has_one, requirement, unmet),
+    }
 
 
 class Standing(NamedTuple):
@@ -183,14 +196,8 @@ def hold_to_decisions(judged: Sequence[JudgedMission], row_id: str | None) -> No
 class Variation:
     """A mission whose file is read with other values: each is held to everything that a file is.
 
-    Parameters
-    ----------
-    mission : Mission
-        As loaded, with the options that changed it; they stay.
-    model : str, optional
-        Gating model in place of the mission's own.
-    named : Named, optional
-        What the mission names, where its files are not there.
+    Options that changed the mission stay. `model` gates in place of its own, `named` is what it names, where the
+    files are not there.
     """
 
     def __init__(self, mission: Mission, model: str | None, named: Named | None = None) -> None:
@@ -203,13 +210,7 @@ class Variation:
         return read_tree(self.mission.data, self.mission.file)
 
     def read(self, changes: Sequence[SetValue] = ()) -> Mission:
-        """Read the mission with values in place of its own.
-
-        Raises
-        ------
-        MissionError
-            With them there is no mission.
-        """
+        """Read the mission with values in place of its own; a `MissionError` says that there is none with them."""
         anew = {parts_of(change.key) for change in changes}
         given = [change for change in self.mission.changes if parts_of(change.key) not in anew]
         mission, tree = self.mission, self.tree.copied()
@@ -233,53 +234,40 @@ class Question(NamedTuple):
     file: str
     changes: tuple[SetValue, ...]
     keys: tuple[str, ...]
-    columns: tuple[str, ...]
     model: str | None
     today: date
+    columns: tuple[str, ...] = ()
     choices: tuple[str, ...] = ()
     named: Named | None = None
     row: str | None = None
     breaks: frozenset[str] = breaking("fail")
 
-
-class _Field(NamedTuple):
-    """A column that was asked for: a field of a row."""
-
-    name: str
-    row: str
-    field: str
-
-    @property
-    def is_text(self) -> bool:
-        """Whether it is no number."""
-        return self.field == "status"
+    @classmethod
+    def of(cls, mission: Mission, keys: Sequence[str], model: str | None, today: date, **more: Any) -> "Question":
+        """The question about a mission as it was loaded."""
+        return cls(mission.data, mission.file, mission.changes, tuple(keys), model, today, **more)
 
 
 class Table:
     """Checks cases of one mission; a process of its own can have one.
 
-    Parameters
-    ----------
-    question : Question
-        What is asked of each case.
-    mission : Mission
-        As loaded.
-    numbers : sequence of Number, optional
-        Those of the question's keys; of `FACTOR` the errors below its key are scaled.
+    `numbers` are those of the question's keys, which need not be looked up then; of `FACTOR` the errors below its key
+    are scaled.
     """
 
     def __init__(self, question: Question, mission: Mission, numbers: Sequence[Number] = ()) -> None:
-        self.question, model = question, question.model
-        self.chosen: dict[tuple[str, ...], Table | None] = {}  # by the words of its cases; None: no mission
-        self.mission = mission if model is None else _gated(mission, model)
-        self.variation = Variation(mission, model, question.named)
+        self.question, self.mission = question, mission
+        self.chosen: dict[tuple[str, ...], Table] = {}  # by the words of its cases
+        self.variation = Variation(mission, question.model, question.named)
+        if question.model is not None:
+            self.mission = mission._replace(allocation=mission.allocation._replace(model=question.model))
         tree = tree_of(mission)
         self.numbers = tuple(numbers) or tuple(number_of(tree, key) for key in question.keys)
-        self.asked = [_Field(name, *_of_row(name)) for name in question.columns]
-        wanted = {one.row for one in self.asked} | ({question.row} if question.row else set())
+        self.fields = {name: name.rpartition(".")[::2] for name in question.columns}  # row and field of each column
+        wanted = {row for row, _ in self.fields.values()} | ({question.row} if question.row else set())
         rows = judged_mission(Analysis(self.mission), question.today).rows if wanted else ()
         self.subjects = {row.subject.id: row.subject for row in rows if row.subject.id in wanted}
-        self.is_whole = any(one.field in WHOLE for one in self.asked)
+        self.is_whole = any(field in WHOLE for _, field in self.fields.values())
         # Numbers that decide more than themselves: a case that has another value than the mission is read.
         self.to_read = {
             one.key
@@ -329,9 +317,9 @@ class Table:
         """The values of some cases, and room for what is found of them."""
         found: dict[str, Values] = {key: np.asarray(values[key], dtype=object) for key in self.question.choices}
         found |= {number.key: np.asarray(values[number.key], dtype=float) for number in self.numbers}
-        columns = [(column.name, column.is_text) for column in (*GEOMETRY, *VERDICT, REASON)]
-        for name, is_text in (*columns, *((one.name, one.is_text) for one in self.asked)):
-            found[name] = np.full(cases, "", dtype=object) if is_text else np.full(cases, math.nan)
+        is_text = {column.name: column.is_text for column in (*GEOMETRY, *VERDICT, REASON)}
+        for name, is_one in (is_text | {name: is_status(name) for name in self.fields}).items():
+            found[name] = np.full(cases, "", dtype=object) if is_one else np.full(cases, math.nan)
         return found
 
     # ---------------------------------------------------------------- one mission for the same words
@@ -341,37 +329,28 @@ class Table:
         for place, words in enumerate(zip(*(found[key].tolist() for key in self.question.choices), strict=True)):
             same.setdefault(words, []).append(place)
         for words, some in same.items():
-            table = self.chosen.get(words) or self._with(words, found, some)
-            if table is not None:
-                self.chosen[words] = table
-                yield table, np.array(some)
-
-    def _with(self, words: tuple[str, ...], found: Mapping[str, Values], some: Sequence[int]) -> "Table | None":
-        """The table of the mission with these words, and with the numbers of the first case that makes it one."""
-        changes = [SetValue(*one) for one in zip(self.question.choices, words, strict=True)]
-        mission = None
-        try:
-            mission = self.variation.read(changes)
-        except MissionError:
-            for place in some:
-                mission = mission or self._read(found, place)
-        if mission is None:
-            return None
-        return Table(self.question._replace(changes=mission.changes, choices=()), mission)
+            if words not in self.chosen:
+                changes = [SetValue(*one) for one in zip(self.question.choices, words, strict=True)]
+                mission = None
+                try:
+                    mission = self.variation.read(changes)
+                except MissionError:  # the numbers of the first case that makes it one
+                    for place in some:
+                        mission = mission or self._read(found, place)
+                if mission is None:
+                    continue
+                self.chosen[words] = Table(self.question._replace(changes=mission.changes, choices=()), mission)
+            yield self.chosen[words], np.array(some)
 
     def _read(self, found: Mapping[str, Values], place: int) -> Mission | None:
         """Read the mission of a case; where there is none, say why."""
         words = [SetValue(key, found[key][place]) for key in self.question.choices]
         values = {one: float(found[one.key][place]) for one in self.numbers}
+        changed = {
+            one: value for one, value in values.items() if one.reader is not FACTOR and (words or value != one.value)
+        }
         try:
-            mission = self.variation.at(
-                {
-                    one: value
-                    for one, value in values.items()
-                    if one.reader is not FACTOR and (words or value != one.value)
-                },
-                words,
-            )
+            mission = self.variation.at(changed, words)
         except MissionError as error:
             fault = error.faults[0]
             found["status"][place], found["reason"][place] = "error", f"{fault.key}: {fault.problem}"
@@ -385,20 +364,29 @@ class Table:
     def _fill(self, found: dict[str, Values]) -> None:
         """Check every case."""
         cases = found["utilization"].size
-        some, mission, geometries = self._arrays(found, cases)
+        some, together, geometries = self._arrays(found, cases)
         if some.size:
-            self._check(found, some, mission, geometries)
+            self._check(found, some, together, geometries)
         places: list[int] = []
-        read = self._all_read(found, np.delete(np.arange(cases), some).tolist(), places)
-        for mission, some in stacked(read):
-            self._check(found, np.array(places)[some], mission, mission.geometry)
+
+        def read() -> Iterator[Mission]:
+            """Other cases, one after the other; the place of each that is a mission is noted."""
+            for place in np.delete(np.arange(cases), some).tolist():
+                mission = self._read(found, place)
+                if mission is not None:
+                    places.append(place)
+                    yield mission
+
+        for mission, same in stacked(read()):
+            self._check(found, np.array(places)[same], mission, mission.geometry)
 
     def _arrays(self, found: Mapping[str, Values], cases: int) -> tuple[Places, Mission, BistaticGeometry]:
         """The cases whose numbers can be put into the mission, the mission with them, and its geometry."""
         direct = np.ones(cases, dtype=bool)
         for one in self.numbers:
-            values = found[one.key]
-            direct &= values == one.value if one.key in self.to_read else _within(one, values)
+            values, (gt, ge, lt, le) = found[one.key], one.reader.bounds
+            is_accepted = (values > gt) & (values >= ge) & (values < lt) & (values <= le)
+            direct &= values == one.value if one.key in self.to_read else is_accepted
         some, mission = np.flatnonzero(direct), self.mission
         for one in self.numbers:
             if one.reader is FACTOR:
@@ -412,93 +400,32 @@ class Table:
         mission = picked(mission, np.flatnonzero(is_sure))
         return some[is_sure], mission, mission.geometry
 
-    def _all_read(self, found: dict[str, Values], others: Sequence[int], places: list[int]) -> Iterator[Mission]:
-        """Read other cases, one after the other, and note the place of each that is a mission."""
-        for place in others:
-            mission = self._read(found, place)
-            if mission is not None:
-                places.append(place)
-                yield mission
-
     def _check(self, found: dict[str, Values], some: Places, mission: Mission, geometries: BistaticGeometry) -> None:
         """Judge the cases of a mission together, those that need as many nodes."""
-        for nodes, same, part, of_part in by_nodes(mission, some.size, geometries):
-            self._judge(found, some[same], part, of_part, nodes)
-
-    def _judge(
-        self, found: dict[str, Values], some: Places, mission: Mission, geometries: BistaticGeometry, nodes: int
-    ) -> None:
-        question, T = self.question, mission.collection.aperture_time
-        analysis = Analysis(
-            mission,
-            some.size,
-            geometry=geometries,
-            nodes=nodes,
-            shown=self.subjects,
-            is_whole=self.is_whole,
-        )
-        judged = judged_mission(analysis, question.today)
-        rows = {row.subject.id: row for row in judged.rows}
-        columns = _verdict(judged, rows, question.row, question.breaks)
-        with np.errstate(all="ignore"):
-            geometry = (
-                geometries.range_resolution(mission.radar.bandwidth, SPEED_OF_LIGHT),
-                geometries.cross_range_resolution(mission.radar.wavelength, T),
-                geometries.bistatic_angle,
-                geometries.gradient_angle,
+        for nodes, same, part, seen in by_nodes(mission, some.size, geometries):
+            analysis = Analysis(
+                part, same.size, geometry=seen, nodes=nodes, shown=self.subjects, is_whole=self.is_whole
             )
-            columns |= {column.name: number for column, number in zip(GEOMETRY, geometry, strict=True)}
-            for one in self.asked:
-                if one.row in rows:
-                    columns[one.name] = field(rows[one.row], one.field)
-                elif one.is_text:
-                    columns[one.name] = "not_declared"
-        for name, column in columns.items():
-            found[name][some] = np.broadcast_to(column, some.shape)
+            judged = judged_mission(analysis, self.question.today)
+            rows = {row.subject.id: row for row in judged.rows}
+            columns = _verdict(judged, rows, self.question.row, self.question.breaks)
+            with np.errstate(all="ignore"):
+                geometry = (
+                    seen.range_resolution(part.radar.bandwidth, SPEED_OF_LIGHT),
+                    seen.cross_range_resolution(part.radar.wavelength, part.collection.aperture_time),
+                    seen.bistatic_angle,
+                    seen.gradient_angle,
+                )
+                columns |= {column.name: number for column, number in zip(GEOMETRY, geometry, strict=True)}
+                for name, (row, of_row) in self.fields.items():
+                    if row in rows:
+                        columns[name] = field(rows[row], of_row)
+                    elif is_status(name):
+                        columns[name] = "not_declared"
+            for name, column in columns.items():
+                found[name][some[same]] = np.broadcast_to(column, same.shape)
 
 
-def _verdict(
-    judged: JudgedMission, by_id: Mapping[str, Judged], row_id: str | None, breaks: Container[str]
-) -> dict[str, Any]:
-    """Status, worst row, utilization and requirement of each case, or of the row that is asked for."""
-    rows = list(judged.rows) if row_id is None else [by_id[row_id]] if row_id in by_id else []
-    does_break = np.array([name in breaks for name in STATUS])
-    if not rows:
-        nothing = "not_evaluated"
-        return {"status": nothing, "worst_row": "", "utilization": math.nan, "binding_requirement": ""}
-    codes, uses = np.array([one.status for one in rows]), np.array([one.utilization for one in rows])
-    status = judged.status if row_id is None else codes[0]
-    worst = deciding([one.subject.kind for one in rows], codes, uses, status, breaks)
-    has_one = worst >= 0
-    ids, metrics = (
-        np.array(names, dtype=object) for names in ([one.subject.id for one in rows], [one.metric for one in rows])
-    )
-    each = np.arange(worst.size)
-    binding = np.array([one.binding for one in rows])[worst, each]
-    requirement = np.where(binding >= 0, np.array(REQUIREMENTS, dtype=object)[binding], metrics[worst])
-    unmet = np.full(status.shape, "", dtype=object)  # where no row decides, the requirement that breaks
-    if row_id is None:
-        for one in reversed(judged.requirements):
-            unmet = np.where((one.status == status) & does_break[status], one.key, unmet)
-    return {
-        "status": statuses(status),
-        "worst_row": np.where(has_one, ids[worst], ""),
-        "utilization": np.where(has_one, uses[worst, each], math.nan),
-        "binding_requirement": np.where(has_one, requirement, unmet),
-    }
-
-
-def _within(number: Number, values: Any) -> NDArray[np.bool_]:
-    """Whether each value is one that the file may have."""
-    gt, ge, lt, le = number.reader.bounds
-    return cast("NDArray[np.bool_]", (values > gt) & (values >= ge) & (values < lt) & (values <= le))
-
-
-def _gated(mission: Mission, model: str) -> Mission:
-    return mission._replace(allocation=mission.allocation._replace(model=model))
-
-
-def _of_row(name: str) -> tuple[str, str]:
-    """Row and field of a column."""
-    row, _, field = name.rpartition(".")
-    return row, field
+def is_status(name: str) -> bool:
+    """Whether a column, `ROW.FIELD`, has statuses instead of numbers."""
+    return name.endswith(".status")

@@ -3,7 +3,7 @@
 One line here is all that a new status needs, besides the rule that gives it (`budget.judgement`).
 """
 
-from collections.abc import Container, Iterable
+from collections.abc import Container, Iterable, Mapping
 from typing import NamedTuple
 
 
@@ -93,6 +93,11 @@ STATUSES = tuple(sorted(STATUS, key=lambda name: not STATUS[name].gates))
 def worst(statuses: Iterable[str]) -> str:
     """Return the worst of the statuses that gate; `pass` if there is none."""
     return min((name for name in statuses if STATUS[name].gates), key=RANK.__getitem__, default="pass")
+
+
+def complying(counts: Mapping[str, int]) -> int:
+    """Number of missions that break nothing, by the number of each status."""
+    return sum(count for name, count in counts.items() if name != "error" and not STATUS[name].fails)
 
 
 def exit_code(statuses: Container[str], strict: bool) -> int:

@@ -39,6 +39,15 @@ class MissingExtraError(Exception):
         super().__init__(f"bisar-budget {MISSING_EXTRA}")
 
 
+def check_extra() -> None:
+    """Raise a `MissingExtraError` where the extra `formats` is not installed."""
+    try:
+        for module in ("lxml.etree", "sarkit", "sarkit.cphd"):
+            import_module(module)
+    except ImportError:
+        raise MissingExtraError from None
+
+
 class Element:
     """An element of an XML document, which knows its file and its path there.
 
@@ -166,23 +175,9 @@ def _any_namespace(path: str) -> str:
 
 
 def parse(file: str, data: bytes, start: int = 0) -> Element:
-    """Read an XML document without document type, entities or references to other files.
+    """Read an XML document, which begins at a byte of a file, without document type, entities or references.
 
-    Parameters
-    ----------
-    file : str
-        For messages.
-    data : bytes
-        The document.
-    start : int
-        Byte of the file at which it begins.
-
-    Raises
-    ------
-    FormatError
-        It is no XML, or has what a description of a collection has no use for.
-    MissingExtraError
-        The extra `formats` is not installed.
+    A `FormatError` says that it is no XML, or has what a description of a collection has no use for.
     """
     try:
         from lxml import etree
@@ -192,22 +187,14 @@ def parse(file: str, data: bytes, start: int = 0) -> Element:
         at = data.find(word)
         if at >= 0:
             raise FormatError(file, f"byte {start + at}: XML with {word.decode()} is refused: entities are not read")
-    parser = etree.XMLParser(
-        resolve_entities=False,
-        no_network=True,
-        load_dtd=False,
-        huge_tree=False,
-        remove_comments=True,
-        remove_pis=True,
-    )
+    refused = dict.fromkeys(("resolve_entities", "load_dtd", "huge_tree"), False)
+    parser = etree.XMLParser(no_network=True, remove_comments=True, remove_pis=True, **refused)
     try:
         root = etree.fromstring(data.strip(b" \r\n\t\0"), parser)
     except (etree.XMLSyntaxError, ValueError) as error:
         line, column = getattr(error, "position", (0, 0))
-        raise FormatError(
-            file,
-            f"byte {start}: no readable XML begins here, line {line}, column {column} of it: {shown(str(error))}",
-        ) from None
+        where = f"byte {start}: no readable XML begins here, line {line}, column {column} of it"
+        raise FormatError(file, f"{where}: {shown(str(error))}") from None
     if root.getroottree().docinfo.doctype:  # in an encoding that hid it
         raise FormatError(file, f"byte {start}: XML with a document type is refused: entities are not read")
     for node in root.iter(f"{_INCLUDE}*"):
@@ -256,15 +243,7 @@ class Container:
 
 
 def open_container(file: str) -> Container:
-    """Read header and XML of a file.
-
-    Raises
-    ------
-    FormatError
-        It cannot be read, is none of the formats, or is cut off.
-    MissingExtraError
-        The extra `formats` is not installed.
-    """
+    """Read header and XML of a file; a `FormatError` says that it cannot be read, is no such file, or is cut off."""
     try:
         if not stat.S_ISREG(os.stat(file).st_mode):  # a pipe would wait for ever
             raise FormatError(file, "is no regular file")
@@ -305,9 +284,8 @@ def _read(stream: BinaryIO, file: str, start: int, length: int) -> bytes:
     stream.seek(start)
     data = stream.read(length)
     if len(data) < length:
-        raise FormatError(
-            file, f"byte {start + len(data)}: is cut off here, {length} bytes from {start} on are needed"
-        )
+        end = start + len(data)
+        raise FormatError(file, f"byte {end}: is cut off here, {length} bytes from {start} on are needed")
     return data
 
 
@@ -362,12 +340,9 @@ def _nitf(file: str, stream: BinaryIO) -> Container:
             if one["subheader"]["DESID"].value.strip() == "XML_DATA_CONTENT"
         ]
         whole = read["FileHeader"]["FL"].value
-    except FormatError:
-        raise
     except Exception as error:  # whatever a parser of a broken file comes to
-        raise FormatError(
-            file, f"byte {stream.tell()}: is cut off, or no NITF ({type(error).__name__}: {shown(str(error))})"
-        ) from None
+        said = f"{type(error).__name__}: {shown(str(error))}"
+        raise FormatError(file, f"byte {stream.tell()}: is cut off, or no NITF ({said})") from None
     if whole > size:
         raise FormatError(file, f"byte {size}: is cut off here, its header says {whole} bytes")
     for start, length in segments:

@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from bisar_budget import __version__
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.faults import printable
-from bisar_budget.formats.containers import MissingExtraError
-from bisar_budget.formats.file_errors import ADDED, KINDS, correlated
+from bisar_budget.formats.collected import ADDED, KINDS, correlated
+from bisar_budget.formats.containers import check_extra
 from bisar_budget.geometry import Axes, PlatformState, Vector
 from bisar_budget.mission.model import Mission, Simulation, has_instruments
 from bisar_budget.paths.earth import Geodetic, SceneAxes, axes_at, geodetic
@@ -84,16 +84,7 @@ class _Plan:
 def export_phase_history(mission: Mission, targets: Targets) -> Exported:
     """Record targets with the declared errors of a mission, and write what was recorded as CPHD.
 
-    Parameters
-    ----------
-    mission : Mission
-        As loaded.
-    targets : Targets
-        What stands in the scene. Clutter is one random scatterer for each resolution cell of the image area.
-
-    Returns
-    -------
-    Exported
+    Clutter is one random scatterer for each resolution cell of the image area.
 
     Raises
     ------
@@ -103,11 +94,7 @@ def export_phase_history(mission: Mission, targets: Targets) -> Exported:
     MissingExtraError
         The extra `formats` is not installed.
     """
-    try:
-        import_module("lxml.etree")
-        import_module("sarkit.cphd")
-    except ImportError:
-        raise MissingExtraError from None
+    check_extra()
     settings = mission.simulation or Simulation()
     collection, errors = PointCollection(mission, mission.geometry), declared_errors(mission)
     plan = _plan(mission, targets, collection, errors)
@@ -405,9 +392,9 @@ def _layout(vectors: NDArray[Any]) -> _Leaves:
     fields: Any = vectors.dtype.fields
     leaves: _Leaves = {}
     for name, size in _VECTOR:
-        leaves[f"PVP/{name}/Offset"] = int(fields[name][1]) // 8
-        leaves[f"PVP/{name}/Size"] = size
-        leaves[f"PVP/{name}/Format"] = "X=F8;Y=F8;Z=F8;" if size == 3 else "I8" if name == "SIGNAL" else "F8"
+        form = "X=F8;Y=F8;Z=F8;" if size == 3 else "I8" if name == "SIGNAL" else "F8"
+        said = {"Offset": int(fields[name][1]) // 8, "Size": size, "Format": form}
+        leaves |= {f"PVP/{name}/{key}": value for key, value in said.items()}
     return leaves
 
 

@@ -15,15 +15,17 @@ from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.faults import printable, shown
 from bisar_budget.formats.collected import (
     LONGEST,
+    FileErrors,
     Imported,
     NoPathError,
     ReferenceGeometry,
     Seen,
     fitted,
+    of_matrices,
+    of_sigmas,
     reference_of,
 )
-from bisar_budget.formats.containers import Container, Element, FormatError, MissingExtraError, open_container
-from bisar_budget.formats.file_errors import FileErrors, of_matrices, of_sigmas
+from bisar_budget.formats.containers import Container, Element, FormatError, check_extra, open_container
 from bisar_budget.geometry import PlatformState, Vector
 from bisar_budget.paths.earth import SceneAxes, axes_at, geodetic
 from bisar_budget.paths.flight import Fitted
@@ -65,31 +67,12 @@ class _Aperture(NamedTuple):
 
 
 def import_collection(file: str, channel: str | None = None) -> Imported:
-    """Read the collection of a CPHD, CRSD or SICD file, or of XML of one.
+    """Read the collection of a CPHD, CRSD or SICD file, or of XML of one; its signal is not read.
 
-    Parameters
-    ----------
-    file : str
-        Its name. Header, XML and parameters of the pulses are read, the signal is not.
-    channel : str, optional
-        Identifier of a channel of CPHD or CRSD; the reference channel.
-
-    Returns
-    -------
-    Imported
-
-    Raises
-    ------
-    FormatError
-        The file cannot be used; the message names it, and its byte or XML path.
-    MissingExtraError
-        The extra `formats` is not installed.
+    `channel` is the identifier of a channel of CPHD or CRSD, the reference channel if none. A `FormatError` says that
+    the file cannot be used, a `MissingExtraError` that the extra `formats` is not installed.
     """
-    try:
-        import_module("lxml.etree")
-        import_module("sarkit")
-    except ImportError:
-        raise MissingExtraError from None
+    check_extra()
     container = open_container(file)
     read: Callable[[Container, str | None], Imported] = _READERS[container.format.split()[0]]
     with np.errstate(all="ignore"):  # what is no number in the end is refused
@@ -203,14 +186,11 @@ def _dwell(xml: Element, dwell: Element | None, used: Element, point: Vector) ->
         polynomial = dwell.with_child(name, "Identifier", used.text(key))
         if polynomial is None:
             raise used.fault(f"names no {name} of {dwell.path}", key)
-        found.append(_at(polynomial.polynomial(f"{name}Poly", 2), x, y))
+        coefficients = polynomial.polynomial(f"{name}Poly", 2)
+        found.append(float(np.polynomial.polynomial.polyval2d(x, y, coefficients)))
     if not found[1] > 0:
         raise used.fault(f"gives a dwell time of {found[1]:g} s at the scene point")
     return _Aperture(*found)
-
-
-def _at(polynomial: Floats, x: float, y: float) -> float:
-    return float(np.polynomial.polynomial.polyval2d(x, y, polynomial))
 
 
 def _image_coordinates(scene: Element, point: Vector) -> tuple[float, float]:
@@ -494,13 +474,14 @@ def _imported(
     unused: str = "",
 ) -> Imported:
     if not (0 < aperture.length <= LONGEST and abs(aperture.middle) <= LONGEST):
-        raise FormatError(
-            container.file, f"{container.xml.path}: an aperture of {aperture.length:g} s at {aperture.middle:g} s"
-        )
+        given = f"an aperture of {aperture.length:g} s at {aperture.middle:g} s"
+        raise FormatError(container.file, f"{container.xml.path}: {given}")
     if not 0 < band[1] < 2 * band[0]:
-        raise FormatError(
-            container.file, f"{container.xml.path}: a band of {band[1]:g} Hz about {band[0]:g} Hz, which is none"
-        )
+        given = f"a band of {band[1]:g} Hz about {band[0]:g} Hz, which is none"
+        raise FormatError(container.file, f"{container.xml.path}: {given}")
+    begun = parse_instant(start.text(), needs_zone=False)
+    if begun is None:
+        raise start.fault(f"is no instant of UTC (got {shown(start.text())!r})")
     return Imported(
         file=os.path.basename(container.file),
         format=container.format,
@@ -511,27 +492,15 @@ def _imported(
         center_frequency=band[0],
         bandwidth=band[1],
         aperture_time=aperture.length,
-        center_time=_center_time(start, aperture.middle),
+        center_time=begun.after(aperture.middle).as_text(),
         transmitter=seen.transmitter,
         receiver=seen.receiver,
         is_monostatic=is_monostatic,
         reference=reference,
-        transmitter_error=errors.transmitter,
-        receiver_error=errors.receiver,
-        common_error=errors.common,
-        timing_constant=errors.timing_constant,
-        timing_linear=errors.timing_linear,
-        errors_at=errors.at,
+        errors=errors,
         remarks=(*([f"{unused.capitalize()}."] if unused else []), *remarks, *errors.remarks),
         unused=unused,
     )
-
-
-def _center_time(start: Element, middle: float) -> str:
-    instant = parse_instant(start.text(), needs_zone=False)
-    if instant is None:
-        raise start.fault(f"is no instant of UTC (got {shown(start.text())!r})")
-    return instant.after(middle).as_text()
 
 
 _READERS: dict[str, Callable[[Container, str | None], Imported]] = {"CPHD": _cphd, "CRSD": _crsd, "SICD": _sicd}

@@ -11,7 +11,6 @@ the draws.
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -24,7 +23,7 @@ from bisar_budget.effects.effect import ErrorSource
 from bisar_budget.faults import printable
 from bisar_budget.geometry import PlatformState
 from bisar_budget.memory import is_spacious
-from bisar_budget.ranges.exact_ranges import STILL, ExactRanges, Floats, Found, Truths, followed
+from bisar_budget.ranges.exact_ranges import STILL, ExactRanges, Floats, Found, followed
 
 if TYPE_CHECKING:
     from bisar_budget.workers import MapBlocks
@@ -65,11 +64,6 @@ class HeldSum(NamedTuple):
     limit: float
     owners: tuple[str, ...]
     columns: tuple[int, ...]  # of the effects: one phase, or east and north
-
-    def holds(self, square: Floats) -> Truths:
-        """Whether sums whose squares are given are within the limit."""
-        held: Truths = square <= (self.limit * (1 + UTILIZATION_TOLERANCE)) ** 2
-        return held
 
 
 class DrawsPiece(NamedTuple):
@@ -115,19 +109,6 @@ class Tally(NamedTuple):
     all_hold: int
 
 
-@dataclass(frozen=True, slots=True)
-class Counted:
-    """Counts and mean squares of all draws.
-
-    For each requirement the draws in which it held and the mean square, over draws that have an image; the draws in
-    which all held.
-    """
-
-    holds: list[int]
-    mean_squares: list[float]
-    all_hold: int
-
-
 def drawing_of(
     analysis: Analysis, variables: Sequence[Variable], judged: Sequence[HeldSum], draws: int, seed: int
 ) -> Drawing:
@@ -135,19 +116,22 @@ def drawing_of(
     given = (analysis.mission.name, tuple(variables), tuple(judged), analysis.exact, analysis.geometry.both)
     drawing = Drawing(*given, draws, seed, False, CHUNK)
     is_exact = bool(variables and judged) and _needs_exact_ranges(drawing)
-    drawn = tuple(variable for variable in variables if _counts(variable, judged, is_exact))
-    return drawing._replace(variables=drawn, is_exact=is_exact)
+
+    def counts(variable: Variable) -> bool:
+        """Whether it does anything that is judged; each has a stream of its own, so that none misses it."""
+        if is_exact and variable.parts:
+            return any(size for _, size in variable.parts)
+        return any(variable.effects[column] for one in judged for column in one.columns)
+
+    return drawing._replace(variables=tuple(filter(counts, variables)), is_exact=is_exact)
 
 
-def _counts(variable: Variable, judged: Sequence[HeldSum], is_exact: bool) -> bool:
-    """Whether a variable does anything that is judged; each has a stream of its own, so that none misses it."""
-    if is_exact and variable.parts:
-        return any(size for _, size in variable.parts)
-    return any(variable.effects[column] for one in judged for column in one.columns)
+def joined(tallies: Iterable[Tally], count: int) -> tuple[list[int], list[float], int]:
+    """Join what pieces give about so many requirements, in any order: integers, and fractions that do not round.
 
-
-def joined(tallies: Iterable[Tally], count: int) -> Counted:
-    """Join what pieces give about so many requirements, in any order: integers, and fractions that do not round."""
+    For each requirement the draws in which it held and the mean square, over draws that have an image; the draws in
+    which all held.
+    """
     holds, imaged, all_hold = [0] * count, [0] * count, 0
     squares = [Fraction()] * count
     for tally in tallies:
@@ -157,7 +141,7 @@ def joined(tallies: Iterable[Tally], count: int) -> Counted:
             imaged[index] += tally.imaged[index]
             squares[index] += Fraction(tally.squares[index])
     means = [float(square / number) if number else math.nan for square, number in zip(squares, imaged, strict=True)]
-    return Counted(holds, means, all_hold)
+    return holds, means, all_hold
 
 
 Share = Callable[[Drawing], Iterable[tuple[DrawsPiece, Tally]]]  # gives every piece once, in any order
@@ -187,16 +171,8 @@ class Sums:
     By owner, if kept: `motion` is position, velocity, acceleration error and so on of both platforms, (2, rates, 3,
     draws),
     `clock` its coefficients (4, draws), `alone` what is known by its effects only: quadratic and cubic phase,
-    displacement east and north (4, draws).
-
-    Parameters
-    ----------
-    drawing : Drawing
-        Says what will be added, and what will be asked for.
-    size : int
-        Draws.
-    adds, keeps_motion : bool
-        Whether `square`, and whether `exact_square` will be asked for.
+    displacement east and north (4, draws). Where it `adds`, `square` can be asked for, where it `keeps_motion`,
+    `exact_square`.
     """
 
     def __init__(self, drawing: Drawing, size: int, *, adds: bool, keeps_motion: bool) -> None:
@@ -274,7 +250,7 @@ class Sums:
         return square
 
     def exact_square(self, judged: HeldSum) -> Floats:
-        """The same by exact ranges; not a number for a draw without an image."""
+        """Square of it by exact ranges, (draws,); not a number for a draw without an image."""
         owners = judged.owners
         if owners not in self._exact:
             self._exact[owners] = self._by_exact_ranges(owners)
@@ -332,7 +308,8 @@ class Drawer:
             together = np.ones(size, dtype=bool)
             for index, one in enumerate(drawing.judged):
                 square = sums.exact_square(one) if drawing.is_exact else sums.square(one)
-                held = one.holds(square)  # what has no image holds nothing: it is not a number
+                # What has no image holds nothing: it is not a number.
+                held = square <= (one.limit * (1 + UTILIZATION_TOLERANCE)) ** 2
                 holds[index] += int(np.count_nonzero(held))
                 if drawing.is_exact:
                     square = square[np.isfinite(square)]
@@ -384,7 +361,7 @@ def _fill_normal(generator: np.random.Generator, out: Floats) -> None:
 
 @cache
 def _compiled() -> Callable[[np.random.Generator, Floats], None]:
-    """The same, compiled where Numba is there, has room and can keep what it compiles."""
+    """Filling by compiled code, where Numba is there, has room and can keep what it compiles."""
     if not is_spacious():
         return _fill_normal
     try:
@@ -397,7 +374,7 @@ def _compiled() -> Callable[[np.random.Generator, Floats], None]:
 
 
 def _fill_each(generator: np.random.Generator, out: Floats) -> None:
-    """What Numba compiles: normal draws, those of NumPy to the last bit, in two thirds of the time."""
+    """Fill with normal draws, compiled by Numba: those of NumPy to the last bit, in two thirds of the time."""
     for index in range(out.size):
         out[index] = generator.standard_normal()
 

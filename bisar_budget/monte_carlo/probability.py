@@ -48,8 +48,6 @@ def monte_carlo(
 
     Parameters
     ----------
-    analysis : Analysis
-        Of the mission.
     draws : int
         From 1 to `MAX_DRAWS`; memory does not grow with it.
     seed : int, optional
@@ -71,20 +69,19 @@ def monte_carlo(
     is_placed = not any(error.displaces_unknown for error in analysis.random)
     judged = list(_requirements(mission, analysis.allocation, variables, is_placed=is_placed))
     drawing = drawing_of(analysis, variables, judged, draws, seed)
-    counted = joined((tally for _, tally in (share or in_turn)(drawing)), len(judged))
+    holds, mean_squares, all_hold = joined((tally for _, tally in (share or in_turn)(drawing)), len(judged))
     predictions = _Predictions(analysis, variables)
     requirements = tuple(
-        _requirement(one, holds, mean_square, draws, predictions)
-        for one, holds, mean_square in zip(judged, counted.holds, counted.mean_squares, strict=True)
+        _requirement(*one, draws, predictions) for one in zip(judged, holds, mean_squares, strict=True)
     )
-    low, high = _wilson(counted.all_hold, draws, _QUANTILE) if judged else (None, None)
+    low, high = _wilson(all_hold, draws, _QUANTILE) if judged else (None, None)
     return MonteCarlo(
         draws=draws,
         seed=seed,
         model="full",
         confidence=CONFIDENCE,
         requirements=requirements,
-        probability=counted.all_hold / draws if judged else None,
+        probability=all_hold / draws if judged else None,
         probability_low=low,
         probability_high=high,
         is_exact=drawing.is_exact,
@@ -161,7 +158,7 @@ def _variable(
 def _requirements(
     mission: Mission, allocation: Allocation, variables: Sequence[Variable], *, is_placed: bool
 ) -> Iterator[HeldSum]:
-    """Those of `check` that declared errors count against; the location where it is known (`is_placed`)."""
+    """Requirements of `check` that declared errors count against; the location where it is known (`is_placed`)."""
     present = {variable.owner for variable in variables}
     every = ("transmitter", "receiver", "clock", "mission")
     wanted = {
@@ -217,18 +214,11 @@ class _Predictions:
     def probability_normal(self, judged: HeldSum) -> float:
         """Probability that a normal distribution with these variances stays within the limit."""
         members = [variable.effects for variable in self.variables if variable.owner in judged.owners]
-        covariance = [
-            math.fsum(effects[a] * effects[b] for effects in members)
-            for a, b in ((judged.columns[0],) * 2, (judged.columns[-1],) * 2, (judged.columns[0], judged.columns[-1]))
-        ]
-        return (
-            _within(judged.limit, *covariance) if len(judged.columns) == 2 else _between(judged.limit, covariance[0])
-        )
-
-
-def _between(limit: float, variance: float) -> float:
-    """Probability that a normal variable about zero lies within ±limit."""
-    return math.erf(limit / math.sqrt(2 * variance)) if variance else 1.0
+        a, b = judged.columns[0], judged.columns[-1]
+        xx, yy, xy = (math.fsum(one[i] * one[j] for one in members) for i, j in ((a, a), (b, b), (a, b)))
+        if len(judged.columns) == 2:
+            return _within(judged.limit, xx, yy, xy)
+        return math.erf(judged.limit / math.sqrt(2 * xx)) if xx else 1.0
 
 
 def _within(radius: float, xx: float, yy: float, xy: float) -> float:
@@ -287,6 +277,7 @@ def _requirement(
 
 def _doubts(found: Requirement, holds: int, draws: int, predictions: _Predictions) -> Iterator[str]:
     """Say where root-sum-square and the normal distribution do not describe the sum."""
+    # A covariance, which is no single variable, is always normal.
     if found.dominant_share > DOMINANT and not predictions.is_normal(found.dominant):
         yield (
             f"{found.dominant}, which is not normal, has {100 * found.dominant_share:.3g} % of the variance: the "

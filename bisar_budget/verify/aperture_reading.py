@@ -77,10 +77,8 @@ def read_aperture(
 
     Parameters
     ----------
-    collection : PointCollection
-        That formed the chips.
-    errors : Errors
-        Of the measured paths.
+    collection, errors
+        Those that formed the chips; the errors are of the measured paths.
     centre : (2,) float
         Middle of the chips and place of the reference. [m]
     chip, reference : Chip
@@ -149,8 +147,9 @@ class _Pixels:
         """
         collection = self.collection
         paths = collection.flight(self.errors, slow_time).paths
-        if collection.is_tapered:
-            by_time = _weights(collection, slow_time)[:, None]
+        if collection.is_tapered:  # over the aperture too
+            fine = taylor_window(1024)
+            by_time = np.interp(slow_time, cell_centres(collection.aperture_time, fine.size), fine)[:, None]
         contribution = np.empty((slow_time.size, self.places.shape[0]), dtype=np.complex64)
         pulses = max(1, _BLOCK // self.places.shape[0])
         for start in range(0, slow_time.size, pulses):
@@ -176,13 +175,6 @@ class _Pixels:
         return contribution
 
 
-def _weights(collection: PointCollection, slow_time: Floats) -> Floats:
-    """Weights of a Taylor window over the aperture."""
-    fine = taylor_window(1024)
-    weights: Floats = np.interp(slow_time, cell_centres(collection.aperture_time, fine.size), fine)
-    return weights
-
-
 def _squares(points: Floats) -> Floats:
     found: Floats = np.einsum("ij,ij->i", points, points)
     return found
@@ -204,7 +196,10 @@ def _fit_to_pulses(
     `images` are with and without error, of the same pixels.
     """
     place = 2 * slow_time / every.collection.aperture_time
-    tapered = np.stack([(one * _taper(columns)).reshape(-1) for one in images])
+    # The ends of a line, half the cells of a response without smear, fade.
+    inside = np.minimum(np.arange(columns) + 0.5, columns - np.arange(columns) - 0.5)
+    taper = np.sin(math.pi / 2 * np.clip(inside / round(CELLS * OVERSAMPLING / 2), 0, 1)) ** 2
+    tapered = np.stack([(one * taper).reshape(-1) for one in images])
     correlated = np.empty((2, slow_time.size), dtype=complex)
     block = max(1, _BLOCK // every.places.shape[0])
     for start in range(0, slow_time.size, block):
@@ -231,15 +226,6 @@ def _fit_to_pulses(
     fit = np.zeros(max(4, order + 1))
     fit[: order + 1] = np.polynomial.legendre.legfit(place[kept], phase, order, w=np.abs(clean[kept]))
     return fit, covered
-
-
-def _taper(columns: int) -> Floats:
-    """Weights along a line: its ends, half the cells of a response without smear, fade."""
-    ramp = round(CELLS * OVERSAMPLING / 2)
-    place = np.arange(columns)
-    inside = np.minimum(place + 0.5, columns - place - 0.5) / ramp
-    taper: Floats = np.sin(math.pi / 2 * np.clip(inside, 0, 1)) ** 2
-    return taper
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -399,22 +385,7 @@ def refocused(
     where range and Doppler gradients are nearly parallel, equal times take up unequal parts of that band: a quadratic
     phase in time is none in frequency, and what a few per cent of the band hold of the aperture is lost to an
     estimate. The lines' spectra are therefore read at equal times, focused there, and the phase is taken back to
-    their frequencies.
-
-    Parameters
-    ----------
-    collection : PointCollection
-        That formed the chip.
-    errors : Errors
-        Of the measured paths.
-    centre : (2,) float
-        Middle of the chip. [m]
-    chip : Chip
-        Image with the error.
-    algorithm : callable
-        `phase_gradient_autofocus` or `map_drift`.
-    half : int
-        Lines on either side of the middle one that are used.
+    their frequencies. So many lines on either side of the middle one are used.
     """
     lines, columns = chip.image.shape
     slow_time = cell_centres(collection.aperture_time, max(64, round(columns / OVERSAMPLING)))

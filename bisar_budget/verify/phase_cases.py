@@ -13,7 +13,7 @@ from bisar_budget.effects.effect import ErrorSource, Subject
 from bisar_budget.effects.vibration import Line, unit_of_line
 from bisar_budget.findings.images import Verdict
 from bisar_budget.geometry import GroundVector
-from bisar_budget.phrases import Note
+from bisar_budget.phrases import NOTHING, Note
 from bisar_budget.simulate.collection import CELLS, MAX_CELLS, OVERSAMPLING, RANGE_CELLS
 from bisar_budget.simulate.impulse_response import highest, impulse_response
 from bisar_budget.simulate.phase_history import Errors, ExactEffect, NoGroundPointError, PathError, PathSinusoid
@@ -217,10 +217,7 @@ def predicted(effect: ExactEffect) -> dict[str, Any]:
 def _without_image(study: Study, blank: Verdict, error: ValueError) -> Verdict:
     """Say why a limit has no image; one of the published model that leaves no point of the ground is no limit."""
     if isinstance(error, NoGroundPointError) and not study.is_full:
-        return blank._replace(
-            verdict="optimistic",
-            reason=reasons.no_image_at_the_limit(),
-        )
+        return blank._replace(verdict="optimistic", reason=reasons.no_image_at_the_limit())
     return blank._replace(reason=reasons.no_image_formed(str(error)))
 
 
@@ -260,6 +257,11 @@ def _judged(study: Study, blank: Verdict, sizes: Sizes) -> Verdict:
     is_small = images.spread.smear <= _BESIDE_CELLS
     inside, beyond = (_phase(study, sizes, factor * scale) if is_small else None for factor in (INSIDE, BEYOND))
     verdict, remark = _through_the_limit(inside, measured, beyond, budget)
+    cell, unusual = phase_across_a_cell(Case(study.analysis)), NOTHING
+    if reading.coverage < 0.9:
+        unusual = reasons.smear_leaves_the_patch(reading.coverage)
+    elif cell > COARSE_CELL_RAD:
+        unusual = reasons.range_cells_absorb_phase(cell)
     return blank._replace(
         **predicted(images.effect),
         **_of_response(images, reading),
@@ -272,7 +274,7 @@ def _judged(study: Study, blank: Verdict, sizes: Sizes) -> Verdict:
         displacement_full_m=images.effect.displacement,
         smear_azimuth_published_rad=(study.geometry.look_azimuth + math.pi / 2) % math.pi,
         verdict=verdict,
-        reason=_both(remark, _remark(study, reading.coverage)),
+        reason=remark.then(unusual) if remark else unusual or None,
     )
 
 
@@ -292,10 +294,6 @@ def _through_the_limit(
         return verdict, None
     places = ((inside, f" at {INSIDE:g} of the limit"), (measured, " at it"), (beyond, f" at {BEYOND:g}"))
     return verdict, reasons.phase_does_not_grow([(phase, where) for phase, where in places if phase is not None])
-
-
-def _both(first: Note | None, second: Note | None) -> Note | None:
-    return first.then(second or "") if first else second
 
 
 def _of_response(images: Responses, reading: ApertureReading) -> dict[str, Any]:
@@ -328,23 +326,11 @@ def _phase(study: Study, sizes: Sizes, scale: float) -> float | None:
         return None
 
 
-def _remark(study: Study, coverage: float) -> Note | None:
-    """Say what of the image is unusual: a smear beyond the patch, or range cells that absorb phase."""
-    if coverage < 0.9:
-        return reasons.smear_leaves_the_patch(coverage)
-    cell = phase_across_a_cell(Case(study.analysis))
-    if cell > COARSE_CELL_RAD:
-        return reasons.range_cells_absorb_phase(cell)
-    return None
-
-
 def _scale_of_cubic(study: Study, sizes: Sizes, scale: float, requirement: float) -> float:
     """Scale at which exact ranges give the cubic phase, from a first guess.
 
-    Raises
-    ------
-    ValueError
-        None was found: the phase goes past the requirement where the point has no image, or never reaches it.
+    A `ValueError` says that none was found: the phase goes past the requirement where the point has no image, or
+    never reaches it.
     """
     low, high = 0.0, math.inf  # scales with less phase, and with more or without a point
     for _ in range(60):
@@ -378,7 +364,8 @@ def location(study: Study, requirement: float) -> Verdict:
             degeneracy = study.analysis.published.degeneracy
             why = reasons.displacement_degenerates(degeneracy) if degeneracy else reasons.errors_move_nothing(rule)
             return blank._replace(reason=why)
-        said = _places(study, sizes, scale)
+        by_25 = published_displacement(study, sizes, scale)
+        said = study.effect(sizes, scale).displacement if study.is_full else by_25
         images = study.images(study.together(sizes, scale))
         effect = images.effect
         shift = measured_shift(images.chip, images.reference, study.read(images))
@@ -394,7 +381,11 @@ def location(study: Study, requirement: float) -> Verdict:
             if alone is not None:
                 exact = study.effect([(source, size)], scale).displacement
                 seen.append((f"{source.id} alone", alone, exact))
-    verdict, farthest = _of_places(study, seen)
+    verdict = "confirmed"
+    for _, by_rule, is_at in seen:
+        if max(_pixels_apart(study, by_rule, is_at)) > HALF_PIXEL:
+            is_harmless = verdict != "optimistic" and _is_shorter(study, by_rule, is_at)
+            verdict = "conservative" if is_harmless else "optimistic"
     along, across = _pixels_apart(study, said, measured)
     if study.is_full:
         # What exact ranges predict is the middle of the chip, whose lines and columns are those of range and Doppler.
@@ -402,36 +393,16 @@ def location(study: Study, requirement: float) -> Verdict:
         verdict = "confirmed" if max(along, across) <= HALF_PIXEL else "optimistic"
     reason = reasons.places_differ(rule, along, across)
     if verdict != "confirmed":
-        who, by_rule, is_at = farthest
+        who, by_rule, is_at = max(seen, key=lambda one: max(_pixels_apart(study, *one[1:])))
         reason = reason.then(reasons.rule_misplaces(who, rule, by_rule, is_at))
     return blank._replace(
         **predicted(effect),
-        displacement_published_m=published_displacement(study, sizes, scale),
+        displacement_published_m=by_25,
         displacement_full_m=effect.displacement,
         measured_displacement_m=measured,
         verdict=verdict,
         reason=reason,
     )
-
-
-_Seen = tuple[str, GroundVector, GroundVector]
-
-
-def _of_places(study: Study, seen: list[_Seen]) -> tuple[str, _Seen]:
-    """Verdict on what was said and where it is, and the pair that is farthest apart."""
-    verdict = "confirmed"
-    for _, said, is_at in seen:
-        if max(_pixels_apart(study, said, is_at)) > HALF_PIXEL:
-            is_harmless = verdict != "optimistic" and _is_shorter(study, said, is_at)
-            verdict = "conservative" if is_harmless else "optimistic"
-    return verdict, max(seen, key=lambda one: max(_pixels_apart(study, *one[1:])))
-
-
-def _places(study: Study, sizes: Sizes, scale: float) -> GroundVector | None:
-    """Displacement of errors together by the gating model; None where (25) has none."""
-    if not study.is_full:
-        return published_displacement(study, sizes, scale)
-    return study.effect(sizes, scale).displacement
 
 
 def _scale_of_location(study: Study, sizes: Sizes, requirement: float) -> float | None:

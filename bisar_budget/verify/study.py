@@ -62,7 +62,7 @@ class Study:
 
     @property
     def models(self) -> tuple[Model, ...]:
-        """Those that gate: under `strictest` both."""
+        """Models that gate: under `strictest` both."""
         full, published = self.analysis.models("full")
         return {"full": (full,), "published": (published,)}.get(self.model, (published, full))
 

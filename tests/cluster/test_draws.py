@@ -15,7 +15,7 @@ pytest.importorskip("distributed")
 pytest.importorskip("pyarrow")
 
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.cli import shared_work as command
+from bisar_budget.cli import long_work
 from bisar_budget.cluster.scheduler import Workers, connected
 from bisar_budget.mission.load import load_mission
 from bisar_budget.monte_carlo import draws as drawing
@@ -135,9 +135,9 @@ def test_a_terminal_has_a_bar() -> None:
 
 def test_how_long_many_draws_take(run, monkeypatch: pytest.MonkeyPatch) -> None:
     """By the time of some of them, shared by as many threads as there are."""
-    monkeypatch.setattr(command, "_MANY", 10_000)
-    monkeypatch.setattr(command, "_TRIAL", 0.001)
-    monkeypatch.setattr(command, "LONG", 0.0)
+    monkeypatch.setattr(long_work, "_MANY", 10_000)
+    monkeypatch.setattr(long_work, "_TRIAL", 0.001)
+    monkeypatch.setattr(long_work, "LONG", 0.0)
     found = run("check", "-q", DRONES, "--monte-carlo", "20e3")
     assert found.stderr.startswith("20,000 draws of Two drones with the same GNSS will take about ")
     assert found.stderr.endswith(" s.\n")

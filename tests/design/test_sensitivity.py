@@ -14,7 +14,7 @@ import pytest
 
 from bisar_budget import evaluators
 from bisar_budget.budget.check import check_mission
-from bisar_budget.cli import waiting
+from bisar_budget.cli.long_work import watched_checks
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.design import sensitivity as asking
 from bisar_budget.design.quantities import QuestionError
@@ -312,8 +312,8 @@ class TestProgress:
         errors = StringIO()
         monkeypatch.setattr(errors, "isatty", lambda: is_watched)
         monkeypatch.setattr("sys.stderr", errors)
-        monkeypatch.setattr(waiting, "_MOMENT", moment)
-        with waiting.watched_checks("Section V") as progress:
+        monkeypatch.setattr("bisar_budget.cli.long_work._MOMENT", moment)
+        with watched_checks("Section V") as progress:
             for done in range(1, 4):
                 progress(done, 3)
         assert ("Checking values" in errors.getvalue()) == (is_watched and moment == 0)

@@ -158,7 +158,7 @@ class TestBack:
             "timing_error": {"constant": "2 ns", "linear": 1e-9},
         }
         found = import_collection(str(exported(tmp_path, mission_text(**changes))))
-        one = found.receiver_error
+        one = found.errors.receiver
         assert one.frame == ("ric" if frame == "ric" else "scene")
         if frame == "track":  # the receiver flies north-west, its larger error is across
             assert one.correlation[0][1] == pytest.approx((0.04 - 0.01) / (0.04 + 0.01), abs=1e-6)
@@ -166,14 +166,14 @@ class TestBack:
             assert one.correlation == ()
             assert one.position == pytest.approx((0.1, 0.2, 0.3), rel=1e-9)
             assert one.velocity == pytest.approx((0.01, 0.02, 0.03), rel=1e-9)
-        assert found.transmitter_error.position is None
-        assert found.transmitter_error.acceleration == pytest.approx((0.001, 0, 0.002))
-        assert (found.timing_constant, found.timing_linear) == pytest.approx((2e-9, 1e-9))
+        assert found.errors.transmitter.position is None
+        assert found.errors.transmitter.acceleration == pytest.approx((0.001, 0, 0.002))
+        assert (found.errors.timing_constant, found.errors.timing_linear) == pytest.approx((2e-9, 1e-9))
         parse_mission(imported_text(found), "again.yaml")
 
     def test_a_mission_without_errors_declares_none(self, tmp_path) -> None:
         found = import_collection(str(exported(tmp_path, mission_text())))
-        assert found.transmitter_error is found.receiver_error is found.timing_linear is None
+        assert found.errors.transmitter is found.errors.receiver is found.errors.timing_linear is None
 
     def test_the_reference_geometry_is_that_of_the_mission(self, tmp_path) -> None:
         path = exported(tmp_path, mission_text(scene=PLACE))

@@ -278,7 +278,7 @@ class TestErrors:
 
         turn = np.array(axes_at(found.scene).axes)
         expected = turn @ np.diag([25.0, 1, 1]) @ turn.T
-        error = found.receiver_error
+        error = found.errors.receiver
         correlation = np.array(error.correlation)[:3, :3]
         assert correlation * np.outer(error.position, error.position) == pytest.approx(expected, abs=1e-9)
         assert "stated in ECF; they are turned" in " ".join(mission_text(found).replace("\n#", "").split())
@@ -287,7 +287,7 @@ class TestErrors:
     def test_in_track_over_the_ground_is_turned_to_that_against_the_stars(self, tmp_path) -> None:
         """About the radial axis, by the angle between both velocities: the larger sigma leaves its axis."""
         found = self.imported(tmp_path, ERRORS.replace("RIC_ECI", "RIC_ECF"))
-        error = found.transmitter_error
+        error = found.errors.transmitter
         assert error.position[0] == pytest.approx(1, rel=1e-12)
         assert sum(sigma**2 for sigma in error.position) == pytest.approx(14, rel=1e-12)
         assert 2 < error.position[1] < 2.1
@@ -295,7 +295,7 @@ class TestErrors:
 
     def test_correlations_that_no_error_has_are_said_and_left_out(self, tmp_path) -> None:
         found = self.imported(tmp_path, ERRORS.replace("<P1V3>0<", "<P1V3>0.9<").replace("<V2V3>0<", "<V2V3>0.9<"))
-        assert found.transmitter_error.correlation == ()
+        assert found.errors.transmitter.correlation == ()
         assert any("no covariance" in remark for remark in found.remarks)
 
     @pytest.mark.parametrize(
@@ -310,8 +310,8 @@ class TestErrors:
         xml = ERRORS[ERRORS.index("<PosVelErr><Frame>ECF") : ERRORS.index("</PosVelErr><RadarSensor><ClockFreqSF>4")]
         xml = f"<ErrorParameters><Monostatic>{xml}</PosVelErr><RadarSensor><RangeBias>0.15</RangeBias></RadarSensor>"
         found = self.imported(tmp_path, f"{xml}</Monostatic></ErrorParameters>")
-        assert found.common_error.position == pytest.approx((1, 1, 1))
-        assert found.timing_constant == pytest.approx(0.3 / flown.C)
+        assert found.errors.common.position == pytest.approx((1, 1, 1))
+        assert found.errors.timing_constant == pytest.approx(0.3 / flown.C)
         assert mission_tree(found)["common_motion_error"]["velocity"] == ["0.01 m/s"] * 3
         parse_mission(mission_text(found), "m.yaml")
 
@@ -368,15 +368,15 @@ class TestSicd:
             + matrix("TxRcvTimeFreq", 4, clocks)
             + "</RadarSensor></BistaticComponents>",
         )
-        error = found.transmitter_error
+        error = found.errors.transmitter
         assert error.frame == "ric"
         assert error.position == pytest.approx((1, 2, 3), rel=1e-12)
         assert error.velocity == pytest.approx((0.01, 0.02, 0.03), rel=1e-12)
         assert error.correlation[0][4] == pytest.approx(-0.9, rel=1e-12)
-        error = found.receiver_error
+        error = found.errors.receiver
         assert (error.frame, error.correlation) == ("scene", ())
         assert (*error.position, *error.velocity) == pytest.approx((2, 2, 2, 0.01, 0.01, 0.01), rel=1e-9)
-        assert found.timing_linear == pytest.approx(math.sqrt(15e-18), rel=1e-12)  # 9 + 16 less twice 5
+        assert found.errors.timing_linear == pytest.approx(math.sqrt(15e-18), rel=1e-12)  # 9 + 16 less twice 5
         said = " ".join(found.remarks)
         assert "TxRcvPVXCov: how errors of both platforms go together is not taken over" in said
         assert "errors of the times of transmission and reception are not taken over" in said
@@ -390,9 +390,9 @@ class TestSicd:
             "<RadarSensor><RangeBias>0.15</RangeBias></RadarSensor></Components>",
             kind="MONOSTATIC",
         )
-        assert found.common_error.position == pytest.approx((1, 1, 1))
-        assert found.timing_constant == pytest.approx(0.3 / flown.C)
-        assert found.transmitter_error is None
+        assert found.errors.common.position == pytest.approx((1, 1, 1))
+        assert found.errors.timing_constant == pytest.approx(0.3 / flown.C)
+        assert found.errors.transmitter is None
         parse_mission(mission_text(found), "m.yaml")
 
     def test_a_nitf_file(self, tmp_path) -> None:
@@ -477,8 +477,8 @@ def test_crsd(tmp_path) -> None:
         )
     assert math.degrees(found.reference.bistatic_angle) == pytest.approx(0.002767539111287036, rel=1e-4)
     # Its covariance along the Earth's axes is that of a platform that transmits and receives: traces stay.
-    error = found.transmitter_error
-    assert error == found.receiver_error
+    error = found.errors.transmitter
+    assert error == found.errors.receiver
     assert error.frame == "scene"
     assert sum(sigma**2 for sigma in error.position) == pytest.approx(0 + 1 + 2, rel=1e-9)
     assert sum(sigma**2 for sigma in error.velocity) == pytest.approx(3 + 4 + 5, rel=1e-9)

@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from bisar_budget.cli.simulate import simulate
+from bisar_budget.cli.images import simulate
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.report.drawing import point_plot
 from bisar_budget.report.drawing.figure import figure_file

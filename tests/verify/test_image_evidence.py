@@ -225,7 +225,7 @@ class TestRowsWorthShowing:
 @pytest.mark.parametrize("illustrated", [True, False])
 def test_only_a_report_that_shows_images_keeps_them(illustrated: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
-        "bisar_budget.cli.verify.verify_all",
+        "bisar_budget.cli.images.verify_all",
         lambda missions, *_: [verify_mission(m, "transmitter.acceleration.x") for m in missions],
     )
     report = check_all([str(SECTION_V)], TODAY, None, True, illustrated)
