@@ -1,9 +1,9 @@
 """The part of a compliance report about a sweep: its question, its command, what complies where."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from shlex import quote
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,38 +12,85 @@ from bisar_budget.faults import changes_words, printable
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.status import STATUS
 from bisar_budget.findings.trade import Axis, Trade, TradeStudy
-from bisar_budget.report.compliance.view import Picture, Stretch, Studied, StudyPart
+from bisar_budget.report.compliance import document as doc
+from bisar_budget.report.compliance.matrix import Page
 from bisar_budget.report.drawing.trade_drawing import trade_drawing
 from bisar_budget.report.drawing.trades import per_word
-from bisar_budget.report.words.sentences import BINDING_WORDS, percent
+from bisar_budget.report.words.sentences import BINDING_WORDS, counted, percent
 
 _MOST = 20  # lines of a table
 _FEW = 6  # words that are listed in a sentence
 
 
-def written(found: MissionFindings, study: TradeStudy, file: str) -> Studied:
-    """Write a sweep of a mission; `file` is the name of the mission file that is shown."""
-    trade = study.trade
-    stretches = list(_stretches(trade)) if len(trade.axes) == 1 else []
-    parts = list(_parts(trade)) if len(trade.axes) == 2 else []
+def studied(page: Page, study: TradeStudy) -> doc.Section:
+    """The question, the command that gives its cases, what was found, drawn and as a table."""
+    found, trade = page.found, study.trade
+    by_word = per_word(trade)
     counts, question = _counts(study), _question(trade)
+    stretches = list(_stretches(trade)) if len(trade.axes) == 1 else []
+    parts = list(_parts(trade, by_word)) if len(trade.axes) == 2 else []
     said = [
         f"{one.where}: {STATUS[one.status].words}{f', {one.row} {one.use}' if one.row else ''}" for one in stretches
     ]
     said += [f"{one.name}: {one.complying} of {one.cases} comply" for one in parts]
     description = f"{question} {counts} {'; '.join(said[:_MOST])}{' ...' if len(said) > _MOST else '.'}"
     title = f"Trade study: {' and '.join(axis.key for axis in trade.axes)}"
-    drawing = trade_drawing(trade, study.rows, found.file, f"{title}, {found.name}", description)
-    by_word = per_word(trade)
-    return Studied(
-        question=question,
-        command=_command(found, study, file),
-        counts=counts,
-        picture=Picture("study.svg", title, drawing),
-        stretches=tuple(stretches[:_MOST]),
-        parts=tuple(parts[:_MOST]),
-        parts_are=by_word[0].key if by_word else "Worst row",
-        hidden=max(len(stretches) + len(parts) - _MOST, 0),
+    drawing = trade_drawing(trade, study.rows, found.file, f"{title}, {page.name}", description)
+    beside: list[doc.Block] = [
+        doc.Figure(f"{page.number}-study.svg", page.anchor, doc.Name(title), f"{title} of {page.name}", drawing)
+    ]
+    label = f"Cases of {page.name}"
+    if stretches:
+        columns = doc.columns("Values", "Status", doc.Column("Worst row", "id"), *doc.numbers("Utilization"))
+        caption = "Where it complies, and what binds there: the row that uses most of its limit"
+        beside.append(doc.Table(label, caption, columns, [_line(one) for one in stretches[:_MOST]]))
+    if parts:
+        name: doc.Text = doc.Name(by_word[0].key) if by_word else "Worst row"
+        columns = doc.columns(doc.Column(name, "id"), *doc.numbers("Cases", "Comply", "Utilization"))
+        caption = "How many cases comply with each" if by_word else ""
+        caption = caption or "What binds in how many cases, and how many of them comply"
+        lines = [(doc.Name(one.name), str(one.cases), str(one.complying), one.use) for one in parts[:_MOST]]
+        beside.append(doc.Table(label, caption, columns, lines))
+    blocks: list[doc.Block] = [
+        doc.Paragraph(question),
+        doc.Paragraph(f"{counts} Each was checked as the mission itself. This writes them as a table:"),
+        doc.Paragraph(doc.Code(_command(found, study, page.file)), "command"),
+        doc.Group("beside", beside),
+    ]
+    if hidden := max(len(said) - _MOST, 0):
+        blocks.append(doc.Paragraph(f"Not shown: {counted(hidden, 'more line')}.", "more"))
+    return doc.Section("Trade study", blocks, f"{page.anchor}-study", style="study")
+
+
+class Stretch(NamedTuple):
+    """Neighbouring values of a sweep, or one word, with one status and one worst row.
+
+    `requirement` sets its limit; empty where the name of the row says it.
+    """
+
+    where: str
+    status: str
+    row: str
+    requirement: str
+    use: str
+
+
+class StudyPart(NamedTuple):
+    """Cases of a sweep over two keys that have a word or a worst row in common."""
+
+    name: str
+    cases: int
+    complying: int
+    use: str
+
+
+def _line(one: Stretch) -> doc.Line:
+    row: doc.Text = doc.Name(one.row) if one.row else "–"
+    return (
+        one.where,
+        doc.Badge(one.status),
+        (row, doc.Styled("own-id", one.requirement)) if one.requirement else row,
+        one.use,
     )
 
 
@@ -118,11 +165,10 @@ def _uses(uses: NDArray[Any]) -> str:
     return low if low == high else f"{low} to {high}"
 
 
-def _parts(trade: Trade) -> Iterator[StudyPart]:
+def _parts(trade: Trade, by_word: tuple[Axis, Mapping[str, Trade]] | None) -> Iterator[StudyPart]:
     """Numbers of cases that comply, by word, or else by row that is the worst somewhere; the most cases first."""
     status = trade.values["status"].ravel()
     complies = np.array([name != "error" and not STATUS[name].fails for name in status.tolist()])
-    by_word = per_word(trade)
     if by_word is not None:
         for word, of_word in by_word[1].items():
             names = of_word.values["status"].tolist()
