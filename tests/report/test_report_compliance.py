@@ -25,7 +25,7 @@ from bisar_budget.monte_carlo.probability import monte_carlo
 from bisar_budget.report import Style, pictures, render
 from bisar_budget.report.compliance.document import (
     Badge,
-    Document,
+    Compliance,
     Facts,
     Items,
     Name,
@@ -34,8 +34,8 @@ from bisar_budget.report.compliance.document import (
     Steps,
     Styled,
     Swatch,
-    Table,
     Text,
+    TextTable,
     Use,
     blocks_of,
 )
@@ -106,30 +106,30 @@ def plain(text: Text) -> str:
     return "".join(str(word) for word in words)
 
 
-def lines(document: Document, *heads: str) -> list[dict[str, Text]]:
+def lines(document: Compliance, *heads: str) -> list[dict[str, Text]]:
     """Lines of all tables with these columns, by the heads of the columns."""
     found = []
     for table in blocks_of(document):
-        named = [plain(column.head) for column in table.columns] if isinstance(table, Table) else []
+        named = [plain(head.text) for head in table.heads] if isinstance(table, TextTable) else []
         if set(heads) <= set(named):
             found += [dict(zip(named, row, strict=True)) for row in table.rows]
     return found
 
 
-def matrix(document: Document) -> dict[str, dict[str, str]]:
+def matrix(document: Compliance) -> dict[str, dict[str, str]]:
     """Words of the compliance matrix, with what the annex has of it, by the id of the row."""
     return {parts(line["Id"])[0].text: {head: plain(cell) for head, cell in line.items()}
             for line in lines(document, "Id", "Verified by")}  # fmt: skip
 
 
-def facts(document: Document, style: str) -> list[tuple[str, str]]:
+def facts(document: Compliance, style: str) -> list[tuple[str, str]]:
     """Names of facts, and what they are, in all lists of a style."""
     pairs = [pair for block in blocks_of(document) if isinstance(block, Facts) and block.style == style
              for pair in block.pairs]  # fmt: skip
     return [(plain(name), plain(words)) for name, words in pairs]
 
 
-def drivers(document: Document) -> list[tuple[str, str, float]]:
+def drivers(document: Compliance) -> list[tuple[str, str, float]]:
     """Id, status and bar of each row that drives the verdict."""
     found = []
     for block in blocks_of(document):

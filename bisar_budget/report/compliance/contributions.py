@@ -91,16 +91,16 @@ def largest_contributions(page: Page) -> Iterator[doc.Block]:
         yield doc.Paragraph("No declared error displaces the image.")
 
 
-def _largest(page: Page, found: Sequence[Contribution], about: str, head: str, caption: str) -> doc.Table:
+def _largest(page: Page, found: Sequence[Contribution], about: str, head: str, caption: str) -> doc.TextTable:
     of_sum = doc.numbers("Of the sum") if any(one.more for one in found) else []
-    size = doc.Column(head, "number")
-    columns = doc.columns("Owner", "Kind", "Axis or term", size, "Relative to the largest", *of_sum)
+    size = doc.Head(head, "number")
+    columns = doc.heads("Owner", "Kind", "Axis or term", size, "Relative to the largest", *of_sum)
     lines: list[doc.Line] = [
         (one.owner, one.subject.kind, one.axis, one.size, doc.Bar(one.part, one.owner), *one.more[:1])
         for one in found[:_TOP]
     ]
     caption += f": the {_TOP} largest of {len(found)}" if len(found) > _TOP else ""
-    return doc.Table(f"Contributions to the {about} of {page.name}", caption, columns, lines, "contributions")
+    return doc.TextTable(f"Contributions to the {about} of {page.name}", caption, columns, lines, "contributions")
 
 
 def all_contributions(page: Page) -> Iterator[doc.Block]:
@@ -118,6 +118,6 @@ def all_contributions(page: Page) -> Iterator[doc.Block]:
         ),
     ):  # fmt: skip
         if found:
-            columns = doc.columns(doc.Column("Id", "id"), *doc.numbers(*heads))
+            columns = doc.heads(doc.Head("Id", "id"), *doc.numbers(*heads))
             lines: list[doc.Line] = [(doc.Name(one.id), one.size, *one.more) for one in found]
-            yield doc.Table(f"All {about} of {page.name}", caption, columns, lines, "contributions")
+            yield doc.TextTable(f"All {about} of {page.name}", caption, columns, lines, "contributions")

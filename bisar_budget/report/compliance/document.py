@@ -109,25 +109,25 @@ class Items:
 
 
 @dataclass(frozen=True, slots=True)
-class Column:
+class Head:
     """The head of a column of a table, and `number` (to the right) or `id`."""
 
-    head: Text
+    text: Text
     style: str = ""
 
 
-def columns(*heads: Column | str) -> list[Column]:
-    """Columns of a table; one that is only a head has text."""
-    return [Column(head) if isinstance(head, str) else head for head in heads]
+def heads(*heads: Head | str) -> list[Head]:
+    """Heads of columns; below one that is only text stands text."""
+    return [Head(head) if isinstance(head, str) else head for head in heads]
 
 
-def numbers(*heads: str) -> list[Column]:
-    """Columns of numbers."""
-    return [Column(head, "number") for head in heads]
+def numbers(*heads: str) -> list[Head]:
+    """Heads of columns of numbers."""
+    return [Head(head, "number") for head in heads]
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
+class TextTable:
     """Cells below the heads of their columns, the first of each row its name.
 
     `label` is its name among the parts of a page that scroll; a table without one is narrow.
@@ -135,7 +135,7 @@ class Table:
 
     label: str
     caption: Text
-    columns: Sequence[Column]
+    heads: Sequence[Head]
     rows: Sequence[Sequence[Text]]
     style: str = ""
 
@@ -165,7 +165,7 @@ class Figure:
 
 
 @dataclass(frozen=True, slots=True)
-class Chip:
+class ShownImage:
     """A small image: `name` of its file, what it shows, the PNG, its size on a page. [px]"""
 
     name: str
@@ -176,10 +176,10 @@ class Chip:
 
 
 @dataclass(frozen=True, slots=True)
-class Chips:
+class Images:
     """Small images side by side."""
 
-    chips: Sequence[Chip]
+    images: Sequence[ShownImage]
 
 
 @dataclass(frozen=True, slots=True)
@@ -209,7 +209,7 @@ class Group:
 
 
 @dataclass(frozen=True, slots=True)
-class Section:
+class Chapter:
     """Blocks below a heading; `short` is its title in the contents, `anchor` empty where nothing leads to it."""
 
     title: Text
@@ -222,7 +222,7 @@ class Section:
     is_listed: bool = True  # in the contents
 
 
-Block = Paragraph | Facts | Items | Table | Stack | Figure | Chips | Steps | Group | Section
+Block = Paragraph | Facts | Items | TextTable | Stack | Figure | Images | Steps | Group | Chapter
 
 
 @dataclass(frozen=True, slots=True)
@@ -236,22 +236,22 @@ class Margins:
 
 
 @dataclass(frozen=True, slots=True)
-class Document:
+class Compliance:
     """A whole report; `subject` is the mission, or how many."""
 
     version: str
     subject: str
     facts: Facts
     margins: Sequence[Margins]
-    sections: Sequence[Section]
+    chapters: Sequence[Chapter]
 
 
-def blocks_of(block: Document | Block) -> Iterator[Block]:
+def blocks_of(block: Compliance | Block) -> Iterator[Block]:
     """All blocks inside one, in their order, those inside others too."""
     inner: Sequence[Block] = ()
-    if isinstance(block, Document):
-        inner = block.sections
-    elif isinstance(block, Section | Group):
+    if isinstance(block, Compliance):
+        inner = block.chapters
+    elif isinstance(block, Chapter | Group):
         inner = block.blocks
     for one in inner:
         yield one

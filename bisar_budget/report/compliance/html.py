@@ -45,8 +45,8 @@ def as_html(report: Report, style: Style) -> str:
     return _page().render(
         document=document,
         facts=_block(document.facts),
-        main=_blocks(document.sections),
-        inner=lambda section: [one for one in section.blocks if isinstance(one, doc.Section) and one.is_listed],
+        main=_blocks(document.chapters),
+        inner=lambda chapter: [one for one in chapter.blocks if isinstance(one, doc.Chapter) and one.is_listed],
         statuses=STATUS.values(),
     )
 
@@ -104,7 +104,7 @@ def _block(block: doc.Block) -> Markup:
             return _element("dl", style, Markup("\n{}").format(Markup("").join(rows)))
         case doc.Items(items, style, is_numbered):
             return _element("ol" if is_numbered else "ul", style, Markup("\n").join(["", *map(_item, items), ""]))
-        case doc.Table():
+        case doc.TextTable():
             return _table(block)
         case doc.Stack():
             return _stack(block)
@@ -112,7 +112,7 @@ def _block(block: doc.Block) -> Markup:
             inner = _scroll(block.label, _inline(block))
             caption = Markup("<figcaption>{}</figcaption>").format(_text(title))
             return _element("figure", style, Markup("\n{}{}\n").format(inner, caption))
-        case doc.Chips(chips):
+        case doc.Images(chips):
             images = (
                 Markup(
                     '<figure><img src="data:image/png;base64,{}" alt="{}" width="{}" height="{}">'
@@ -126,8 +126,8 @@ def _block(block: doc.Block) -> Markup:
         case doc.Group(style, blocks, heading):
             head = Markup("<h4>{}</h4>\n").format(_text(heading)) if heading else ""
             return _element("div", style, Markup("\n{}{}").format(head, _blocks(blocks)))
-        case doc.Section():
-            return _section(block)
+        case doc.Chapter():
+            return _chapter(block)
     raise TypeError(block)
 
 
@@ -142,18 +142,18 @@ def _scroll(label: str, content: Markup) -> Markup:
     return Markup(region).format(printable(label), content)
 
 
-def _section(section: doc.Section) -> Markup:
-    level = f"h{section.level}"
-    title, content = _text(section.title), _blocks(section.blocks)
-    if not section.anchor:
+def _chapter(chapter: doc.Chapter) -> Markup:
+    level = f"h{chapter.level}"
+    title, content = _text(chapter.title), _blocks(chapter.blocks)
+    if not chapter.anchor:
         return Markup("<{0}>{1}</{0}>\n{2}").format(level, title, content)
     return Markup(
         '<{tag}{style} id="{anchor}" aria-labelledby="{anchor}-h">\n'
         '<{level} id="{anchor}-h">{title}</{level}>\n{content}</{tag}>\n'
     ).format(
-        tag="article" if section.is_article else "section",
-        style=Markup(' class="{}"').format(section.style) if section.style else "",
-        anchor=section.anchor,
+        tag="article" if chapter.is_article else "section",
+        style=Markup(' class="{}"').format(chapter.style) if chapter.style else "",
+        anchor=chapter.anchor,
         level=level,
         title=title,
         content=content,
@@ -175,13 +175,11 @@ def _item(paragraphs: doc.Line) -> Markup:
     return Markup("<li>{}</li>").format(Markup("").join(_cell("p", (text,)) for text in paragraphs))
 
 
-def _table(table: doc.Table) -> Markup:
-    heads = (
-        _cell("th", column.head, "number" if column.style == "number" else "", "col") for column in table.columns
-    )
+def _table(table: doc.TextTable) -> Markup:
+    heads = (_cell("th", head.text, "number" if head.style == "number" else "", "col") for head in table.heads)
     lines = [Markup("<caption>{}</caption>").format(_text(table.caption))]
     lines += [Markup("<thead><tr>{}</tr></thead>").format(Markup("").join(heads)), Markup("<tbody>")]
-    styles = [column.style for column in table.columns]
+    styles = [head.style for head in table.heads]
     for first, *others in table.rows:
         cells = [_cell("th", first, styles[0], "row")]
         cells += [_cell("td", cell, style) for cell, style in zip(others, styles[1:], strict=True)]

@@ -23,7 +23,7 @@ def as_markdown(report: Report, style: Style) -> str:
     """Write the report; drawings are linked where `style.assets` says that they lie."""
     document = compliance(report, style)
     subject = "Motion-measurement error budget, bistatic SAR."
-    parts = ["# Compliance report", subject, *_blocks([document.facts, *document.sections], uri(style.assets))]
+    parts = ["# Compliance report", subject, *_blocks([document.facts, *document.chapters], uri(style.assets))]
     return "\n\n".join(part.rstrip("\n") for part in parts if part) + "\n"
 
 
@@ -33,8 +33,8 @@ def pictures(report: Report, style: Style) -> Mapping[str, bytes]:
     for block in doc.blocks_of(compliance(report, style)):
         if isinstance(block, doc.Figure):
             files[block.name] = block.svg.encode()
-        elif isinstance(block, doc.Chips):
-            files |= {chip.name: chip.png for chip in block.chips}
+        elif isinstance(block, doc.Images):
+            files |= {chip.name: chip.png for chip in block.images}
     return files
 
 
@@ -97,7 +97,7 @@ def _block(block: doc.Block, assets: str, is_introduced: bool) -> Iterator[str]:
                 yield f"{number}. " + "\n\n   ".join(map(_text, paragraphs))
         case doc.Items(items):
             yield "\n".join(f"- {' '.join(map(_text, paragraphs))}" for paragraphs in items)
-        case doc.Table():
+        case doc.TextTable():
             if not is_introduced:
                 caption = _text(block.caption)
                 is_whole = ":" in caption or caption.endswith(".")
@@ -109,7 +109,7 @@ def _block(block: doc.Block, assets: str, is_introduced: bool) -> Iterator[str]:
             if not block.is_told:
                 match = _DESCRIPTION.search(block.svg)  # for readers who cannot see it
                 yield markdown_text(unescape(match[1]) if match else "")
-        case doc.Chips(chips):
+        case doc.Images(chips):
             if assets:
                 yield "\n".join(
                     f'<img src="{assets}/{one.name}" alt="{escape(printable(one.title))}" '
@@ -125,14 +125,14 @@ def _block(block: doc.Block, assets: str, is_introduced: bool) -> Iterator[str]:
             if heading:
                 yield f"#### {_text(heading)}"
             yield from _blocks(inner, assets)
-        case doc.Section(title, inner, level=level):
+        case doc.Chapter(title, inner, level=level):
             yield f"{'#' * level} {_text(title)}"
             yield from _blocks(inner, assets)
 
 
-def _table(table: doc.Table) -> str:
-    heads = [_text(column.head) for column in table.columns]
-    rules = ["---:" if column.style == "number" else "---" for column in table.columns]
+def _table(table: doc.TextTable) -> str:
+    heads = [_text(head.text) for head in table.heads]
+    rules = ["---:" if head.style == "number" else "---" for head in table.heads]
     rows = [[_text(cell, badge="{}") for cell in row] for row in table.rows]
     return "\n".join(f"| {' | '.join(cells)} |" for cells in (heads, rules, *rows))
 

@@ -96,13 +96,13 @@ def page_of(found: MissionFindings, style: Style, anchor: str) -> Page:
     )
 
 
-def matrix_table(page: Page, rows: Iterable[Row], label: str, caption: str) -> doc.Table:
+def matrix_table(page: Page, rows: Iterable[Row], label: str, caption: str) -> doc.TextTable:
     """Lines of the matrix for some of its rows."""
     places = {row.id: place for place, row in enumerate(page.matrix, start=1)}
     verdicts = {verdict.id: verdict.verdict for verdict in page.found.verdicts or ()}
     sizes = doc.numbers("Utilization", "Declared", "Allowable", "Margin")
     said = ("Requirement", "Verified by", "Waiver")
-    columns = doc.columns(doc.Column("Id", "id"), "Status", *sizes, *said, *doc.numbers("Line"))
+    columns = doc.heads(doc.Head("Id", "id"), "Status", *sizes, *said, *doc.numbers("Line"))
     lines: list[doc.Line] = []
     for row in rows:
         name: doc.Text = doc.Name(row.id, f"{page.anchor}-row-{places[row.id]}" if page.is_full else "")
@@ -123,15 +123,15 @@ def matrix_table(page: Page, rows: Iterable[Row], label: str, caption: str) -> d
             )
         )
     is_waived = any(row.waivers for row in page.matrix)
-    return doc.Table(label, caption, columns, lines, "matrix" if is_waived else "matrix unwaived")
+    return doc.TextTable(label, caption, columns, lines, "matrix" if is_waived else "matrix unwaived")
 
 
-def undeclared_table(page: Page) -> doc.Table:
+def undeclared_table(page: Page) -> doc.TextTable:
     """Errors that the file does not declare, and what each may be."""
-    return doc.Table(
+    return doc.TextTable(
         f"Errors that {page.name} does not declare",
         "Not declared, so not judged, and what each may be",
-        doc.columns(doc.Column("Id", "id"), *doc.numbers("Allowable"), "From"),
+        doc.heads(doc.Head("Id", "id"), *doc.numbers("Allowable"), "From"),
         [(doc.Name(row.id), dashed(allowable_words(row, page.found)), row.equation) for row in page.undeclared],
     )
 

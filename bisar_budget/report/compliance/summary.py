@@ -1,6 +1,5 @@
 """The compliance report of a run: an index of missions, a summary of each, options, signatures, and the annexes."""
 
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from hashlib import sha256
 
@@ -12,7 +11,7 @@ from bisar_budget.findings.mission import MissionFindings, Report, UnusableMissi
 from bisar_budget.findings.requirement import NAMES
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import STATUS
-from bisar_budget.mission.model import Document as OwnDocument
+from bisar_budget.mission.model import Document
 from bisar_budget.report import Style
 from bisar_budget.report.compliance import document as doc
 from bisar_budget.report.compliance.annex import annex, sources
@@ -25,7 +24,7 @@ from bisar_budget.report.compliance.matrix import (
     undeclared_table,
     use_text,
 )
-from bisar_budget.report.drawing.collection import geometry_elevation, geometry_plan
+from bisar_budget.report.drawing.geometry_views import geometry_elevation, geometry_plan
 from bisar_budget.report.words.identity import (
     document_words,
     doubtful_model,
@@ -87,7 +86,7 @@ _RULES = {
 }
 
 
-def compliance(report: Report, style: Style) -> doc.Document:
+def compliance(report: Report, style: Style) -> doc.Compliance:
     """Arrange the findings of a run for a report that people read.
 
     Raises
@@ -102,7 +101,7 @@ def compliance(report: Report, style: Style) -> doc.Document:
         anchor = f"m{number}"
         if isinstance(mission, UnusableMission):
             file = name = source_path(mission.file, style)
-            data, document = mission.data, OwnDocument()
+            data, document = mission.data, Document()
             blocks: list[doc.Block] = [_faults(mission, name, anchor)]
             faults = counted(len(mission.faults), "fault")
             index.append((doc.Name(name, anchor), doc.Name(file), doc.Badge("error"), "–", "–", faults))
@@ -114,7 +113,7 @@ def compliance(report: Report, style: Style) -> doc.Document:
             annexes += annex(page, several=count > 1)
         digest = "" if data is None else sha256(data).hexdigest()
         facts = _facts_of_file(file, digest, document, index[-1][-1])
-        missions.append(doc.Section(name, [facts, *blocks], anchor, level=2, is_article=True, is_listed=count == 1))
+        missions.append(doc.Chapter(name, [facts, *blocks], anchor, level=2, is_article=True, is_listed=count == 1))
         margins.append(doc.Margins(anchor, name, document_words(document), f"SHA-256 {digest}" if digest else file))
     subject = f"{count} missions" if count > 1 else margins[0].name
     about: list[tuple[doc.Text, doc.Text]] = [] if count > 1 else [("Mission", subject)]
@@ -123,31 +122,27 @@ def compliance(report: Report, style: Style) -> doc.Document:
     about.append(("Tool", f"bisar-budget {report.version}"))
     sections = [_index(index)] if count > 1 else []
     sections += [*missions, _made(report), _approval(), *annexes]
-    return doc.Document(report.version, subject, doc.Facts(about), margins, sections)
+    return doc.Compliance(report.version, subject, doc.Facts(about), margins, sections)
 
 
 # ---------------------------------------------------------------------- the run
-def _judged(status: str, waived: Counter[str]) -> str:
+_WAIVED = (
+    ("row over its limit is", "rows over their limits are"),
+    ("requirement or row that cannot be judged is", "requirements or rows that cannot be judged are"),
+)
+
+
+def _judged(status: str, waived: Sequence[int]) -> str:
     """Verdict on rows and requirements, with what it owes to waivers."""
-    said = [f"{count} {_plural(what, count)} {'are' if count > 1 else 'is'} waived" for what, count in waived.items()]
+    said = [f"{count} {words[count > 1]} waived" for count, words in zip(waived, _WAIVED, strict=True) if count]
     return "; ".join([STATUS[status].verdict, *said])
 
 
-_OVER, _UNJUDGED = "row over its limit", "requirement or row that cannot be judged"
-
-
-def _plural(what: str, count: int) -> str:
-    if count == 1:
-        return what
-    return "rows over their limits" if what == _OVER else "requirements or rows that cannot be judged"
-
-
-def _waived(found: MissionFindings) -> Counter[str]:
-    """Number of rows that are waived, and of requirements that are and have no such row."""
+def _waived(found: MissionFindings) -> tuple[int, int]:
+    """Number of rows that are waived, and of requirements that are and have no such row: over a limit, not judged."""
     rows = [row for row in found.rows if row.status == "waived"]
     over = sum((row.utilization or 0.0) > 1 for row in rows)
-    unjudged = len(rows) - over + sum(one.status == "waived" for one in unseen(found))
-    return Counter({what: count for what, count in ((_OVER, over), (_UNJUDGED, unjudged)) if count})
+    return over, len(rows) - over + sum(one.status == "waived" for one in unseen(found))
 
 
 def _overall(report: Report) -> str:
@@ -157,7 +152,7 @@ def _overall(report: Report) -> str:
     empty = sum(mission.is_empty and not mission.changes for mission in usable)
     if empty == count:
         return _NOTHING
-    said = _judged(report.status, sum(map(_waived, usable), Counter()))
+    said = _judged(report.status, [sum(counts) for counts in zip(*map(_waived, usable), strict=True)] or (0, 0))
     if empty:
         said = f"{said}; of {count} missions {empty} declare no error"
     if any(mission.changes for mission in usable):
@@ -173,14 +168,14 @@ def _is_alone(found: MissionFindings) -> bool:
     return not found.is_empty and found.combine == "each"
 
 
-def _index(lines: Sequence[doc.Line]) -> doc.Section:
-    file, worst = doc.Column("File", "id"), doc.Column("Worst row", "id")
-    columns = doc.columns("Mission", file, "Status", worst, *doc.numbers("Use"), "Rows")
+def _index(lines: Sequence[doc.Line]) -> doc.Chapter:
+    file, worst = doc.Head("File", "id"), doc.Head("Worst row", "id")
+    columns = doc.heads("Mission", file, "Status", worst, *doc.numbers("Use"), "Rows")
     caption = (
         f"{len(lines)} missions, in the order given. Use is declared over allowable. A name leads to its report."
     )
-    table = doc.Table("Index of the missions", caption, columns, lines, "index")
-    return doc.Section("Index", [table], "summary", level=2)
+    table = doc.TextTable("Index of the missions", caption, columns, lines, "index")
+    return doc.Chapter("Index", [table], "summary", level=2)
 
 
 def _index_line(page: Page) -> doc.Line:
@@ -196,7 +191,7 @@ def _index_line(page: Page) -> doc.Line:
     return name, doc.Name(page.file), doc.Badge(found.status), doc.Name(worst) if worst else "–", use, counts
 
 
-def _made(report: Report) -> doc.Section:
+def _made(report: Report) -> doc.Chapter:
     which = "s above, each" if len(report.missions) > 1 else " above,"
     said = (
         f"By bisar-budget {report.version} from the mission file{which} known by the SHA-256 of its bytes. The same "
@@ -205,19 +200,19 @@ def _made(report: Report) -> doc.Section:
     options: list[doc.Line] = [
         (doc.Styled("id", option.name), option.value, option.origin) for option in report.options
     ]
-    columns = doc.columns("Option", "Value", "From")
-    table = doc.Table("Options of the run", "Options of this run", columns, options or [("none", "–", "–")])
-    return doc.Section("How this report was made", [doc.Paragraph(said), table], "made", level=2)
+    columns = doc.heads("Option", "Value", "From")
+    table = doc.TextTable("Options of the run", "Options of this run", columns, options or [("none", "–", "–")])
+    return doc.Chapter("How this report was made", [doc.Paragraph(said), table], "made", level=2)
 
 
-def _approval() -> doc.Section:
-    columns = doc.columns("Role", "Name", "Date", "Signature")
+def _approval() -> doc.Chapter:
+    columns = doc.heads("Role", "Name", "Date", "Signature")
     lines = [(role, "", "", "") for role in ("Prepared", "Reviewed", "Approved")]
-    return doc.Section("Approval", [doc.Table("", "Signatures", columns, lines, "approval")], "approval", level=2)
+    return doc.Chapter("Approval", [doc.TextTable("", "Signatures", columns, lines, "approval")], "approval", level=2)
 
 
 # ---------------------------------------------------------------------- one mission
-def _facts_of_file(file: str, digest: str, document: OwnDocument, counts: doc.Text) -> doc.Facts:
+def _facts_of_file(file: str, digest: str, document: Document, counts: doc.Text) -> doc.Facts:
     pairs: list[tuple[doc.Text, doc.Text]] = [
         ("File", doc.Styled("id", doc.Name(file))),
         ("SHA-256", doc.Styled("digest", digest or "not read")),
@@ -229,28 +224,28 @@ def _facts_of_file(file: str, digest: str, document: OwnDocument, counts: doc.Te
     return doc.Facts([*pairs, ("Rows", counts)])
 
 
-def _faults(found: UnusableMission, name: str, anchor: str) -> doc.Section:
+def _faults(found: UnusableMission, name: str, anchor: str) -> doc.Chapter:
     """What is wrong with a file that cannot be used."""
     said = f"{STATUS['error'].verdict}: the mission file is not usable."
     lines = [(f"{fault.line or '–'}:{fault.column or '–'}", str(fault)) for fault in found.faults]
-    columns = doc.columns("Line:column", "Fault")
-    table = doc.Table(f"Faults of {name}", "Faults of the mission file", columns, lines)
-    return doc.Section("Verdict", [doc.Paragraph(said, "verdict error"), table], f"{anchor}-verdict", is_listed=False)
+    columns = doc.heads("Line:column", "Fault")
+    table = doc.TextTable(f"Faults of {name}", "Faults of the mission file", columns, lines)
+    return doc.Chapter("Verdict", [doc.Paragraph(said, "verdict error"), table], f"{anchor}-verdict", is_listed=False)
 
 
 def _summary(page: Page) -> list[doc.Block]:
     return [
-        doc.Section("Verdict", list(_verdict(page)), f"{page.anchor}-verdict"),
-        doc.Section("Compliance matrix", list(_matrix(page)), f"{page.anchor}-matrix"),
-        doc.Section(
+        doc.Chapter("Verdict", list(_verdict(page)), f"{page.anchor}-verdict"),
+        doc.Chapter("Compliance matrix", list(_matrix(page)), f"{page.anchor}-matrix"),
+        doc.Chapter(
             "Where phase and displacement come from",
             list(largest_contributions(page)),
             f"{page.anchor}-contributions",
             short="Contributions",
         ),
-        doc.Section("Geometry", list(_geometry(page)), f"{page.anchor}-geometry"),
-        doc.Section("Allocation", list(_allocation(page)), f"{page.anchor}-allocation", style="allocation"),
-        doc.Section("Assumptions and validity", list(_validity(page)), f"{page.anchor}-validity"),
+        doc.Chapter("Geometry", list(_geometry(page)), f"{page.anchor}-geometry"),
+        doc.Chapter("Allocation", list(_allocation(page)), f"{page.anchor}-allocation", style="allocation"),
+        doc.Chapter("Assumptions and validity", list(_validity(page)), f"{page.anchor}-validity"),
     ]
 
 
@@ -258,7 +253,7 @@ def _verdict(page: Page) -> Iterator[doc.Block]:
     found, waived = page.found, _waived(page.found)
     said = _NOTHING if found.is_empty else _judged(found.status, waived)
     said += (_CHANGED if found.changes else "") + (_ALONE if _is_alone(found) else "")
-    tone = "warn" if STATUS[found.status].is_met and waived else found.status
+    tone = "warn" if STATUS[found.status].is_met and any(waived) else found.status
     yield doc.Paragraph(said, f"verdict {tone}")
     if doubt := doubtful_model(found):
         yield doc.Paragraph(doubt)
@@ -283,7 +278,7 @@ def _verdict(page: Page) -> Iterator[doc.Block]:
         yield doc.Items([_driver(row, found) for row in drivers], "drivers", is_numbered=True)
 
 
-def _requirements(page: Page) -> doc.Table:
+def _requirements(page: Page) -> doc.TextTable:
     lines: list[doc.Line] = []
     for one in requirement_lines(page.found):
         decided: doc.Text = dashed(one.decided_by)
@@ -299,9 +294,9 @@ def _requirements(page: Page) -> doc.Table:
                 (decided, ", " if one.decided_by and one.remark else "", one.remark),
             )
         )
-    columns = doc.columns("Requirement", *doc.numbers("Allowed", "Reached", "Use"), "Status", "Decided by")
+    columns = doc.heads("Requirement", *doc.numbers("Allowed", "Reached", "Use"), "Status", "Decided by")
     caption = "Requirements, and whether each was judged and is met"
-    return doc.Table(f"Requirements of {page.name}", caption, columns, lines, "requirements")
+    return doc.TextTable(f"Requirements of {page.name}", caption, columns, lines, "requirements")
 
 
 def _drivers(page: Page) -> Iterator[Row]:
@@ -382,12 +377,12 @@ def _allocation(page: Page) -> Iterator[doc.Block]:
             name: doc.Text = (doc.Swatch(owner, part), owner) if part else owner
             share = f"{part:.3g}" if part else "held to the receiver’s"
             lines.append((name, share, phase_limit(limit, found), phase_limit(limit * gain, found)))
-    columns = doc.columns("Owner", *doc.numbers("Share", "Before autofocus", "With autofocus"))
-    yield doc.Table(f"Allocation of {page.name}", "Shares of the quadratic phase error", columns, lines)
+    columns = doc.heads("Owner", *doc.numbers("Share", "Before autofocus", "With autofocus"))
+    yield doc.TextTable(f"Allocation of {page.name}", "Shares of the quadratic phase error", columns, lines)
     yield from _power_shares(page)
 
 
-def _power_shares(page: Page) -> Iterator[doc.Table]:
+def _power_shares(page: Page) -> Iterator[doc.TextTable]:
     """Shares of the power that vibration and noise may add; that of the clock only where it has one."""
     required, allocation = page.mission.requirements, page.found.allocation
     stated = [
@@ -407,8 +402,8 @@ def _power_shares(page: Page) -> Iterator[doc.Table]:
         lines.append((name, f"{value:g} dB", *shares))
     if lines:
         caption = "Shares of the power that vibration and noise may add; autofocus does not change them"
-        columns = doc.columns("Metric", *doc.numbers(*heads))
-        yield doc.Table(f"Shares of the power of {page.name}", caption, columns, lines)
+        columns = doc.heads("Metric", *doc.numbers(*heads))
+        yield doc.TextTable(f"Shares of the power of {page.name}", caption, columns, lines)
 
 
 def _gain(allocation: Allocation) -> str:

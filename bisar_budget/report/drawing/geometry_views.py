@@ -12,17 +12,7 @@ from typing import NamedTuple
 
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.geometry import BistaticGeometry, PlatformState, Vector, norm
-from bisar_budget.report.drawing.svg import (
-    Box,
-    Canvas,
-    DrawnLabel,
-    Point,
-    axis_number,
-    outline,
-    round_step,
-    text_width,
-    ticks,
-)
+from bisar_budget.report.drawing import svg
 from bisar_budget.units import format_quantity
 
 Place = tuple[float, float]  # in the plane that is drawn: to the right, up [m]
@@ -210,11 +200,11 @@ def _compass(value: float, positive: str, negative: str) -> str:
 class _Panel(NamedTuple):
     """A part of the page and what it shows: `centre` lies in its middle, at `scale`. [px], [m], [px/m]"""
 
-    frame: Box
+    frame: svg.Box
     centre: Place
     scale: float
 
-    def pixel(self, place: Place) -> Point:
+    def pixel(self, place: Place) -> svg.Point:
         middle = ((self.frame.left + self.frame.right) / 2, (self.frame.top + self.frame.bottom) / 2)
         return (
             middle[0] + (place[0] - self.centre[0]) * self.scale,
@@ -224,7 +214,7 @@ class _Panel(NamedTuple):
 
 def _drawing(view: _View, kind: str, side: str, description: str, note: str = "") -> str:
     """A view, what is too close enlarged below; a note and what explains the symbols stand at its end."""
-    canvas = Canvas()
+    canvas = svg.Canvas()
     main = _whole(view)
     enlarged = _enlargement(view, main)
     of_scene = enlarged is not None and bool(_beside_the_scene(view, main))
@@ -316,52 +306,52 @@ def _fitted(view: _View, places: Sequence[Place], top: float, part: float = 1.0)
     # The middle of the frame is not that of the places where the margins differ; the ground stays down.
     low = min(ys) - (below + slack) / scale
     centre = ((max(xs) + min(xs)) / 2, low + height / 2 / scale)
-    return _Panel(Box(_AXIS[0], top, _AXIS[0] + width, top + height), centre, scale)
+    return _Panel(svg.Box(_AXIS[0], top, _AXIS[0] + width, top + height), centre, scale)
 
 
-def _axes(canvas: Canvas, panel: _Panel, view: _View) -> None:
+def _axes(canvas: svg.Canvas, panel: _Panel, view: _View) -> None:
     """Grid, ticks and names of the axes; the same step both ways, because both are to scale."""
     frame, scale = panel.frame, panel.scale
-    step = round_step(62 / scale)
+    step = svg.round_step(62 / scale)
     far = max(abs(panel.centre[0]), abs(panel.centre[1])) + (frame.right - frame.left) / scale
     unit, name = (1e3, "km") if far >= 2e3 else (1.0, "m")
     half = ((frame.right - frame.left) / 2 / scale, (frame.bottom - frame.top) / 2 / scale)
-    for value in ticks(panel.centre[0] - half[0], panel.centre[0] + half[0], step):
+    for value in svg.ticks(panel.centre[0] - half[0], panel.centre[0] + half[0], step):
         x, _ = panel.pixel((value, 0.0))
         if frame.left + 1 < x < frame.right - 1:
             canvas.polyline([(x, frame.top), (x, frame.bottom)], "grid", is_obstacle=False)
         shown = value if view.is_plan else abs(value)
-        text = axis_number(shown / unit)
-        if x + text_width(text) / 2 < _WIDTH:
+        text = svg.axis_number(shown / unit)
+        if x + svg.text_width(text) / 2 < _WIDTH:
             canvas.text((x, frame.bottom + 13), [text], "axis", "middle")
-    for value in ticks(panel.centre[1] - half[1], panel.centre[1] + half[1], step):
+    for value in svg.ticks(panel.centre[1] - half[1], panel.centre[1] + half[1], step):
         _, y = panel.pixel((0.0, value))
         if not view.is_plan and value < 0:
             continue
         if frame.top + 1 < y < frame.bottom - 1:
             canvas.polyline([(frame.left, y), (frame.right, y)], "grid", is_obstacle=False)
-        canvas.text((frame.left - 5, y + 3.5), [axis_number(value / unit)], "axis", "end")
+        canvas.text((frame.left - 5, y + 3.5), [svg.axis_number(value / unit)], "axis", "end")
     middle = (frame.left + frame.right) / 2
     across, up = ("east", "north") if view.is_plan else ("ground distance", "height")
     canvas.text((middle, frame.bottom + 28), [f"{across} [{name}]"], "axis", "middle")
     canvas.upright_text((11, (frame.top + frame.bottom) / 2), f"{up} [{name}]", "axis")
-    outline(canvas, frame, "grid")
+    svg.outline(canvas, frame, "grid")
 
 
-def _outline(canvas: Canvas, panel: _Panel) -> None:
+def _outline(canvas: svg.Canvas, panel: _Panel) -> None:
     """Frame of an enlargement, with a bar for its scale."""
     frame = panel.frame
-    outline(canvas, frame, "grid")
-    length = round_step(40 / panel.scale)
+    svg.outline(canvas, frame, "grid")
+    length = svg.round_step(40 / panel.scale)
     right, y = frame.right - 10, frame.top + 22
     left = right - length * panel.scale
     for line in ([(left, y), (right, y)], *([(x, y - 3), (x, y + 3)] for x in (left, right))):
         canvas.polyline(line, "line")
     canvas.text(((left + right) / 2, y - 6), [format_quantity(length, "m")], "axis", "middle")
-    canvas.obstacles.append(Box(left - 4, frame.top, frame.right, y + 4))
+    canvas.obstacles.append(svg.Box(left - 4, frame.top, frame.right, y + 4))
 
 
-def _draw_panel(canvas: Canvas, panel: _Panel, view: _View, is_detail: bool, enlarged: _Panel | None) -> None:
+def _draw_panel(canvas: svg.Canvas, panel: _Panel, view: _View, is_detail: bool, enlarged: _Panel | None) -> None:
     """Lines first, then markers, then labels, which look for what space is left."""
     frame, scene = panel.frame, panel.pixel(_SCENE)
     if view.is_plan:
@@ -380,7 +370,7 @@ def _draw_panel(canvas: Canvas, panel: _Panel, view: _View, is_detail: bool, enl
         if _shows_path(panel, platform):
             canvas.polyline([panel.pixel(place) for place in platform.path], f"{platform.name} path", frame)
     has_scene = frame.holds(scene)
-    labels: list[DrawnLabel] = []
+    labels: list[svg.DrawnLabel] = []
     if is_detail and has_scene:
         if view.is_plan:
             labels += _directions(canvas, panel, view)
@@ -395,13 +385,13 @@ def _draw_panel(canvas: Canvas, panel: _Panel, view: _View, is_detail: bool, enl
     if has_scene:
         for x, y in ((5, 0), (0, 5)):
             canvas.polyline([(scene[0] - x, scene[1] - y), (scene[0] + x, scene[1] + y)], "marker line")
-        canvas.obstacles.append(Box(scene[0] - 5, scene[1] - 5, scene[0] + 5, scene[1] + 5))
+        canvas.obstacles.append(svg.Box(scene[0] - 5, scene[1] - 5, scene[0] + 5, scene[1] + 5))
     canvas.labels([*_labels(panel, view, visible, has_scene, enlarged), *labels])
 
 
 def _labels(
     panel: _Panel, view: _View, visible: Sequence[_Platform], has_scene: bool, enlarged: _Panel | None
-) -> Iterator[DrawnLabel]:
+) -> Iterator[svg.DrawnLabel]:
     """Labels, with their text and where they belong; things on one spot share a label."""
     frame, scene = panel.frame, panel.pixel(_SCENE)
     # From the side, what is written of a platform stays above the ground.
@@ -412,27 +402,27 @@ def _labels(
         distance = math.dist(*(p.state.position for p in free))
         together = f"{_range(view, free[0])}, {format_quantity(distance, 'm')} apart"
         below = ("enlarged below",) if enlarged else ()
-        yield DrawnLabel(panel.pixel(free[0].at), ("transmitter and receiver", together, *below), above)
+        yield svg.DrawnLabel(panel.pixel(free[0].at), ("transmitter and receiver", together, *below), above)
     else:
         for platform in free:
             lines = platform.name, _range(view, platform) + (f", {platform.motion}" if view.is_plan else "")
-            yield DrawnLabel(panel.pixel(platform.at), lines, above)
+            yield svg.DrawnLabel(panel.pixel(platform.at), lines, above)
     if has_scene:
         if at_scene and enlarged:
             names = " and ".join(["scene", *(p.name for p in at_scene)])
-            yield DrawnLabel(scene, (names, "enlarged below"), frame)
+            yield svg.DrawnLabel(scene, (names, "enlarged below"), frame)
         elif at_scene:
             names = " and ".join(p.name for p in at_scene)
             ranges = ", ".join(f"{_range(view, p)}, {p.motion}" for p in at_scene)
-            yield DrawnLabel(scene, (f"{names} over the scene", ranges), frame)
+            yield svg.DrawnLabel(scene, (f"{names} over the scene", ranges), frame)
         else:
             radius = f", radius {format_quantity(view.radius, 'm')}" if view.radius else ""
-            yield DrawnLabel(scene, (f"scene{radius}",), frame)
+            yield svg.DrawnLabel(scene, (f"scene{radius}",), frame)
     for platform in view.platforms:
         if platform not in visible and (part := frame.clipped((scene, panel.pixel(platform.at)))):
-            yield DrawnLabel(part[1], (f"to {platform.name}, {_range(view, platform)}",), above)
+            yield svg.DrawnLabel(part[1], (f"to {platform.name}, {_range(view, platform)}",), above)
     if not has_scene and visible and (part := frame.clipped((panel.pixel(visible[0].at), scene))):
-        yield DrawnLabel(part[1], ("to the scene",), frame)
+        yield svg.DrawnLabel(part[1], ("to the scene",), frame)
 
 
 def _range(view: _View, platform: _Platform) -> str:
@@ -440,18 +430,18 @@ def _range(view: _View, platform: _Platform) -> str:
     return slant if view.is_plan else f"{slant} at {_degrees(platform.state.elevation)}"
 
 
-def _directions(canvas: Canvas, panel: _Panel, view: _View) -> Iterator[DrawnLabel]:
+def _directions(canvas: svg.Canvas, panel: _Panel, view: _View) -> Iterator[svg.DrawnLabel]:
     """φ_b of (11), and across it the line along which errors smear, (31)."""
     scene, look = panel.pixel(_SCENE), view.found.geometry.look_azimuth
     tip = _turned(scene, _LOOK, look)
     ends = [_turned(scene, sign * _SMEAR, look + math.pi / 2) for sign in (-1, 1)]
     canvas.arrow(scene, tip)
     canvas.arrow(ends[0], ends[1], both_ends=True)
-    yield DrawnLabel(tip, (f"look φ_b {_degrees(look)}",), panel.frame)
-    yield DrawnLabel(max(ends, key=lambda end: end[1]), ("smear",), panel.frame)
+    yield svg.DrawnLabel(tip, (f"look φ_b {_degrees(look)}",), panel.frame)
+    yield svg.DrawnLabel(max(ends, key=lambda end: end[1]), ("smear",), panel.frame)
 
 
-def _turned(origin: Point, length: float, azimuth: float) -> Point:
+def _turned(origin: svg.Point, length: float, azimuth: float) -> svg.Point:
     return (origin[0] + length * math.cos(azimuth), origin[1] - length * math.sin(azimuth))
 
 
@@ -459,7 +449,7 @@ def _on_circle(centre: Place, radius: float, angle: float) -> Place:
     return (centre[0] + radius * math.cos(angle), centre[1] + radius * math.sin(angle))
 
 
-def _arc(canvas: Canvas, panel: _Panel, platform: _Platform, radius: float) -> None:
+def _arc(canvas: svg.Canvas, panel: _Panel, platform: _Platform, radius: float) -> None:
     """Elevation angle at the scene."""
     scene = panel.pixel(_SCENE)
     end = math.atan2(platform.at[1], platform.at[0])
@@ -468,7 +458,7 @@ def _arc(canvas: Canvas, panel: _Panel, platform: _Platform, radius: float) -> N
     canvas.polyline([_turned(scene, radius, angle) for angle in steps], f"{platform.name}", panel.frame)
 
 
-def _velocity(canvas: Canvas, panel: _Panel, platform: _Platform) -> None:
+def _velocity(canvas: svg.Canvas, panel: _Panel, platform: _Platform) -> None:
     if platform.is_still:
         return
     x, y = panel.pixel(platform.at)
@@ -493,7 +483,7 @@ def _is_end_on(platform: _Platform) -> bool:
     return not platform.is_still and math.hypot(*platform.heading) < _SHORT
 
 
-def _marker(canvas: Canvas, at: Point, platform: _Platform) -> None:
+def _marker(canvas: svg.Canvas, at: svg.Point, platform: _Platform) -> None:
     """Triangle for the transmitter, square for the receiver; hollow if it does not move."""
     x, y = at
     style = f"marker {'hollow line' if platform.is_still else 'solid'} {platform.name}"
@@ -514,7 +504,7 @@ def _shows_path(panel: _Panel, platform: _Platform) -> bool:
 
 def _degrees(angle: float) -> str:
     """Angle in degrees, to a hundredth."""
-    return f"{axis_number(round(math.degrees(angle), 2))}°"
+    return f"{svg.axis_number(round(math.degrees(angle), 2))}°"
 
 
 def _times(factor: float) -> str:
