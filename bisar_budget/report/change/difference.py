@@ -68,7 +68,7 @@ _TITLES = {
 
 
 def _changed(mission: MissionChange, gate: Gate | None) -> Iterator[_Said]:
-    """What changed beside the rows, in the order of the titles; a gate refuses what is loosened."""
+    """Changes beside those of rows, in the order of the titles; a gate refuses what is loosened."""
     for kind, moves in (("input", mission.inputs), ("geometry", mission.geometry)):
         yield from (_Said(kind, one.name, f"{_said(one.before, one)} -> {_said(one.after, one)}") for one in moves)
     for one in mission.requirements:

@@ -197,7 +197,7 @@ def _parts(trade: Trade, by_word: Mapping[str, Trade]) -> Iterator[tuple[doc.Lin
 
 # ---------------------------------------------------------------------- images
 def _evidence(page: Page) -> Iterator[doc.Block]:
-    """What images show of the limits, beside what was predicted."""
+    """Evidence of images about the limits, beside what was predicted."""
     verdicts = page.found.verdicts or ()
     yield doc.Paragraph(
         "Each error was set to its limit in data simulated from exact ranges, and the phase was measured in the "
@@ -273,7 +273,7 @@ def _on_page(image: PointImage) -> tuple[int, int]:
 
 # ---------------------------------------------------------------------- draws
 def _draws(page: Page, drawn: MonteCarlo) -> Iterator[doc.Block]:
-    """How often each requirement holds."""
+    """Probability that each requirement holds, with what needs no draws."""
     lines: list[doc.Line] = []
     for one in drawn.requirements:
         sizes = ("–" if size is None else format_quantity(size, one.unit) for size in (one.sum, one.rss, one.sigma))
@@ -301,7 +301,7 @@ def _draws(page: Page, drawn: MonteCarlo) -> Iterator[doc.Block]:
 
 # ---------------------------------------------------------------------- all rows
 def _rows(page: Page) -> Iterator[doc.Block]:
-    """What a summary leaves out of the matrix and of the contributions."""
+    """Rows and contributions that a summary leaves out, with the remarks of all rows."""
     if page.hidden:
         yield matrix_table(page, page.hidden, f"Other rows of {page.name}", "Rows that are not in the summary")
     if page.undeclared and page.matrix:

@@ -17,7 +17,7 @@ _TOP = 8  # of a summary
 
 @dataclass(frozen=True, slots=True)
 class Contribution:
-    """What one declared error adds; `part` is its size as a part of the largest, `more` what the annex says too."""
+    """Effect of one declared error; `part` is its size as a part of the largest, `more` what the annex says too."""
 
     id: str
     subject: Subject

@@ -62,7 +62,7 @@ class Swatch:
 
 @dataclass(frozen=True, slots=True)
 class Code:
-    """What is typed."""
+    """Words to type."""
 
     text: str
 
@@ -227,7 +227,7 @@ Block = Paragraph | Facts | Items | TextTable | Stack | Figure | Images | Steps 
 
 @dataclass(frozen=True, slots=True)
 class Margins:
-    """What printed pages of a mission have in their margins: its name, its document, the bytes of its file."""
+    """Words in the margins of a mission's printed pages: its name, its document, the bytes of its file."""
 
     anchor: str
     name: str

@@ -137,7 +137,7 @@ def _element(tag: str, style: str, content: Markup) -> Markup:
 
 
 def _scroll(label: str, content: Markup) -> Markup:
-    """What may be wider than the page scrolls in a region that the keyboard reaches."""
+    """A region that the keyboard reaches, in which content that is wider than the page scrolls."""
     region = '<div class="scroll" tabindex="0" role="region" aria-label="{}">{}</div>'
     return Markup(region).format(printable(label), content)
 

@@ -147,7 +147,7 @@ def grouped(said: Iterable[tuple[str, Sequence[str]]]) -> doc.Facts | None:
 
 
 def all_remarks(page: Page) -> Iterator[tuple[str, Sequence[str]]]:
-    """What the rows of the matrix say besides their numbers."""
+    """Remarks of each row of the matrix, besides its numbers."""
     for row in page.matrix:
         yield row.id, [text for text in (row.reason, *row.remarks, *row.refuted) if text]
 

@@ -225,7 +225,7 @@ def _facts_of_file(file: str, digest: str, document: Document, counts: doc.Text)
 
 
 def _faults(found: UnusableMission, name: str, anchor: str) -> doc.Chapter:
-    """What is wrong with a file that cannot be used."""
+    """Faults of a file that cannot be used."""
     said = f"{STATUS['error'].verdict}: the mission file is not usable."
     lines = [(f"{fault.line or '–'}:{fault.column or '–'}", str(fault)) for fault in found.faults]
     columns = doc.heads("Line:column", "Fault")
@@ -439,7 +439,7 @@ def _validity(page: Page) -> Iterator[doc.Block]:
 
 
 def _assumptions(page: Page) -> Iterator[tuple[str, str]]:
-    """What the verdict assumes, and where it holds."""
+    """Assumptions of the verdict, and where it holds."""
     mission, found = page.mission, page.found
     if found.changes:
         yield "Mission", f"not that of the file, but that of the file with {changes_words(found.changes)}"

@@ -96,7 +96,7 @@ def head_of(trade: Trade, mission: Mission, *, is_polar: bool) -> list[str]:
 
 def _style(trade: Trade) -> str:
     """Rules for what only these drawings have."""
-    light, dark = svg.light(), svg.dark()
+    light, dark = svg.colours()
     rules = []
     for place, (name, dashes) in enumerate(zip(svg.ROWS, _DASHES, strict=True)):
         rules.append(f".row{place}{{fill:none;stroke:var(--{name},{light[name]});stroke-width:1.8")

@@ -11,6 +11,7 @@ from bisar_budget.findings.mission import MissionFindings, UnusableMission
 from bisar_budget.findings.row import Row, worst_first
 from bisar_budget.findings.status import STATUS, worst
 from bisar_budget.report import Piece, Style
+from bisar_budget.report.formats.verification import evidence
 from bisar_budget.report.words.identity import document_words, doubtful_model, head, narrow_gradients
 from bisar_budget.report.words.requirements import (
     COLUMNS,
@@ -19,6 +20,7 @@ from bisar_budget.report.words.requirements import (
     is_said_with_the_table,
     overrides_lines,
     overrides_words,
+    probabilities,
     requirement_lines,
     rule_words,
     unjudged_effects,
@@ -147,12 +149,8 @@ def _after(mission: MissionFindings, style: Style) -> Iterator[str]:
         yield from ("", *details)
     yield from (line for text in _asides(mission, style) for line in wrapped(text, "  "))
     if mission.monte_carlo is not None:
-        from bisar_budget.report.words.requirements import probabilities
-
         yield from ("", *probabilities(mission.monte_carlo))
     if mission.verdicts is not None:
-        from bisar_budget.report.formats.verification import evidence
-
         yield from ("", "Images with each error at its limit", "", *evidence(mission.verdicts, style))
 
 
