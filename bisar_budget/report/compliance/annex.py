@@ -354,7 +354,7 @@ def _formulas(page: Page) -> Iterator[doc.Block]:
         derivation = doc.Steps(f"Formulas of {row.id}, {page.name}", list(chain(placed, found, row)))
         yield doc.Chapter(title, [derivation], f"{page.anchor}-row-{number}", level=4, style="derivation")
     general = [
-        (f"{number or 'Full model'}, {title[:1].lower()}{title[1:]}", doc.Equality(left, right))
+        (f"{number or 'Full model'}, {title[:1].lower()}{title[1:]}", [doc.Equality(left, right)])
         for number, title, left, right in EQUATIONS
         if number not in ("(11)", "(31)") and (page.mission.has_direct_path or not title.startswith("Direct path"))
     ]

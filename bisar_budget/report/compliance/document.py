@@ -6,7 +6,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from bisar_budget.report.explain.notation import Step
+from bisar_budget.report.explain.notation import WorkedEquation
 
 
 # ---------------------------------------------------------------------- parts of a line
@@ -192,10 +192,10 @@ class Equality:
 
 @dataclass(frozen=True, slots=True)
 class Steps:
-    """Steps of a derivation, or formulas with their titles."""
+    """Steps of a derivation, or other formulas with their titles."""
 
     label: str
-    steps: Sequence[Step | tuple[str, Equality]]
+    steps: Sequence[tuple[str, Sequence[WorkedEquation | str | Equality]]]
     style: str = "step"
 
 

@@ -207,19 +207,17 @@ def _inline(figure: doc.Figure) -> Markup:
     return Markup(re.sub(r'\b(id|aria-labelledby|aria-describedby)="', rf'\1="{figure.anchor}-', figure.svg))
 
 
-def _step(title: str, parts: doc.Equality | Iterable[WorkedEquation | str], style: str) -> Markup:
-    if isinstance(parts, doc.Equality):
-        sides = (notation.mathml_of(side) for side in (parts.left, parts.right))
-        formula = Markup(notation.math("<mrow>{}<mo>=</mo>{}</mrow>".format(*sides)))
-        content = Markup('<p class="part">{}</p>').format(formula)
-    else:
-        content = Markup("").join(map(_equation, parts))
+def _step(title: str, parts: Iterable[WorkedEquation | str | doc.Equality], style: str) -> Markup:
     step = '<div class="{}"><p class="step-title">{}</p>{}</div>\n'
-    return Markup(step).format(style, printable(title), content)
+    return Markup(step).format(style, printable(title), Markup("").join(map(_equation, parts)))
 
 
-def _equation(part: WorkedEquation | str) -> Markup:
+def _equation(part: WorkedEquation | str | doc.Equality) -> Markup:
     """One part of a step: a formula as MathML, words and text as text."""
+    if isinstance(part, doc.Equality):
+        sides = (notation.mathml_of(side) for side in (part.left, part.right))
+        formula = notation.math("<mrow>{}<mo>=</mo>{}</mrow>".format(*sides))
+        return Markup('<p class="part">{}</p>').format(Markup(formula))
     if not isinstance(part, WorkedEquation):
         text = notation.readable(part) if isinstance(part, Sum) else printable(part)
         return Markup("<p class=part>{}</p>").format(text)

@@ -14,7 +14,7 @@ from bisar_budget.report.explain import notation
 from bisar_budget.report.explain.notation import Sum, WorkedEquation
 from bisar_budget.report.words.sentences import markdown_text, uri
 
-_BAR = 20  # characters
+_BAR, _LIMIT = 20, 16  # characters of a bar, and of a use as large as its limit
 _BRACKETED = {"own-id": " ({})", "origin": "({})"}
 _DESCRIPTION = re.compile("<desc[^>]*>(.*?)</desc>", re.DOTALL)
 
@@ -51,7 +51,7 @@ def _text(text: doc.Text, badge: str = "**{}**") -> str:
         case doc.Badge(status):
             return badge.format(STATUS[status].words if status in STATUS else markdown_text(status))
         case doc.Use(part):
-            return "" if part is None else f" {_bar(part)}"
+            return "" if part is None else f" {_use(part)}"
         case doc.Bar(part):
             return _bar(part)
         case doc.Swatch(_, part):
@@ -69,9 +69,14 @@ def _inside(text: doc.Text, badge: str) -> str:
 
 
 def _bar(part: float) -> str:
-    """A bar of text; what goes beyond its end has an arrow."""
-    filled = "█" * round(_BAR * min(1.0, part))
-    return filled.ljust(_BAR, "░") + ("▶" if part > 1 + 1e-9 else "")
+    """A bar of text."""
+    return ("█" * round(_BAR * part)).ljust(_BAR, "░")
+
+
+def _use(part: float) -> str:
+    """A bar of text with a mark at the limit; what goes beyond its end has an arrow."""
+    bar = _bar(min(1.0, part * _LIMIT / _BAR))
+    return f"{bar[:_LIMIT]}┃{bar[_LIMIT:]}{'▶' if part > _BAR / _LIMIT else ''}"
 
 
 # ---------------------------------------------------------------------- blocks
@@ -137,24 +142,26 @@ def _table(table: doc.TextTable) -> str:
     return "\n".join(f"| {' | '.join(cells)} |" for cells in (heads, rules, *rows))
 
 
-def _formulas(parts: doc.Equality | Iterable[WorkedEquation | str]) -> Iterator[str]:
+def _formulas(parts: Iterable[WorkedEquation | str | doc.Equality]) -> Iterator[str]:
     """A block of LaTeX for each formula, a list of what stands between them."""
-    if isinstance(parts, doc.Equality):
-        yield _math(f"{notation.latex_of(parts.left)} = {notation.latex_of(parts.right)}")
-        return
     lines: list[str] = []
     for part in parts:
-        if isinstance(part, WorkedEquation) and part.formula and notation.is_formula(part):
+        if latex := _latex(part):
             yield from ["\n".join(lines)] if lines else []
             lines = []
-            yield _math("\\begin{{aligned}}\n{} \\\\\n{}\n\\end{{aligned}}".format(*notation.as_latex(part)))
+            yield f"```math\n{latex}\n```"
         elif isinstance(part, WorkedEquation):
             lines.append(f"- `{' '.join(notation.as_text(part)).rstrip()}`")  # nothing of the user's is in it
         else:
-            lines.append(f"- `{notation.readable(part)}`" if isinstance(part, Sum) else f"- {markdown_text(part)}")
+            text = str(part)
+            lines.append(f"- `{notation.readable(text)}`" if isinstance(part, Sum) else f"- {markdown_text(text)}")
     yield from ["\n".join(lines)] if lines else []
 
 
-def _math(latex: str) -> str:
-    """A block of LaTeX, as GitHub takes it."""
-    return f"```math\n{latex}\n```"
+def _latex(part: WorkedEquation | str | doc.Equality) -> str:
+    """A formula as LaTeX; nothing of words and of arithmetic."""
+    if isinstance(part, doc.Equality):
+        return f"{notation.latex_of(part.left)} = {notation.latex_of(part.right)}"
+    if isinstance(part, WorkedEquation) and part.formula and notation.is_formula(part):
+        return "\\begin{{aligned}}\n{} \\\\\n{}\n\\end{{aligned}}".format(*notation.as_latex(part))
+    return ""

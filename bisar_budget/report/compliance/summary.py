@@ -324,7 +324,7 @@ def _matrix(page: Page) -> Iterator[doc.Block]:
         "amplitudes; the mark on its bar is the allowable. A margin of × 12 is an allowable of twelve times what is "
         "declared. The requirement is the one that sets the allowable."
     )
-    caption += " Each id leads to its formulas." if page.is_full else ""
+    caption += " The annex has the formulas of each id." if page.is_full else ""
     shown = [row for row in page.matrix if row.id in page.in_summary]
     yield matrix_table(page, shown, f"Compliance matrix of {page.name}", caption)
     hidden = len(page.hidden)
