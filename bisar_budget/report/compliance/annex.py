@@ -17,9 +17,9 @@ from bisar_budget.findings.monte_carlo import MonteCarlo
 from bisar_budget.findings.status import STATUS
 from bisar_budget.findings.trade import Axis, Trade, TradeStudy
 from bisar_budget.report.compliance import document as doc
-from bisar_budget.report.compliance.contributions import all_contributions
-from bisar_budget.report.compliance.matrix import (
+from bisar_budget.report.compliance.rows import (
     Page,
+    all_contributions,
     all_remarks,
     grouped,
     limit_words,

@@ -15,10 +15,10 @@ from bisar_budget.mission.model import Document
 from bisar_budget.report import Style
 from bisar_budget.report.compliance import document as doc
 from bisar_budget.report.compliance.annex import annex, sources
-from bisar_budget.report.compliance.contributions import largest_contributions
-from bisar_budget.report.compliance.matrix import (
+from bisar_budget.report.compliance.rows import (
     Page,
     grouped,
+    largest_contributions,
     matrix_table,
     page_of,
     undeclared_table,
