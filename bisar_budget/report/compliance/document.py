@@ -93,7 +93,7 @@ class Paragraph:
 
 @dataclass(frozen=True, slots=True)
 class Facts:
-    """Pairs of a name and what it is."""
+    """Pairs of a name and what it is; one without a name is another of the name before it."""
 
     pairs: Sequence[tuple[Text, Text]]
     style: str = "facts"

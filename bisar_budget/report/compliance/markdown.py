@@ -95,8 +95,7 @@ def _block(block: doc.Block, assets: str, is_introduced: bool) -> Iterator[str]:
         case doc.Paragraph(text, style):
             yield f"**{_text(text)}**" if style.startswith("verdict") else _text(text)
         case doc.Facts(pairs):
-            lines = (f"{_text(key)}: {_text(value)}" if key else _text(value) for key, value in pairs)
-            yield "\n".join(f"- {line}" for line in lines)
+            yield "\n".join(_facts(pairs))
         case doc.Items(items, is_numbered=True):
             for number, paragraphs in enumerate(items, start=1):
                 yield f"{number}. " + "\n\n   ".join(map(_text, paragraphs))
@@ -133,6 +132,13 @@ def _block(block: doc.Block, assets: str, is_introduced: bool) -> Iterator[str]:
         case doc.Chapter(title, inner, level=level):
             yield f"{'#' * level} {_text(title)}"
             yield from _blocks(inner, assets)
+
+
+def _facts(pairs: Iterable[tuple[doc.Text, doc.Text]]) -> Iterator[str]:
+    before: doc.Text = ""
+    for name, value in pairs:
+        before = name or before
+        yield f"- {_text(before)}: {_text(value)}"
 
 
 def _table(table: doc.TextTable) -> str:
