@@ -43,7 +43,6 @@ _PHASES = "bisar_budget/verify/phase_cases.py"
 _NOISE = "bisar_budget/verify/spread_cases.py"
 
 _PLOT = "bisar_budget/report/drawing/point_plot.py"
-_FIGURES = "bisar_budget/report/drawing/point_figures.py"
 
 _FIGURES_3_TO_7 = "tests/simulate/test_figures.py::"
 _BORDERS = "tests/verify/test_verdict_borders.py::"
@@ -162,7 +161,7 @@ MUTANTS = (
     ),
     Mutant(
         "plot: segments of twice their length",
-        _FIGURES,
+        _PLOT,
         "half = (times[1] - times[0]) / 2",
         "half = times[1] - times[0]",
         (f"{_FIGURES_3_TO_7}TestFigure3::test_segments_are_thirds_of_the_aperture_and_touch_the_curve",),
@@ -183,21 +182,21 @@ MUTANTS = (
     ),
     Mutant(
         "plot: image data transposed",
-        _FIGURES,
+        _PLOT,
         "return np.where(is_missing, math.nan, _decibels(fine, peak)), corners",
         "return np.where(is_missing, math.nan, _decibels(fine, peak)), corners[..., ::-1]",
         (f"{_FIGURES_3_TO_7}TestPictures::test_targets_stand_where_they_are_in_every_picture",),
     ),
     Mutant(
         "plot: pixels half a step off",
-        _FIGURES,
+        _PLOT,
         "(np.arange(count * factor + 1) - 0.5) / factor",
         "np.arange(count * factor + 1) / factor",
         (f"{_FIGURES_3_TO_7}TestPictures::test_targets_stand_where_they_are_in_every_picture",),
     ),
     Mutant(
         "plot: turned the other way",
-        _FIGURES,
+        _PLOT,
         "turn = np.array([[cosine, -sine], [sine, cosine]])",
         "turn = np.array([[cosine, sine], [-sine, cosine]])",
         (f"{_FIGURES_3_TO_7}TestPictures::test_targets_stand_where_they_are_in_every_picture",),

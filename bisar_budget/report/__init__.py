@@ -31,16 +31,18 @@ class Format(NamedTuple):
 
 
 _FORMATS = (
-    Format("text", "text_table", (".txt",), is_piecewise=True),
-    Format("json", "json_document", (".json",), is_piecewise=True),
-    Format("csv", "csv_table", (".csv",), is_piecewise=True),
-    Format("junit", "traceability", (".xml",), "test cases"),
-    Format("sarif", "annotations", (".sarif", ".sarif.json"), "code scanning"),
-    Format("github", "annotations", (), "annotations of a pull request"),
-    Format("needs", "traceability", (".needs.json",), "Sphinx-Needs"),
-    Format("html", "documents", (".html", ".htm"), "a compliance report for a review board", is_illustrated=True),
+    Format("text", "formats.text_table", (".txt",), is_piecewise=True),
+    Format("json", "formats.json_document", (".json",), is_piecewise=True),
+    Format("csv", "formats.csv_table", (".csv",), is_piecewise=True),
+    Format("junit", "formats.traceability", (".xml",), "test cases"),
+    Format("sarif", "formats.annotations", (".sarif", ".sarif.json"), "code scanning"),
+    Format("github", "formats.annotations", (), "annotations of a pull request"),
+    Format("needs", "formats.traceability", (".needs.json",), "Sphinx-Needs"),
     Format(
-        "markdown", "documents", (".md", ".markdown"), "the same with its drawings beside it",
+        "html", "compliance.html", (".html", ".htm"), "a compliance report for a review board", is_illustrated=True
+    ),
+    Format(
+        "markdown", "compliance.markdown", (".md", ".markdown"), "the same with its drawings beside it",
         is_illustrated=True, has_pictures=True,
     ),
 )  # fmt: skip
@@ -75,7 +77,7 @@ class Style(NamedTuple):
 
 def _module(format_name: str) -> Any:
     """Imported when it is asked for, so that none costs the others anything."""
-    return import_module(f"bisar_budget.report.formats.{FORMATS[format_name].module}")
+    return import_module(f"bisar_budget.report.{FORMATS[format_name].module}")
 
 
 def render(format_name: str, report: "Report", style: Style) -> str:

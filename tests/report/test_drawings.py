@@ -14,7 +14,7 @@ from bisar_budget.budget.check import check_mission
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.geometry import BistaticGeometry, PlatformState
 from bisar_budget.mission.load import load_mission
-from bisar_budget.report.drawing.drawings import geometry_elevation, geometry_plan
+from bisar_budget.report.drawing.geometry_views import geometry_elevation, geometry_plan
 from bisar_budget.report.drawing.svg import LINE_HEIGHT, Box, text_width
 from tests.conftest import ROOT, TODAY, findings
 

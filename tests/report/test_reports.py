@@ -272,7 +272,7 @@ def test_an_oscillator_as_declared_is_0_db_and_stands_in_the_table(run) -> None:
 
 def test_what_a_mask_is_extrapolated_by_stands_in_a_report(run) -> None:
     text = run("check", "specs/missions/ocxo_free_running.yaml", "--format", "markdown").stdout
-    assert "Oscillator of the receiver: the mask begins at 1 Hz; below, it continues as f^-3.5" in text
+    assert "Oscillator of the receiver: The mask begins at 1 Hz; below, it continues as f^-3.5" in text
 
 
 def test_a_cubic_phase_without_requirement_is_not_called_none(run, tmp_path) -> None:

@@ -12,7 +12,7 @@ from bisar_budget.cli.images import simulate
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.report.drawing import point_plot
 from bisar_budget.report.drawing.figure import figure_file
-from bisar_budget.report.drawing.point_figures import ImagePanel, rotated_back, sheet
+from bisar_budget.report.drawing.point_plot import ImagePanel, rotated_back, sheet
 from bisar_budget.simulate import former, image_formation
 from bisar_budget.simulate import point as point_module
 from bisar_budget.simulate.former import IMAGE_FORMERS

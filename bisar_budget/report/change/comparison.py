@@ -366,7 +366,7 @@ class Change(NamedTuple):
 
 
 class RequirementMove(NamedTuple):
-    """How a requirement stood and stands: its statuses; None where the mission has no such requirement."""
+    """Statuses of a requirement before and after; None where the mission has no such requirement."""
 
     key: str
     name: str

@@ -1,8 +1,8 @@
 """Effects of a change on missions, as text, Markdown or JSON `bisar-budget/diff/1`."""
 
 import json
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Iterable, Iterator
+from typing import Any, NamedTuple
 
 from bisar_budget.faults import changes_words, printable
 from bisar_budget.findings.mission import MissionFindings
@@ -15,7 +15,6 @@ from bisar_budget.report.change.comparison import (
     MissionChange,
     Moved,
     Refusal,
-    RequirementMove,
 )
 from bisar_budget.report.words.requirements import overrides_lines, overrides_words
 from bisar_budget.report.words.sentences import counted, markdown_text, percent, row_size, table, wrapped
@@ -27,8 +26,8 @@ FORMAT = "bisar-budget/diff/1"
 def as_text(comparison: ChangeSet, gate: Gate | None, all_rows: bool = False) -> str:
     """Write what changed, then a table per mission with the largest erosion first, and one summary line each."""
     parts = [_text(mission, gate, all_rows) for mission in comparison.missions]
-    if refusals := _refusals(comparison, gate):
-        parts.append(_refused_lines(refusals))
+    if blocks := list(_blocks(_refused(comparison, gate))):
+        parts.append([line for block in blocks for line in block])
     if said := _of_no_mission(comparison, gate):
         parts.append([line for text in said for line in wrapped(printable(text), "  ")])
     return "\n\n".join("\n".join(lines) for lines in parts) + "\n"
@@ -50,39 +49,72 @@ def _refusals(of: MissionChange | ChangeSet, gate: Gate | None) -> list[Refusal]
     return [] if gate is None else of.refusals(gate)
 
 
-def _refused_lines(refusals: Sequence[Refusal]) -> list[str]:
-    """Lines of all that a gate refuses and of all that is let through, a block each."""
-    lines: list[str] = []
-    for title, is_allowed in (("Refused", False), ("Let through by --allow", True)):
-        texts = [f"  {one.id}: {one.words}" for one in refusals if one.is_allowed is is_allowed]
+class _Said(NamedTuple):
+    """One thing that changed, in words: what it is (`input`), its name, and before -> after, or what is wrong."""
+
+    kind: str
+    name: str
+    words: str
+
+
+_TITLES = {
+    "input": "Inputs",
+    "geometry": "Geometry",
+    "requirement": "Requirements",
+    "loosened": "Loosened",
+    "**refused**": "Refused",
+    "let through by --allow:": "Let through by --allow",
+}
+
+
+def _changed(mission: MissionChange, gate: Gate | None) -> Iterator[_Said]:
+    """Changes beside those of rows, in the order of the titles; a gate refuses what is loosened."""
+    for kind, moves in (("input", mission.inputs), ("geometry", mission.geometry)):
+        yield from (_Said(kind, one.name, f"{_said(one.before, one)} -> {_said(one.after, one)}") for one in moves)
+    for one in mission.requirements:
+        before, after = ("none" if status is None else STATUS[status].text for status in (one.before, one.after))
+        yield _Said("requirement", one.name, f"{before} -> {after}")
+    if gate is None:
+        yield from (_Said("loosened", one.id, one.words) for one in mission.loosened)
+
+
+def _refused(of: MissionChange | ChangeSet, gate: Gate | None) -> list[_Said]:
+    """All that a gate refuses, then all that is let through."""
+    kinds = {False: "**refused**", True: "let through by --allow:"}
+    return [_Said(kinds[one.is_allowed], one.id, one.words) for one in _refusals(of, gate)]
+
+
+def _blocks(said: Iterable[_Said]) -> Iterator[list[str]]:
+    """Lines below a title, a block for each kind."""
+    said = list(said)
+    for kind, title in _TITLES.items():
+        texts = [printable(f"  {one.name}: {one.words}") for one in said if one.kind == kind]
         if texts:
-            lines += [title, *(line for text in texts for line in wrapped(printable(text), "    "))]
-    return lines
+            yield [title, *(line for text in texts for line in wrapped(text, "    "))]
+
+
+def _items(said: Iterable[_Said]) -> list[str]:
+    """The same as a list in Markdown."""
+    return [f"- {one.kind} {markdown_text(one.name)}: {_arrows(one.words)}" for one in said]
+
+
+def _arrows(words: str) -> str:
+    return " → ".join(map(markdown_text, words.split(" -> ")))
 
 
 def _text(mission: MissionChange, gate: Gate | None, all_rows: bool) -> list[str]:
     lines = [*wrapped(printable(f"{mission.before.file} -> {_named(mission.after)}"), "  ")]
     lines += [*overrides_lines(mission.after), ""]
-    for title, moves in (("Inputs", mission.inputs), ("Geometry", mission.geometry)):
-        if moves:
-            texts = [
-                printable(f"  {move.name}: {_said(move.before, move)} -> {_said(move.after, move)}") for move in moves
-            ]
-            lines += [title, *(line for text in texts for line in wrapped(text, "    ")), ""]
-    if mission.requirements:
-        texts = [f"  {one.name}: {_standings(one)}" for one in mission.requirements]
-        lines += ["Requirements", *texts, ""]
-    if mission.loosened and gate is None:
-        texts = [printable(f"  {one.id}: {one.words}") for one in mission.loosened]
-        lines += ["Loosened", *(line for text in texts for line in wrapped(text, "    ")), ""]
+    for block in _blocks(_changed(mission, gate)):
+        lines += [*block, ""]
     if changes := _shown(mission, gate, all_rows):
         rows = [
             (printable(change.id), _use(change.before), _use(change.after), _erosion(change), _statuses(change))
             for change in changes
         ]
         lines += [*table([("row", "before", "after", "erosion", "status"), *rows]), ""]
-    if refusals := _refusals(mission, gate):
-        lines += [*_refused_lines(refusals), ""]
+    if blocks := list(_blocks(_refused(mission, gate))):
+        lines += [*(line for block in blocks for line in block), ""]
     return [*lines, *wrapped(_summary(mission, gate, all_rows), "  ")]
 
 
@@ -119,11 +151,6 @@ def _statuses(change: Change) -> str:
     return after if before == after else f"{before} -> {after}"
 
 
-def _standings(one: RequirementMove) -> str:
-    before, after = ("none" if status is None else STATUS[status].text for status in (one.before, one.after))
-    return f"{before} -> {after}"
-
-
 def _summary(mission: MissionChange, gate: Gate | None, all_rows: bool) -> str:
     newly = sum(change.is_newly_failing for change in mission.changes)
     hidden = len(mission.changes) - len(_shown(mission, gate, all_rows))
@@ -150,18 +177,7 @@ def as_markdown(comparison: ChangeSet, gate: Gate | None, all_rows: bool = False
         lines += [f"### {markdown_text(_named(mission.after))}: {_summary(mission, gate, all_rows)}", ""]
         if outside := overrides_words(mission.after, with_changes=False):
             lines += [f"From outside the file: {markdown_text(outside)}", ""]
-        for title, moves in (("input", mission.inputs), ("geometry", mission.geometry)):
-            for move in moves:
-                said = (
-                    markdown_text(f"{move.name}: {_said(move.before, move)}"),
-                    markdown_text(_said(move.after, move)),
-                )
-                lines.append(f"- {title} {' → '.join(said)}")
-        for one in mission.requirements:
-            lines.append(f"- requirement {markdown_text(one.name)}: {_standings(one).replace('->', '→')}")
-        if gate is None:
-            lines += [f"- loosened {_arrow(one.id, one.words)}" for one in mission.loosened]
-        lines += _refused_items(_refusals(mission, gate))
+        lines += [*_items(_changed(mission, gate)), *_items(_refused(mission, gate))]
         lines += [""] if lines[-1] else []
         changes = _shown(mission, gate, all_rows)
         if changes:
@@ -179,19 +195,9 @@ def as_markdown(comparison: ChangeSet, gate: Gate | None, all_rows: bool = False
             )
             lines.append(f"| {' | '.join(cells)} |")
         lines += [""] if changes else []
-    lines += _refused_items(_refusals(comparison, gate))
+    lines += _items(_refused(comparison, gate))
     lines += [f"- {markdown_text(text)}" for text in _of_no_mission(comparison, gate)]
     return "\n".join(lines).rstrip("\n") + "\n"
-
-
-def _refused_items(refusals: Sequence[Refusal]) -> list[str]:
-    """List items for each thing that a gate refuses, marked as refused or as let through."""
-    marks = {False: "**refused**", True: "let through by --allow:"}
-    return [f"- {marks[one.is_allowed]} {_arrow(one.id, one.words)}" for one in refusals]
-
-
-def _arrow(id: str, words: str) -> str:
-    return f"{markdown_text(id)}: {' → '.join(map(markdown_text, words.split(' -> ')))}"
 
 
 def _values(change: Change, field: str, mission: MissionChange) -> str:

@@ -1,1 +1,1 @@
-"""The compliance report: what it shows, as plain data for the templates."""
+"""The compliance report: its content as blocks, which are written as a page and as Markdown."""

@@ -6,18 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from bisar_budget.findings.images import FLOOR_DB, ImageEvidence, PointImage, Verdict
-from bisar_budget.report.drawing.svg import (
-    Box,
-    Canvas,
-    Scale,
-    axis_number,
-    grid,
-    legend,
-    line_entry,
-    outline,
-    x_axis,
-    y_axis,
-)
+from bisar_budget.report.drawing import svg
 from bisar_budget.units import format_limit, format_quantity
 
 _WIDTH, _HEIGHT = 520.0, 190.0  # px, of the drawing and of one panel
@@ -48,7 +37,7 @@ def impulse_response_cuts(evidence: ImageEvidence) -> str:
         An SVG document, to be inlined or to be a file of its own.
     """
     verdict = evidence.verdict
-    canvas = Canvas()
+    canvas = svg.Canvas()
     at_limit = evidence.at_limit
     curves = [
         _curve("at the limit", at_limit.cut_db, at_limit.step_m, FOCUSED),
@@ -112,7 +101,7 @@ def chip_caption(image: PointImage) -> str:
     along, across = (format_quantity(side, "m") for side in image.extent_m)
     return (
         f"{along} along x′ (look, to the right) by {across} along y′ (cross-range, up); "
-        f"{axis_number(FLOOR_DB)} dB (black) to 0 dB (white) of the peak without error"
+        f"{svg.axis_number(FLOOR_DB)} dB (black) to 0 dB (white) of the peak without error"
     )
 
 
@@ -148,18 +137,20 @@ def _phase(value: float | None) -> str:
     return "unknown" if value is None else f"{value:.3f} rad"
 
 
-def cut_panel(canvas: Canvas, top: float, width: float, height: float, title: str, curves: Sequence[Curve]) -> float:
+def cut_panel(
+    canvas: svg.Canvas, top: float, width: float, height: float, title: str, curves: Sequence[Curve]
+) -> float:
     """Draw cuts on one panel, its title above, and return where it ends. [px]"""
-    frame = Box(_LEFT, top + _TITLE, width - _EDGE, top + _TITLE + height)
+    frame = svg.Box(_LEFT, top + _TITLE, width - _EDGE, top + _TITLE + height)
     places = [place for curve in curves for place in curve.places]
-    across = Scale(min(places), max(places), frame.left, frame.right)
-    up = Scale(FLOOR_DB, max(0.0, *(max(curve.levels) for curve in curves)), frame.bottom, frame.top)
+    across = svg.Scale(min(places), max(places), frame.left, frame.right)
+    up = svg.Scale(FLOOR_DB, max(0.0, *(max(curve.levels) for curve in curves)), frame.bottom, frame.top)
     canvas.text((frame.left, top + 14), [title], "small")
-    outline(canvas, frame, "grid")
-    grid(canvas, frame, across, up)
-    y_axis(canvas, frame, up, "power [dB]")
-    bottom = x_axis(canvas, frame, across, "y′ [m]")
+    svg.outline(canvas, frame, "grid")
+    svg.grid(canvas, frame, across, up)
+    svg.y_axis(canvas, frame, up, "power [dB]")
+    bottom = svg.x_axis(canvas, frame, across, "y′ [m]")
     for curve in curves:
         points = [(across.at(place), up.at(level)) for place, level in zip(curve.places, curve.levels, strict=True)]
         canvas.polyline(points, curve.style, frame)
-    return legend(canvas, bottom, width, [line_entry(canvas, curve.name, curve.style) for curve in curves])
+    return svg.legend(canvas, bottom, width, [svg.line_entry(canvas, curve.name, curve.style) for curve in curves])

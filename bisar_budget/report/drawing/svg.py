@@ -486,21 +486,12 @@ EMPTY = "reserve"  # of what is no mission
 
 
 @cache
-def light() -> Mapping[str, str]:
-    """Colours on white paper."""
-    return _colours()[0]
-
-
-@cache
-def dark() -> Mapping[str, str]:
-    """Colours on a dark screen."""
-    return _colours()[1]
-
-
-def _colours() -> Sequence[Mapping[str, str]]:
+def colours() -> tuple[Mapping[str, str], Mapping[str, str]]:
+    """Colours of the page by name, on white paper and on a dark screen."""
     sheet = resource("templates", "report.css").read_text(encoding="utf-8")
     blocks = sheet.split("}", 2)[:2]
-    return [dict(re.findall(r"--([\w-]+): (#[0-9a-f]{3,6})", block)) for block in blocks]
+    light, dark = (dict(re.findall(r"--([\w-]+): (#[0-9a-f]{3,6})", block)) for block in blocks)
+    return light, dark
 
 
 def has_no_mission(status: str) -> bool:

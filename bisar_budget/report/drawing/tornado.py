@@ -5,19 +5,8 @@ All bars are for the same part: 1 % of a number, of a radian, of a power, of the
 
 from bisar_budget.design.sensitivity import EVEN, Sensitivity, Slope
 from bisar_budget.faults import changes_words, printable
+from bisar_budget.report.drawing import svg
 from bisar_budget.report.drawing.figure import drawing_file
-from bisar_budget.report.drawing.svg import (
-    Box,
-    Canvas,
-    Scale,
-    box_entry,
-    grid,
-    head,
-    legend,
-    short,
-    text_width,
-    x_axis,
-)
 from bisar_budget.report.words.sentences import percent
 
 MOST = 20  # bars
@@ -40,31 +29,31 @@ def tornado_drawing(found: Sensitivity) -> str:
 
     Strong is what a larger number does, pale what a smaller one does; both are the same slope.
     """
-    canvas = Canvas()
+    canvas = svg.Canvas()
     shown = found.shown[:MOST]
     name = printable(f"{found.name} {changes_words(found.changes)}".rstrip())
     what = printable(f"row {found.row}" if found.row else f"worst utilization: {found.worst_row}")
-    top = head(canvas, [short(name, _WIDTH), what, f"change of the utilization, {percent(found.asked)} now"])
-    labels = [short(_label(slope), 1.1 * _MOST_LEFT) for slope in shown]
-    left = min(0.9 * max(map(text_width, labels), default=0.0) + 16, _MOST_LEFT)
-    frame = Box(left, top, _WIDTH - _EDGE, top + _ROW * max(len(shown), 1))
+    top = svg.head(canvas, [svg.short(name, _WIDTH), what, f"change of the utilization, {percent(found.asked)} now"])
+    labels = [svg.short(_label(slope), 1.1 * _MOST_LEFT) for slope in shown]
+    left = min(0.9 * max(map(svg.text_width, labels), default=0.0) + 16, _MOST_LEFT)
+    frame = svg.Box(left, top, _WIDTH - _EDGE, top + _ROW * max(len(shown), 1))
     reach = 105 * max((abs(slope.even_effect) for slope in shown), default=0.0) or 1.0
-    along = Scale(-reach, reach, frame.left, frame.right)
-    grid(canvas, frame, along, None)
+    along = svg.Scale(-reach, reach, frame.left, frame.right)
+    svg.grid(canvas, frame, along, None)
     zero, middle = along.at(0.0), top + _ROW / 2 + 4
     for place, (slope, label) in enumerate(zip(shown, labels, strict=True)):
         y, change = top + _ROW * (place + 0.5), 100 * slope.even_effect
         for part, value in (("larger", change), ("smaller", -change)):
             start, end = sorted((zero, along.at(value)))
-            bar = Box(start, y - _HALF, end, y + _HALF)
+            bar = svg.Box(start, y - _HALF, end, y + _HALF)
             canvas.boxes([bar], ("worse" if value > 0 else "better") + _PARTS[part])
         canvas.text((frame.left - 6, y + 4), [label], "axis", "end")
     canvas.lines([((zero, frame.top), (zero, frame.bottom))], "line")
     if not shown:
         canvas.text((zero, middle), ["no number changes it"], "", "middle")
-    bottom = x_axis(canvas, frame, along, "percentage points")
-    entries = [box_entry(canvas, f"the number is {part}", f"bar{style}") for part, style in _PARTS.items()]
-    bottom = legend(canvas, bottom, _WIDTH, entries)
+    bottom = svg.x_axis(canvas, frame, along, "percentage points")
+    entries = [svg.box_entry(canvas, f"the number is {part}", f"bar{style}") for part, style in _PARTS.items()]
+    bottom = svg.legend(canvas, bottom, _WIDTH, entries)
     return canvas.document((_WIDTH, bottom + 4), f"tornado {found.name}", f"Sensitivity: {name}", what, _STYLE)
 
 

@@ -19,24 +19,6 @@ from bisar_budget.findings.trade import Axis, Trade
 from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.model import Mission
 from bisar_budget.report.drawing import svg
-from bisar_budget.report.drawing.svg import (
-    Box,
-    Canvas,
-    LegendLine,
-    Point,
-    Scale,
-    axis_number,
-    box_entry,
-    grid,
-    head,
-    legend,
-    line_entry,
-    outline,
-    short,
-    text_width,
-    x_axis,
-    y_axis,
-)
 from bisar_budget.report.drawing.trades import borders, level_lines, per_word, regions, runs, thinned
 from bisar_budget.report.words.sentences import percent
 
@@ -87,8 +69,8 @@ def trade_drawing(
     seen_from_above : BistaticGeometry, optional
         Draws a polar map, with the place of the platform that does not move around.
     """
-    canvas = Canvas()
-    top = head(canvas, above)
+    canvas = svg.Canvas()
+    top = svg.head(canvas, above)
     by_word = per_word(trade)
     if by_word is not None or (len(trade.axes) == 1 and not trade.axes[0].words):
         bottom = _curves(canvas, top, trade, rows, by_word[1] if by_word else {})
@@ -114,7 +96,7 @@ def head_of(trade: Trade, mission: Mission, *, is_polar: bool) -> list[str]:
 
 def _style(trade: Trade) -> str:
     """Rules for what only these drawings have."""
-    light, dark = svg.light(), svg.dark()
+    light, dark = svg.colours()
     rules = []
     for place, (name, dashes) in enumerate(zip(svg.ROWS, _DASHES, strict=True)):
         rules.append(f".row{place}{{fill:none;stroke:var(--{name},{light[name]});stroke-width:1.8")
@@ -153,31 +135,31 @@ def _heat_colour(part: float) -> str:
     return "#" + "".join(f"{round(a + along * (b - a)):02x}" for a, b in zip(*ends, strict=True))
 
 
-def _value_scale(values: Floats, start: float, end: float, *, is_use: bool) -> Scale:
+def _value_scale(values: Floats, start: float, end: float, *, is_use: bool) -> svg.Scale:
     """Scale of a column; of utilizations [%] one from 0, or in equal ratios where some are far above their limit."""
     finite = values[np.isfinite(values)]
     if is_use:
         finite = np.append(finite[finite > 0], 100.0)
         high = float(finite.max())
         if high <= _HIGH:
-            return Scale(0.0, 1.08 * high, start, end)
-        return Scale(max(_LEAST, float(finite.min())) / 1.3, 1.3 * high, start, end, is_log=True)
+            return svg.Scale(0.0, 1.08 * high, start, end)
+        return svg.Scale(max(_LEAST, float(finite.min())) / 1.3, 1.3 * high, start, end, is_log=True)
     low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 1.0)
     margin = (high - low) / 20 or abs(high) / 20 or 1.0
-    return Scale(low - margin, high + margin, start, end)
+    return svg.Scale(low - margin, high + margin, start, end)
 
 
-def _swatches(canvas: Canvas, statuses: Sequence[str]) -> list[LegendLine]:
-    return [box_entry(canvas, svg.status_words(name), f"is-{name}", "frame") for name in statuses]
+def _swatches(canvas: svg.Canvas, statuses: Sequence[str]) -> list[svg.LegendLine]:
+    return [svg.box_entry(canvas, svg.status_words(name), f"is-{name}", "frame") for name in statuses]
 
 
-def _mark(canvas: Canvas, words: str = "this mission", style: str = "own") -> LegendLine:
-    return LegendLine(words, lambda at: canvas.circle((at[0] + 13, at[1]), 5 if style == "own" else 3, style))
+def _mark(canvas: svg.Canvas, words: str = "this mission", style: str = "own") -> svg.LegendLine:
+    return svg.LegendLine(words, lambda at: canvas.circle((at[0] + 13, at[1]), 5 if style == "own" else 3, style))
 
 
 # ---------------------------------------------------------------- one key
 def _curves(
-    canvas: Canvas, top: float, trade: Trade, rows: Mapping[str, Floats], by_word: Mapping[str, Trade]
+    canvas: svg.Canvas, top: float, trade: Trade, rows: Mapping[str, Floats], by_word: Mapping[str, Trade]
 ) -> float:
     """Utilizations of rows, or of words, over a number with their limit, or a column; behind them the status."""
     first = next(iter(by_word.values())) if by_word else trade
@@ -191,39 +173,41 @@ def _curves(
         curves.insert(0, ("worst row", "worst", trade.values[name]))
     factor = 1 if trade.column else 100
     curves = [(word, style, factor * np.asarray(values, float)) for word, style, values in curves]
-    frame = Box(_LEFT, top, _WIDTH - _RIGHT, top + _HEIGHT)
+    frame = svg.Box(_LEFT, top, _WIDTH - _RIGHT, top + _HEIGHT)
     across = _axis_scale(axis, frame.left, frame.right)
     all_values = np.concatenate([values for *_, values in curves])
     up = _value_scale(all_values, frame.bottom, frame.top, is_use=not trade.column)
     statuses = [] if by_word else trade.statuses
     for run in () if by_word else runs(axis, trade.values["status"]):
-        box = Box(across.at(run.low), frame.top, across.at(run.high), frame.bottom)
+        box = svg.Box(across.at(run.low), frame.top, across.at(run.high), frame.bottom)
         canvas.boxes([box], f"is-{run.status}")
-    grid(canvas, frame, None, up)
+    svg.grid(canvas, frame, None, up)
     entries = []
     for word, style, values in curves:
         _curve(canvas, frame, across, up, axis.values, values, style)
-        entries.append(line_entry(canvas, word, style))
+        entries.append(svg.line_entry(canvas, word, style))
     if not trade.column:
         canvas.lines([((frame.left, up.at(100.0)), (frame.right, up.at(100.0)))], "limit")
-        entries.append(line_entry(canvas, "limit", "limit"))
+        entries.append(svg.line_entry(canvas, "limit", "limit"))
     if axis.own is not None and axis.values[0] <= axis.own <= axis.values[-1]:
         x = across.at(axis.own)
         canvas.lines([((x, frame.top), (x, frame.bottom))], "at")
-        entries.append(line_entry(canvas, "this mission", "at"))
-    outline(canvas, frame, "frame")
-    y_axis(canvas, frame, up, trade.heading or ("worst utilization [%]" if by_word else "utilization [%]"))
-    bottom = x_axis(canvas, frame, across, axis.label)
-    return legend(canvas, bottom, _WIDTH, [*entries, *_swatches(canvas, statuses)])
+        entries.append(svg.line_entry(canvas, "this mission", "at"))
+    svg.outline(canvas, frame, "frame")
+    svg.y_axis(canvas, frame, up, trade.heading or ("worst utilization [%]" if by_word else "utilization [%]"))
+    bottom = svg.x_axis(canvas, frame, across, axis.label)
+    return svg.legend(canvas, bottom, _WIDTH, [*entries, *_swatches(canvas, statuses)])
 
 
-def _curve(canvas: Canvas, frame: Box, across: Scale, up: Scale, x: Floats, values: Floats, style: str) -> None:
+def _curve(
+    canvas: svg.Canvas, frame: svg.Box, across: svg.Scale, up: svg.Scale, x: Floats, values: Floats, style: str
+) -> None:
     """One curve, broken where there is no value; one alone between two of these is a short line."""
     points = [
         (across.at(at), up.at(value)) if math.isfinite(value) and (value > 0 or not up.is_log) else None
         for at, value in zip(x.tolist(), values.tolist(), strict=True)
     ]
-    run: list[Point] = []
+    run: list[svg.Point] = []
     for point in (*points, None):
         if point is not None:
             run.append(point)
@@ -239,10 +223,10 @@ def _curve(canvas: Canvas, frame: Box, across: Scale, up: Scale, x: Floats, valu
                 canvas.circle(point, 2.4, style.replace("row", "dot"))
 
 
-def _seen(points: Sequence[Point]) -> list[Point]:
+def _seen(points: Sequence[svg.Point]) -> list[svg.Point]:
     """The visible points of a curve of many: the first, lowest, highest and last of each half pixel."""
-    kept: list[Point] = []
-    column: list[Point] = []
+    kept: list[svg.Point] = []
+    column: list[svg.Point] = []
     for point in (*points, (math.inf, 0.0)):
         if column and point[0] - column[0][0] > 0.5:
             ends = (column[0], *sorted((min(column, key=_height), max(column, key=_height))), column[-1])
@@ -252,22 +236,22 @@ def _seen(points: Sequence[Point]) -> list[Point]:
     return kept
 
 
-def _height(point: Point) -> float:
+def _height(point: svg.Point) -> float:
     return point[1]
 
 
-def _bars(canvas: Canvas, top: float, trade: Trade, rows: Mapping[str, Floats]) -> float:
+def _bars(canvas: svg.Canvas, top: float, trade: Trade, rows: Mapping[str, Floats]) -> float:
     """A bar of utilization, or of a column, for each word, in the colour of its status; on it some rows."""
     (axis,) = trade.axes
-    left = min(max(map(text_width, axis.words)) + 34, _MOST_LEFT)
-    canvas.text((8, top + 8), [short(axis.key, _WIDTH)], "small")
-    frame = Box(left, top + 16, _WIDTH - _RIGHT, top + 24 + _BAR * len(axis.words))
+    left = min(max(map(svg.text_width, axis.words)) + 34, _MOST_LEFT)
+    canvas.text((8, top + 8), [svg.short(axis.key, _WIDTH)], "small")
+    frame = svg.Box(left, top + 16, _WIDTH - _RIGHT, top + 24 + _BAR * len(axis.words))
     values = np.asarray(trade.values[trade.column] if trade.column else 100 * trade.values["utilization"], float)
     is_use = not trade.column
     seen = values if is_use else np.append(values, 0.0)
     along = _value_scale(seen, frame.left, frame.right - 50, is_use=is_use)  # with room for a number
-    down = Scale(-0.5, len(axis.words) - 0.5, frame.top + 4, frame.bottom - 4)
-    grid(canvas, frame, along, None)
+    down = svg.Scale(-0.5, len(axis.words) - 0.5, frame.top + 4, frame.bottom - 4)
+    svg.grid(canvas, frame, along, None)
     base = frame.left if is_use else along.at(0.0)
     limit = along.at(100.0) if is_use else math.inf
     for place, (status, value) in enumerate(zip(trade.values["status"], values.tolist(), strict=True)):
@@ -275,14 +259,14 @@ def _bars(canvas: Canvas, top: float, trade: Trade, rows: Mapping[str, Floats]) 
         said = svg.status_words(status)
         if math.isfinite(value):
             end = max(along.at(max(value, along.low)), frame.left + 2)
-            canvas.boxes([Box(min(base, end), y - 7, max(base, end), y + 7)], f"bar is-{status}")
-            said = percent(value / 100) if is_use else axis_number(value)
+            canvas.boxes([svg.Box(min(base, end), y - 7, max(base, end), y + 7)], f"bar is-{status}")
+            said = percent(value / 100) if is_use else svg.axis_number(value)
         beside = max(base, limit if end < limit < end + 60 else end)
         canvas.text((beside + 6, y + 4), [said], "small")
     entries = []
     if is_use:
         canvas.lines([((limit, frame.top), (limit, frame.bottom))], "limit")
-        entries.append(line_entry(canvas, "limit", "limit"))
+        entries.append(svg.line_entry(canvas, "limit", "limit"))
     for number, (row, uses) in enumerate(rows.items() if is_use else ()):
         shown = [(along.at(100 * use), down.at(place)) for place, use in enumerate(uses.tolist()) if use > 0]
         for point in filter(frame.holds, shown):
@@ -291,27 +275,27 @@ def _bars(canvas: Canvas, top: float, trade: Trade, rows: Mapping[str, Floats]) 
     if axis.own is not None:
         canvas.circle((frame.left + 9, down.at(axis.own)), 5, "own")
         entries.append(_mark(canvas))
-    outline(canvas, frame, "frame")
-    y_axis(canvas, frame, down, "", axis.words)
-    bottom = x_axis(canvas, frame, along, trade.heading or "utilization [%]")
-    return legend(canvas, bottom, _WIDTH, [*entries, *_swatches(canvas, trade.statuses)])
+    svg.outline(canvas, frame, "frame")
+    svg.y_axis(canvas, frame, down, "", axis.words)
+    bottom = svg.x_axis(canvas, frame, along, trade.heading or "utilization [%]")
+    return svg.legend(canvas, bottom, _WIDTH, [*entries, *_swatches(canvas, trade.statuses)])
 
 
 # ---------------------------------------------------------------- two keys
 class _Plane(NamedTuple):
     """Where a map has a place: to the right and up, or around a middle, in radians, and outwards. [px]"""
 
-    across: Scale
-    up: Scale
-    middle: Point | None = None
+    across: svg.Scale
+    up: svg.Scale
+    middle: svg.Point | None = None
 
-    def at(self, p: float, q: float) -> Point:
+    def at(self, p: float, q: float) -> svg.Point:
         """Place on the page of one on the two scales."""
         if self.middle is None:
             return p, q
         return self.middle[0] + q * math.cos(p), self.middle[1] - q * math.sin(p)
 
-    def line(self, points: Sequence[Point]) -> list[Point]:
+    def line(self, points: Sequence[svg.Point]) -> list[svg.Point]:
         """Line through places on the two scales, on the page."""
         line = [self.at(*points[0])]
         for (p, q), (u, v) in pairwise(points):
@@ -319,7 +303,7 @@ class _Plane(NamedTuple):
             line += [self.at(p + (u - p) * step / steps, q + (v - q) * step / steps) for step in range(1, steps + 1)]
         return line
 
-    def fill(self, canvas: Canvas, boxes: Iterator[Box], style: str) -> None:
+    def fill(self, canvas: svg.Canvas, boxes: Iterator[svg.Box], style: str) -> None:
         """Fill cells, which are rectangles on the two scales."""
         if self.middle is None:
             canvas.boxes(boxes, style)
@@ -328,20 +312,20 @@ class _Plane(NamedTuple):
         canvas.polygons([self.line(four) for four in corners], f"{style} curved")
 
 
-def _axis_scale(axis: Axis, start: float, end: float) -> Scale:
+def _axis_scale(axis: Axis, start: float, end: float) -> svg.Scale:
     """The scale of an axis: on a map the cells of words stand side by side; numbers go from the first to the last."""
     if axis.words:
-        return Scale(-0.5, axis.values[-1] + 0.5, start, end)
-    return Scale(float(axis.values[0]), float(axis.values[-1]), start, end, axis.is_log)
+        return svg.Scale(-0.5, axis.values[-1] + 0.5, start, end)
+    return svg.Scale(float(axis.values[0]), float(axis.values[-1]), start, end, axis.is_log)
 
 
-def _map(canvas: Canvas, top: float, trade: Trade, geometry: BistaticGeometry | None) -> float:
+def _map(canvas: svg.Canvas, top: float, trade: Trade, geometry: BistaticGeometry | None) -> float:
     """Statuses or a column over two keys, the line of 100 %, and what binds where."""
     trade = thinned(trade)
     x, y = trade.axes
-    left = min(max(map(text_width, y.words)) + 34, _MOST_LEFT) if y.words else _LEFT + 10
+    left = min(max(map(svg.text_width, y.words)) + 34, _MOST_LEFT) if y.words else _LEFT + 10
     right = _WIDTH - _RIGHT - (_HEAT_BAR if trade.column else 0.0)
-    frame = Box(left, top, right, top + _HEIGHT + 60)
+    frame = svg.Box(left, top, right, top + _HEIGHT + 60)
     if geometry is None:
         ends = (frame.top, frame.bottom) if y.words else (frame.bottom, frame.top)
         plane = _Plane(_axis_scale(x, frame.left, frame.right), _axis_scale(y, *ends))
@@ -368,18 +352,18 @@ def _map(canvas: Canvas, top: float, trade: Trade, geometry: BistaticGeometry | 
     if not has_words and (border := _limit(trade, plane)):
         canvas.lines(border, "halo")
         canvas.lines(border, "border")
-        entries.insert(0, line_entry(canvas, "utilization 100 %", "border"))
+        entries.insert(0, svg.line_entry(canvas, "utilization 100 %", "border"))
     if all(axis.own is not None and axis.values[0] <= axis.own <= axis.values[-1] for axis in (x, y)):
         canvas.circle(plane.at(plane.across.at(x.own or 0.0), plane.up.at(y.own or 0.0)), 5, "own")
         entries.append(_mark(canvas))
     if geometry is not None:
-        return legend(canvas, frame.bottom + 24, _WIDTH, entries)
-    outline(canvas, frame, "frame")
-    y_axis(canvas, frame, plane.up, y.label, y.words)
-    return legend(canvas, x_axis(canvas, frame, plane.across, x.label, x.words), _WIDTH, entries)
+        return svg.legend(canvas, frame.bottom + 24, _WIDTH, entries)
+    svg.outline(canvas, frame, "frame")
+    svg.y_axis(canvas, frame, plane.up, y.label, y.words)
+    return svg.legend(canvas, svg.x_axis(canvas, frame, plane.across, x.label, x.words), _WIDTH, entries)
 
 
-def _cuts(axis: Axis, scale: Scale) -> list[float]:
+def _cuts(axis: Axis, scale: svg.Scale) -> list[float]:
     """Places of the edges of the cells; the first and the last end at the values themselves."""
     edges = axis.edges
     if not axis.words:
@@ -387,17 +371,17 @@ def _cuts(axis: Axis, scale: Scale) -> list[float]:
     return [scale.at(edge) for edge in edges.tolist()]
 
 
-def _cells(mask: NDArray[np.bool_], columns: Sequence[float], lines: Sequence[float]) -> Iterator[Box]:
+def _cells(mask: NDArray[np.bool_], columns: Sequence[float], lines: Sequence[float]) -> Iterator[svg.Box]:
     """Cells of a mask as rectangles, those side by side along the first axis as one."""
     for j in range(mask.shape[1]):
         padded = np.concatenate([[False], mask[:, j], [False]])
         ends = np.flatnonzero(padded[1:] != padded[:-1])
         low, high = sorted((lines[j], lines[j + 1]))
         for start, stop in zip(ends[::2].tolist(), ends[1::2].tolist(), strict=True):
-            yield Box(columns[start], low, columns[stop], high)
+            yield svg.Box(columns[start], low, columns[stop], high)
 
 
-def _limit(trade: Trade, plane: _Plane) -> list[tuple[Point, Point]]:
+def _limit(trade: Trade, plane: _Plane) -> list[tuple[svg.Point, svg.Point]]:
     """Line of 100 %: through the logarithms of utilizations, which turn less than these."""
     uses = np.asarray(trade.values["utilization"], float)
     # Where a row is not evaluated, those that are left do not say how near the limit is.
@@ -411,7 +395,7 @@ def _limit(trade: Trade, plane: _Plane) -> list[tuple[Point, Point]]:
 
 
 def _heat(
-    canvas: Canvas, frame: Box, trade: Trade, plane: _Plane, columns: Sequence[float], lines: Sequence[float]
+    canvas: svg.Canvas, frame: svg.Box, trade: Trade, plane: _Plane, columns: Sequence[float], lines: Sequence[float]
 ) -> None:
     """A column in colours with their scale beside it, in equal ratios where it spans more than two decades."""
     shown = np.asarray(trade.values[trade.column], float)
@@ -420,7 +404,7 @@ def _heat(
     if not finite.size:
         return
     low, high = float(finite.min()), float(finite.max())
-    scale = Scale(low, high if high > low else low + (abs(low) or 1.0), frame.bottom, frame.top)
+    scale = svg.Scale(low, high if high > low else low + (abs(low) or 1.0), frame.bottom, frame.top)
     scale = scale._replace(is_log=low > 0 and high / low > 100)
     seen, ends = (np.log(one) if scale.is_log else np.asarray(one) for one in (shown, scale[:2]))
     with np.errstate(invalid="ignore"):
@@ -430,13 +414,13 @@ def _heat(
     for place in range(_HEATS):
         plane.fill(canvas, _cells(heats == place, columns, lines), f"heat{place}")
         bottom = frame.bottom - place * step
-        canvas.boxes([Box(left, bottom - step, left + 12, bottom)], f"heat{place}")
+        canvas.boxes([svg.Box(left, bottom - step, left + 12, bottom)], f"heat{place}")
     for value in scale.ticks(26.0):
-        canvas.text((left + 16, scale.at(value) + 3.5), [axis_number(value)], "axis")
-    canvas.upright_text((_WIDTH - 4, (frame.top + frame.bottom) / 2), short(trade.heading, 420.0), "small")
+        canvas.text((left + 16, scale.at(value) + 3.5), [svg.axis_number(value)], "axis")
+    canvas.upright_text((_WIDTH - 4, (frame.top + frame.bottom) / 2), svg.short(trade.heading, 420.0), "small")
 
 
-def _in_cells(canvas: Canvas, trade: Trade, columns: Sequence[float], lines: Sequence[float]) -> None:
+def _in_cells(canvas: svg.Canvas, trade: Trade, columns: Sequence[float], lines: Sequence[float]) -> None:
     """Write the utilization and the worst row into each cell of a map of words."""
     room = int((columns[1] - columns[0]) / 6.5)  # characters of a cell
     for (i, j), use in np.ndenumerate(trade.values["utilization"]):
@@ -449,8 +433,8 @@ def _in_cells(canvas: Canvas, trade: Trade, columns: Sequence[float], lines: Seq
 
 
 def _names(
-    canvas: Canvas, rows: NDArray[Any], plane: _Plane, columns: Sequence[float], lines: Sequence[float]
-) -> list[LegendLine]:
+    canvas: svg.Canvas, rows: NDArray[Any], plane: _Plane, columns: Sequence[float], lines: Sequence[float]
+) -> list[svg.LegendLine]:
     """The name of a row in each region, upright where it is tall, else a letter that the legend explains."""
     letters: dict[str, str] = {}
     named = set()
@@ -465,7 +449,7 @@ def _names(
             side = math.cos(p)
             canvas.text((x, y + 4), [row], "", "start" if side < -0.3 else "end" if side > 0.3 else "middle")
             continue
-        half = 0.45 * text_width(row) + 6
+        half = 0.45 * svg.text_width(row) + 6
         if region.size[0] * cell[0] < 2 * half < region.size[1] * cell[1]:
             canvas.upright_text((x + 4, min(max(y, min(lines) + half), max(lines) - half)), row, "")
             continue
@@ -474,20 +458,20 @@ def _names(
             half = 8.0
         canvas.text((min(max(x, columns[0] + half), columns[-1] - half), y + 4), [row], "", "middle")
     entries = [
-        LegendLine(row, lambda at, letter=letter: canvas.text((at[0] + 13, at[1] + 4), [letter], "", "middle"))  # type: ignore[misc]
+        svg.LegendLine(row, lambda at, letter=letter: canvas.text((at[0] + 13, at[1] + 4), [letter], "", "middle"))  # type: ignore[misc]
         for row, letter in letters.items()
     ]
     occurring = set(rows.ravel().tolist()) - {""}
     if others := sorted(occurring - named):
         listed = f"{', '.join(others[:3])}{' …' * (len(others) > 3)}"
-        entries.append(line_entry(canvas, f"another row binds, in small regions {listed}", "between"))
+        entries.append(svg.line_entry(canvas, f"another row binds, in small regions {listed}", "between"))
     elif len(occurring) > 1:
-        entries.append(line_entry(canvas, "another row binds", "between"))
+        entries.append(svg.line_entry(canvas, "another row binds", "between"))
     return entries
 
 
 # ---------------------------------------------------------------- from above
-def _from_above(around: Axis, radius: Axis, frame: Box) -> _Plane:
+def _from_above(around: Axis, radius: Axis, frame: svg.Box) -> _Plane:
     """Azimuths from east, counter-clockwise; the other key as a radius from 0.
 
     An elevation is 90 deg in the middle: what is seen from above there stands over the scene.
@@ -496,13 +480,13 @@ def _from_above(around: Axis, radius: Axis, frame: Box) -> _Plane:
     is_elevation = radius.key.endswith(".elevation")
     inner, rim = (math.pi / 2 / radius.scale, radius.values[0]) if is_elevation else (0.0, radius.values[-1])
     return _Plane(
-        Scale(first, last, first * around.scale, last * around.scale),
-        Scale(inner, float(rim), 0.0, _RIM),
+        svg.Scale(first, last, first * around.scale, last * around.scale),
+        svg.Scale(inner, float(rim), 0.0, _RIM),
         ((frame.left + frame.right) / 2, frame.top + 24 + _RIM),
     )
 
 
-def _around(canvas: Canvas, plane: _Plane, around: Axis, geometry: BistaticGeometry) -> list[LegendLine]:
+def _around(canvas: svg.Canvas, plane: _Plane, around: Axis, geometry: BistaticGeometry) -> list[svg.LegendLine]:
     """Directions, circles with their numbers, and at the rim where the other platform stands."""
     turn = (0.0, 2 * math.pi)
     names = {0: "east", 90: "north", 180: "west", 270: "south"}
@@ -519,7 +503,7 @@ def _around(canvas: Canvas, plane: _Plane, around: Axis, geometry: BistaticGeome
     for value in plane.up.ticks(26.0):
         radius = plane.up.at(value)
         canvas.polyline(plane.line([(angle, radius) for angle in turn]), "grid", is_obstacle=False)
-        canvas.text(plane.at(free, radius), [axis_number(value)], "axis", "middle")
+        canvas.text(plane.at(free, radius), [svg.axis_number(value)], "axis", "middle")
     canvas.polyline(plane.line([(angle, _RIM) for angle in turn]), "frame", is_obstacle=False)
     moved = [name for name in ("transmitter", "receiver") if f".{name}." in f".{around.key}"]
     if len(moved) != 1:
@@ -530,7 +514,7 @@ def _around(canvas: Canvas, plane: _Plane, around: Axis, geometry: BistaticGeome
     points = [plane.at(angle, _RIM - 7), *(plane.at(angle + side, _RIM + 6) for side in (0.045, -0.045))]
     canvas.polygon(points, f"solid {other}")
     return [
-        LegendLine(
+        svg.LegendLine(
             f"direction of the {other}",
             lambda at: canvas.polygon(
                 [(at[0] + 6, at[1]), *((at[0] + 19, at[1] + side) for side in (7, -7))], f"solid {other}"

@@ -258,7 +258,7 @@ def _result(row: Row, mission: MissionFindings, artifact: dict[str, Any], identi
     name = identity.of(row.id, row.requirement_id)
     result = _located(rule, STATUS[row.status].sarif, finding(row, mission), row.line, artifact, name)
     result["properties"] = _properties(
-        mission=mission.name,
+        mission,
         status=row.status,
         metric=row.metric,
         unit=row.unit,
@@ -270,11 +270,8 @@ def _result(row: Row, mission: MissionFindings, artifact: dict[str, Any], identi
         equation=row.equation,
         requirement_id=row.requirement_id,
         evidence=row.evidence,
-        overrides=overrides_words(mission) or None,
     )
-    if row.status == "waived":
-        result["suppressions"] = [_suppression(row.waivers, artifact)]
-    return result
+    return result | _suppressed(row.status, row.waivers, artifact)
 
 
 def _requirement(
@@ -283,7 +280,7 @@ def _requirement(
     level, name = STATUS[one.status].sarif, identity.of(requirement_id(one))
     result = _located(one.key, level, requirement_finding(one), one.line, artifact, name)
     result["properties"] = _properties(
-        mission=mission.name,
+        mission,
         status=one.status,
         metric=one.key,
         unit=one.unit or None,
@@ -291,15 +288,13 @@ def _requirement(
         allowable=one.value if one.allowed is None else one.allowed,
         utilization=one.utilization,
         decided_by=one.row,
-        overrides=overrides_words(mission) or None,
     )
-    if one.status == "waived" and one.waivers:
-        result["suppressions"] = [_suppression(one.waivers, artifact)]
-    return result
+    return result | _suppressed(one.status, one.waivers, artifact)
 
 
-def _properties(**values: str | float | None) -> dict[str, str | float]:
-    """Return what has a value, made harmless."""
+def _properties(mission: MissionFindings, **values: str | float | None) -> dict[str, str | float]:
+    """Properties that have a value, made harmless, with those of the mission."""
+    values = {"mission": mission.name, **values, "overrides": overrides_words(mission) or None}
     return {
         key: printable(value) if isinstance(value, str) else value
         for key, value in values.items()
@@ -318,13 +313,17 @@ def _located(
         "message": {"text": printable(message)},
         "locations": [
             {
-                "physicalLocation": {"artifactLocation": artifact, "region": _sarif_region(line)},
+                **_location(artifact, _sarif_region(line)),
                 "logicalLocations": [{"fullyQualifiedName": printable(name[-1]), "kind": "member"}],
             }
         ],
         # Code scanning tells an old alert from a new one by this key alone.
         "partialFingerprints": {"primaryLocationLineHash": digest(rule, *name)[:16] + ":1"},
     }
+
+
+def _location(artifact: dict[str, Any], region: dict[str, int]) -> dict[str, Any]:
+    return {"physicalLocation": {"artifactLocation": artifact, "region": region}}
 
 
 def _sarif_region(line: int | None) -> dict[str, int]:
@@ -337,17 +336,19 @@ def _sarif_region(line: int | None) -> dict[str, int]:
     return region
 
 
-def _suppression(waivers: Sequence[AppliedWaiver], artifact: dict[str, Any]) -> dict[str, Any]:
-    """Return the waiver: it stands in the file that is checked, which the standard calls `inSource`."""
+def _suppressed(status: str, waivers: Sequence[AppliedWaiver], artifact: dict[str, Any]) -> dict[str, Any]:
+    """The waiver, if there is one: it stands in the file that is checked, which the standard calls `inSource`."""
+    if status != "waived" or not waivers:
+        return {}
     waiver = next(one for one in waivers if not one.is_expired)
-    region = {"startLine": int(waiver.line or 1)}
-    return {
+    suppression = {
         "kind": "inSource",
         "status": "accepted",
         "justification": printable(waiver.reason),
-        "location": {"physicalLocation": {"artifactLocation": artifact, "region": region}},
+        "location": _location(artifact, {"startLine": int(waiver.line or 1)}),
         "properties": {"until": waiver.until.isoformat()},
     }
+    return {"suppressions": [suppression]}
 
 
 def _notification(fault: Fault, artifact: dict[str, Any]) -> dict[str, Any]:
@@ -358,5 +359,5 @@ def _notification(fault: Fault, artifact: dict[str, Any]) -> dict[str, Any]:
         "descriptor": {"id": "unusable_mission", "index": 0},
         "level": "error",
         "message": {"text": printable(str(fault))},
-        "locations": [{"physicalLocation": {"artifactLocation": artifact, "region": region}}],
+        "locations": [_location(artifact, region)],
     }

@@ -3,21 +3,19 @@
 import json
 from collections.abc import Callable, Sequence
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from bisar_budget.analysis.allocation import Split
 from bisar_budget.faults import Fault
+from bisar_budget.findings.images import Verdict
 from bisar_budget.findings.mission import FileWarning, MissionFindings, UnusableMission
+from bisar_budget.findings.monte_carlo import MonteCarlo
 from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import worst
+from bisar_budget.findings.trade import TradeStudy
 from bisar_budget.geometry import PlatformState
 from bisar_budget.report import Piece, Style
-
-if TYPE_CHECKING:
-    from bisar_budget.findings.images import Verdict
-    from bisar_budget.findings.monte_carlo import MonteCarlo
-    from bisar_budget.findings.trade import TradeStudy
 
 FORMAT = "bisar-budget/check/1"
 
@@ -153,7 +151,7 @@ def _mission(mission: MissionFindings) -> dict[str, Any]:
     }
 
 
-def _study(study: "TradeStudy") -> dict[str, Any]:
+def _study(study: TradeStudy) -> dict[str, Any]:
     return {
         "vary": list(study.asked),
         "cases": study.cases,
@@ -167,7 +165,7 @@ def _warning(warning: FileWarning) -> dict[str, Any]:
     return {"line": warning.line, "message": warning.message, "code": warning.message.code}
 
 
-def verdict_item(verdict: "Verdict") -> dict[str, Any]:
+def verdict_item(verdict: Verdict) -> dict[str, Any]:
     """Write what images say of a limit, with the codes of the reasons."""
     reasons = {"reason_code": verdict.reason, "reason_autofocus_code": verdict.reason_autofocus}
     return verdict._asdict() | {name: None if reason is None else reason.code for name, reason in reasons.items()}
@@ -191,7 +189,7 @@ def _row(row: Row) -> dict[str, Any]:
     return found
 
 
-def _monte_carlo(drawn: "MonteCarlo") -> dict[str, Any]:
+def _monte_carlo(drawn: MonteCarlo) -> dict[str, Any]:
     return {**drawn._asdict(), "requirements": [requirement._asdict() for requirement in drawn.requirements]}
 
 

@@ -8,9 +8,10 @@ from functools import cache
 from bisar_budget.effects.declared import END_OF_IMAGE
 from bisar_budget.faults import changes_words, printable
 from bisar_budget.findings.mission import MissionFindings, UnusableMission
-from bisar_budget.findings.row import DECLARE, Row, worst_first
+from bisar_budget.findings.row import Row, worst_first
 from bisar_budget.findings.status import STATUS, worst
 from bisar_budget.report import Piece, Style
+from bisar_budget.report.formats.verification import evidence
 from bisar_budget.report.words.identity import document_words, doubtful_model, head, narrow_gradients
 from bisar_budget.report.words.requirements import (
     COLUMNS,
@@ -19,6 +20,7 @@ from bisar_budget.report.words.requirements import (
     is_said_with_the_table,
     overrides_lines,
     overrides_words,
+    probabilities,
     requirement_lines,
     rule_words,
     unjudged_effects,
@@ -26,12 +28,13 @@ from bisar_budget.report.words.requirements import (
 )
 from bisar_budget.report.words.sentences import (
     WIDTH,
+    allowable_words,
     binding_words,
     counted,
     matters,
     percent,
-    row_limit,
     row_size,
+    shown_use,
     wrapped,
     wrapped_counts,
 )
@@ -146,12 +149,8 @@ def _after(mission: MissionFindings, style: Style) -> Iterator[str]:
         yield from ("", *details)
     yield from (line for text in _asides(mission, style) for line in wrapped(text, "  "))
     if mission.monte_carlo is not None:
-        from bisar_budget.report.words.requirements import probabilities
-
         yield from ("", *probabilities(mission.monte_carlo))
     if mission.verdicts is not None:
-        from bisar_budget.report.formats.verification import evidence
-
         yield from ("", "Images with each error at its limit", "", *evidence(mission.verdicts, style))
 
 
@@ -227,17 +226,10 @@ def _line(cells: Sequence[str], widths: Sequence[int]) -> str:
 
 
 def _row(row: Row, mission: MissionFindings) -> tuple[str, ...]:
-    status, limit, declared = row.status, row.allowable, row.declared
-    size = "-" if declared is None else row_size(declared, row, mission)
-    use = "-"
-    if limit is None:
-        is_open = status in ("not_evaluated", "info") or row.metric in ("pslr", "islr", DECLARE)
-        allowable = "-" if is_open else "no limit"
-    else:
-        allowable = row_limit(limit, row, mission)
-        if row.utilization is not None and status != "not_evaluated":
-            use = percent(row.utilization)
-    return STATUS[status].text, row.id, size, allowable, use, _limited_by(row)
+    size = "-" if row.declared is None else row_size(row.declared, row, mission)
+    use = shown_use(row)
+    used = "-" if use is None else percent(use)
+    return STATUS[row.status].text, row.id, size, allowable_words(row, mission), used, _limited_by(row)
 
 
 def _limited_by(row: Row) -> str:

@@ -182,19 +182,19 @@ def as_needs(report: Report, style: Style) -> str:
     Only fields that every project of Sphinx-Needs has are used, so that an import warns of nothing. A project's own
     requirement id becomes a link; numbers are in the content, which Sphinx reads as reStructuredText.
     """
-    names: list[tuple[str, ...]] = []
-    found: list[dict[str, Any]] = []
+    found: list[tuple[tuple[str, ...], dict[str, Any]]] = []
     for mission, identity in zip(report.missions, identities(report.missions, style), strict=True):
+        file = identity.path
         if isinstance(mission, UnusableMission):
-            names.append(identity.of("mission"))
-            found.append(_unusable_need(mission, identity.path))
+            found.append((identity.of("mission"), _unusable_need(mission, file)))
             continue
-        names += [identity.of(requirement_id(one)) for one in mission.requirements]
-        found += [_requirement_need(one, mission, identity.path) for one in mission.requirements]
-        names += [identity.of(row.id, row.requirement_id) for row in mission.rows]
-        found += [_row_need(row, mission, identity.path) for row in mission.rows]
+        for one in mission.requirements:
+            found.append((identity.of(requirement_id(one)), _requirement_need(one, mission, file)))
+        for row in mission.rows:
+            found.append((identity.of(row.id, row.requirement_id), _row_need(row, mission, file)))
+    names = [name for name, _ in found]
     needs: dict[str, dict[str, Any]] = {}
-    for wanted, need in zip(distinct([_identifier(name) for name in names], names), found, strict=True):
+    for wanted, (_, need) in zip(distinct([_identifier(name) for name in names], names), found, strict=True):
         identifier = _unused(wanted, needs)
         needs[identifier] = {"id": identifier, **need}
     version = {
@@ -222,24 +222,28 @@ def _unused(identifier: str, needs: Container[str]) -> str:
 def _row_need(row: Row, mission: MissionFindings, file: str) -> dict[str, Any]:
     texts = [measure(row, mission), cause(row), f"From {row.equation}."]
     texts += [f"Evidence: {row.evidence}"] if row.evidence else []
-    return {
-        "type": "test",
-        "title": need_text(f"{row.id} of {mission.name}"),
-        "status": row.status,
-        "tags": ["bisar-budget", row.metric],
-        "links": [need_text(row.requirement_id)] if row.requirement_id else [],
-        "content": _content([*texts, *_origin(row.line, mission, file)]),
-    }
+    texts += _origin(row.line, mission, file)
+    return _need(f"{row.id} of {mission.name}", row.status, texts, row.metric, link=row.requirement_id)
 
 
 def _requirement_need(one: JudgedRequirement, mission: MissionFindings, file: str) -> dict[str, Any]:
+    texts = [requirement_finding(one), *_origin(one.line, mission, file)]
+    return _need(f"{one.name} of {mission.name}", one.status, texts, "requirement", one.key)
+
+
+def _unusable_need(mission: UnusableMission, file: str) -> dict[str, Any]:
+    texts = [f"{fault.line or '-'}:{fault.column or '-'} {fault}" for fault in mission.faults]
+    return _need(f"{file} cannot be used", mission.status, texts)
+
+
+def _need(title: str, status: str, texts: Sequence[str], *tags: str, link: str | None = None) -> dict[str, Any]:
     return {
         "type": "test",
-        "title": need_text(f"{one.name} of {mission.name}"),
-        "status": one.status,
-        "tags": ["bisar-budget", "requirement", one.key],
-        "links": [],
-        "content": _content([requirement_finding(one), *_origin(one.line, mission, file)]),
+        "title": need_text(title),
+        "status": status,
+        "tags": ["bisar-budget", *tags],
+        "links": [need_text(link)] if link else [],
+        "content": "\n\n".join(rst_text(text) for text in texts if text),
     }
 
 
@@ -250,20 +254,3 @@ def _origin(line: int | None, mission: MissionFindings, file: str) -> Iterator[s
         yield f"Not as the file says: {changes_words(mission.changes)}"
     if outside := overrides_words(mission, with_changes=False):
         yield f"From outside the file: {outside}"
-
-
-def _content(texts: Sequence[str]) -> str:
-    return "\n\n".join(rst_text(text) for text in texts if text)
-
-
-def _unusable_need(mission: UnusableMission, file: str) -> dict[str, Any]:
-    return {
-        "type": "test",
-        "title": need_text(f"{file} cannot be used"),
-        "status": mission.status,
-        "tags": ["bisar-budget"],
-        "links": [],
-        "content": "\n\n".join(
-            rst_text(f"{fault.line or '-'}:{fault.column or '-'} {fault}") for fault in mission.faults
-        ),
-    }

@@ -122,6 +122,19 @@ def row_limit(value: float, row: Row, mission: MissionFindings) -> str:
     return row_size(value, row, mission, "down")
 
 
+def allowable_words(row: Row, mission: MissionFindings) -> str:
+    """The allowable of a row; a dash where it was not judged, or where its metric has no limit of its own."""
+    if row.allowable is not None:
+        return row_limit(row.allowable, row, mission)
+    is_open = row.status in ("not_evaluated", "info") or row.metric in ("pslr", "islr", DECLARE)
+    return "-" if is_open else "no limit"
+
+
+def shown_use(row: Row) -> float | None:
+    """Utilization of a row; None where it has no limit, or was not evaluated."""
+    return None if row.allowable is None or row.status == "not_evaluated" else row.utilization
+
+
 def phase_unit(mission: MissionFindings) -> str:
     """Unit of the quadratic phase requirement."""
     lines = (one.line for one in mission.requirements if one.key == "quadratic_phase_error")

@@ -1,0 +1,228 @@
+"""The compliance report as an HTML page: no script, nothing from elsewhere, light, dark and on paper."""
+
+import re
+from base64 import b64encode
+from collections.abc import Iterable
+from functools import cache
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
+from markupsafe import Markup, escape
+
+from bisar_budget.faults import printable
+from bisar_budget.findings.mission import Report
+from bisar_budget.findings.status import STATUS
+from bisar_budget.report import Style
+from bisar_budget.report.compliance import document as doc
+from bisar_budget.report.compliance.summary import compliance
+from bisar_budget.report.explain import notation
+from bisar_budget.report.explain.notation import Sum, WorkedEquation
+from bisar_budget.resources import resource
+
+_AFTER = re.compile(r"([._/])(?=\w{2})")  # where a long name may break: an axis stays with what it is of
+_SHAPE = 'viewBox="0 0 {} 8" preserveAspectRatio="none" aria-hidden="true" focusable="false"'
+_USE = _SHAPE.format(120)  # the limit is at 96
+_PART = _SHAPE.format(100)
+
+
+@cache
+def _page() -> Template:
+    """The page around the sections, a file of `resource("templates")`; compiling it takes as long as a mission."""
+    environment = Environment(
+        loader=FileSystemLoader(resource("templates")),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    environment.filters |= {"css_string": _css_string, "text": _text}
+    return environment.get_template("report.html.j2")
+
+
+def as_html(report: Report, style: Style) -> str:
+    """Write the page."""
+    document = compliance(report, style)
+    return _page().render(
+        document=document,
+        facts=_block(document.facts),
+        main=_blocks(document.chapters),
+        inner=lambda chapter: [one for one in chapter.blocks if isinstance(one, doc.Chapter) and one.is_listed],
+        statuses=STATUS.values(),
+    )
+
+
+def _css_string(text: str) -> Markup:
+    """A string of a style sheet: every character but letters, digits and blanks of ASCII is its number."""
+    safe = (c if c.isascii() and (c.isalnum() or c == " ") else f"\\{ord(c):x} " for c in printable(text))
+    return Markup(f'"{"".join(safe)}"')
+
+
+# ---------------------------------------------------------------------- parts of a line
+def _text(text: doc.Text) -> Markup:
+    match text:
+        case tuple():
+            return Markup("").join(map(_text, text))
+        case doc.Name(words, target):
+            broken = Markup(_AFTER.sub(r"\1<wbr>", str(escape(printable(words)))))
+            return Markup('<a href="#{}">{}</a>').format(target, broken) if target else broken
+        case doc.Styled(style, inner):
+            return Markup('<span class="{}">{}</span>').format(style, _text(inner))
+        case doc.Badge(status):
+            words = STATUS[status].words if status in STATUS else status
+            return Markup('<span class="status {}">{}</span>').format(status, words)
+        case doc.Use(part, status):
+            if part is None:
+                return Markup("")
+            beyond = '<path class="break" d="M108 9l4-10h3l-4 10z"/>' if part > 1.25 else ""
+            bar = f'<rect class="track" width="120" height="8"/>{_fill(min(96 * part, 120))}{beyond}'
+            return Markup(f'<svg class="use {status}" {_USE}>{bar}<path class="limit" d="M96 0v8"/></svg>')
+        case doc.Bar(part, owner):
+            bar = f'<rect class="track" width="100" height="8"/>{_fill(100 * part)}'
+            return Markup(f'<svg class="part {owner}" {_PART}>{bar}</svg>')
+        case doc.Swatch(owner):
+            return Markup(f'<span class="swatch {owner}" aria-hidden="true"></span>')
+        case doc.Code(words):
+            return Markup("<code>{}</code>").format(printable(words))
+    return escape(printable(text))
+
+
+def _fill(width: float) -> str:
+    return f'<rect class="fill" width="{width:.2f}" height="8"/>'
+
+
+# ---------------------------------------------------------------------- blocks
+def _blocks(blocks: Iterable[doc.Block]) -> Markup:
+    return Markup("").join(map(_block, blocks))
+
+
+def _block(block: doc.Block) -> Markup:
+    match block:
+        case doc.Paragraph(text, style):
+            return _element("p", style, _text(text))
+        case doc.Facts(pairs, style):
+            rows = [Markup("<div>{}{}</div>\n").format(_cell("dt", key), _cell("dd", value)) for key, value in pairs]
+            return _element("dl", style, Markup("\n{}").format(Markup("").join(rows)))
+        case doc.Items(items, style, is_numbered):
+            return _element("ol" if is_numbered else "ul", style, Markup("\n").join(["", *map(_item, items), ""]))
+        case doc.TextTable():
+            return _table(block)
+        case doc.Stack():
+            return _stack(block)
+        case doc.Figure(title=title, style=style):
+            inner = _scroll(block.label, _inline(block))
+            caption = Markup("<figcaption>{}</figcaption>").format(_text(title))
+            return _element("figure", style, Markup("\n{}{}\n").format(inner, caption))
+        case doc.Images(chips):
+            images = (
+                Markup(
+                    '<figure><img src="data:image/png;base64,{}" alt="{}" width="{}" height="{}">'
+                    "<figcaption>{}</figcaption></figure>\n"
+                ).format(b64encode(chip.png).decode(), printable(chip.title), *chip.size, printable(chip.caption))
+                for chip in chips
+            )
+            return _element("div", "chips", Markup("\n{}").format(Markup("").join(images)))
+        case doc.Steps(label, steps, style):
+            return _scroll(label, Markup("").join(_step(title, parts, style) for title, parts in steps))
+        case doc.Group(style, blocks, heading):
+            head = Markup("<h4>{}</h4>\n").format(_text(heading)) if heading else ""
+            return _element("div", style, Markup("\n{}{}").format(head, _blocks(blocks)))
+        case doc.Chapter():
+            return _chapter(block)
+    raise TypeError(block)
+
+
+def _element(tag: str, style: str, content: Markup) -> Markup:
+    opening = Markup('<{} class="{}">').format(tag, style) if style else Markup("<{}>").format(tag)
+    return Markup("{}{}</{}>\n").format(opening, content, tag)
+
+
+def _scroll(label: str, content: Markup) -> Markup:
+    """A region that the keyboard reaches, in which content that is wider than the page scrolls."""
+    region = '<div class="scroll" tabindex="0" role="region" aria-label="{}">{}</div>'
+    return Markup(region).format(printable(label), content)
+
+
+def _chapter(chapter: doc.Chapter) -> Markup:
+    level = f"h{chapter.level}"
+    title, content = _text(chapter.title), _blocks(chapter.blocks)
+    if not chapter.anchor:
+        return Markup("<{0}>{1}</{0}>\n{2}").format(level, title, content)
+    return Markup(
+        '<{tag}{style} id="{anchor}" aria-labelledby="{anchor}-h">\n'
+        '<{level} id="{anchor}-h">{title}</{level}>\n{content}</{tag}>\n'
+    ).format(
+        tag="article" if chapter.is_article else "section",
+        style=Markup(' class="{}"').format(chapter.style) if chapter.style else "",
+        anchor=chapter.anchor,
+        level=level,
+        title=title,
+        content=content,
+    )
+
+
+def _cell(tag: str, text: doc.Text, style: str = "", scope: str = "") -> Markup:
+    """An element of a table or a list of facts; text with a style gives its style to the element."""
+    if isinstance(text, doc.Styled):
+        style, text = text.style, text.text
+    scoped = Markup(' scope="{}"').format(scope) if scope else ""
+    styled = Markup(' class="{}"').format(style) if style else ""
+    return Markup("<{0}{1}{2}>{3}</{0}>").format(tag, scoped, styled, _text(text))
+
+
+def _item(paragraphs: doc.Line) -> Markup:
+    if len(paragraphs) == 1:
+        return Markup("<li>{}</li>").format(_text(paragraphs[0]))
+    return Markup("<li>{}</li>").format(Markup("").join(_cell("p", (text,)) for text in paragraphs))
+
+
+def _table(table: doc.TextTable) -> Markup:
+    heads = (_cell("th", head.text, "number" if head.style == "number" else "", "col") for head in table.heads)
+    lines = [Markup("<caption>{}</caption>").format(_text(table.caption))]
+    lines += [Markup("<thead><tr>{}</tr></thead>").format(Markup("").join(heads)), Markup("<tbody>")]
+    styles = [head.style for head in table.heads]
+    for first, *others in table.rows:
+        cells = [_cell("th", first, styles[0], "row")]
+        cells += [_cell("td", cell, style) for cell, style in zip(others, styles[1:], strict=True)]
+        lines.append(Markup("<tr>{}</tr>").format(Markup("").join(cells)))
+    whole = _element("table", table.style, Markup("\n").join(["", *lines, Markup("</tbody>\n")]))
+    return _scroll(table.label, whole) if table.label else whole
+
+
+def _stack(stack: doc.Stack) -> Markup:
+    said = ", ".join(f"{owner} {words}" for owner, _, words in stack.parts)
+    bars = (
+        Markup('<span class="{}" style="width:{:.3f}%">{}</span>').format(
+            owner, 100 * part, owner if part > 0.16 else ""
+        )
+        for owner, part, _ in stack.parts
+    )
+    return Markup(
+        '<div class="stack-row"><span class="stack-label">{0}</span>'
+        '<div class="stack" role="img" aria-label="{0}: {1}">{2}</div></div>\n'
+    ).format(stack.label, said, Markup("").join(bars))
+
+
+def _inline(figure: doc.Figure) -> Markup:
+    """A drawing within the page; the same mission may stand in a report twice."""
+    return Markup(re.sub(r'\b(id|aria-labelledby|aria-describedby)="', rf'\1="{figure.anchor}-', figure.svg))
+
+
+def _step(title: str, parts: Iterable[WorkedEquation | str | doc.Equality], style: str) -> Markup:
+    step = '<div class="{}"><p class="step-title">{}</p>{}</div>\n'
+    return Markup(step).format(style, printable(title), Markup("").join(map(_equation, parts)))
+
+
+def _equation(part: WorkedEquation | str | doc.Equality) -> Markup:
+    """One part of a step: a formula as MathML, words and text as text."""
+    if isinstance(part, doc.Equality):
+        sides = (notation.mathml_of(side) for side in (part.left, part.right))
+        formula = notation.math("<mrow>{}<mo>=</mo>{}</mrow>".format(*sides))
+        return Markup('<p class="part">{}</p>').format(Markup(formula))
+    if not isinstance(part, WorkedEquation):
+        text = notation.readable(part) if isinstance(part, Sum) else printable(part)
+        return Markup("<p class=part>{}</p>").format(text)
+    if notation.is_formula(part):
+        mathml = notation.as_mathml(part)
+        return Markup("<p class=part>{} {}</p>").format(Markup(mathml.formula), Markup(mathml.numbers))
+    formula, numbers = notation.as_text(part)
+    return Markup("<p class=part><span>{}</span> <span>{}</span></p>").format(formula, numbers)
