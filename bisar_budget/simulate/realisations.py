@@ -200,7 +200,7 @@ def drawn_errors(analysis: Analysis) -> Errors:
             is_set = error.full.displacement > 0
             phase = phase + (drawn if is_set else drawn - Course(moments, drawn).smooth(1).values)
     transmitter, receiver = (
-        PathError(course=Course(times, moved[name]) if name in moved else None) for name in PLATFORMS
+        PathError(course=Course(flown, moved[name]) if name in moved else None) for name in PLATFORMS
     )
     seconds = clock_seconds(phase, mission.radar.wavelength)
     if air[DELAY].any():

@@ -27,7 +27,16 @@ ZERO = {
     "imu": {"imu": {"gyro_bias": 0}},
     "random": {"random": [{"name": "GNSS", "sigma": 0, "correlation_time": "1 s"}]},
     "vibration": {"vibration": {"wideband": {"rms": 0}}},
+    "time_tag": {"time_tag": 0},
+    "lever_arm": {"lever_arm": {"uncertainty": 0}},
 }
+OTHERS = (
+    "imu",
+    "random",
+    "vibration",
+    "time_tag",
+    "lever_arm",
+)  # kinds that are no position, velocity or acceleration
 OSCILLATOR = {"power_law": {"h0": 0}}
 STILL = {"position": ["6 km", "6 km", "2 km"], "velocity": [0, 0, 0]}
 
@@ -159,7 +168,7 @@ def test_a_common_error_says_nothing_of_the_platforms_own() -> None:
 )
 def test_a_platform_that_does_not_move_owes_its_position_only(receiver: dict) -> None:
     of_transmitter = {
-        "motion_error": ALL | ZERO["imu"] | ZERO["random"] | ZERO["vibration"],
+        "motion_error": ALL | {key: value for kind in OTHERS for key, value in ZERO[kind].items()},
         "oscillator": OSCILLATOR,
     }
     changes = {f"platforms__transmitter__{key}": value for key, value in of_transmitter.items()}

@@ -322,12 +322,20 @@ def test_exchanged_pulses_take_a_turn_out() -> None:
     assert held.full.displacement < 0.01 * free.full.displacement
 
 
-def test_the_direct_path_takes_both_oscillators_out() -> None:
+def test_of_a_direct_path_what_a_receiver_changes_by_until_the_echo_comes_is_left() -> None:
+    """S·4 sin²(πfΔt) of the vibration, summed densely; a turn leaves next to nothing, the transmitter nothing."""
     text = "{spectrum: {20 Hz: 0.04 g^2/Hz, 1 kHz: 0.04 g^2/Hz}, sinusoidal: [{amplitude: 1 g, frequency: 50 Hz}]}"
     link = "synchronization: {method: direct_path, error: 1 deg}"
     heard = mission(text, "acceleration_sensitivity: 1e-9 /g", path=TURN, more=link)
-    assert of(heard, "receiver.oscillator.acceleration").full[:5] == (0, 0, 0, 0, 0)
-    assert [one.subject.id for one in Analysis(heard).tones] == ["receiver.vibration.sinusoidal.0"]
+    error, delay = of(heard, "receiver.oscillator.acceleration"), heard.geometry.echo_delay
+    f = np.linspace(20.0, 1e3, 400_001)
+    turned = 2 * np.sin(math.pi * f * delay)
+    power = np.trapezoid((10e9 * 1e-9 / f * turned) ** 2 * 0.04, f)
+    assert (error.full.spread * error.declared) ** 2 == pytest.approx(power, rel=5e-3)
+    tones = {one.subject.id: one.phase for one in Analysis(heard).tones}
+    assert tones.keys() == {"receiver.vibration.sinusoidal.0", "receiver.oscillator.acceleration.0"}
+    expected = 10e9 * 1e-9 / 50 * 2 * math.sin(math.pi * 50 * delay)
+    assert tones["receiver.oscillator.acceleration.0"] == pytest.approx(expected, rel=1e-9)
 
 
 def test_below_a_cycle_per_aperture_a_tone_is_a_phase() -> None:

@@ -92,7 +92,6 @@ SCHEMA_SEES = {
         "f.yaml:5:1: gyro_bais: is not a known key; accepted: kind, name,",
     ),
     "a key of another kind": (IMU + MASK, "f.yaml:5:1: phase_noise: is not a known key"),
-    "a key that is to come": (CLOCK + "level: 3 dB\n", "is not computed by this version yet"),
     "no kind": (
         IMU.replace("kind: imu\n", ""),
         "f.yaml:1:1: kind: must be one of imu, gnss, oscillator, and is missing. Its figures are those of kind: imu",

@@ -92,7 +92,8 @@ def test_a_piece_of_a_mask_is_integrated_to_1e_4(low: float, high: float, slope:
             *(j[0] ** 2, (3 * j[1]) ** 2, -7.5 * j[0] * j[2], -52.5 * j[1] * j[3]),
         )
     ]
-    assert found == pytest.approx(expected, rel=1e-4)
+    assert found[:7] == pytest.approx(expected, rel=1e-4)
+    assert not any(found[7:])  # of noise that no setting ties to the aperture
 
 
 def test_many_aperture_times_at_once_are_each_alone() -> None:
@@ -109,8 +110,8 @@ def test_many_aperture_times_at_once_are_each_alone() -> None:
         lambda T: link_parts(T, 0.1),
         lambda T: gauss_markov(T, 2.0),
     ):
-        alone = np.array([integrate(float(T)) for T in times]).T
-        assert np.array(integrate(times)) == pytest.approx(alone, rel=1e-12)
+        alone = np.array([integrate(float(T))[:7] for T in times]).T
+        assert np.array(integrate(times)[:7]) == pytest.approx(alone, rel=1e-12)
 
 
 def test_check_values_of_three_pairs_of_oscillators() -> None:

@@ -17,6 +17,7 @@ from bisar_budget.analysis.vibration_limits import (
     tone_limits,
 )
 from bisar_budget.budget.random_rows import held_effect, no_effect
+from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.effect import subject
 from bisar_budget.effects.lever_arms import arm_at, body_axes
@@ -342,11 +343,13 @@ def integrals(
     """The parts that each piece of a spectrum adds to the mean squares."""
     T, interval = mission.collection.aperture_time, None if sync is None else sync.interval
     if sync is not None and sync.is_direct_path:
-        delay = mission.geometry.echo_delay
+        geometry, delay = mission.geometry, mission.geometry.echo_delay
+        ways = [float(path.slant_range) for path in (*geometry.both, geometry.apart)]
         each, density = [heard_parts((piece,), T, delay) for piece in pieces], "S_left"
+        values = dict(zip(("R_t", "R_r", "b"), ways, strict=True)) | {"c": SPEED_OF_LIGHT}
         yield from step(
-            "Heard directly, and Δt later by the echo: S_left = S·4·sin²(πf·Δt); a constant phase moves nothing",
-            f"Δt = (R_t + R_r − |p_t − p_r|)/c = {with_unit(delay, 's')}",
+            "Heard over the baseline b, and a delay Δt later by the echo: S_left = S·4·sin²(πf·Δt)",
+            *equation("delay", "(R_t + R_r - b)/c", values, delay, "s"),
         )
     elif interval is None:
         each, density = [parts((piece,), T) for piece in pieces], "S"
