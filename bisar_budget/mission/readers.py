@@ -540,7 +540,6 @@ DISTRIBUTIONS = "normal: the values are one sigma; uniform, bound: they are not 
 # of them in a file is an error that says so: an unknown key would be told which other key was perhaps meant.
 NOT_COMPUTED = "is not computed by this version yet"
 _LEAVE = "accepted: leave it out"
-_OSCILLATOR = f"{_LEAVE}, and state the noise with it, as phase_noise or spurs"
 
 # By the name of the section, as its class has it, and the key: what is accepted instead.
 LATER: Mapping[str, Mapping[str, str]] = {
