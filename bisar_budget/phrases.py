@@ -114,11 +114,11 @@ _SHOWN_EFFECTS = {
     "tone": "tone of {} rad",
 }
 _NEEDED_DECLARATIONS = {
-    "quadratic_phase_error": "has a quadratic phase (position, velocity, acceleration, imu, timing)",
-    "cubic_phase_error": "has a cubic phase (velocity, acceleration, imu, timing)",
-    "location_error": "displaces the image (position, velocity, timing)",
+    "quadratic_phase_error": "has a quadratic phase (velocity, acceleration, imu, random, oscillator, timing)",
+    "cubic_phase_error": "has a cubic phase (velocity, acceleration, imu, random, oscillator, timing)",
+    "location_error": "displaces the image (position, velocity, time_tag, lever_arm, random, timing, propagation)",
     "pslr": "makes echoes (vibration.sinusoidal, oscillator.spurs, oscillator.acceleration_sensitivity)",
-    "islr": "spreads (vibration, random, oscillator)",
+    "islr": "spreads (vibration, random, oscillator, synchronization)",
 }
 
 
@@ -600,6 +600,28 @@ def noise_is_shifted(level_db: float) -> str:
 def left_by_exchanges(interval: float) -> str:
     """Said of an oscillator. [s]"""
     return f"only what synchronisation every {format_quantity(interval, 's')} leaves of it counts"
+
+
+@phrase
+def points_are_sorted() -> str:
+    """Said of a mask or a spectrum whose points do not rise in the file."""
+    return "the file has its points in another order: they are read in rising order"
+
+
+@phrase
+def setting_is_perfect(missing: Sequence[str]) -> str:
+    """Said of clocks in holdover whose setting has no error in the file."""
+    keys = " and ".join(f"synchronization.{one}" for one in missing)
+    return f"the file has no {keys}: the clocks are taken to be set without that error"
+
+
+@phrase
+def mask_ends_within_the_band(last: float, bandwidth: float) -> str:
+    """Said of a mask that ends below the bandwidth beside it. [Hz]"""
+    return (
+        f"counts up to the mask's last point, {format_quantity(last, 'Hz')}: beyond it, up to the bandwidth of "
+        f"{format_quantity(bandwidth, 'Hz')}, nothing is stated"
+    )
 
 
 @phrase

@@ -137,7 +137,7 @@ def notes_of_acceleration(mission: Mission, name: str) -> tuple[Note, ...]:
     one = felt(mission, name)
     oscillator: Oscillator = getattr(mission.platforms, name).oscillator
     notes = list[Note]()
-    if one is None or mission.has_direct_path:
+    if one is None or (mission.has_direct_path and name == "transmitter"):
         return ()
     vibration = one.vibration
     if vibration.spectrum is not None or vibration.sinusoidal:
@@ -150,4 +150,6 @@ def notes_of_acceleration(mission: Mission, name: str) -> tuple[Note, ...]:
         notes.append(phrases.tones_have_rows(f"{name}.oscillator.acceleration"))
     if mission.synchronization is not None and mission.synchronization.interval is not None:
         notes.append(phrases.left_by_exchanges(mission.synchronization.interval))
+    if mission.has_direct_path:
+        notes.append(phrases.heard_twice(mission.geometry.echo_delay))
     return (*notes, *override_notes(name, oscillator.overridden, SENSITIVITY))

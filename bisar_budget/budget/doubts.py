@@ -127,6 +127,11 @@ def collection_notes(case: Case) -> Iterator[Note]:
             yield phrases.sight_turns(name, turn)
     if mission.has_direct_path:
         yield phrases.direct_path_is_the_clock()
+    sync = mission.synchronization
+    if sync is not None and sync.is_holdover:
+        missing = [key for key in ("time_error", "frequency_error") if getattr(sync, key) is None]
+        if missing:
+            yield phrases.setting_is_perfect(missing)
     cell = phase_across_a_cell(case)
     if cell > COARSE_CELL_RAD:
         yield phrases.range_cells_are_coarse(cell, 100 / (1 + (cell / _ABSORBED_RAD) ** 2))

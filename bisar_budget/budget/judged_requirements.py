@@ -318,7 +318,9 @@ def _missing(mission: Mission, still: Container[str]) -> Iterator[Missing]:
         owner, dot, kind = asked.rpartition(".")
         if kind == "timing":
             if not _states_clock(mission):
-                yield Missing("clock", kind, "timing_error")
+                sync = mission.synchronization
+                is_set = sync is not None and sync.is_holdover
+                yield Missing("clock", kind, "synchronization.time_error" if is_set else "timing_error")
             continue
         key, declares = _DECLARES[kind]
         for name in (owner,) if dot else PLATFORMS:

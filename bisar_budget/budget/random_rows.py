@@ -39,6 +39,7 @@ from bisar_budget.effects.vibration import counted, projected
 from bisar_budget.effects.vibration_spectra import displacement_rms, power_of
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import GroundVector
+from bisar_budget.mission.curves import SortedPoints
 from bisar_budget.mission.instruments import FORMS, Oscillator, Synchronization
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
@@ -399,7 +400,8 @@ def _said_of_spectrum(mission: Mission, name: str) -> tuple[Note, ...]:
         return ()
     rms = displacement_rms(spectrum, float(power_of(vibration)))
     seen = projected(mission, rms, getattr(mission.platforms, name).motion_error, rms * along)
-    return (phrases.spectrum_shakes(rms, vibration.spectrum_level or 0.0), *seen)
+    order = (phrases.points_are_sorted(),) if isinstance(spectrum.points, SortedPoints) else ()
+    return (phrases.spectrum_shakes(rms, vibration.spectrum_level or 0.0), *order, *seen)
 
 
 def _said_of_acceleration(mission: Mission, error: RandomError) -> tuple[str, str | None, tuple[Note, ...]]:
@@ -461,7 +463,7 @@ def no_effect(mission: Mission, error: RandomError) -> Note:
         return (phrases.below_the_ionosphere if is_content else phrases.runs_along_the_ground)(error.owner)
     if error.subject.kind == "synchronization":
         return phrases.nothing_spreads()
-    if mission.has_direct_path:
+    if mission.has_direct_path and error.owner == "transmitter":
         return phrases.oscillators_drop_out()
     return phrases.no_acceleration() if error.subject.axis else phrases.no_phase_noise()
 

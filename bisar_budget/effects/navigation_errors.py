@@ -208,7 +208,8 @@ def _with_arm(
         left_heard = left_heard + scale * walk.left * (heard[i] * heard[j]).sum(axis=0)
     (quadratic, cubic, east, north), covariance = sigmas(np.asarray(whole), np.asarray(sizes))
     constant, linear, own, own_cubic = np.maximum(orders, 0.0)
-    spread, spread_heard = (k * np.sqrt(np.maximum(one, 0.0)) for one in (left, left_heard))
+    # What spreads is a mean power, which has no coverage factor.
+    spread, spread_heard = (k * np.sqrt(np.maximum(one, 0.0)) / seen.factor for one in (left, left_heard))
     published = RandomEffect(k * np.sqrt(own), k * np.sqrt(own_cubic), spread, *seen.moved(constant, linear))
     return published, RandomEffect(quadratic, cubic, spread_heard, east, north, covariance)
 

@@ -12,7 +12,7 @@ from bisar_budget import evaluators, phrases
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.spectra import PowerLawPiece, held
 from bisar_budget.geometry import BistaticGeometry
-from bisar_budget.mission.curves import Points
+from bisar_budget.mission.curves import Points, SortedPoints
 from bisar_budget.mission.instruments import Oscillator, PowerLaw
 from bisar_budget.mission.model import Mission
 from bisar_budget.phrases import NOTHING, Note
@@ -70,10 +70,12 @@ def _of_mask(oscillator: Oscillator, center_frequency: float, aperture_time: flo
     below = NOTHING
     if first * aperture_time > 0.5:
         below = phrases.mask_begins(first, slope)
-    notes = []
+    notes = [phrases.points_are_sorted()] if isinstance(points, SortedPoints) else []
     if bandwidth < last:
         beyond = (piece.integral(max(piece.low, bandwidth), piece.high) for piece in pieces if piece.high > bandwidth)
         notes.append(phrases.mask_is_cut(bandwidth, last, math.sqrt(math.fsum(beyond))))
+    elif bandwidth > last:
+        notes.append(phrases.mask_ends_within_the_band(last, bandwidth))
     counted = (piece._replace(high=min(piece.high, bandwidth)) for piece in pieces if piece.low < bandwidth)
     return Noise(tuple(counted), tuple(notes), below)
 

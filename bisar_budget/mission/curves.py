@@ -8,8 +8,12 @@ from bisar_budget.mission.readers import INVALID, Quantity, Reader, Report
 Points = tuple[tuple[float, float], ...]
 
 
+class SortedPoints(tuple[tuple[float, float], ...]):
+    """Points of a curve in rising order, which the file has in another: the rows that rest on them say so."""
+
+
 class CurveReader(Reader):
-    """A mapping of abscissas to ordinates, in any order of the file, read into pairs in rising order."""
+    """A mapping of abscissas to ordinates, read in rising order: `SortedPoints` if the file has another."""
 
     def __init__(self, abscissa: Quantity, ordinate: Quantity, what: str, fewest: int, most: int = 100) -> None:
         self.abscissa, self.ordinate, self.what, self.fewest, self.most = abscissa, ordinate, what, fewest, most
@@ -27,7 +31,7 @@ class CurveReader(Reader):
             try:
                 at = self.abscissa.leaf(key)
             except InvalidValueError as error:
-                report(here, error.problem)
+                report(here, error.problem._replace(is_of_key=True))
                 is_valid = False
                 continue
             if at in points:
@@ -36,7 +40,8 @@ class CurveReader(Reader):
             points[at] = item if item is INVALID else self.ordinate.read(item, here, report)
         if INVALID in points.values() or not is_valid:
             return INVALID
-        return tuple(sorted(points.items()))
+        found = sorted(points.items())
+        return tuple(found) if found == list(points.items()) else SortedPoints(found)
 
     def below(self, part: str) -> Reader | None:
         """Give the reader of an ordinate."""

@@ -205,9 +205,9 @@ def least_age(averaging: Any, aperture_time: Any) -> Any:
 def _unset_clocks(values: Mapping[str, Any]) -> Iterator[Problem]:
     """Hold clocks that were set to a time before the aperture, and to one way to say what they are wrong by."""
     sync, collection, timing = (values.get(key) for key in ("synchronization", "collection", "timing_error"))
-    if sync is None or not sync.is_holdover:
+    if sync is None or sync.is_direct_path:
         return
-    if collection is not None:
+    if sync.is_holdover and collection is not None:
         least = least_age(sync.averaging, collection.aperture_time)
         if sync.age < least:
             yield Problem(
@@ -216,10 +216,18 @@ def _unset_clocks(values: Mapping[str, Any]) -> Iterator[Problem]:
                 at=("synchronization", "age"),
             )
     for term, stands in (("constant", "time_error"), ("linear", "frequency_error")):
-        if timing is not None and getattr(timing, term) is not None:
+        if timing is None or getattr(timing, term) is None:
+            continue
+        if sync.is_holdover:
             yield Problem(
                 "stands beside synchronization.method holdover, which says what the clocks are wrong by",
                 f"accepted: synchronization.{stands}, or no holdover",
+                at=("timing_error", term),
+            )
+        elif getattr(sync, stands) is not None:
+            yield Problem(
+                f"stands beside synchronization.{stands}: the same error would count twice",
+                "accepted: one of the two",
                 at=("timing_error", term),
             )
 

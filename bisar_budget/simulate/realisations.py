@@ -179,7 +179,7 @@ def drawn_errors(analysis: Analysis) -> Errors:
     phase: Floats = np.zeros(moments.size)
     air = dict.fromkeys(DELAYS, np.zeros(times.size))
     for error in analysis.random:
-        if not error.declared or error.counted_in:
+        if not error.declared or error.counted_in or error.subject.kind == "other":  # known by its effect alone
             continue
         rng = np.random.default_rng([seed, *error.id.encode()])
         if error.subject.kind in MOVING:

@@ -46,6 +46,15 @@ class TestLeverArm:
         lines = mission_text(**{**TURN, **NEEDS, ERROR: {"imu": IMU, "lever_arm": ARM}}).splitlines()
         assert "5 mm" in lines[arm.line - 1]
 
+    def test_the_coverage_factor_multiplies_no_power(self) -> None:
+        """What angle noise spreads beside an arm grew with it, 6 dB at a factor of 2."""
+        walk = {ERROR: {"imu": {"angle_random_walk": "2 deg/sqrt(h)"}, "lever_arm": {"arm": ["2 m", 0, 0]}}}
+        once, twice = (
+            row(of(**walk, allocation__coverage_factor=factor), "receiver.imu.angle_random_walk") for factor in (1, 2)
+        )
+        assert once.islr_db == pytest.approx(twice.islr_db, abs=1e-9)
+        assert twice.qpe_full_rad == pytest.approx(2 * once.qpe_full_rad)
+
     @pytest.mark.parametrize("combine", ["each", "sum", "rss"])
     def test_what_attitude_does_counts_once(self, combine: str) -> None:
         """By `each` the row of the whole is judged, and the part of the arm is not."""

@@ -86,10 +86,14 @@ def test_what_is_done_when_a_sweep_is_ended_is_not_done_again(
     """Interrupted; gone on with and killed; gone on with without the scheduler."""
     output = tmp_path / "t.csv"
     arguments = ("-o", str(output), "--scheduler", cluster.address)
-    with command(*arguments) as process:
-        wait_until(lambda: kept(output) >= 2)
-        process.send_signal(signal.SIGINT)
-        code, said = ended(process)
+    for _ in range(3):  # one that was held up may have ended before it heard
+        with command(*arguments) as process:
+            wait_until(lambda: kept(output) >= 2)
+            process.send_signal(signal.SIGINT)
+            code, said = ended(process)
+        if code:
+            break
+        output.unlink()
     done = kept(output)
     assert 2 <= done < PARTS - 1
     assert code == 130

@@ -37,6 +37,7 @@ YORK = tuple(
 )
 PER_PHASE = SPEED_OF_LIGHT / (2 * math.pi * F_0)  # m per radian
 HOLDOVER = {"method": "holdover", "age": "60 s", "averaging": "10 s"}
+LINK = {"interval": "1 s", "error": "1 deg"}
 OCXO = {"power_law": {"h-2": "4e-23", "h-1": "2e-24", "h0": "1e-25"}}
 RECEIVER = "platforms__receiver__oscillator"
 HELD = MISSION[: MISSION.index("    motion_error")].rstrip()
@@ -186,6 +187,19 @@ class TestSetting:
         # 1e-9 of the 36 km by which the echo is longer.
         assert math.hypot(*row(found, "timing.frequency").displacement_m) < 1e-4
 
+    def test_one_without_errors_is_taken_to_be_perfect_and_it_is_said(self) -> None:
+        notes = [
+            " ".join(map(str, findings(synchronization=HOLDOVER | more).notes)) for more in ({}, {"time_error": 0})
+        ]
+        assert "no synchronization.time_error and synchronization.frequency_error: the clocks are taken" in notes[0]
+        assert "no synchronization.frequency_error: the clocks" in notes[1]
+
+    def test_declare_asks_for_the_key_that_holdover_has(self) -> None:
+        found = findings(synchronization=HOLDOVER, requirements={"declare": ["timing"]})
+        assert "synchronization.time_error" in str(row(found, "mission.declare").reason)
+        found = findings(synchronization=HOLDOVER | {"time_error": 0}, requirements={"declare": ["timing"]})
+        assert row(found, "mission.declare").status == "pass"
+
     def test_how_good_a_setting_must_be_is_said_where_nothing_is_declared(self) -> None:
         found = findings(
             synchronization=HOLDOVER, requirements={"location_error": "1 m"}, allocation={"model": "full"}
@@ -308,6 +322,8 @@ class TestDirectPath:
         (HOLDOVER | {"age": "7.9 s"}, {}, "synchronization.age", "overlaps the aperture of 6 s"),
         (HOLDOVER, {"timing_error": {"constant": "1 ns"}}, "timing_error.constant", "stands beside"),
         (HOLDOVER, {"timing_error": {"linear": "0"}}, "timing_error.linear", "stands beside"),
+        (LINK | {"time_error": 0}, {"timing_error": {"constant": 0}}, "timing_error.constant", "would count twice"),
+        (LINK | {"frequency_error": 0}, {"timing_error": {"linear": 0}}, "timing_error.linear", "would count twice"),
         (HOLDOVER | {"age": "-1 s"}, {}, "synchronization.age", "must be greater than 0 s"),
         ({}, {RECEIVER: OCXO | {"aging": "1e-10"}}, "platforms.receiver.oscillator.aging", "has no unit"),
         ({}, {RECEIVER: OCXO | {"aging": "-1e-10 /day"}}, "platforms.receiver.oscillator.aging", "at least 0"),

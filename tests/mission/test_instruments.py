@@ -108,6 +108,23 @@ def test_a_mask_is_sorted_by_frequency() -> None:
     assert oscillator.phase_noise == ((1.0, -95.0), (1000.0, -150.0))
 
 
+@pytest.mark.parametrize("is_sorted", [True, False])
+def test_a_mask_that_does_not_rise_is_said_to_be_sorted(is_sorted: bool) -> None:
+    points = ["1 Hz: -95 dBc/Hz", "1 kHz: -150 dBc/Hz"]
+    mask = ", ".join(points if is_sorted else reversed(points))
+    text = receiver(f"oscillator: {{frequency: 10 MHz, phase_noise: {{{mask}}}}}")
+    noise = next(one.noise for one in Analysis(parse_mission(text)).random if one.subject.kind == "oscillator")
+    assert ["in another order" in str(note) for note in noise.notes] == [True] * (not is_sorted)
+
+
+def test_a_mask_that_ends_below_its_bandwidth_says_so() -> None:
+    mask = "phase_noise: {1 Hz: -95 dBc/Hz, 1 kHz: -150 dBc/Hz}"
+    for bandwidth, is_said in (("1 kHz", False), ("1.001 kHz", True)):
+        text = receiver(f"oscillator: {{frequency: 10 MHz, {mask}, bandwidth: {bandwidth}}}")
+        noise = next(one.noise for one in Analysis(parse_mission(text)).random if one.subject.kind == "oscillator")
+        assert ["nothing is stated" in str(note) for note in noise.notes] == [True] * is_said
+
+
 @pytest.mark.parametrize(
     ("text", "culprit", "said"),
     [

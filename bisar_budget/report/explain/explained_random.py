@@ -160,7 +160,7 @@ def _with_arm(analysis: Analysis, error: RandomError) -> Iterator[Step]:
         "Published model: both together, the line of sight held",
         *(
             f"{part}/unit = {with_unit(value, unit)}"
-            for part, value in zip(_PARTS[:2], error.published[:2], strict=True)
+            for part, value in zip(_PARTS, error.published[:3], strict=True)
             if value
         ),
     )

@@ -1,0 +1,35 @@
+"""Errors as they are flown once: a vibration by its spectrum, and what is known by its effect alone."""
+
+import numpy as np
+import pytest
+
+from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.mission.load import load_mission, parse_mission
+from bisar_budget.simulate.point import declared_errors
+from tests.conftest import ROOT, mission_text
+
+
+@pytest.mark.parametrize("effect", [{"location_error": "1 m"}, {"cubic_phase_error": "1 deg"}, {"islr": "-40 dB"}])
+def test_what_is_known_by_its_effect_alone_is_in_no_image(effect: dict[str, str]) -> None:
+    """A displacement was looked for at a platform: a fault of the tool."""
+    without, flown = (
+        declared_errors(parse_mission(mission_text(other_errors=others)))
+        for others in ([], [{"name": "a", **effect}])
+    )
+    assert flown.clock_course is None is without.clock_course
+    assert [flown.transmitter, flown.receiver] == [without.transmitter, without.receiver]
+
+
+def test_a_spectrum_is_flown_beside_errors_that_change_slowly() -> None:
+    """The example with a shaking airframe has an inertial sensor too; histories of two lengths were mixed."""
+    mission = load_mission(str(ROOT / "specs" / "missions" / "uav_vibrating_ocxo.yaml"))
+    course = declared_errors(mission).receiver.course
+    assert course is not None
+    assert course.times.shape == course.values.shape[:1]
+    sight = np.array(mission.platforms.receiver.state.look)
+    fast = course.values @ sight - course.smooth(7).values @ sight
+    (error,) = (one for one in Analysis(mission).random if one.id == "receiver.vibration.spectrum")
+    rms = error.full.spread * error.declared * mission.radar.wavelength / (2 * np.pi)
+    noise = next(one for one in Analysis(mission).random if one.id == "receiver.random.GNSS")
+    beside = noise.full.spread * noise.declared * mission.radar.wavelength / (2 * np.pi)
+    assert np.std(fast) == pytest.approx(np.hypot(rms, beside), rel=0.25)  # one draw, and GNSS is slow
