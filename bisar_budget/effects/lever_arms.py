@@ -49,7 +49,7 @@ def swung(axes: Floats, arm: Floats) -> Floats:
 
 
 def lever_arm_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
-    """What attitude does through a platform's arm, declared or not, and how well the arm is known."""
+    """Errors that attitude makes through a platform's arm, declared or not, and errors of the arm itself."""
     error = seen.error(name)
     lever: LeverArm | None = error.lever_arm
     if lever is None:

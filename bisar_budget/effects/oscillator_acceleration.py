@@ -44,7 +44,7 @@ _STARTS = 8  # of exchanges within an interval, over which what they leave of a 
 
 
 class Felt(NamedTuple):
-    """What an oscillator feels: its own vibration, or that of its platform, and its sensitivity. [s²/m]"""
+    """The vibration an oscillator feels, its own or that of its platform, and its sensitivity. [s²/m]"""
 
     vibration: Vibration | FeltVibration
     sensitivity: Any

@@ -171,7 +171,7 @@ class SensorCases:
 
     @cached_property
     def weights(self) -> Floats:
-        """What a metre of range error at each node does, (4, nodes, cases): two phases [rad], east and north. [m]"""
+        """Effects of a metre of range error at each node, (4, nodes, cases): two phases [rad], east and north. [m]"""
         return np.array((*self.exact.phase_weights, *self.exact.place_weights))
 
     @cached_property

@@ -22,7 +22,7 @@ _PLACES = np.linspace(-1.0, 1.0, 9)[:, None]  # of an aperture, in halves of it
 
 
 class LegDelay(NamedTuple):
-    """What correction leaves of the delays on one leg, 1 sigma."""
+    """Delays on one leg that correction leaves, 1 sigma."""
 
     zenith_delay: Annotated[float | None, Key(_ZENITH_DELAY, "Of the troposphere.")] = None
     zenith_electron_content: Annotated[
@@ -41,7 +41,7 @@ _LEG = Section(LegDelay)
 
 
 class Propagation(NamedTuple):
-    """What correction leaves of the delays in the air, 1 sigma: the same for each leg, or of each leg its own."""
+    """Delays in the air that correction leaves, 1 sigma: the same for each leg, or of each leg its own."""
 
     zenith_delay: Annotated[float | None, Key(_ZENITH_DELAY, "Of the troposphere, on each leg.")] = None
     zenith_electron_content: Annotated[
