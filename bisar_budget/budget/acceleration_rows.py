@@ -13,7 +13,7 @@ from bisar_budget.analysis.spread import islr_of
 from bisar_budget.analysis.vibration_limits import tone_limits
 from bisar_budget.budget.judged_rows import BOUND, Judged, Judging, worded
 from bisar_budget.effects.effect import override_notes
-from bisar_budget.effects.oscillator_acceleration import AcceleratedTone, accelerated_tones, felt, flies_a_turn
+from bisar_budget.effects.oscillator_acceleration import accelerated_tones, felt, flies_a_turn
 from bisar_budget.effects.vibration import SLOWEST, cubic_part, quadratic_part
 from bisar_budget.findings.row import Row
 from bisar_budget.mission.instruments import Oscillator
@@ -105,7 +105,7 @@ class AcceleratedRow:
             evidence=evidence(oscillator),
             remarks=(
                 phrases.tone_lies(one.frequency, cycles),
-                phrases.shakes_an_oscillator(_length(mission, one), one.phase),
+                phrases.shakes_an_oscillator(float(one.acceleration), one.phase),
                 *_whose(not _is_own(mission, one.name)),
                 *override_notes(one.name, oscillator.overridden, SENSITIVITY),
             ),
@@ -124,12 +124,6 @@ def _is_own(mission: Mission, name: str) -> bool:
 
 def _whose(is_of_the_platform: bool) -> tuple[Note, ...]:
     return (phrases.vibration_of_the_platform(),) if is_of_the_platform else ()
-
-
-def _length(mission: Mission, one: AcceleratedTone) -> float:
-    """Amplitude of the acceleration of a tone. [m/s²]"""
-    scale = mission.radar.center_frequency * one.left / one.frequency
-    return float(one.per_unit / scale) if scale else 0.0
 
 
 def notes_of_acceleration(mission: Mission, name: str) -> tuple[Note, ...]:

@@ -63,17 +63,18 @@ def felt(mission: Mission, name: str) -> Felt | None:
 
 
 class AcceleratedTone(NamedTuple):
-    """A vibration as an oscillator's tone: platform, entry, frequency [Hz], peak phase by a unit of Γ [rad/(s²/m)].
+    """A vibration as an oscillator's tone: platform, entry, frequency [Hz], amplitude of the acceleration [m/s²].
 
-    `in_quadrature` is the row of the vibration of the platform that makes it, from which it is a quarter of a turn
-    away; None of one along several axes, and of one that the oscillator alone is said to feel. `left` is the part
-    that exchanged pulses leave.
+    `free` is the peak phase by a unit of Γ of a free oscillator [rad/(s²/m)], `left` what the synchronization leaves
+    of it. `in_quadrature` is the row of the vibration of the platform that makes it, from which it is a quarter of a
+    turn away; None of one along several axes, and of one that the oscillator alone is said to feel.
     """
 
     name: str
     entry: int
     frequency: Any
-    per_unit: Any
+    acceleration: Any
+    free: Any
     sensitivity: Any
     left: Any
     in_quadrature: str | None
@@ -82,6 +83,11 @@ class AcceleratedTone(NamedTuple):
     def subject(self) -> Subject:
         """That of its row."""
         return subject(self.name, "oscillator", "acceleration", entry=self.entry)
+
+    @property
+    def per_unit(self) -> Any:
+        """Peak phase at the centre frequency by a unit of Γ. [rad/(s²/m)]"""
+        return self.free * self.left
 
     @property
     def phase(self) -> Any:
@@ -101,16 +107,13 @@ def accelerated_tones(mission: Mission, geometry: BistaticGeometry | None = None
             continue
         for index, line in enumerate(one.vibration.sinusoidal):
             left = left_of_tone(line.frequency, mission, geometry or mission.geometry)
-            phase = mission.radar.center_frequency * _length(line.acceleration) / line.frequency * left
+            a = norm(line.acceleration) if isinstance(line.acceleration, tuple) else line.acceleration
+            free = mission.radar.center_frequency * a / line.frequency
             # Axes may vibrate in any phase: then a quarter of a turn is not certain.
             is_apart = one.is_own or isinstance(line.amplitude, tuple)
             shared = None if is_apart else subject(name, "vibration", "sinusoidal", entry=index).id
-            found.append(AcceleratedTone(name, index, line.frequency, phase, one.sensitivity, left, shared))
+            found.append(AcceleratedTone(name, index, line.frequency, a, free, one.sensitivity, left, shared))
     return found
-
-
-def _length(acceleration: Any) -> Any:
-    return norm(acceleration) if isinstance(acceleration, tuple) else acceleration
 
 
 def oscillator_acceleration(seen: SensorCases, name: str) -> Iterator[RandomError]:

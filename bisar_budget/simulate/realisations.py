@@ -413,10 +413,9 @@ class _Bend:
         self.state = getattr(mission.platforms, name).state
         self.turns = not mission.has_direct_path and flies_a_turn(mission, name)
         sync = mission.synchronization
-        is_linked = sync is not None and sync.interval is not None
-        # What exchanges leave of a tone is in its phase already.
+        is_linked = sync is not None and sync.interval is not None  # what exchanges leave is drawn
         self.slow = [
-            (one.frequency, one.per_unit / one.left if is_linked and one.left else one.per_unit)
+            (one.frequency, one.free if is_linked else one.per_unit)
             for one in accelerated_tones(mission)
             if one.name == name and one.frequency * T < SLOWEST
         ]

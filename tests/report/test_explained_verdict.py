@@ -298,3 +298,33 @@ class TestRequirements:
         result = run("check", "-", "--explain", asked, input=mission_text())
         assert result.exit_code == 2
         assert hint in result.stderr
+
+
+class TestAcceleratedTone:
+    """The tone of an oscillator that vibrates, of which a direct path leaves 2·sin(πfΔt)."""
+
+    def test_with_a_direct_path_no_pulses_are_spoken_of(self) -> None:
+        mission = parse_mission("""
+schema_version: 1
+name: heard
+radar: {center_frequency: 10 GHz, bandwidth: 150 MHz}
+collection: {aperture_time: 2 s}
+platforms:
+  transmitter:
+    position: [30 km, 4 km, 9 km]
+    velocity: [0 m/s, 180 m/s, 0 m/s]
+    oscillator: {frequency: 10 MHz, power_law: {h0: 1e-30}}
+  receiver:
+    position: [820 m, 1419 m, 1147 m]
+    velocity: [-33.8 m/s, 9 m/s, 0 m/s]
+    motion_error: {vibration: {sinusoidal: [{frequency: 20 Hz, amplitude: 0.1 g}]}}
+    oscillator: {frequency: 10 MHz, power_law: {h0: 1e-30}, acceleration_sensitivity: 1e-9 /g}
+synchronization: {method: direct_path, error: 1 deg}
+requirements: {quadratic_phase_error: 45 deg, pslr: -20 dB}
+""")
+        text = explained(mission, "receiver.oscillator.acceleration.0")
+        assert "pulses" not in text
+        path = sum(math.dist(one, (0, 0, 0)) for one in ((30e3, 4e3, 9e3), (820, 1419, 1147)))
+        delay = (path - math.dist((30e3, 4e3, 9e3), (820, 1419, 1147))) / 299792458
+        # 1e-9 per g, 0.1 g and 20 Hz at 10 GHz: 0.05 rad of a free oscillator.
+        assert values(text)["φ"] == pytest.approx(0.05 * 2 * math.sin(math.pi * 20 * delay), rel=1e-4)

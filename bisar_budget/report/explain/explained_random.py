@@ -641,7 +641,7 @@ def explained_spur(mission: Mission, allocation: Allocation, row: Row) -> Iterat
     title = "At the centre frequency; an echo has the amplitude of the sideband"
     if left != 1:
         values, formula = {**values, "left": left}, f"{formula} + 20*log(left)/log(10)"
-        title += ", of which the exchanged pulses leave a part"
+        title += ", times what the synchronization leaves of it"
     yield from step(title, *equation("declared", formula, values, row.declared or 0.0, "dB"))
     limits = tone_limits(mission, allocation)[1].get(row.owner)
     if limits is None or row.allowable is None:

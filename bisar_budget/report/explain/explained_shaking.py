@@ -137,8 +137,7 @@ def explained_tone(mission: Mission, allocation: Allocation, row: Row) -> Iterat
     is_own = felt_one is not None and felt_one.is_own
     section = ("oscillator",) if is_own else ("motion_error",)
     path = ("platforms", name, *section, "vibration", "sinusoidal", entry, "amplitude")
-    scale = f_0 * one.left / one.frequency
-    a = one.per_unit / scale
+    a = float(one.acceleration)
     gamma = ("platforms", name, "oscillator", "acceleration_sensitivity")
     yield from step(f"Γ, declared in {place(mission, gamma)}", f"Γ = {with_unit(one.sensitivity, 's^2/m')}")
     if row.evidence:
@@ -150,7 +149,7 @@ def explained_tone(mission: Mission, allocation: Allocation, row: Row) -> Iterat
     title = "Derived: peak phase of the tone, a quarter of a turn from the motion itself"
     if one.left != 1:
         values, formula = {**values, "left": one.left}, f"{formula}*left"
-        title += ", of which the exchanged pulses leave a part"
+        title += ", times what the synchronization leaves of it"
     yield from step(title, *equation("φ", formula, values, one.phase, "rad"))
     if one.phase:
         level = 20 * math.log10(one.phase / 2)
