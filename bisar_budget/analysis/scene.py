@@ -316,7 +316,7 @@ def _climbed(height_at: HeightAt, sides: tuple[Floats, Floats], start: Heights, 
     Linear in the radius, a height is a constant and a cosine of the azimuth. Where its crest does not tell what is
     found there, that is looked for again in a quarter of the arc.
     """
-    found, here, some = start, start, np.arange(start.height.size)
+    found, here, some = Heights(*map(np.array, start)), start, np.arange(start.height.size)
     for _ in range(CLIMBS):
         if not some.size:
             break

@@ -13,12 +13,14 @@ import threading
 
 import pytest
 
-from bisar_budget.faults import MissionError
+from bisar_budget.budget.check import check_mission
+from bisar_budget.faults import MissionError, SetValue
 from bisar_budget.findings.mission import Report
 from bisar_budget.geometry import BistaticGeometry, PlatformState
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.report import Style, render
-from tests.conftest import ROOT, findings, heed_signals, mission_text, row
+from tests.conftest import ROOT, TODAY, findings, heed_signals, mission_text, row
+from tests.families import mission_text as of_family
 
 COMMAND = [sys.executable, "-m", "bisar_budget"]
 ERROR = "platforms__transmitter__motion_error"
@@ -307,3 +309,13 @@ def test_cross_range_resolution_of_gradients_that_are_not_at_right_angles() -> N
     ]
     cycles_per_metre = abs(turned[1] - turned[0]) / 0.03 / step
     assert pair.cross_range_resolution(0.03, T) == pytest.approx(1 / cycles_per_metre, rel=2e-3)
+
+
+def test_errors_of_a_covariance_that_none_is_large_beside_have_a_scene_edge() -> None:
+    """The climb along the scene's edge wrote into numbers that all circles share, and the check ended in a crash."""
+    with_covariance = SetValue(
+        "platforms.receiver.motion_error",
+        "{covariance: {position: [1 m, 1 m, 2 m], velocity: 5 mm/s, correlation: {position.x-velocity.x: 0.6}}}",
+    )
+    mission = parse_mission(of_family("satellite_aircraft", 96), "m.yaml", changes=[with_covariance])
+    assert check_mission(mission, TODAY).status == "pass"
