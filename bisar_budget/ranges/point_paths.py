@@ -24,7 +24,7 @@ FINEST_STEP = 1e-6  # where the gradients stay apart, the way only turns
 OF_FOLD = 0.8  # of the way to where the gradients seem to become parallel, that one step makes
 SHORT = 0.1  # of the last step, below which that step says little of the way left
 FOLDS = 0.1  # of what the gradients span at the centre; a way that ends at more of it does not end in a fold
-NEAR_FOLD = 0.06  # likewise; nearer, the square of what they span is a straight line
+NEAR_FOLD = 0.03  # likewise; nearer, the square of what they span is a straight line
 CLOSE = 1e-5  # of a limit, where a search ends
 ALMOST = 0.002  # of a limit, from where a curve leads to it
 CREST = 0.01  # of a limit: so little below it, the crest of a curve through few points may be above
@@ -34,7 +34,11 @@ GROWTH = 1.5  # of a size in a step
 ROUNDS = 100  # of a search; none is known that takes more than 25
 NEWTON = 3  # steps on a cubic
 FEW = 256  # lanes: of so few, several points cost as much as one
-LADDER = np.array((0.25, 0.5, 0.75, 1.0, 1.3))  # of the size that is looked at first, where nothing is known
+LADDER = np.array((0.25, 0.5, 0.75, 1.3, 2.0))  # of the way to the size that is looked at first
+BESIDE = np.array((0.98, 0.996, 1.004, 1.02))  # of a size at which a limit is likely to be reached
+MORE = GROWTH ** np.arange(1, 5)  # of a size in a step, that are tried too
+EARLY = 0.125  # of a size, at which the way tells how it bends from no error on
+PARTS = np.array((0.25, 0.5, 1.2, 2.0, 4.0))  # of a step that are tried too
 
 QUADRATIC, CUBIC, WAY = range(3)  # what is held to a limit: a phase, or the way to the point
 # Rows of a known point: size, east, north, quadratic, cubic, turn.
@@ -109,6 +113,7 @@ class PointPaths:
         self._known = np.full((6, count, 2), math.inf)  # by size; infinite where there is none
         self._known[:, :, 0] = _NO_ERROR[:, None]
         self._step = np.full(count, math.inf)  # the longest that is tried
+        self._step_from = np.zeros(count)  # where: from sizes that are no smaller
         self._is_lost = np.zeros(count, dtype=bool)  # whether the last one led nowhere
 
     def _at(self, index: Places, some: Places) -> Floats:
@@ -138,13 +143,17 @@ class PointPaths:
         index = (self._known[0, some] < size[:, None]).sum(axis=1) - 1
         last = self._at(index, some)
         fold = self._to_fold(index, some, last)
-        step = np.minimum(self._step[some], np.where(fold > FINEST_STEP * last[0], OF_FOLD * fold, math.inf))
+        longest = np.where(last[0] >= self._step_from[some], self._step[some], math.inf)
+        step = np.minimum(longest, np.where(fold > FINEST_STEP * last[0], OF_FOLD * fold, math.inf))
         # A little beyond a step is one step too; but where that led nowhere, it would again.
-        is_short = size - last[0] >= np.where(self._is_lost[some], 1.0, 1.2) * step
-        size = np.where(is_short, last[0] + step, size)
-        if is_few(some.size, self._is_alike) and is_short.any():  # and to half of it
-            size = np.concatenate((size, (last[0] + step / 2)[is_short]))
-            some, index, fold = (np.concatenate((one, one[is_short])) for one in (some, index, fold))
+        is_short = size - last[0] >= np.where(self._is_lost[some] & np.isfinite(longest), 1.0, 1.2) * step
+        asked, size = size, np.where(is_short, last[0] + step, size)
+        if is_few(some.size, self._is_alike) and is_short.any():
+            more = (last[0] + np.multiply.outer(PARTS, step))[:, is_short]
+            size = np.concatenate((size, _upto(more, asked[is_short]).ravel()))
+            some, index, fold = (
+                np.concatenate((one, np.tile(one[is_short], PARTS.size))) for one in (some, index, fold)
+            )
         order = np.lexsort((size, some))
         lane, before = some[order], size[order]
         is_new = np.ones(order.size, dtype=bool)
@@ -156,11 +165,16 @@ class PointPaths:
         found = self.exact.phases(self.lanes.of(some), size, near)
         point = np.array((size, *found[1:]))
         is_on = found.is_found & _is_on_the_way(last, point, near)
+        begins = np.ones(some.size, dtype=bool)
+        begins[1:] = (some[1:] != some[:-1]) | (index[1:] != index[:-1])
+        later = np.flatnonzero(~begins & ~is_on & found.is_found)
+        if later.size:  # which the steps before lead to as well
+            one, two = point[:, later - 1], np.where(begins[later - 1], last[:, later], point[:, later - 2])
+            earlier = np.where(begins[later - 1], self._at(np.maximum(index - 1, 0), some)[:, later], last[:, later])
+            is_on[later] = _is_on_the_way(one, point[:, later], _through(earlier, two, one, size[later]))
         is_end = is_on & (np.abs(point[5]) < PARALLEL)
 
         # Of several steps from one known point those count that come before the first that leads nowhere.
-        begins = np.ones(some.size, dtype=bool)
-        begins[1:] = (some[1:] != some[:-1]) | (index[1:] != index[:-1])
         is_bad = ~is_on | is_end
         missed = np.cumsum(is_bad)
         missed = missed - (missed - is_bad)[np.maximum.accumulate(np.where(begins, np.arange(some.size), 0))]
@@ -170,19 +184,20 @@ class PointPaths:
         if stops.any():
             before = np.where(begins, last, np.roll(point, 1, axis=1))
             fold = np.where(begins & ~found.is_found, fold, math.inf)
-            self._stop(some[stops], point[:, stops], before[:, stops], fold[stops], is_end[stops])
+            went = before[0] - last[0]
+            self._stop(some[stops], point[:, stops], before[:, stops], went[stops], fold[stops], is_end[stops])
         self._insert(some[is_kept], point[:, is_kept])
 
-    def _stop(self, some: Places, point: Floats, before: Floats, fold: Floats, is_end: Truths) -> None:
+    def _stop(self, some: Places, point: Floats, before: Floats, went: Floats, fold: Floats, is_end: Truths) -> None:
         """Note ends of ways where a step led nowhere, or go on in shorter ones from the known points before."""
         end = _parallel_between(before, point)
-        step = np.where(is_end, 0.9 * (end - before[0]), (point[0] - before[0]) / 2)
+        step = np.where(is_end, 0.9 * (end - before[0]), np.maximum((point[0] - before[0]) / 2, went))
         is_fold = (np.abs(before[5]) < FOLDS) & (fold < LEAST_STEP * point[0])
         is_near = is_end & (np.abs(before[5]) < NEAR_FOLD)
         is_over = ~is_near & ((is_fold & ~is_end) | (step < FINEST_STEP * point[0]))
         self.end[some[is_near]] = end[is_near]
         self.end[some[is_over]] = (before[0] + np.minimum(step, fold))[is_over]
-        self._step[some], self._is_lost[some] = step, True
+        self._step[some], self._step_from[some], self._is_lost[some] = step, before[0], True
 
     def _insert(self, some: Places, point: Floats) -> None:
         """Note known points, by lane and size."""
@@ -201,10 +216,16 @@ class PointPaths:
             self._known[:, lane, :needed] = np.take_along_axis(here, order[None], axis=2)
 
     def _to_fold(self, index: Places, some: Places, last: Floats) -> Floats:
-        before = self._at(np.maximum(index - 1, 0), some)
-        square, earlier, step = last[5] ** 2, before[5] ** 2, last[0] - before[0]
-        fold = np.where(square < earlier, square * step / (earlier - square), math.inf)
-        return np.where((index > 0) & (fold > SHORT * step), fold, math.inf)
+        """Way left to where the square of what gradients span is nothing by a parabola; infinite where nowhere."""
+        before, earlier = (self._at(np.maximum(index - back, 0), some) for back in (1, 2))
+        step, step_before = last[0] - before[0], before[0] - earlier[0]
+        square, square_before = last[5] ** 2, before[5] ** 2
+        falls = (square_before - square) / step
+        bend = ((earlier[5] ** 2 - square_before) / step_before - falls) / (step + step_before)
+        bend = np.where(index > 1, bend, 0.0)
+        falls = falls - bend * step
+        fold = 2 * square / (falls + np.sqrt(np.maximum(falls * falls - 4 * bend * square, 0.0)))
+        return np.where((index > 0) & (falls > 0) & (fold > SHORT * step), fold, math.inf)
 
     def _guess(self, index: Places, some: Places, last: Floats, size: Floats) -> tuple[Floats, Floats]:
         """Where known points lead: by a parabola from no error on where the way so far was nearly straight."""
@@ -213,18 +234,34 @@ class PointPaths:
         part = np.where(index > 0, (size / last[0]) ** 2, 0.0)
         is_straight = np.hypot(*bent) <= STRAIGHT * np.hypot(last[1], last[2])
         east, north = u * size + bent[0] * part, v * size + bent[1] * part
+        fresh = np.flatnonzero(index == 0)
+        if fresh.size:  # the way bends from its start as it does to a little error
+            early, to_east, to_north = EARLY * size[fresh], u[fresh], v[fresh]
+            way = self._way_at(some[fresh], np.array((early, to_east * early, to_north * early)))
+            half = size[fresh] / (2 * EARLY)
+            east[fresh] += half * (way[0] - to_east)
+            north[fresh] += half * (way[1] - to_north)
         bends = np.flatnonzero(~is_straight | (self._is_lost[some] & (index > 0)))
         if bends.size:
             east[bends], north[bends] = self._ahead(index[bends], some[bends], last[:, bends], size[bends])
         return (east, north)
 
     def _ahead(self, index: Places, some: Places, last: Floats, size: Floats) -> tuple[Floats, Floats]:
-        """Where known points lead along the way of the last, which bends as it did."""
+        """Where known points lead along the way of the last, which bends as it did.
+
+        It bends with the size or, near a fold, with the root of what is left to it.
+        """
         before = self._at(np.maximum(index - 1, 0), some)
         both = self._way_at(np.tile(some, 2), np.concatenate((last, before), axis=1))
-        (u, p), (v, q) = (part.reshape(2, -1) for part in both)
-        step = size - last[0]
-        bend = np.where(index > 0, step / (2 * (last[0] - before[0])), 0.0)
+        fold = last[0] + self._to_fold(index, some, last)
+        near, here, there = (
+            np.where(np.isfinite(fold), -np.sqrt(np.maximum(fold - one, 0.0)), one)
+            for one in (size, last[0], before[0])
+        )
+        of_here, of_there = (np.where(np.isfinite(fold), -2 * one, 1.0) for one in (here, there))
+        step = near - here
+        bend = np.where(index > 0, step / (2 * (here - there)), 0.0)
+        (u, p), (v, q) = (part.reshape(2, -1) * (of_here, of_there) for part in both)
         return last[1] + (u + bend * (u - p)) * step, last[2] + (v + bend * (v - q)) * step
 
     def _way_at(self, some: Places, known: Floats) -> tuple[Floats, Floats]:
@@ -288,7 +325,7 @@ class _SearchState:
         is_past, ends = self.low >= upto, np.isfinite(end)
         self.is_sure = np.isnan(self.doubtful).all(axis=1)
         self.is_sure &= np.where(self.is_between, is_close, ends | is_ahead) | is_past
-        found = np.where(self.is_between, self.between, np.where(ends, end, self.ahead))
+        found = np.where(self.is_between, self.between, np.minimum(end, self.ahead))
         self.found = np.where((found <= upto) & ~is_past, found, math.inf)
 
     def _slopes(self, every: Places) -> None:
@@ -329,7 +366,7 @@ class _SearchState:
             steep = begins + part * (2 * (3 * (b - a) - 2 * begins - ends) + 3 * part * (begins + ends - 2 * (b - a)))
             part = part - (_on_cubic(part, a, b - a, begins, ends) - 1) / steep
             part = np.where((part >= 0) & (part <= 1), part, chord)
-        found = top - (1 - part) * width
+        self.top, found = top, top - (1 - part) * width
         is_narrow = width <= CLOSE * top
         is_close = (b - 1 < ALMOST) & (top - found < 2 * ALMOST * top)
         is_close |= (1 - a < ALMOST) & (found - (top - width) < 2 * ALMOST * top)
@@ -353,7 +390,6 @@ class _SearchState:
     def next(self, going: Places, *, is_few: bool) -> tuple[Places, Floats]:
         """Sizes to look at next in the searches that go on: of many one each, and one a lane."""
         low, upto = self.low[going], self.upto[going]
-        is_fresh = self.count[going] == 1
         grown = np.minimum(np.maximum(self.ahead[going], 1.01 * low), GROWTH * low)
         is_before = low < self.held.first[going]
         ahead = np.where(is_before, self.held.first[going], grown)
@@ -366,14 +402,25 @@ class _SearchState:
             lane = self.held.lane[going][order]
             order = order[np.append(True, np.diff(lane) > 0)]
             return going[order], size[order]
-        size = np.where((low < upto) | self.is_between[going], size, math.nan)
-        is_growing = ~is_before & ~self.is_between[going] & (grown >= GROWTH * low)
-        more = np.where(is_growing, GROWTH, math.nan)[:, None] * size[:, None] * np.array((1.0, GROWTH))
-        rungs = np.where(is_fresh[:, None], size[:, None] * LADDER, math.nan)
-        sizes = np.concatenate((size[:, None], doubtful, more, rungs), axis=1)
-        sizes = np.where(self.is_between[going][:, None], sizes, np.minimum(sizes, upto[:, None]))
+        is_between, begins = self.is_between[going][:, None], low[:, None]
+        size = np.where((low < upto) | self.is_between[going], size, math.nan)[:, None]
+        is_beside = is_between & (begins < size * BESIDE) & (size * BESIDE < self.top[going][:, None])
+        is_growing = ~is_between & (~is_before & (grown >= GROWTH * low))[:, None]
+        is_rung = ~is_between & is_before[:, None]
+        more = (
+            np.where(is_beside, size * BESIDE, math.nan),
+            np.where(is_growing, size * MORE, math.nan),
+            np.where(is_rung, begins + (size - begins) * LADDER, math.nan),
+        )
+        sizes = np.concatenate((size, doubtful, *more), axis=1)
+        sizes = np.where(is_between, sizes, _upto(sizes, upto[:, None]))
         place, column = np.nonzero(np.isfinite(sizes))
         return going[place], sizes[place, column]
+
+
+def _upto(size: Floats, most: Floats) -> Floats:
+    """Sizes, but none beyond a largest, and none that is hardly less."""
+    return np.where(size > (1 - CLOSE) * most, most, size)
 
 
 def _is_on_the_way(last: Floats, found: Floats, near: tuple[Floats, Floats]) -> Truths:
@@ -382,6 +429,15 @@ def _is_on_the_way(last: Floats, found: Floats, near: tuple[Floats, Floats]) -> 
     led = np.maximum(np.hypot(found[1] - last[1], found[2] - last[2]), led)
     is_on: Truths = stray <= STRAY * led + FLOOR_M
     return is_on
+
+
+def _through(a: Floats, b: Floats, c: Floats, size: Floats) -> tuple[Floats, Floats]:
+    """Where the parabola through three known points leads, or the straight line through two."""
+    part = (size - c[0]) / (c[0] - b[0])
+    bend = np.where(a[0] < b[0], (size - b[0]) / (c[0] - a[0]), 0.0) * part
+    known = np.where(a[0] < b[0], (b[1:3] - a[1:3]) / (b[0] - a[0]) * (c[0] - b[0]), 0.0)
+    east, north = c[1:3] + (c[1:3] - b[1:3]) * part + (c[1:3] - b[1:3] - known) * bend
+    return east, north
 
 
 def _parallel_between(before: Floats, beyond: Floats) -> Floats:

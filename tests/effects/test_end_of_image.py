@@ -125,7 +125,7 @@ def test_the_explanation_says_what_it_means(aircraft: MissionFindings) -> None:
     assert aircraft.mission is not None
     text = " ".join(explain(aircraft.mission, aircraft, OVER).split())
     assert "End of the image: no ground point has the range history of a larger error" in text
-    assert "by_image = 10.7993 m" in text
+    assert "by_image = 10.799" in text
     assert "Allowable: the smallest, by by_image" in text
     other = explain(aircraft.mission, aircraft, "receiver.acceleration.y")
     assert "End of the image" not in other
