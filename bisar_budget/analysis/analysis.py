@@ -61,6 +61,8 @@ class Analysis:
         Ids of rows of which the allowable is asked though nothing is declared; omitted: all.
     is_whole : bool
         All of each row is asked for, not only what decides; a case is then the same however many there are.
+    is_of_sums : bool
+        Only what errors add up to is asked for: one that counts in a sum needs no allowable of its own.
     """
 
     def __init__(
@@ -72,8 +74,10 @@ class Analysis:
         nodes: int | None = None,
         shown: Mapping[str, Subject] | None = None,
         is_whole: bool = False,
+        is_of_sums: bool = False,
     ) -> None:
         self.mission, self.cases, self.nodes, self.shown = mission, cases, nodes, shown
+        self.is_of_sums = is_of_sums and mission.allocation.combine != "each"
         self.is_by_itself, self.is_whole = geometry is None, is_whole
         self.geometry = mission.geometry if geometry is None else geometry
 

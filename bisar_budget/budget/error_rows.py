@@ -37,6 +37,7 @@ class ErrorRows:
     def __init__(self, judging: Judging, analysis: Analysis, limits: Mapping[str, Floats]) -> None:
         self.judging, self.errors, self.limits = judging, analysis.errors, limits
         self.gain = judging.array(analysis.allocation.autofocus_gain)
+        self.is_of_sums = analysis.is_of_sums
 
     def rows(self, gating: str, other: str) -> Iterator["ErrorRow"]:
         """Rows by one model, which the other may doubt."""
@@ -50,7 +51,8 @@ class ErrorRows:
         held = (limit, needs.cubic_phase_error, needs.location_error)
         # Searches start from what declared errors are known to do.
         mine, theirs = errors.of_block(gating, place), errors.of_block(other, place)
-        allowed = block.allowed(gating, held, is_whole=is_whole)
+        searched = (None, None, None) if self.is_of_sums else held
+        allowed = block.allowed(gating, searched, is_whole=is_whole)
         published, full = (mine, theirs) if gating == "published" else (theirs, mine)
         is_again = np.array([[not source.is_independent] for source in sources])
         judged = self.judging.row(

@@ -97,15 +97,19 @@ def tree_of(mission: Mission) -> dict[str, Any]:
     return root
 
 
-def number_of(tree: dict[str, Any], key: str, of_all: str = "") -> Number:
+def number_of(tree: dict[str, Any], key: str, of_all: str = "", *, is_for_each: bool = False) -> Number:
     """Find the number that a key names; a scalar that stands for each axis is one.
 
-    `tree` is what the file says, as text, `of_all` what else is accepted where a key has three numbers. A
-    `QuestionError` says that there is no such key, or no number.
+    `tree` is what the file says, as text, `of_all` what else is accepted where a key has three numbers. Where one is
+    looked for that is to stand for each axis, the largest of three in the file is its value. A `QuestionError` says
+    that there is no such key, or no number.
     """
     reader, value = _found(tree, key)
     reader = form_of(reader, value)
     if isinstance(reader, Triple):
+        if is_for_each and reader.or_scalar and isinstance(value, list):
+            of_each = [as_number(key, reader.component, one) for one in value]
+            return max(of_each, key=lambda one: abs(one.value or 0.0))
         if isinstance(value, list) or not reader.or_scalar:
             more = of_all if reader.or_scalar else ""
             raise QuestionError(f"{key}: has three components; accepted: {key}.0, .1 or .2{more}")

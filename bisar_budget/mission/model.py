@@ -38,6 +38,7 @@ from bisar_budget.mission.readers import (
     Text,
     TextMap,
     Version,
+    Weights,
     Whole,
     Words,
 )
@@ -309,6 +310,13 @@ class AllocationRules(NamedTuple):
     warn_above: Annotated[
         float, Key(Quantity(units.RATIO, gt=0, le=1), "Utilization above which a pass becomes a warning.")
     ] = 0.8
+    specify: Annotated[
+        Mapping[str, float],
+        Key(
+            Weights(),
+            "Keys of the errors that `bisar-budget allocate` specifies, each with its weight, or a list of keys.",
+        ),
+    ] = {}
 
 
 class Autofocus(NamedTuple):

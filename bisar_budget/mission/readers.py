@@ -352,6 +352,40 @@ class TextMap(Reader):
         return {"type": "object", "additionalProperties": Label().schema(definitions), "maxProperties": _MAX_IDS}
 
 
+_WEIGHT = Quantity(units.RATIO, gt=0, ge=1e-6, le=1e6)
+
+
+class Weights(Reader):
+    """Keys of the file with a weight above 0 each, or a list of keys, whose weights are 1."""
+
+    def read(self, value: Any, path: KeyPath, report: Report) -> Any:
+        """Read each key and weight at its own place."""
+        if not isinstance(value, dict | list):
+            report(path, Problem("must be keys with their weights, or a list of keys"))
+            return INVALID
+        if len(value) > _MAX_IDS:
+            report(path, Problem(f"must have at most {_MAX_IDS} entries, has {len(value)}"))
+            return INVALID
+        if isinstance(value, list):
+            names = [_read(Text(), name, (*path, place), report) for place, name in enumerate(value)]
+            twice = [place for place, name in enumerate(names) if name in names[:place]]
+            for place in twice:
+                report((*path, place), Problem("stands twice", "accepted: each key once"))
+            return INVALID if twice or any(name is INVALID for name in names) else dict.fromkeys(names, 1.0)
+        weights = {key: _read(_WEIGHT, weight, (*path, key), report) for key, weight in value.items()}
+        return INVALID if any(weight is INVALID for weight in weights.values()) else weights
+
+    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
+        """Object of numbers, or array of text."""
+        label, weight = Label().schema(definitions), _WEIGHT.schema(definitions)
+        return {
+            "anyOf": [
+                {"type": "object", "additionalProperties": weight, "maxProperties": _MAX_IDS},
+                {"type": "array", "items": label, "maxItems": _MAX_IDS},
+            ]
+        }
+
+
 class Section(Reader):
     """A mapping with known keys, read into a `NamedTuple`; an unknown key is an error.
 
@@ -547,7 +581,6 @@ LATER: Mapping[str, Mapping[str, str]] = {
     "TrajectorySource": dict.fromkeys(
         ("time_scale", "geoid_separation"), f"{_LEAVE}; a log in CSV has UTC, and heights above the ellipsoid"
     ),
-    "AllocationRules": {"specify": _LEAVE},
     "Mission": {"earth_orientation": f"{_LEAVE}; UT1 is taken to be UTC"},
 }
 LATER_FORMATS: Mapping[str, str] = dict.fromkeys(("pos", "nmea", "gpx", "ulog"), NOT_COMPUTED)

@@ -1,0 +1,569 @@
+"""Specifications that hold together: the largest sizes of errors with which a mission meets every requirement.
+
+Each row of the budget that can fail is held to what it may use. What an error adds to it is a power of the size: the
+square where errors combine by root-sum-square or powers add, the size itself where they add up. So much room as is
+left by the other errors is divided among the specified ones, so that the sum of weight·log(size) is largest
+(`geometric_program`). Errors of any size are followed by exact ranges: what each adds is seen by whole checks, of a
+fifth more and a fifth less of it, at the sizes found before, until these change no more. Values in SI and radians.
+"""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from datetime import date
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.budget.check import check_mission
+from bisar_budget.budget.judged_mission import JudgedMission, judged_mission
+from bisar_budget.budget.judged_requirements import SMALL_RAD, TENTH
+from bisar_budget.budget.judged_rows import CODE, REQUIREMENTS, Why
+from bisar_budget.design.geometric_program import Rows, largest_sizes
+from bisar_budget.design.quantities import QuestionError, tree_of
+from bisar_budget.design.specified import ACCEPTED, Specified, specified_errors
+from bisar_budget.design.table import Variation
+from bisar_budget.design.varied import is_held, varied
+from bisar_budget.effects.declared import CUBIC, END_OF_IMAGE, LOCATION, QUADRATIC
+from bisar_budget.faults import MissionError, SetValue
+from bisar_budget.findings.mission import MissionFindings
+from bisar_budget.findings.requirement import JudgedRequirement, Override
+from bisar_budget.mission.changes import parts_of
+from bisar_budget.mission.load import folder_of
+from bisar_budget.mission.model import MetricSplits, Mission
+from bisar_budget.mission.parts import Entry, PartError, entries, folders
+from bisar_budget.ranges.exact_ranges import Floats, Truths
+from bisar_budget.workers import Progress, unseen
+
+BESIDE = (0.8, 1.2)  # of a size, at which it is seen what an error adds
+CHANGES = 1e-4  # of a size: less ends the search
+ROUNDS = 20  # of it; four are enough where effects are proportional to errors
+_FARTHEST = 3.0  # of what a row may use, up to which a step of the search may go
+_SHORT_OF_END = 0.995  # of the size from which there is no image: that is found to 0.1 %
+_CLOSE = 1e-9  # of what a row may use
+_NOTHING = 1e-13  # of a row: what rounding leaves of it
+NEGLIGIBLE = "negligible"  # begins the ids of effects that no requirement takes
+_WARN_ONLY = ("autofocus_pull_in", "spatial_variance")  # kinds of rows that warn and never fail
+
+
+# ---------------------------------------------------------------- what is found
+class Specification(NamedTuple):
+    """The largest size of one error, and what is to be ordered.
+
+    `value` is the size as found, `ordered` the same rounded down, `text` that as the file would have it; None, and
+    empty, where no requirement limits it. `declared` is what the file has today, the largest of three axes. `shares`
+    are the parts of what each requirement may use, by its row in which the error takes most of it. `parts` are those
+    of the catalogue that keep to what is ordered.
+    """
+
+    key: str
+    weight: float
+    unit: str
+    value: float | None
+    ordered: float | None
+    text: str
+    declared: float | None
+    declared_text: str
+    shares: Mapping[str, float]
+    parts: tuple[str, ...] = ()
+
+
+class RowUse(NamedTuple):
+    """How one row that can fail is used by the sizes as found.
+
+    `requirement` judges it; None: the effect has no requirement, and must stay negligible. `used` is its utilization,
+    `allowed` what it may be; `fixed` is the part of that which all other errors take, `shares` those of the specified
+    ones. `multiplier` says what the row is worth: Σ multiplier·share over rows is the weight of each error.
+    """
+
+    id: str
+    requirement: str | None
+    used: float
+    allowed: float
+    fixed: float
+    shares: Mapping[str, float]
+    multiplier: float
+
+
+class Broken(NamedTuple):
+    """A row that the other errors leave no room in, by its requirement, with what they use of it."""
+
+    id: str
+    requirement: str | None
+    used: float
+    allowed: float
+
+
+class Sheet(NamedTuple):
+    """Specifications of one mission that hold together.
+
+    `status` is that of the check with what is ordered in place, and `requirements` how each then stands. `rows` are
+    those that limit a specification, `broken` those in which there is no room: then there are no values. `reserve` is
+    the part of every limit that is kept free. `notes` say what was taken otherwise than the file has it. `findings`
+    are those of the check.
+    """
+
+    file: str
+    name: str
+    model: str
+    combine: str
+    status: str
+    reserve: float
+    requirements: tuple[JudgedRequirement, ...]
+    specifications: tuple[Specification, ...]
+    rows: tuple[RowUse, ...]
+    broken: tuple[Broken, ...] = ()
+    notes: tuple[str, ...] = ()
+    changes: tuple[SetValue, ...] = ()
+    overrides: tuple[Override, ...] = ()
+    findings: MissionFindings | None = None
+
+    @property
+    def complies(self) -> bool:
+        """Whether the mission meets every requirement with what is ordered."""
+        return not self.broken and self.status not in ("fail", "not_evaluated", "error")
+
+    @property
+    def ordered(self) -> tuple[SetValue, ...]:
+        """What the mission file has to say so that `check` holds it to what is ordered."""
+        return tuple(SetValue(one.key, one.text) for one in self.specifications if one.text)
+
+
+# ---------------------------------------------------------------- the search
+def allocate(
+    mission: Mission,
+    *,
+    keys: Mapping[str, float] | None = None,
+    reserve: float | None = None,
+    model: str | None = None,
+    today: date,
+    progress: Progress = unseen,
+) -> Sheet:
+    """Find the largest sizes of errors with which a mission, as a whole, meets every requirement.
+
+    Parameters
+    ----------
+    mission : Mission
+        As loaded. Its split, combination, coverage, autofocus and model hold; waivers do not count.
+    keys : mapping of str to float, optional
+        Keys of the errors to specify, with their weights; omitted: those of `allocation.specify`, else the usual.
+    reserve : float, optional
+        Part of every limit that is kept free; omitted: what `allocation.warn_above` leaves.
+    model : str, optional
+        Gating model in place of the mission's own.
+    today : date
+        Day of the check.
+    progress : callable, optional
+        Is told how many rounds are done, and how many there may be.
+
+    Returns
+    -------
+    Sheet
+        With the verdict of a full check that has what is ordered in place.
+
+    Raises
+    ------
+    QuestionError
+        The question cannot be asked of this mission; says why.
+    """
+    if mission.allocation.combine == "each":
+        raise QuestionError(_each(mission, keys, model, today))
+    search = _Search(mission, keys, reserve, model, today)
+    broken = search.broken()
+    if broken:
+        return search.sheet(None, broken)
+    return search.sheet(search.found(progress), ())
+
+
+def _each(mission: Mission, keys: Mapping[str, float] | None, model: str | None, today: date) -> str:
+    """Say that each error alone is held to its limit, and list the limits."""
+    asked = specified_errors(mission, tree_of(mission), keys)
+    rows = check_mission(mission if model is None else Variation(mission, model).read(), today).rows
+    said = []
+    for one in asked:
+        owner, *_, kind = [part for part in parts_of(one.key) if part != "platforms"]
+        limits = [row for row in rows if row.subject.owner == owner and row.subject.kind == kind and row.allowable]
+        if limits:
+            least = min(limits, key=lambda row: row.allowable or math.inf)
+            said.append(f"{one.key} {one.ordered(least.allowable or 0.0)[1]}")
+    listed = f": {'; '.join(said)}" if said else ""
+    return (
+        "combine: each holds every error alone to its limit, and the single allowables are the answer"
+        f"{listed}. accepted: combine: rss or sum, for specifications that hold together"
+    )
+
+
+class _Uses(NamedTuple):
+    """Utilizations of the rows that can fail in some cases, (rows, cases), by their ids; and what judges each."""
+
+    ids: list[str]
+    requirements: list[str | None]
+    powers: Floats
+    uses: Floats
+
+
+class _Found(NamedTuple):
+    """Sizes as found, (sizes,), nan: limited by nothing; with the rows that limit any, (rows,).
+
+    `parts` are those of the power of what each row may use, (rows, sizes).
+    """
+
+    sizes: Floats
+    ids: list[str]
+    requirements: list[str | None]
+    powers: Floats
+    used: Floats
+    allowed: Floats
+    parts: Floats
+    multipliers: Floats
+
+
+class _Search:
+    """One mission and the errors of it that are specified."""
+
+    def __init__(
+        self,
+        mission: Mission,
+        keys: Mapping[str, float] | None,
+        reserve: float | None,
+        model: str | None,
+        today: date,
+    ) -> None:
+        self.given, self.today, self.notes = mission, today, list[str]()
+        if mission.waivers:
+            mission = mission._replace(waivers=())
+            self.notes.append("waivers do not count: a specification has to hold by itself")
+        self.variation, self.equal = Variation(mission, model), tuple(self._equal(mission))
+        base = self.variation.read(self.equal)._replace(waivers=())
+        self.specified = specified_errors(base, tree_of(mission), keys)
+        self.weights = np.array([one.weight for one in self.specified])
+        least = 1 - base.allocation.warn_above
+        self.reserve = least if reserve is None else reserve
+        self.combine, self.model = base.allocation.combine, base.gating_model
+        # A mission that states each of them: where arrays are put into their places.
+        tiny = np.array([one.tiny for one in self.specified])
+        try:
+            self.stated = self._with([one.text(size) for one, size in zip(self.specified, tiny, strict=True)])
+        except MissionError as error:
+            fault = error.faults[0]
+            raise QuestionError(f"{fault.key}: {fault.problem}; it cannot be specified beside the rest") from None
+        for one in self.specified:
+            if not is_held(self.stated, one.key, is_stated=True):
+                raise QuestionError(f"{one.key}: decides more than its own size; {ACCEPTED}")
+        self.tiny, self.ends, self.unjudged = tiny, np.full(tiny.shape, math.inf), set[str]()
+
+    def _equal(self, mission: Mission) -> Iterator[SetValue]:
+        """Balanced shares follow what is declared, and what is declared is looked for: they are taken as equal."""
+        split = mission.allocation.split
+        key = "allocation.split"
+        if isinstance(split, MetricSplits):
+            split, key = split.quadratic_phase_error, f"{key}.quadratic_phase_error"
+        if split == "balanced":
+            self.notes.append("balanced shares follow what is declared; they are taken as equal")
+            yield SetValue(key, "equal")
+
+    def _with(self, texts: Sequence[str]) -> Mission:
+        """The mission with numbers, as the file would have them; empty: as it is."""
+        changes = [SetValue(one.key, text) for one, text in zip(self.specified, texts, strict=True) if text]
+        return self.variation.read([*self.equal, *changes])._replace(waivers=())
+
+    # ---------------------------------------------------------------- what rows use
+    def _judged(self, sizes: Floats, *, is_of_sums: bool = True) -> JudgedMission:
+        """Judge the mission with sizes, (sizes, cases): what errors add up to, or each by itself too."""
+        mission = self.stated
+        for one, column in zip(self.specified, sizes, strict=True):
+            mission = varied(mission, one.key, one.numbers(column))
+        cases, geometry = sizes.shape[1], self.stated.geometry
+        analysis = Analysis(mission, cases, geometry=geometry, nodes=self._nodes, shown={}, is_of_sums=is_of_sums)
+        return judged_mission(analysis, self.today)
+
+    @cached_property
+    def _nodes(self) -> int:
+        return int(Analysis(self.stated).exact.fit.shape[1])
+
+    def _uses(self, sizes: Floats) -> _Uses:
+        """Utilizations of the rows that can fail, with sizes."""
+        judged = self._judged(sizes)
+        ids, requirements, powers, uses = list[str](), list[str | None](), list[float](), list[Floats]()
+        for row in judged.rows:
+            is_judged = ~np.isin(row.status, (CODE["info"], CODE["not_declared"]))
+            if not is_judged.any() or (self.reserve <= 0 and row.subject.kind in _WARN_ONLY):
+                continue
+            is_lost = np.isin(row.status, (CODE["fail"], CODE["not_evaluated"])) & np.isnan(row.utilization)
+            is_lost &= (row.why != Why.EFFECT_NOT_TAKEN) & (row.subject.id not in self.unjudged)
+            use = np.where(is_lost, math.inf, np.nan_to_num(row.utilization, nan=0.0, posinf=math.inf))
+            binding = int(row.binding.max())
+            ids.append(row.subject.id)
+            requirements.append(
+                row.metric if binding < 0 or binding >= len(REQUIREMENTS) - 1 else REQUIREMENTS[binding]
+            )
+            powers.append(self._power(row.subject.kind))
+            uses.append(use)
+        level = min(TENTH * float(np.max(self.stated.requirements.quadratic_phase_error)), SMALL_RAD)
+        for one in judged.untaken:
+            ids.append(f"{NEGLIGIBLE}.{one.kind}")
+            requirements.append(None)
+            powers.append(1.0 if self.combine == "sum" else 2.0)
+            uses.append(np.broadcast_to(one.total, sizes.shape[1:]) / level)
+        for place in np.flatnonzero(np.isfinite(self.ends)).tolist():
+            ids.append(f"{END_OF_IMAGE}.{self.specified[place].key}")
+            requirements.append(None)
+            powers.append(2.0)
+            uses.append(sizes[place] / self.ends[place])
+        return _Uses(ids, requirements, np.array(powers), np.array(uses))
+
+    def _power(self, kind: str) -> float:
+        """Power of a size that adds up in a row."""
+        is_summed = self.combine == "sum" and kind in (QUADRATIC, CUBIC, LOCATION)
+        return 1.0 if is_summed or kind in _WARN_ONLY else 2.0
+
+    def _allowed(self, ids: Sequence[str]) -> Floats:
+        """What each row may use: what has no requirement, and what has no image, stays below the limit."""
+        most = {NEGLIGIBLE: 1 - 1e-6, END_OF_IMAGE: min(1 - self.reserve, _SHORT_OF_END)}
+        return np.array([most.get(row.partition(".")[0], 1 - self.reserve) for row in ids])
+
+    # ---------------------------------------------------------------- steps
+    def broken(self) -> tuple[Broken, ...]:
+        """Rows in which the other errors leave no room."""
+        nothing = np.array([one.nothing for one in self.specified])
+        # What cannot be judged without these errors says nothing of them.
+        rows = self._judged(nothing[:, None]).rows
+        self.unjudged = {row.subject.id for row in rows if row.status[0] == CODE["not_evaluated"]}
+        found = self._uses(nothing[:, None])
+        return tuple(
+            Broken(row_id, requirement, float(use), float(most))
+            for row_id, requirement, use, most in zip(
+                found.ids, found.requirements, found.uses[:, 0], self._allowed(found.ids), strict=True
+            )
+            if use >= most * (1 - 1e-6)
+        )
+
+    def found(self, progress: Progress) -> _Found:
+        """Search for the sizes: at each step what rows use is taken as it is near the sizes of the step before."""
+        sizes = self._begun()
+        inside, cuts = sizes, _Cuts([], [], [])
+        for done in range(ROUNDS):
+            progress(done, ROUNDS)
+            near = self._near(sizes)
+            if near is None:  # too far: half of the way back
+                sizes = np.sqrt(sizes * inside)
+                continue
+            some = ~near.is_free
+            if not some.any():
+                break
+            cuts = cuts.with_rows(near) if self.combine == "sum" else _Cuts.of(near)
+            log = largest_sizes(self.weights[some], cuts.rows(some)).log
+            inside, sizes = sizes, sizes.copy()
+            sizes[some] = np.exp(log)
+            if np.abs(np.log(sizes / inside)).max() < CHANGES:
+                break
+        return self._kept(sizes)
+
+    def _begun(self) -> Floats:
+        """Sizes that alone would each use so little of what limits it that all together have room."""
+        count = self.tiny.size
+        cases = np.repeat(self.tiny[:, None], count + 1, axis=1)
+        cases[np.arange(count), np.arange(1, count + 1)] *= 2
+        rows = self._judged(cases, is_of_sums=False).rows
+        use = np.array([row.utilization for row in rows])
+        is_end = np.array([row.binding[:1] == REQUIREMENTS.index(END_OF_IMAGE) for row in rows])
+        with np.errstate(all="ignore"):
+            is_own = np.abs(use[:, 1:] / use[:, :1] - 2) < 0.02
+            reach = np.where(is_own & (use[:, :1] > 0), self.tiny / use[:, :1], math.inf)
+            alone = reach.min(axis=0)
+            self.ends = np.where(is_end, reach, math.inf).min(axis=0)
+        return np.where(np.isfinite(alone), alone / (2 * count), self.tiny)
+
+    def _near(self, sizes: Floats) -> "_Near | None":
+        """What rows use near sizes; None where these are far beyond what they may use."""
+        count = sizes.size
+        cases = np.repeat(sizes[:, None], 2 * count + 1, axis=1)
+        for place, factor in enumerate(BESIDE):
+            cases[np.arange(count), 1 + place * count + np.arange(count)] *= factor
+        found = self._uses(cases)
+        allowed, power = self._allowed(found.ids), found.powers[:, None]
+        if not (found.uses[:, 0] <= _FARTHEST * allowed).all():
+            return None
+        whole = found.uses**power
+        base, (less, more) = whole[:, :1], np.split(whole[:, 1:], 2, axis=1)
+        is_lost = ~np.isfinite(more)
+        low, high = (factor**power for factor in BESIDE)
+        with np.errstate(invalid="ignore"):
+            part: Floats = np.where(is_lost, (base - less) / (1 - low), (more - less) / (high - low))
+        part = np.where(part > _NOTHING * base, part, 0.0)
+        room = allowed**found.powers - (base[:, 0] - part.sum(axis=1))
+        is_limit: Truths = np.any(part > 0, axis=1)
+        if (room[is_limit] <= 0).any():
+            return None
+        is_free: Truths = ~np.any(part > 0, axis=0)
+        return _Near(found, allowed, sizes, part, room, is_limit, is_free)
+
+    def _kept(self, sizes: Floats) -> _Found:
+        """Keep to what rows may use, to the last digit, and say what each error takes of it."""
+        near = self._near(sizes)
+        while near is None:
+            sizes = sizes * 0.9
+            near = self._near(sizes)
+        for _ in range(ROUNDS):
+            used = self._used(near, sizes)
+            over = float((used / near.allowed)[near.is_limit].max(initial=0.0))
+            if over <= 1:
+                break
+            sizes = np.where(near.is_free, sizes, sizes / (over * (1 + _CLOSE)))
+        some, limits = ~near.is_free, near.is_limit
+        multipliers = np.zeros(limits.sum())
+        if some.any():
+            whole = near.allowed**near.found.powers
+            of_room = largest_sizes(self.weights[some], _Cuts.of(near).rows(some)).multipliers
+            multipliers = of_room * whole[limits] / near.room[limits]
+        ids = [row for row, is_limit in zip(near.found.ids, limits, strict=True) if is_limit]
+        requirements = [row for row, is_limit in zip(near.found.requirements, limits, strict=True) if is_limit]
+        parts = near.part[limits] / (near.allowed**near.found.powers)[limits, None]
+        sizes = np.where(near.is_free, math.nan, sizes)
+        return _Found(
+            sizes,
+            ids,
+            requirements,
+            near.found.powers[limits],
+            used[limits],
+            near.allowed[limits],
+            parts,
+            multipliers,
+        )
+
+    def _used(self, near: "_Near", sizes: Floats) -> Floats:
+        """Utilizations with sizes of the rows that are seen near them, (rows,)."""
+        found = self._uses(sizes[:, None])
+        uses = dict(zip(found.ids, found.uses[:, 0].tolist(), strict=True))
+        return np.array([uses.get(row, 0.0) for row in near.found.ids])
+
+    # ---------------------------------------------------------------- the sheet
+    def sheet(self, found: _Found | None, broken: tuple[Broken, ...]) -> Sheet:
+        """Put what was found into words and units, and check the mission with what is ordered."""
+        values = [math.nan] * len(self.specified) if found is None else self._values(found)
+        ordered = [
+            (math.nan, "") if math.isnan(value) else one.ordered(value)
+            for one, value in zip(self.specified, values, strict=True)
+        ]
+        texts = [text for _, text in ordered]
+        findings = check_mission(
+            self._with(texts) if found is not None else self.variation.read(self.equal), self.today
+        )
+        specifications = [
+            Specification(
+                key=one.key,
+                weight=one.weight,
+                unit=one.number.dimension.si,
+                value=None if math.isnan(value) else value,
+                ordered=None if math.isnan(value) else number,
+                text=text,
+                declared=one.number.value,
+                declared_text="" if one.number.value is None else one.number.text(one.number.value),
+                shares={} if found is None else _shares(found, place),
+                parts=() if not text else tuple(self._parts(one, number)),
+            )
+            for place, (one, value, (number, text)) in enumerate(zip(self.specified, values, ordered, strict=True))
+        ]
+        return Sheet(
+            file=self.given.file,
+            name=self.given.name,
+            model=self.model,
+            combine=self.combine,
+            status=findings.status,
+            reserve=self.reserve,
+            requirements=findings.requirements,
+            specifications=tuple(specifications),
+            rows=() if found is None else tuple(_row_uses(found, self.specified)),
+            broken=broken,
+            notes=tuple(self.notes),
+            changes=self.given.changes,
+            findings=findings,
+        )
+
+    def _values(self, found: _Found) -> list[float]:
+        return [
+            float(one.numbers(np.array([size]))[0]) if not math.isnan(size) else math.nan
+            for one, size in zip(self.specified, found.sizes.tolist(), strict=True)
+        ]
+
+    def _parts(self, one: Specified, most: float) -> Iterator[str]:
+        """Parts of the catalogue whose figure of this name is no larger in any axis."""
+        *_, section, figure = parts_of(one.key)
+        if section not in ("motion_error", "imu"):
+            return
+        for entry in self._entries:
+            figures = entry.part if entry.part.kind == ("imu" if section == "imu" else "gnss") else None
+            value = getattr(figures, figure, None)
+            if value is not None and np.abs(value).max() <= most:
+                yield entry.id
+
+    @cached_property
+    def _entries(self) -> list[Entry]:
+        try:
+            return list(entries(folders(folder_of(self.given.file))))
+        except PartError:  # a folder of the project has a file that is no part; `sensors` says which
+            return []
+
+
+class _Near(NamedTuple):
+    """What rows use near sizes, (sizes,): the part of each, of the power of the utilization, and the room for all.
+
+    `is_limit` are the rows that any of the sizes takes part in, `is_free` the sizes that take part in none.
+    """
+
+    found: _Uses
+    allowed: Floats
+    sizes: Floats
+    part: Floats
+    room: Floats
+    is_limit: Truths
+    is_free: Truths
+
+
+class _Cuts(NamedTuple):
+    """Rows of a program, as they were seen at several sizes.
+
+    A displacement that adds up over all signs is the largest over all directions: what was seen before still holds.
+    """
+
+    share: list[Floats]
+    power: list[Floats]
+    room: list[Floats]
+
+    @classmethod
+    def of(cls, near: _Near) -> "_Cuts":
+        """What is seen near sizes."""
+        return cls([], [], []).with_rows(near)
+
+    def with_rows(self, near: _Near) -> "_Cuts":
+        """These, and what is seen near other sizes."""
+        limits, power = near.is_limit, near.found.powers[near.is_limit]
+        share = near.part[limits] / near.sizes ** power[:, None]
+        return _Cuts([*self.share, share], [*self.power, power], [*self.room, near.room[limits]])
+
+    def rows(self, some: Truths) -> Rows:
+        """The rows for some of the sizes."""
+        return Rows(np.concatenate(self.share)[:, some], np.concatenate(self.power), np.concatenate(self.room))
+
+
+def _shares(found: _Found, place: int) -> dict[str, float]:
+    """Largest part that an error takes of what a row of each requirement may use."""
+    shares: dict[str, float] = {}
+    for requirement, part in zip(found.requirements, found.parts[:, place].tolist(), strict=True):
+        if requirement is not None:
+            shares[requirement] = max(shares.get(requirement, 0.0), part)
+    return shares
+
+
+def _row_uses(found: _Found, specified: Sequence[Specified]) -> Iterator[RowUse]:
+    """Rows by what they are worth, the one that limits most first."""
+    for place in np.argsort(-found.multipliers, kind="stable").tolist():
+        parts = found.parts[place].tolist()
+        used, allowed = float(found.used[place]), float(found.allowed[place])
+        shares = {one.key: part for one, part in zip(specified, parts, strict=True) if part > 0}
+        whole = used / allowed
+        fixed = max(0.0, whole ** float(found.powers[place]) - sum(shares.values()))
+        yield RowUse(
+            found.ids[place], found.requirements[place], used, allowed, fixed, shares, float(found.multipliers[place])
+        )

@@ -1,0 +1,85 @@
+"""The largest sizes that powers of them leave room for: a geometric program, solved by a barrier.
+
+In the logarithms x of the sizes each row's Σ aᵢ·e^(p·xᵢ) is convex, and Σ wᵢ·xᵢ, which is maximised, is linear: there
+is one maximum. A barrier keeps inside the rows' room, and Newton's method follows the maximum as the barrier gives
+way. Derived here; of the method see Boyd & Vandenberghe, Convex Optimization, 4.5 and 11.3.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from bisar_budget.ranges.exact_ranges import Floats
+
+_GAP = 1e-8  # of Σ w·x, that the maximum may be above what is found
+_STEP = 30.0  # by which the barrier gives way each time
+_NEWTON = 60  # steps to follow it once; some ten are enough
+_SETTLED = 1e-9  # half the square of Newton's decrement
+
+
+class Rows(NamedTuple):
+    """Rows Σ aᵢ·sᵢ^p ≤ room, (rows,), with a of (rows, sizes); a size that no row limits is not among them."""
+
+    share: Floats
+    power: Floats
+    room: Floats
+
+    def at(self, x: Floats) -> Floats:
+        """Parts of each row at sizes e^x, over its room, (rows, sizes)."""
+        found: Floats = self.share * np.exp(self.power[:, None] * x) / self.room[:, None]
+        return found
+
+
+class Largest(NamedTuple):
+    """Logarithms of the largest sizes, and the multiplier of each row: Σⱼ multiplierⱼ·partⱼᵢ = weightᵢ."""
+
+    log: Floats
+    multipliers: Floats
+
+
+def largest_sizes(weights: Floats, rows: Rows) -> Largest:
+    """Maximise Σ wᵢ·log sᵢ within rows that have room.
+
+    Parameters
+    ----------
+    weights : (sizes,)
+        All above 0.
+    rows : Rows
+        With room above 0, and each size in at least one of them.
+    """
+    with np.errstate(divide="ignore"):
+        alone = (np.log(rows.room[:, None] / rows.share) - np.log(2 * weights.size)) / rows.power[:, None]
+    x: Floats = alone.min(axis=0)  # half of every room is left
+    firmness, count = max(1.0, float(weights.sum())), rows.room.size
+    while True:
+        for _ in range(_NEWTON):
+            part = rows.at(x)
+            left = 1 - part.sum(axis=1)
+            slope = rows.power[:, None] * part / left[:, None]  # of each row's barrier
+            gradient = slope.sum(axis=0) - firmness * weights
+            curvature = np.diag((rows.power[:, None] * slope).sum(axis=0)) + slope.T @ slope
+            step = -np.linalg.solve(curvature, gradient)
+            decrement = float(-gradient @ step)
+            if decrement / 2 < _SETTLED:
+                break
+            x = _towards(x, step, gradient, firmness * weights, rows)
+        if count / firmness < _GAP * max(1.0, float(weights.sum())):
+            part = rows.at(x)
+            multipliers = rows.power / (firmness * (1 - part.sum(axis=1)))
+            return Largest(x, multipliers)
+        firmness *= _STEP
+
+
+def _towards(x: Floats, step: Floats, gradient: Floats, pull: Floats, rows: Rows) -> Floats:
+    """Go so much of a step that the barrier's value falls by enough, and no row is full."""
+    before, falls = _value(x, pull, rows), float(gradient @ step)
+    length = min(1.0, 2.0 / float(np.abs(step).max()))
+    while _value(x + length * step, pull, rows) > before + 0.1 * length * falls and length > 1e-12:
+        length /= 2
+    there: Floats = x + length * step
+    return there
+
+
+def _value(x: Floats, pull: Floats, rows: Rows) -> float:
+    left = 1 - rows.at(x).sum(axis=1)
+    return float(-np.log(left).sum() - pull @ x) if (left > 0).all() else np.inf

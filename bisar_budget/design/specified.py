@@ -1,0 +1,153 @@
+"""The errors that are specified: which keys name one, what their sizes are, in which units they are ordered."""
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from bisar_budget import units
+from bisar_budget.design.quantities import Number, QuestionError, number_of
+from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.mission.changes import parts_of
+from bisar_budget.mission.model import Mission
+from bisar_budget.ranges.exact_ranges import Floats
+from bisar_budget.units import Dimension, parse_quantity
+
+DIGITS = 2  # of a number that is ordered
+_SILENT_DB = -400.0  # a level of nothing
+_SECTIONS = (
+    *("motion_error", "common_motion_error", "timing_error", "propagation", "other_errors"),
+    *("oscillator", "synchronization"),
+)
+_NO_SIZES = ("age", "arm", "averaging", "bandwidth", "correlation_time", "frequency", "interval")
+_LEVELS = (units.POWER_RATIO, units.PHASE_NOISE, units.TONE)
+ACCEPTED = (
+    "accepted: a key of an error with one number, such as platforms.receiver.motion_error.velocity, "
+    "platforms.receiver.motion_error.imu.gyro_bias, platforms.receiver.oscillator.level, timing_error.quadratic"
+)
+# Units in which the sizes are ordered, where the file has none: the first in which the number is at least 1.
+_ORDERED_IN: Mapping[Dimension, tuple[str, ...]] = {
+    units.LENGTH: ("m", "mm", "um"),
+    units.SPEED: ("m/s", "mm/s", "um/s"),
+    units.ACCELERATION: ("mg", "ug"),
+    units.ANGLE: ("deg", "mrad", "urad"),
+    units.ANGULAR_RATE: ("deg/s", "deg/h"),
+    units.TIME: ("s", "ms", "us", "ns", "ps"),
+    units.VELOCITY_RANDOM_WALK: ("m/s/sqrt(h)", "ug/sqrt(Hz)"),
+    units.ANGLE_RANDOM_WALK: ("deg/sqrt(h)",),
+}
+# A size so small that effects are proportional to it, from which the search begins.
+_TINY: Mapping[Dimension, float] = {
+    units.LENGTH: 1e-4,
+    units.SPEED: 1e-6,
+    units.ACCELERATION: 1e-8,
+    units.ANGULAR_RATE: 1e-10,
+    units.ANGLE: 1e-7,
+    units.TIME: 1e-14,
+    units.ELECTRON_CONTENT: 1e12,
+    units.POWER_RATIO: 1e-3,
+}
+_LEAST = 1e-18
+
+
+class Specified(NamedTuple):
+    """An error that is specified: its number in the file, and its weight."""
+
+    number: Number
+    weight: float
+
+    @property
+    def key(self) -> str:
+        """Path of the number in the mission file."""
+        return self.number.key
+
+    @property
+    def is_level(self) -> bool:
+        """Whether the number is a level in decibel."""
+        return self.number.dimension in _LEVELS
+
+    @property
+    def nothing(self) -> float:
+        """The size that stands for no error."""
+        return float(10 ** (_SILENT_DB / 20)) if self.is_level else 0.0
+
+    @property
+    def tiny(self) -> float:
+        """A size so small that effects are proportional to it."""
+        return _TINY.get(self.number.dimension, _LEAST)
+
+    def numbers(self, sizes: Floats) -> Floats:
+        """Numbers of the file for sizes: themselves, or levels of amplitudes."""
+        if not self.is_level:
+            return sizes
+        with np.errstate(divide="ignore"):
+            found: Floats = np.maximum(20 * np.log10(sizes), _SILENT_DB)
+        return found
+
+    def text(self, size: float) -> str:
+        """A size as the file would have it, in SI."""
+        return f"{float(self.numbers(np.array([size]))[0])!r} {self.number.dimension.si}".rstrip()
+
+    def ordered(self, value: float) -> tuple[float, str]:
+        """The number rounded down to two digits in the unit that it is ordered in: in SI, and as the file has it."""
+        dimension, unit = self.number.dimension, self.number.unit
+        if self.number.value is None and dimension in _ORDERED_IN:
+            among = _ORDERED_IN[dimension]
+            unit = next((one for one in among if abs(value) >= np.divide(*dimension.scales[one])), among[-1])
+        factor, divisor = dimension.scales[unit]
+        number = value / factor * divisor
+        power = 10.0 ** (math.floor(math.log10(abs(number))) - DIGITS + 1) if number else 1.0
+        number = float(f"{math.floor(number / power * (1 + 1e-12)) * power:.{DIGITS}g}")
+        text = f"{number:.12g} {unit}".rstrip()
+        return parse_quantity(text, dimension), text
+
+
+def specified_errors(mission: Mission, tree: dict[str, object], keys: Mapping[str, float] | None) -> list[Specified]:
+    """Errors to specify: those of the keys, else those that the mission names, else the usual ones.
+
+    Raises
+    ------
+    QuestionError
+        A key names no error; there is none to specify.
+    """
+    asked = keys or mission.allocation.specify or dict.fromkeys(usual_keys(mission), 1.0)
+    if not asked:
+        raise QuestionError(
+            "nothing to specify: every error of the mission comes from a part, a covariance or a path; "
+            "name one with --for KEY"
+        )
+    found = [Specified(_number(mission, tree, key), weight) for key, weight in asked.items()]
+    for one, other in ((a, b) for a in found for b in found if a is not b):
+        if parts_of(other.key)[: len(parts_of(one.key))] == parts_of(one.key):
+            raise QuestionError(f"{other.key}: is specified twice, by {one.key} too; accepted: each error once")
+    return found
+
+
+def usual_keys(mission: Mission) -> Iterator[str]:
+    """Keys of position, velocity, acceleration and clocks that come from no part and no covariance."""
+    for name in PLATFORMS:
+        platform = getattr(mission.platforms, name)
+        error = platform.motion_error
+        kinds = ("position",) if platform.state.is_still else ("position", "velocity", "acceleration")
+        for kind in kinds:
+            is_fixed = error.covariance is not None and kind != "acceleration"
+            if not is_fixed and kind not in dict(error.of_parts):
+                yield f"platforms.{name}.motion_error.{kind}"
+    oscillators = [name for name in PLATFORMS if getattr(mission.platforms, name).oscillator is not None]
+    for name in oscillators:
+        if getattr(mission.platforms, name).oscillator.sensor is None:
+            yield f"platforms.{name}.oscillator.level"
+    if not oscillators and not mission.has_direct_path:
+        yield "timing_error.quadratic"
+
+
+def _number(mission: Mission, tree: dict[str, object], key: str) -> Number:
+    parts = parts_of(key)
+    if not any(part in _SECTIONS for part in parts[:3]) or parts[-1] in _NO_SIZES:
+        raise QuestionError(f"{key}: is no error that can be specified; {ACCEPTED}")
+    number = number_of(tree, key, is_for_each=True)
+    error = getattr(mission.platforms, parts[1]).motion_error if parts[0] == "platforms" else None
+    if error is not None and error.covariance is not None and parts[3] in ("position", "velocity"):
+        raise QuestionError(f"{key}: the file has a covariance of {parts[1]}, which is fixed; {ACCEPTED}")
+    return number
