@@ -20,6 +20,7 @@ from bisar_budget.resources import docstring, hold_files, release_files
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF)
 # Each command to the module that has it, imported when it is asked for.
 _MODULES = {
+    "allocate": "allocate",
     "check": "check",
     "derive": "derive",
     "diff": "diff",

@@ -34,13 +34,18 @@ from bisar_budget.mission.load import folder_of
 from bisar_budget.mission.model import MetricSplits, Mission
 from bisar_budget.mission.parts import Entry, PartError, entries, folders
 from bisar_budget.ranges.exact_ranges import Floats, Truths
+from bisar_budget.units import format_quantity
 from bisar_budget.workers import Progress, unseen
 
 BESIDE = (0.8, 1.2)  # of a size, at which it is seen what an error adds
 CHANGES = 1e-4  # of a size: less ends the search
 ROUNDS = 20  # of it; four are enough where effects are proportional to errors
+_ABOUT = 8  # rounds, after which only half of a step is made: where models change, steps go to and fro
+_STEPS = 24  # between two sizes, where it is looked for the last that leaves an image
 _FARTHEST = 3.0  # of what a row may use, up to which a step of the search may go
+_SURELY = 1 - 1e-5  # of a limit: a case by itself settles to digits of its own
 _SHORT_OF_END = 0.995  # of the size from which there is no image: that is found to 0.1 %
+_POINTS = 4  # of a mask of phase noise that are said
 _CLOSE = 1e-9  # of what a row may use
 _NOTHING = 1e-13  # of a row: what rounding leaves of it
 NEGLIGIBLE = "negligible"  # begins the ids of effects that no requirement takes
@@ -52,7 +57,8 @@ class Specification(NamedTuple):
     """The largest size of one error, and what is to be ordered.
 
     `value` is the size as found, `ordered` the same rounded down, `text` that as the file would have it; None, and
-    empty, where no requirement limits it. `declared` is what the file has today, the largest of three axes. `shares`
+    empty, where no requirement limits it, `found_text` the value in the same unit, `remark` what the number means to a
+    supplier. `declared` is what the file has today, the largest of three axes. `shares`
     are the parts of what each requirement may use, by its row in which the error takes most of it. `parts` are those
     of the catalogue that keep to what is ordered.
     """
@@ -67,6 +73,8 @@ class Specification(NamedTuple):
     declared_text: str
     shares: Mapping[str, float]
     parts: tuple[str, ...] = ()
+    found_text: str = ""
+    remark: str = ""
 
 
 class RowUse(NamedTuple):
@@ -118,6 +126,7 @@ class Sheet(NamedTuple):
     changes: tuple[SetValue, ...] = ()
     overrides: tuple[Override, ...] = ()
     findings: MissionFindings | None = None
+    is_equal: tuple[SetValue, ...] = ()  # what balanced shares were replaced by
 
     @property
     def complies(self) -> bool:
@@ -127,7 +136,7 @@ class Sheet(NamedTuple):
     @property
     def ordered(self) -> tuple[SetValue, ...]:
         """What the mission file has to say so that `check` holds it to what is ordered."""
-        return tuple(SetValue(one.key, one.text) for one in self.specifications if one.text)
+        return (*self.is_equal, *(SetValue(one.key, one.text) for one in self.specifications if one.text))
 
 
 # ---------------------------------------------------------------- the search
@@ -288,11 +297,13 @@ class _Search:
         ids, requirements, powers, uses = list[str](), list[str | None](), list[float](), list[Floats]()
         for row in judged.rows:
             is_judged = ~np.isin(row.status, (CODE["info"], CODE["not_declared"]))
-            if not is_judged.any() or (self.reserve <= 0 and row.subject.kind in _WARN_ONLY):
+            if not is_judged.any():
                 continue
             is_lost = np.isin(row.status, (CODE["fail"], CODE["not_evaluated"])) & np.isnan(row.utilization)
             is_lost &= (row.why != Why.EFFECT_NOT_TAKEN) & (row.subject.id not in self.unjudged)
-            use = np.where(is_lost, math.inf, np.nan_to_num(row.utilization, nan=0.0, posinf=math.inf))
+            is_heeded = self.reserve > 0 or row.subject.kind not in _WARN_ONLY
+            use = np.nan_to_num(row.utilization, nan=0.0, posinf=math.inf) * is_heeded
+            use = np.where(is_lost, math.inf, use)
             binding = int(row.binding.max())
             ids.append(row.subject.id)
             requirements.append(
@@ -320,8 +331,9 @@ class _Search:
 
     def _allowed(self, ids: Sequence[str]) -> Floats:
         """What each row may use: what has no requirement, and what has no image, stays below the limit."""
-        most = {NEGLIGIBLE: 1 - 1e-6, END_OF_IMAGE: min(1 - self.reserve, _SHORT_OF_END)}
-        return np.array([most.get(row.partition(".")[0], 1 - self.reserve) for row in ids])
+        usual = (1 - self.reserve) * _SURELY
+        most = {NEGLIGIBLE: _SURELY, END_OF_IMAGE: min(usual, _SHORT_OF_END)}
+        return np.array([most.get(row.partition(".")[0], usual) for row in ids])
 
     # ---------------------------------------------------------------- steps
     def broken(self) -> tuple[Broken, ...]:
@@ -342,12 +354,13 @@ class _Search:
     def found(self, progress: Progress) -> _Found:
         """Search for the sizes: at each step what rows use is taken as it is near the sizes of the step before."""
         sizes = self._begun()
-        inside, cuts = sizes, _Cuts([], [], [])
+        inside, cuts = np.minimum(self.tiny, sizes), _Cuts([], [], [])
         for done in range(ROUNDS):
             progress(done, ROUNDS)
             near = self._near(sizes)
-            if near is None:  # too far: half of the way back
-                sizes = np.sqrt(sizes * inside)
+            if near is None:  # too far: half of the way back, and no farther again where there is no image
+                self._find_ends(inside, sizes)
+                sizes = np.sqrt(np.minimum(sizes, self.ends) * inside)
                 continue
             some = ~near.is_free
             if not some.any():
@@ -356,9 +369,31 @@ class _Search:
             log = largest_sizes(self.weights[some], cuts.rows(some)).log
             inside, sizes = sizes, sizes.copy()
             sizes[some] = np.exp(log)
+            if done >= _ABOUT:
+                sizes = np.sqrt(sizes * inside)
             if np.abs(np.log(sizes / inside)).max() < CHANGES:
                 break
         return self._kept(sizes)
+
+    def _find_ends(self, inside: Floats, sizes: Floats) -> None:
+        """Note the size of each error, between two, from which there is no image, whatever the others are."""
+        for place in self._lost_alone(inside, sizes):
+            low, high = inside[place], min(sizes[place], self.ends[place])
+            for _ in range(2):
+                steps = np.geomspace(low, high, _STEPS)
+                cases = np.repeat(inside[:, None], _STEPS, axis=1)
+                cases[place] = steps
+                is_lost = np.isinf(self._uses(cases).uses).any(axis=0)
+                first = int(is_lost.argmax()) if is_lost.any() else _STEPS - 1
+                low, high = steps[max(first - 1, 0)], steps[first]
+            self.ends[place] = low
+
+    def _lost_alone(self, inside: Floats, sizes: Floats) -> Iterator[int]:
+        """Errors that leave no image at their size, where the others are inside."""
+        count = sizes.size
+        cases = np.repeat(inside[:, None], count, axis=1)
+        cases[np.arange(count), np.arange(count)] = sizes
+        yield from np.flatnonzero(np.isinf(self._uses(cases).uses).any(axis=0)).tolist()
 
     def _begun(self) -> Floats:
         """Sizes that alone would each use so little of what limits it that all together have room."""
@@ -462,6 +497,8 @@ class _Search:
                 declared_text="" if one.number.value is None else one.number.text(one.number.value),
                 shares={} if found is None else _shares(found, place),
                 parts=() if not text else tuple(self._parts(one, number)),
+                found_text="" if math.isnan(value) else one.said(value),
+                remark="" if not text else self._remark(one, number),
             )
             for place, (one, value, (number, text)) in enumerate(zip(self.specified, values, ordered, strict=True))
         ]
@@ -479,6 +516,7 @@ class _Search:
             notes=tuple(self.notes),
             changes=self.given.changes,
             findings=findings,
+            is_equal=self.equal,
         )
 
     def _values(self, found: _Found) -> list[float]:
@@ -497,6 +535,16 @@ class _Search:
             value = getattr(figures, figure, None)
             if value is not None and np.abs(value).max() <= most:
                 yield entry.id
+
+    def _remark(self, one: Specified, number: float) -> str:
+        """The phase noise that a level of an oscillator asks for, where the file states it by its points."""
+        _, name, *below = parts_of(one.key)
+        if below != ["oscillator", "level"]:
+            return ""
+        oscillator = getattr(self.stated.platforms, name).oscillator
+        points = [f"{level + number:.4g} dBc/Hz at {offset:g} Hz" for offset, level in oscillator.phase_noise or ()]
+        carrier = format_quantity(oscillator.frequency, "Hz", 4) if points else ""
+        return f"{', '.join(points[:_POINTS])} from {carrier}" if points else ""
 
     @cached_property
     def _entries(self) -> list[Entry]:

@@ -89,18 +89,29 @@ class Specified(NamedTuple):
         """A size as the file would have it, in SI."""
         return f"{float(self.numbers(np.array([size]))[0])!r} {self.number.dimension.si}".rstrip()
 
+    def unit_of(self, value: float) -> str:
+        """Unit in which a number is ordered: that of the file, else the one that suits it."""
+        dimension = self.number.dimension
+        if self.number.value is not None or dimension not in _ORDERED_IN:
+            return self.number.unit
+        among = _ORDERED_IN[dimension]
+        return next((one for one in among if abs(value) >= np.divide(*dimension.scales[one])), among[-1])
+
+    def said(self, value: float) -> str:
+        """The number with four digits, in the unit that it is ordered in."""
+        unit = self.unit_of(value)
+        factor, divisor = self.number.dimension.scales[unit]
+        return f"{value / factor * divisor:.4g} {unit}".rstrip()
+
     def ordered(self, value: float) -> tuple[float, str]:
         """The number rounded down to two digits in the unit that it is ordered in: in SI, and as the file has it."""
-        dimension, unit = self.number.dimension, self.number.unit
-        if self.number.value is None and dimension in _ORDERED_IN:
-            among = _ORDERED_IN[dimension]
-            unit = next((one for one in among if abs(value) >= np.divide(*dimension.scales[one])), among[-1])
-        factor, divisor = dimension.scales[unit]
+        unit = self.unit_of(value)
+        factor, divisor = self.number.dimension.scales[unit]
         number = value / factor * divisor
         power = 10.0 ** (math.floor(math.log10(abs(number))) - DIGITS + 1) if number else 1.0
         number = float(f"{math.floor(number / power * (1 + 1e-12)) * power:.{DIGITS}g}")
         text = f"{number:.12g} {unit}".rstrip()
-        return parse_quantity(text, dimension), text
+        return parse_quantity(text, self.number.dimension), text
 
 
 def specified_errors(mission: Mission, tree: dict[str, object], keys: Mapping[str, float] | None) -> list[Specified]:

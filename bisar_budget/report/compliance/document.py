@@ -237,13 +237,14 @@ class Margins:
 
 @dataclass(frozen=True, slots=True)
 class Compliance:
-    """A whole report; `subject` is the mission, or how many."""
+    """A whole report; `subject` is the mission, or how many, `title` what the report is."""
 
     version: str
     subject: str
     facts: Facts
     margins: Sequence[Margins]
     chapters: Sequence[Chapter]
+    title: str = "Compliance report"
 
 
 def blocks_of(block: Compliance | Block) -> Iterator[Block]:

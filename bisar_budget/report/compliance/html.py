@@ -40,8 +40,12 @@ def _page() -> Template:
 
 
 def as_html(report: Report, style: Style) -> str:
-    """Write the page."""
-    document = compliance(report, style)
+    """Write the page of a compliance report."""
+    return page(compliance(report, style))
+
+
+def page(document: doc.Compliance) -> str:
+    """Write the page of a document."""
     return _page().render(
         document=document,
         facts=_block(document.facts),

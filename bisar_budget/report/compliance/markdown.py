@@ -21,9 +21,13 @@ _DESCRIPTION = re.compile("<desc[^>]*>(.*?)</desc>", re.DOTALL)
 
 def as_markdown(report: Report, style: Style) -> str:
     """Write the report; drawings are linked where `style.assets` says that they lie."""
-    document = compliance(report, style)
+    return written(compliance(report, style), uri(style.assets))
+
+
+def written(document: doc.Compliance, assets: str) -> str:
+    """Write a document; `assets` is where its drawings lie, empty: nowhere."""
     subject = "Motion-measurement error budget, bistatic SAR."
-    parts = ["# Compliance report", subject, *_blocks([document.facts, *document.chapters], uri(style.assets))]
+    parts = [f"# {document.title}", subject, *_blocks([document.facts, *document.chapters], assets)]
     return "\n\n".join(part.rstrip("\n") for part in parts if part) + "\n"
 
 

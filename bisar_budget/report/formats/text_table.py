@@ -106,8 +106,8 @@ def _verdict(mission: MissionFindings, style: Style) -> list[str]:
     return lines
 
 
-def _requirements(mission: MissionFindings, style: Style) -> Iterator[str]:
-    """The table of requirements, effects that none takes, and how much is declared."""
+def requirement_table(mission: MissionFindings, style: Style) -> Iterator[str]:
+    """The table of requirements."""
     found = list(requirement_lines(mission))
     cells = [COLUMNS[:4], *((one.name, one.allowed, one.reached, one.use) for one in found)]
     widths = [max(len(line[column]) for line in cells) for column in range(4)]
@@ -115,6 +115,11 @@ def _requirements(mission: MissionFindings, style: Style) -> Iterator[str]:
     yield f"{' '.join(numbers)} {COLUMNS[4]:<8} {COLUMNS[5]}"
     for one in found:
         yield from _requirement(one, widths, style)
+
+
+def _requirements(mission: MissionFindings, style: Style) -> Iterator[str]:
+    """The table of requirements, effects that none takes, and how much is declared."""
+    yield from requirement_table(mission, style)
     for effect in unjudged_effects(mission):
         rows = ", ".join(row.id if row.line is None else f"{row.id} of line {row.line}" for row in effect.rows)
         yield from wrapped(f"Not judged: {effect.text} ({rows}).", "  ")

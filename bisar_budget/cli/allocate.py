@@ -1,0 +1,160 @@
+"""`bisar-budget allocate`: one specification for every error, such that all together meet every requirement."""
+
+import sys
+from collections.abc import Iterator, Sequence
+from datetime import datetime
+from typing import TYPE_CHECKING
+
+import click
+
+from bisar_budget import __version__
+from bisar_budget.cli.long_work import watched_checks
+from bisar_budget.cli.options import DATE, FILE, MISSIONS, MODEL, OUTPUT, SET, day, outside
+from bisar_budget.cli.streams import (
+    EXIT_BROKEN,
+    complain,
+    deliver,
+    expand,
+    fail,
+    load_all,
+    spare,
+    wants_color,
+    write_file,
+)
+
+if TYPE_CHECKING:
+    from bisar_budget.faults import SetValue
+    from bisar_budget.mission.model import Mission
+    from bisar_budget.report.formats.specification_sheet import Answer
+
+_FORMATS = ("text", "json", "csv", "markdown", "html")
+_MISSION = (".yaml", ".yml")
+
+
+@click.command()
+@MISSIONS
+@click.option(
+    "--for",
+    "keys",
+    multiple=True,
+    metavar="KEY",
+    help="Path of an error to specify, such as platforms.receiver.motion_error.velocity. Repeatable; omitted: those "
+    "of allocation.specify, else position, velocity and acceleration of both platforms and the clocks.",
+)
+@click.option(
+    "--reserve",
+    type=click.FloatRange(0, 100, max_open=True),
+    metavar="PERCENT",
+    help="Part of every limit that is kept free (default: what allocation.warn_above leaves, 20 %).",
+)
+@click.option(
+    "--compare", "other", type=FILE, metavar="MISSION", help="Hold the figures of another mission file to it."
+)
+@MODEL
+@SET
+@DATE
+@click.option(
+    "--format",
+    "format_name",
+    type=click.Choice(_FORMATS),
+    default="text",
+    show_default=True,
+    help="Format of the sheet.",
+)
+@OUTPUT
+def allocate(
+    missions: Sequence[str],
+    keys: Sequence[str],
+    reserve: float | None,
+    other: str | None,
+    model: str | None,
+    changes: "tuple[SetValue, ...]",
+    today: datetime | None,
+    format_name: str,
+    output: str | None,
+) -> None:
+    """Find specifications for the errors of a mission that together meet every requirement.
+
+    The sizes are the largest ones: none can grow unless another shrinks. What is ordered is rounded down to two
+    digits, and the mission is checked with it. All other errors of the file are fixed and count first; so do the
+    file's split, combination, autofocus and model. With -o FILE.yaml the mission is written with the specifications
+    in place. Exit code: 0, 1 if there are none, or the mission does not comply with them, or with the offer of
+    --compare, 2 for wrong usage or an unusable mission file.
+    """
+    files = expand(missions)
+    is_mission = output is not None and output.lower().endswith(_MISSION)
+    if is_mission and len(files) > 1:
+        raise click.UsageError("-o FILE.yaml writes one mission.")
+    if other is not None and len(files) > 1:
+        raise click.UsageError("--compare holds one offer to one mission.")
+    spare([*files, *([other] if other else [])], [output])
+    answers = list(_answers(load_all(files, model, changes), keys, reserve, other, model, changes, today))
+    deliver(
+        _written(answers, format_name, None if is_mission else output), None if is_mission else output, format_name
+    )
+    if is_mission and output is not None:
+        _write_mission(answers[0], output)
+    is_broken = any(not one.sheet.complies or (one.offer is not None and not one.offer.complies) for one in answers)
+    sys.exit(EXIT_BROKEN if is_broken else 0)
+
+
+def _answers(
+    missions: "Sequence[Mission]",
+    keys: Sequence[str],
+    reserve: float | None,
+    other: str | None,
+    model: str | None,
+    changes: "tuple[SetValue, ...]",
+    today: datetime | None,
+) -> "Iterator[Answer]":
+    """Ask each mission in turn, with a bar; exits where one cannot be asked."""
+    from bisar_budget.budget.waivers import overrides
+    from bisar_budget.design.allocate import allocate as allocated
+    from bisar_budget.design.offers import offer
+    from bisar_budget.design.quantities import QuestionError
+    from bisar_budget.report.formats.specification_sheet import Answer
+
+    judged_on, from_outside = day(today), outside(today)
+    twice = next((key for place, key in enumerate(keys) if key in keys[:place]), None)
+    if twice is not None:
+        raise click.UsageError(f"--for {twice}: stands twice; each key once.")
+    offered = None if other is None else load_all([other], model, changes)[0]
+    for mission in missions:
+        try:
+            with watched_checks(mission.name) as progress:
+                sheet = allocated(
+                    mission,
+                    keys=dict.fromkeys(keys, 1.0),
+                    reserve=None if reserve is None else reserve / 100,
+                    model=model,
+                    today=judged_on,
+                    progress=progress,
+                )
+        except QuestionError as error:
+            fail(f"{mission.file}: {error}")
+        sheet = sheet._replace(overrides=overrides(mission, from_outside, judged_on))
+        yield Answer(sheet, None if offered is None else offer(sheet, offered, judged_on))
+
+
+def _written(answers: "Sequence[Answer]", format_name: str, output: str | None) -> str:
+    from bisar_budget.report import Style
+    from bisar_budget.report.formats import specification_sheet as sheets
+
+    if format_name == "text":
+        return sheets.as_text(answers, Style(color=output is None and wants_color()))
+    if format_name == "csv":
+        return sheets.as_csv(answers)
+    text: str = getattr(sheets, f"as_{format_name}")(__version__, answers)
+    return text
+
+
+def _write_mission(answer: "Answer", output: str) -> None:
+    """Write the mission with what is ordered in place, comments kept; nothing where there is no specification."""
+    from bisar_budget.mission.edited import with_values
+
+    sheet, findings = answer.sheet, answer.sheet.findings
+    if sheet.broken or findings is None or findings.mission is None:
+        complain(f"{output} is not written: there are no specifications.")
+        return
+    text = (findings.mission.data or b"").decode("utf-8-sig")
+    write_file(output, with_values(text, [*sheet.changes, *sheet.ordered]))

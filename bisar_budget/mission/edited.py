@@ -1,0 +1,98 @@
+"""A mission file with other values in place, and all else of it as it was written, comments included."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import yaml
+
+from bisar_budget.faults import SetValue
+from bisar_budget.mission.changes import next_name, parts_of
+
+_LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+
+
+def with_values(text: str, changes: Sequence[SetValue]) -> str:
+    """Put values into the text of a mission file.
+
+    Parameters
+    ----------
+    text : str
+        Of a file that can be read as a mission.
+    changes : sequence of SetValue
+        Keys, with their values as the file has them; sections that are not there are made.
+    """
+    for change in changes:
+        text = _with_value(text, parts_of(change.key), change.text)
+    return text
+
+
+def _with_value(text: str, parts: tuple[str, ...], value: str) -> str:
+    node: Any = yaml.compose(text, Loader=_LOADER)
+    while True:
+        key, rest = _next(node, parts)
+        inner = _below(node, key)
+        if inner is None:
+            return _beside(text, node, key, rest, value)
+        if not rest:
+            return _replaced(text, inner, value)
+        if not isinstance(inner, yaml.MappingNode | yaml.SequenceNode):  # a section that has nothing in it
+            return _replaced(text, inner, _nested(rest, value))
+        node, parts = inner, rest
+
+
+def _next(node: Any, parts: tuple[str, ...]) -> tuple[str, tuple[str, ...]]:
+    """The key or number that a path goes on with; a key may have dots itself."""
+    names: Any = (
+        {key.value: None for key, _ in node.value} if isinstance(node, yaml.MappingNode) else list(node.value)
+    )
+    name, rest = next_name(names, parts)
+    return str(name), rest
+
+
+def _below(node: Any, name: str) -> Any:
+    """The node of a key or a number; None where there is none."""
+    if isinstance(node, yaml.MappingNode):
+        return next((value for key, value in node.value if key.value == name), None)
+    return node.value[int(name)] if int(name) < len(node.value) else None
+
+
+def _replaced(text: str, node: Any, value: str) -> str:
+    """Put a value in the place of a node; one in lines of its own ends before the comments behind it."""
+    start, end = node.start_mark.index, node.end_mark.index
+    inside = text[start:end]
+    if isinstance(node, yaml.ScalarNode):
+        is_apart = start == 0 or text[start - 1].isspace()
+        return f"{text[:start]}{'' if is_apart else ' '}{value}{text[end:]}"
+    if node.flow_style:
+        return f"{text[:start]}{value}{text[end:]}"
+    before = text[:start].rstrip(" \n")
+    kept = inside[len(_without_comments(inside)) :]
+    return f"{before} {value}{kept or chr(10)}{text[end:]}"
+
+
+def _without_comments(inside: str) -> str:
+    """Lines without those at the end that are comments or blank."""
+    lines = inside.splitlines(keepends=True)
+    while lines and (not lines[-1].strip() or lines[-1].lstrip().startswith("#")):
+        lines.pop()
+    return "".join(lines).rstrip("\n")
+
+
+def _nested(parts: Sequence[str], value: str) -> str:
+    """A value below keys, in one line."""
+    for part in reversed(parts):
+        value = f"{{{part}: {value}}}"
+    return value
+
+
+def _beside(text: str, node: Any, key: str, rest: Sequence[str], value: str) -> str:
+    """Put a key beside those of a mapping, or a value at the end of a list, as the others are written."""
+    whole, start, end = _nested(rest, value), node.start_mark.index, node.end_mark.index
+    entry = whole if isinstance(node, yaml.SequenceNode) else f"{key}: {whole}"
+    if node.flow_style:
+        inside = text[start : end - 1].rstrip()
+        comma = ", " if node.value else ""
+        return f"{text[:start]}{inside}{comma}{entry}{text[start + len(inside) :]}"
+    entry = f"- {entry}" if isinstance(node, yaml.SequenceNode) else entry
+    inside = _without_comments(text[start:end])
+    return f"{text[: start + len(inside)]}\n{' ' * node.start_mark.column}{entry}{text[start + len(inside) :]}"
