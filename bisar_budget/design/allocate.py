@@ -57,10 +57,10 @@ class Specification(NamedTuple):
     """The largest size of one error, and what is to be ordered.
 
     `value` is the size as found, `ordered` the same rounded down, `text` that as the file would have it; None, and
-    empty, where no requirement limits it, `found_text` the value in the same unit, `remark` what the number means to a
-    supplier. `declared` is what the file has today, the largest of three axes. `shares`
-    are the parts of what each requirement may use, by its row in which the error takes most of it. `parts` are those
-    of the catalogue that keep to what is ordered.
+    empty, where no requirement limits it. `found_text` is the value in the same unit, `remark` what the number means to
+    a supplier. `declared` is what the file has today, the largest of three axes. `shares` are the parts of what each
+    requirement may use, by its row in which the error takes most of it. `parts` are those of the catalogue that keep
+    to what is ordered.
     """
 
     key: str
