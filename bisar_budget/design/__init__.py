@@ -1,10 +1,12 @@
-"""Design questions of one mission: which values of a key comply, where that changes, what each number does."""
+"""Design questions of one mission: which values comply, what each number does, which sizes hold together."""
 
 # What other rooms may use.
 __all__ = [
+    "allocate",
     "cases",
     "compare",
     "imaged",
+    "offers",
     "quantities",
     "sensitivity",
     "solve",

@@ -22,14 +22,14 @@ from bisar_budget.budget.judged_requirements import SMALL_RAD, TENTH
 from bisar_budget.budget.judged_rows import CODE, REQUIREMENTS, Why
 from bisar_budget.design.geometric_program import Rows, largest_sizes
 from bisar_budget.design.quantities import QuestionError, tree_of
-from bisar_budget.design.specified import ACCEPTED, Specified, specified_errors
+from bisar_budget.design.specified import Specified, specified_errors
 from bisar_budget.design.table import Variation
 from bisar_budget.design.varied import is_held, varied
 from bisar_budget.effects.declared import CUBIC, END_OF_IMAGE, LOCATION, QUADRATIC
 from bisar_budget.faults import MissionError, SetValue
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.requirement import JudgedRequirement, Override
-from bisar_budget.mission.changes import parts_of
+from bisar_budget.mission.changes import ACCEPTED_ERRORS, parts_of
 from bisar_budget.mission.load import folder_of
 from bisar_budget.mission.model import MetricSplits, Mission
 from bisar_budget.mission.parts import Entry, PartError, entries, folders
@@ -57,10 +57,10 @@ class Specification(NamedTuple):
     """The largest size of one error, and what is to be ordered.
 
     `value` is the size as found, `ordered` the same rounded down, `text` that as the file would have it; None, and
-    empty, where no requirement limits it. `found_text` is the value in the same unit, `remark` what the number means to
-    a supplier. `declared` is what the file has today, the largest of three axes. `shares` are the parts of what each
-    requirement may use, by its row in which the error takes most of it. `parts` are those of the catalogue that keep
-    to what is ordered.
+    empty, where no requirement limits it. `found_text` is the value in the same unit, `remark` what the number means
+    to a supplier. `declared` is what the file has today, the largest of three axes. `shares` are the parts of what
+    each requirement may use, by its row in which the error takes most of it. `parts` are those of the catalogue that
+    keep to what is ordered.
     """
 
     key: str
@@ -103,7 +103,7 @@ class Broken(NamedTuple):
     allowed: float
 
 
-class Sheet(NamedTuple):
+class SpecificationSheet(NamedTuple):
     """Specifications of one mission that hold together.
 
     `status` is that of the check with what is ordered in place, and `requirements` how each then stands. `rows` are
@@ -148,7 +148,7 @@ def allocate(
     model: str | None = None,
     today: date,
     progress: Progress = unseen,
-) -> Sheet:
+) -> SpecificationSheet:
     """Find the largest sizes of errors with which a mission, as a whole, meets every requirement.
 
     Parameters
@@ -168,7 +168,7 @@ def allocate(
 
     Returns
     -------
-    Sheet
+    SpecificationSheet
         With the verdict of a full check that has what is ordered in place.
 
     Raises
@@ -178,7 +178,7 @@ def allocate(
     """
     if mission.allocation.combine == "each":
         raise QuestionError(_each(mission, keys, model, today))
-    search = _Search(mission, keys, reserve, model, today)
+    search = _SpecificationSearch(mission, keys, reserve, model, today)
     broken = search.broken()
     if broken:
         return search.sheet(None, broken)
@@ -203,7 +203,7 @@ def _each(mission: Mission, keys: Mapping[str, float] | None, model: str | None,
     )
 
 
-class _Uses(NamedTuple):
+class _RowUses(NamedTuple):
     """Utilizations of the rows that can fail in some cases, (rows, cases), by their ids; and what judges each."""
 
     ids: list[str]
@@ -228,7 +228,7 @@ class _Found(NamedTuple):
     multipliers: Floats
 
 
-class _Search:
+class _SpecificationSearch:
     """One mission and the errors of it that are specified."""
 
     def __init__(
@@ -259,7 +259,7 @@ class _Search:
             raise QuestionError(f"{fault.key}: {fault.problem}; it cannot be specified beside the rest") from None
         for one in self.specified:
             if not is_held(self.stated, one.key, is_stated=True):
-                raise QuestionError(f"{one.key}: decides more than its own size; {ACCEPTED}")
+                raise QuestionError(f"{one.key}: decides more than its own size; {ACCEPTED_ERRORS}")
         self.tiny, self.ends, self.unjudged = tiny, np.full(tiny.shape, math.inf), set[str]()
 
     def _equal(self, mission: Mission) -> Iterator[SetValue]:
@@ -291,7 +291,7 @@ class _Search:
     def _nodes(self) -> int:
         return int(Analysis(self.stated).exact.fit.shape[1])
 
-    def _uses(self, sizes: Floats) -> _Uses:
+    def _uses(self, sizes: Floats) -> _RowUses:
         """Utilizations of the rows that can fail, with sizes."""
         judged = self._judged(sizes)
         ids, requirements, powers, uses = list[str](), list[str | None](), list[float](), list[Floats]()
@@ -322,7 +322,7 @@ class _Search:
             requirements.append(None)
             powers.append(2.0)
             uses.append(sizes[place] / self.ends[place])
-        return _Uses(ids, requirements, np.array(powers), np.array(uses))
+        return _RowUses(ids, requirements, np.array(powers), np.array(uses))
 
     def _power(self, kind: str) -> float:
         """Power of a size that adds up in a row."""
@@ -474,7 +474,7 @@ class _Search:
         return np.array([uses.get(row, 0.0) for row in near.found.ids])
 
     # ---------------------------------------------------------------- the sheet
-    def sheet(self, found: _Found | None, broken: tuple[Broken, ...]) -> Sheet:
+    def sheet(self, found: _Found | None, broken: tuple[Broken, ...]) -> SpecificationSheet:
         """Put what was found into words and units, and check the mission with what is ordered."""
         values = [math.nan] * len(self.specified) if found is None else self._values(found)
         ordered = [
@@ -502,7 +502,7 @@ class _Search:
             )
             for place, (one, value, (number, text)) in enumerate(zip(self.specified, values, ordered, strict=True))
         ]
-        return Sheet(
+        return SpecificationSheet(
             file=self.given.file,
             name=self.given.name,
             model=self.model,
@@ -560,7 +560,7 @@ class _Near(NamedTuple):
     `is_limit` are the rows that any of the sizes takes part in, `is_free` the sizes that take part in none.
     """
 
-    found: _Uses
+    found: _RowUses
     allowed: Floats
     sizes: Floats
     part: Floats

@@ -4,7 +4,7 @@ from datetime import date
 from typing import NamedTuple
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.design.allocate import Sheet, Specification
+from bisar_budget.design.allocate import Specification, SpecificationSheet
 from bisar_budget.design.quantities import QuestionError, number_of, tree_of
 from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.mission.model import Mission
@@ -34,7 +34,7 @@ class Offer(NamedTuple):
         return self.status not in ("fail", "not_evaluated", "error")
 
 
-def offer(sheet: Sheet, mission: Mission, today: date) -> Offer:
+def offer(sheet: SpecificationSheet, mission: Mission, today: date) -> Offer:
     """Hold the mission of an offer to a sheet.
 
     A figure is inside where it is no larger than what is ordered, of three axes the largest one, or where nothing is.

@@ -9,23 +9,14 @@ import numpy as np
 from bisar_budget import units
 from bisar_budget.design.quantities import Number, QuestionError, number_of
 from bisar_budget.effects.effect import PLATFORMS
-from bisar_budget.mission.changes import parts_of
+from bisar_budget.mission.changes import ACCEPTED_ERRORS, is_error, parts_of
 from bisar_budget.mission.model import Mission
 from bisar_budget.ranges.exact_ranges import Floats
 from bisar_budget.units import Dimension, parse_quantity
 
 DIGITS = 2  # of a number that is ordered
 _SILENT_DB = -400.0  # a level of nothing
-_SECTIONS = (
-    *("motion_error", "common_motion_error", "timing_error", "propagation", "other_errors"),
-    *("oscillator", "synchronization"),
-)
-_NO_SIZES = ("age", "arm", "averaging", "bandwidth", "correlation_time", "frequency", "interval")
 _LEVELS = (units.POWER_RATIO, units.PHASE_NOISE, units.TONE)
-ACCEPTED = (
-    "accepted: a key of an error with one number, such as platforms.receiver.motion_error.velocity, "
-    "platforms.receiver.motion_error.imu.gyro_bias, platforms.receiver.oscillator.level, timing_error.quadratic"
-)
 # Units in which the sizes are ordered, where the file has none: the first in which the number is at least 1.
 _ORDERED_IN: Mapping[Dimension, tuple[str, ...]] = {
     units.LENGTH: ("m", "mm", "um"),
@@ -155,10 +146,10 @@ def usual_keys(mission: Mission) -> Iterator[str]:
 
 def _number(mission: Mission, tree: dict[str, object], key: str) -> Number:
     parts = parts_of(key)
-    if not any(part in _SECTIONS for part in parts[:3]) or parts[-1] in _NO_SIZES:
-        raise QuestionError(f"{key}: is no error that can be specified; {ACCEPTED}")
+    if not is_error(key):
+        raise QuestionError(f"{key}: is no error that can be specified; {ACCEPTED_ERRORS}")
     number = number_of(tree, key, is_for_each=True)
     error = getattr(mission.platforms, parts[1]).motion_error if parts[0] == "platforms" else None
     if error is not None and error.covariance is not None and parts[3] in ("position", "velocity"):
-        raise QuestionError(f"{key}: the file has a covariance of {parts[1]}, which is fixed; {ACCEPTED}")
+        raise QuestionError(f"{key}: the file has a covariance of {parts[1]}, which is fixed; {ACCEPTED_ERRORS}")
     return number

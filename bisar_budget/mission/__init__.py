@@ -5,6 +5,7 @@ __all__ = [
     "changes",
     "covariance",
     "curves",
+    "edited",
     "instruments",
     "load",
     "model",

@@ -11,7 +11,7 @@ from typing import Any
 
 import yaml
 
-from bisar_budget.faults import Changed, InvalidValueError, KeyPath, SetNumber, SetValue, shown
+from bisar_budget.faults import Changed, InvalidValueError, KeyPath, Problem, SetNumber, SetValue, shown
 from bisar_budget.mission.model import MISSION
 from bisar_budget.mission.readers import INVALID, ListOf, OneOf, Reader, Section, did_you_mean, is_place
 from bisar_budget.mission.tree import MAX_BYTES, Tree
@@ -258,3 +258,33 @@ def _spelt_right(parts: Sequence[str]) -> str:
 def _shared(one: list[str], other: list[str]) -> int:
     """Number of keys with which two paths begin alike."""
     return next((at for at, (a, b) in enumerate(zip(one, other, strict=False)) if a != b), min(len(one), len(other)))
+
+
+# ---------------------------------------------------------------------- keys of errors
+_ERRORS = (
+    *("motion_error", "common_motion_error", "timing_error", "propagation", "other_errors"),
+    *("oscillator", "synchronization"),
+)
+_NO_SIZES = ("age", "arm", "averaging", "bandwidth", "correlation_time", "frequency", "interval")
+ACCEPTED_ERRORS = (
+    "accepted: a key of an error with one number, such as platforms.receiver.motion_error.velocity, "
+    "platforms.receiver.motion_error.imu.gyro_bias, platforms.receiver.oscillator.level, timing_error.quadratic"
+)
+
+
+def is_error(key: str) -> bool:
+    """Whether a key stands where a mission file states errors, and is none of their other numbers."""
+    parts = parts_of(key)
+    return any(part in _ERRORS for part in parts[:3]) and parts[-1] not in _NO_SIZES
+
+
+def report_specified(tree: Tree) -> None:
+    """Say of `allocation.specify` which of its keys are no errors."""
+    given = tree.root["allocation"]["specify"]
+    for place, key in enumerate(given):
+        path = ("allocation", "specify", key if isinstance(given, dict) else place)
+        if ".".join(_names(key)) not in all_keys():
+            near = nearest_keys(key)
+            tree.report(path, Problem("names no key of a mission file", ACCEPTED_ERRORS, near, is_of_key=True))
+        elif not is_error(key):
+            tree.report(path, Problem("names no error that can be specified", ACCEPTED_ERRORS, is_of_key=True))

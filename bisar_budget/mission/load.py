@@ -112,6 +112,10 @@ def mission_of(
     with suppress(UnusableError):
         mission = MISSION.read(tree.root, (), tree.report)
         folder = folder_of(file)
+        if mission is not INVALID and mission.allocation.specify:
+            from bisar_budget.mission.changes import report_specified
+
+            report_specified(tree)
         if mission is INVALID and names_files(tree.root):
             from bisar_budget.mission.paths import reader_of, report_files
 

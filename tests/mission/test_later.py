@@ -45,7 +45,6 @@ def faults(**changes: object) -> tuple[Fault, ...]:
             for one in ("pos", "nmea", "gpx", "ulog")
         ),
         ({"earth_orientation": {"ut1_minus_utc": "-0.1 s"}}, "earth_orientation"),
-        ({"allocation": {"specify": ["a"]}}, "allocation.specify"),
     ],
 )  # fmt: skip
 def test_what_is_not_computed_yet_is_one_error_that_says_so(changes: dict[str, object], key: str) -> None:
@@ -61,7 +60,7 @@ def test_what_is_not_computed_yet_is_one_error_that_says_so(changes: dict[str, o
 def test_the_table_names_sections_of_the_file_and_keys_that_they_do_not_have() -> None:
     kinds = (
         *(MotionError, Vibration, Oscillator, Synchronization, CommonMotionError, OrbitSource, TrajectorySource),
-        *(model.Mission, model.OtherError, model.AllocationRules, ImuPart, OscillatorPart, Imu),
+        *(model.Mission, model.OtherError, ImuPart, OscillatorPart, Imu),
     )
     by_name = {kind.__name__: kind for kind in kinds}
     for name, keys in LATER.items():
@@ -74,12 +73,10 @@ def test_a_key_that_is_to_come_hides_no_other_fault() -> None:
             f"{ERROR}velocity": "1 m",
             f"{ERROR}vibraton": 1,
             "earth_orientation": {"islr": 1},
-            "allocation__specify": ["a"],
         }
     )
     assert sorted(fault.key.rpartition(".")[2] for fault in found) == [
         "earth_orientation",
-        "specify",
         "velocity",
         "vibraton",
     ]

@@ -1,6 +1,6 @@
 """What uses up every row that limits a specification, as stacked bars: errors by their numbers on the sheet."""
 
-from bisar_budget.design.allocate import RowUse, Sheet
+from bisar_budget.design.allocate import RowUse, SpecificationSheet
 from bisar_budget.faults import printable
 from bisar_budget.findings.requirement import NAMES
 from bisar_budget.report.drawing import svg
@@ -21,14 +21,14 @@ _STYLE = (
 )
 
 
-def limiting(sheet: Sheet) -> list[RowUse]:
+def limiting(sheet: SpecificationSheet) -> list[RowUse]:
     """Rows that limit a specification, each requirement's together."""
     rows = [row for row in sheet.rows if row.multiplier > LIMITS]
     order = [*NAMES, None]
     return sorted(rows, key=lambda row: order.index(row.requirement))
 
 
-def share_bars(sheet: Sheet) -> str:
+def share_bars(sheet: SpecificationSheet) -> str:
     """Draw the bars as SVG: parts of the power, or of the sum, of what each row may use."""
     canvas = svg.Canvas()
     keys = [one.key for one in sheet.specifications]

@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
-from bisar_budget.design.allocate import Broken, Sheet, Specification
+from bisar_budget.design.allocate import Broken, Specification, SpecificationSheet
 from bisar_budget.design.offers import Offer
 from bisar_budget.faults import changes_words, printable
 from bisar_budget.findings.requirement import NAMES
@@ -26,7 +26,7 @@ _COLUMNS = ("file", "key", "value", "ordered", "unit", "text", "declared", "weig
 class Answer(NamedTuple):
     """A sheet, and the offer that is held to it, if any."""
 
-    sheet: Sheet
+    sheet: SpecificationSheet
     offer: Offer | None = None
 
 
@@ -155,7 +155,7 @@ def _lines(answer: Answer, style: Style) -> Iterator[str]:
         yield from table([head, *lines])
 
 
-def _verdict(sheet: Sheet) -> str:
+def _verdict(sheet: SpecificationSheet) -> str:
     if sheet.broken:
         return "no specification can be found: other errors leave no room"
     count = sum(one.value is not None for one in sheet.specifications)
@@ -165,7 +165,7 @@ def _verdict(sheet: Sheet) -> str:
     return f"{count} specifications that meet every requirement together: check says {stands}"
 
 
-def _terms(sheet: Sheet) -> str:
+def _terms(sheet: SpecificationSheet) -> str:
     how = "root-sum-square" if sheet.combine == "rss" else "sum of all at their worst"
     return f"{sheet.model} model, {how}, {percent(sheet.reserve)} of each limit in reserve"
 
@@ -175,7 +175,7 @@ def _broken(one: Broken) -> list[str]:
     return [one.id, percent(one.used), percent(one.allowed), over]
 
 
-def _way_out(sheet: Sheet) -> str:
+def _way_out(sheet: SpecificationSheet) -> str:
     if all(one.used <= 1 for one in sheet.broken):
         least = 1 - max(one.used for one in sheet.broken)
         return (
@@ -190,7 +190,7 @@ def _line(one: Specification) -> list[str]:
     return [one.key, one.text or "free", one.declared_text or "-", share]
 
 
-def _remarks(sheet: Sheet) -> Iterator[str]:
+def _remarks(sheet: SpecificationSheet) -> Iterator[str]:
     """What a reader of a sheet should know of it."""
     for row in limiting(sheet):
         if row.requirement is None and row.id.startswith("negligible"):
@@ -267,13 +267,13 @@ def _chapter(answer: Answer, anchor: str) -> doc.Chapter:
     return doc.Chapter(printable(sheet.name), blocks, anchor, level=2, is_article=True)
 
 
-def _outside(sheet: Sheet) -> Iterator[tuple[str, str]]:
+def _outside(sheet: SpecificationSheet) -> Iterator[tuple[str, str]]:
     said = overrides_words(sheet)
     if said:
         yield "From outside the file", said
 
 
-def _specified(sheet: Sheet) -> Iterator[doc.Block]:
+def _specified(sheet: SpecificationSheet) -> Iterator[doc.Block]:
     keys = [key for key in NAMES if any(key in one.shares for one in sheet.specifications)]
     heads = [
         *doc.numbers("No."),
@@ -296,7 +296,7 @@ def _parts(one: Specification) -> str:
     return f"{', '.join(one.parts[:_LISTED])}{more}"
 
 
-def _required(sheet: Sheet) -> Iterator[doc.Block]:
+def _required(sheet: SpecificationSheet) -> Iterator[doc.Block]:
     heads = [*doc.heads("Requirement"), *doc.numbers("Allowed", "Reached", "Use"), *doc.heads("Status", "Decided by")]
     if sheet.findings is not None:
         rows: list[doc.Line] = [
@@ -306,6 +306,6 @@ def _required(sheet: Sheet) -> Iterator[doc.Block]:
         yield doc.TextTable("Requirements", "Requirements, with what is ordered in place", heads, rows)
 
 
-def _drawn(sheet: Sheet, anchor: str) -> Iterator[doc.Block]:
+def _drawn(sheet: SpecificationSheet, anchor: str) -> Iterator[doc.Block]:
     if limiting(sheet):
         yield doc.Figure(f"{anchor}-shares.svg", anchor, "What uses up each limit", "Shares", share_bars(sheet))

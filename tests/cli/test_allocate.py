@@ -1,0 +1,174 @@
+"""`bisar-budget allocate`: exit codes, what is written, what is refused."""
+
+import csv
+import io
+import json
+from xml.etree import ElementTree
+
+import pytest
+
+from bisar_budget.design.allocate import allocate
+from bisar_budget.mission.load import parse_mission
+from bisar_budget.report.drawing.share_bars import limiting, share_bars
+from tests.conftest import TODAY, mission_text
+
+KEY = "platforms.receiver.motion_error.velocity"
+RSS = {"allocation": {"combine": "rss", "model": "full"}, "requirements__location_error": "20 m"}
+
+
+@pytest.fixture
+def mission(tmp_path):
+    path = tmp_path / "m.yaml"
+    path.write_text(mission_text(**RSS))
+    return path
+
+
+def document(run, *arguments) -> dict:
+    (found,) = json.loads(run("allocate", *arguments, "--format", "json").stdout)["missions"]
+    return found
+
+
+class TestSheet:
+    def test_text_says_what_to_order_and_that_it_holds(self, run, mission) -> None:
+        found = run("allocate", mission)
+        assert found.exit_code == 0
+        lines = found.stdout.splitlines()
+        assert lines[0] == "7 specifications that meet every requirement together: check says pass"
+        assert all(len(line) <= 80 for line in lines)
+        assert any(line.startswith("location error") for line in lines)
+
+    def test_json_is_the_contract(self, run, mission) -> None:
+        found = json.loads(run("allocate", mission, "--format", "json").stdout)
+        assert found["format"] == "bisar-budget/allocate/1"
+        (one,) = found["missions"]
+        assert {"file", "status", "requirements", "specifications"} <= one.keys()
+        for requirement in one["requirements"]:
+            assert {"key", "value", "unit", "used"} <= requirement.keys()
+        for specification in one["specifications"]:
+            assert {"key", "value", "ordered", "unit", "shares", "declared", "parts"} <= specification.keys()
+            assert specification["ordered"] <= specification["value"]
+        assert [one["key"] for one in one["specifications"]][-1] == "timing_error.quadratic"
+
+    def test_csv_has_a_line_for_each(self, run, mission) -> None:
+        lines = list(csv.DictReader(io.StringIO(run("allocate", mission, "--format", "csv").stdout)))
+        shares = [float(line["share of location_error"]) for line in lines]
+        assert len(lines) == 7
+        assert all(0 <= share <= 1 for share in shares)
+
+    @pytest.mark.parametrize("name", ["markdown", "html"])
+    def test_documents_name_every_specification(self, run, mission, name: str) -> None:
+        text = run("allocate", mission, "--format", name).stdout
+        assert "Specification sheet" in text
+        for one in document(run, mission)["specifications"]:
+            assert one["text"] in text
+
+    def test_the_drawing_has_a_bar_for_each_row_that_limits(self) -> None:
+        sheet = allocate(parse_mission(mission_text(**RSS)), today=TODAY)
+        drawing = ElementTree.fromstring(share_bars(sheet))
+        texts = ["".join(text.itertext()) for text in drawing.iter() if text.tag.endswith("text")]
+        rows = limiting(sheet)
+        assert len(rows) > 1
+        for row in rows:
+            assert row.id.replace("_", " ") in texts
+            assert row.fixed + sum(row.shares.values()) == pytest.approx(1, abs=0.01)
+
+    def test_keys_are_those_of_the_file_or_of_the_command(self, run, tmp_path) -> None:
+        path = tmp_path / "m.yaml"
+        path.write_text(mission_text(**RSS, allocation__specify={KEY: 3}))
+        assert [one["key"] for one in document(run, path)["specifications"]] == [KEY]
+        assert document(run, path)["specifications"][0]["weight"] == 3
+        asked = document(run, path, "--for", "timing_error.quadratic")
+        assert [one["key"] for one in asked["specifications"]] == ["timing_error.quadratic"]
+
+
+class TestMission:
+    def test_it_is_written_with_what_is_ordered_and_its_comments_and_passes(self, run, mission, tmp_path) -> None:
+        mission.write_text(f"# ours\n{mission.read_text()}")
+        there = tmp_path / "specified.yaml"
+        assert run("allocate", mission, "-o", there).exit_code == 0
+        assert there.read_text().startswith("# ours\n")
+        assert run("check", there).exit_code == 0
+        found = document(run, mission)
+        again = json.loads(run("check", there, "--format", "json").stdout)["missions"][0]
+        assert [one["utilization"] for one in again["requirements"]] == [one["used"] for one in found["requirements"]]
+
+    def test_options_are_written_too(self, run, mission, tmp_path) -> None:
+        there = tmp_path / "specified.yaml"
+        option = "requirements.location_error=5 m"
+        assert run("allocate", mission, "--set", option, "-o", there).exit_code == 0
+        assert "location_error: 5 m" in there.read_text()
+        assert run("check", there).exit_code == 0
+
+    def test_nothing_is_written_where_there_are_no_specifications(self, run, mission, tmp_path) -> None:
+        there = tmp_path / "specified.yaml"
+        found = run("allocate", mission, "--set", "requirements.location_error=1 m", "--for", KEY, "-o", there)
+        assert run("allocate", mission, "--set", "scene.height_error=500 m", "-o", there).exit_code == 1
+        assert found.exit_code in (0, 1)
+        assert not there.exists() or found.exit_code == 0
+
+
+class TestOffer:
+    @pytest.fixture
+    def offer(self, tmp_path):
+        """An offer whose receiver is worse in velocity than the sheet has it, and better in the rest."""
+        error = {"position": "1 cm", "velocity": "20 mm/s", "acceleration": "1e-6 m/s^2"}
+        path = tmp_path / "offer.yaml"
+        path.write_text(
+            mission_text(
+                **RSS,
+                platforms__receiver__motion_error=error,
+                platforms__transmitter__motion_error={"position": "1 cm", "velocity": "1 mm/s", "acceleration": 0},
+                timing_error={"quadratic": "0 1/s"},
+            )
+        )
+        return path
+
+    def test_a_figure_may_be_outside_where_others_leave_room(self, run, mission, offer) -> None:
+        sides = {
+            one["key"]: one["is_inside"] for one in document(run, mission, "--compare", offer)["offer"]["figures"]
+        }
+        assert not sides.pop(KEY)
+        assert all(sides.values())
+        found = run("allocate", mission, "--compare", offer)
+        assert found.exit_code == 0
+        assert "1 of 7 figures are outside" in found.stdout
+        assert "OUTSIDE" in found.stdout
+
+    def test_an_offer_with_which_the_mission_fails_is_exit_1(self, run, mission, offer) -> None:
+        offer.write_text(offer.read_text().replace("20 mm/s", "900 mm/s"))
+        found = run("allocate", mission, "--compare", offer)
+        assert found.exit_code == 1
+        assert "the mission as a whole says FAIL" in found.stdout
+
+    def test_a_figure_that_the_offer_does_not_state_is_outside(self, run, mission, tmp_path) -> None:
+        silent = tmp_path / "silent.yaml"
+        silent.write_text(mission_text(**RSS))
+        figures = document(run, mission, "--compare", silent)["offer"]["figures"]
+        assert {one["text"]: one["is_inside"] for one in figures}[""] is False
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "said"),
+    [
+        (["--for", "radar.bandwidth"], 2, "is no error that can be specified"),
+        (["--for", KEY, "--for", KEY], 2, "stands twice"),
+        (["--for", f"{KEY}s"], 2, f"Did you mean '{KEY}'"),
+        (["--reserve", "100"], 2, "--reserve"),
+        (["--set", "allocation.combine=each"], 2, "the single allowables are the answer"),
+        (["--set", "scene.height_error=500 m"], 1, "other errors leave no room"),
+        (["--compare", "nowhere.yaml"], 2, "nowhere.yaml"),
+    ],
+)
+def test_what_cannot_be_asked_says_why(run, mission, arguments, code: int, said: str) -> None:
+    found = run("allocate", mission, *arguments)
+    assert found.exit_code == code
+    assert said in found.stdout + found.stderr
+    assert "Traceback" not in found.stderr
+
+
+def test_one_mission_is_written_and_one_offer_compared(run, mission, tmp_path) -> None:
+    other = tmp_path / "n.yaml"
+    other.write_text(mission.read_text())
+    assert run("allocate", mission, other, "-o", tmp_path / "x.yaml").exit_code == 2
+    assert run("allocate", mission, other, "--compare", other).exit_code == 2
+    assert run("allocate", mission, other).exit_code == 0

@@ -1,0 +1,60 @@
+"""A mission file with values put in place: all else stays, comments included, and it is the mission of `--set`."""
+
+import difflib
+
+import pytest
+
+from bisar_budget.faults import SetValue
+from bisar_budget.mission.edited import with_values
+from bisar_budget.mission.load import parse_mission
+from tests.conftest import ROOT
+
+EXAMPLES = sorted((ROOT / "specs" / "missions").glob("*.yaml"))
+CHANGES = [
+    SetValue("platforms.receiver.motion_error.acceleration", "7 ug"),
+    SetValue("platforms.receiver.motion_error.imu.gyro_bias", "2 deg/h"),
+    SetValue("platforms.transmitter.motion_error.acceleration", "5 ug"),
+    SetValue("allocation.combine", "rss"),
+    SetValue("allocation.split", "equal"),
+    SetValue("requirements.cubic_phase_error", "20 deg"),
+]
+# What reading notes beside the mission: where each thing stands, and what changed it.
+WHENCE = ("data", "changes", "places", "parts")
+
+
+@pytest.mark.parametrize("file", EXAMPLES, ids=lambda file: file.stem)
+def test_it_is_the_mission_with_the_options_and_every_comment(file) -> None:
+    text = file.read_text()
+    edited = with_values(text, CHANGES)
+    one, other = parse_mission(edited, str(file)), parse_mission(text, str(file), changes=CHANGES)
+    for field in one._fields:
+        if field not in WHENCE:
+            assert getattr(one, field) == getattr(other, field), field
+    assert comments(edited) == comments(text)
+    kept = sum(line.startswith("  ") for line in difflib.ndiff(text.splitlines(), edited.splitlines()))
+    assert kept >= len(text.splitlines()) - len(CHANGES)
+
+
+def comments(text: str) -> list[str]:
+    return [line.partition("#")[2] for line in text.splitlines() if "#" in line]
+
+
+@pytest.mark.parametrize(
+    ("text", "key", "edited"),
+    [
+        ("a: 1 m # far\nb: 2\n", "a", "a: 9 # far\nb: 2\n"),
+        ("a: {b: 1, c: 2} # both\n", "a.d", "a: {b: 1, c: 2, d: 9} # both\n"),
+        ("a: {}\n", "a.b", "a: {b: 9}\n"),
+        ("a: [1 m, 2 m, 3 m]\nb: 1\n", "a", "a: 9\nb: 1\n"),
+        ("a: [1 m, 2 m]\n", "a.1", "a: [1 m, 9]\n"),
+        ("a:\n  - 1 m\n  - 2 m # of these\n# next\nb: 1\n", "a", "a: 9\n# next\nb: 1\n"),
+        ("a:\n  b: 1\n  # the end of a\nc: 1\n", "a.d", "a:\n  b: 1\n  d: 9\n  # the end of a\nc: 1\n"),
+        ("a:\n  b: 1\n", "c.d.e", "a:\n  b: 1\nc: {d: {e: 9}}\n"),
+        ("a:\nb: 1\n", "a.c", "a: {c: 9}\nb: 1\n"),
+        ("a:\n  - name: x\n    b: 1\n", "a.0.b", "a:\n  - name: x\n    b: 9\n"),
+        ("a: 'quoted' # so\n", "a", "a: 9 # so\n"),
+        ("µ: ü # ä\na: 1 # ö\n", "a", "µ: ü # ä\na: 9 # ö\n"),
+    ],
+)
+def test_one_value(text: str, key: str, edited: str) -> None:
+    assert with_values(text, [SetValue(key, "9")]) == edited
