@@ -13,7 +13,7 @@ from bisar_budget.report.drawing.share_bars import limiting, share_bars
 from tests.conftest import TODAY, mission_text
 
 KEY = "platforms.receiver.motion_error.velocity"
-RSS = {"allocation": {"combine": "rss", "model": "full"}, "requirements__location_error": "20 m"}
+RSS = {"allocation__combine": "rss", "allocation__model": "full", "requirements__location_error": "20 m"}
 
 
 @pytest.fixture

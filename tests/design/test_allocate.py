@@ -21,7 +21,7 @@ from tests.conftest import ROOT, mission_text
 from tests.families import mission_text as of_family
 
 DAY = date(2026, 11, 25)
-RSS = {"allocation": {"combine": "rss", "model": "full"}}
+RSS = {"allocation__combine": "rss", "allocation__model": "full"}
 
 
 def family(name: str, seed: int, rule: str) -> Mission:
@@ -139,7 +139,7 @@ def test_a_reserve_that_other_errors_have_used_is_no_room_either() -> None:
 
 def test_an_effect_that_no_requirement_takes_stays_negligible() -> None:
     """Without a requirement of the cubic phase a velocity that passes by its quadratic phase would not be judged."""
-    given = mission(collection__aperture_time="12 s", allocation={"combine": "rss", "model": "full"})
+    given = mission(collection__aperture_time="12 s")
     sheet = allocate(given, keys={"timing_error.cubic": 1.0}, today=DAY)
     (row,) = [row for row in sheet.rows if row.multiplier > 1e-3]
     assert (row.id, row.requirement) == ("negligible.cubic", None)
@@ -147,7 +147,7 @@ def test_an_effect_that_no_requirement_takes_stays_negligible() -> None:
 
 
 def test_each_error_alone_needs_no_sheet() -> None:
-    given = mission(allocation={"combine": "each", "model": "full"})
+    given = mission(allocation__combine="each")
     with pytest.raises(
         QuestionError, match=r"the single allowables are the answer: .*receiver\.motion_error\.velocity"
     ):
@@ -155,7 +155,7 @@ def test_each_error_alone_needs_no_sheet() -> None:
 
 
 def test_balanced_shares_are_taken_as_equal_and_it_is_said() -> None:
-    given = mission(allocation={"combine": "rss", "model": "full", "split": "balanced"})
+    given = mission(allocation__split="balanced")
     sheet = allocate(given, today=DAY)
     equal = allocate(mission(), today=DAY)
     assert [one.value for one in sheet.specifications] == pytest.approx([one.value for one in equal.specifications])
