@@ -9,7 +9,7 @@ import click
 
 from bisar_budget import __version__
 from bisar_budget.cli.long_work import watched_checks
-from bisar_budget.cli.options import DATE, FILE, MISSIONS, MODEL, OUTPUT, SET, day, outside
+from bisar_budget.cli.options import DATE, FILE, MISSIONS, MODEL, OUTPUT, SET, day, outside, root_of_names
 from bisar_budget.cli.streams import (
     EXIT_BROKEN,
     complain,
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from bisar_budget.mission.model import Mission
     from bisar_budget.report.formats.specification_sheet import Answer
 
-_FORMATS = ("text", "json", "csv", "markdown", "html")
+_FORMATS = ("text", "json", "csv", "markdown", "html", "needs", "sdoc")
 _MISSION = (".yaml", ".yml")
 
 
@@ -59,7 +59,7 @@ _MISSION = (".yaml", ".yml")
     type=click.Choice(_FORMATS),
     default="text",
     show_default=True,
-    help="Format of the sheet.",
+    help="Format of the sheet; needs and sdoc are requirements for Sphinx-Needs and StrictDoc.",
 )
 @OUTPUT
 def allocate(
@@ -144,6 +144,14 @@ def _written(answers: "Sequence[Answer]", format_name: str, output: str | None) 
         return sheets.as_text(answers, Style(color=output is None and wants_color()))
     if format_name == "csv":
         return sheets.as_csv(answers)
+    if format_name in ("needs", "sdoc"):
+        from bisar_budget.report.formats import flow_down
+
+        root, is_checkout = root_of_names()
+        requirements: str = getattr(flow_down, f"as_{format_name}")(
+            __version__, answers, Style(root=root, is_checkout=is_checkout)
+        )
+        return requirements
     text: str = getattr(sheets, f"as_{format_name}")(__version__, answers)
     return text
 

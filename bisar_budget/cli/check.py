@@ -22,6 +22,7 @@ from bisar_budget.cli.options import (
     day_origin,
     origin_of,
     outside,
+    root_of_names,
     scheduler_options,
     settings_here,
 )
@@ -285,7 +286,7 @@ def check(
     judged_on, from_outside = day(today), outside(today)
     use_color = color == "always" or (color == "auto" and output is None and wants_color())
     verbosity = -1 if quiet else 1 if verbose else 0
-    root, is_checkout = _root()
+    root, is_checkout = root_of_names()
     style = Style(
         color=use_color, verbosity=verbosity, root=root, is_checkout=is_checkout, all_rows=all_rows, detail=detail
     )
@@ -452,16 +453,6 @@ def _format_of(name: str) -> str:
         suffixes = (suffix for one in FORMATS.values() for suffix in one.suffixes)
         raise click.UsageError(f"--report {name}: the suffix must be one of {', '.join(suffixes)}")
     return format_name
-
-
-def _root() -> tuple[str, bool]:
-    """Folder that reports name files of no repository from, and whether it is GitHub's checkout."""
-    try:
-        here = os.getcwd()
-    except OSError:  # somebody removed it under us
-        return "", False
-    checkout = os.environ.get("GITHUB_WORKSPACE")
-    return os.path.realpath(checkout or here), bool(checkout)
 
 
 def _step_summary(format_name: str) -> str | None:

@@ -185,3 +185,13 @@ def day(today: datetime | None) -> date:
         return datetime.fromtimestamp(int(epoch), UTC).date()
     except (ValueError, OverflowError, OSError):
         raise click.UsageError(f"SOURCE_DATE_EPOCH must be seconds since 1970 (got {printable(epoch)!r})") from None
+
+
+def root_of_names() -> tuple[str, bool]:
+    """Folder that reports name files of no repository from, and whether it is GitHub's checkout."""
+    try:
+        here = os.getcwd()
+    except OSError:  # somebody removed it under us
+        return "", False
+    checkout = os.environ.get("GITHUB_WORKSPACE")
+    return os.path.realpath(checkout or here), bool(checkout)

@@ -16,7 +16,7 @@ from bisar_budget.report.compliance import document as doc
 from bisar_budget.report.drawing.share_bars import LIMITS, limiting, share_bars
 from bisar_budget.report.formats.text_table import requirement_table
 from bisar_budget.report.words.requirements import overrides_lines, overrides_words, requirement_lines
-from bisar_budget.report.words.sentences import percent, table, wrapped
+from bisar_budget.report.words.sentences import counted, percent, table, wrapped
 
 _FORMAT = "bisar-budget/allocate/1"
 _LISTED = 3  # parts of the catalogue that a table names
@@ -158,11 +158,12 @@ def _lines(answer: Answer, style: Style) -> Iterator[str]:
 def _verdict(sheet: SpecificationSheet) -> str:
     if sheet.broken:
         return "no specification can be found: other errors leave no room"
-    count = sum(one.value is not None for one in sheet.specifications)
+    number = sum(one.value is not None for one in sheet.specifications)
+    count = counted(number, "specification")
     stands = STATUS[sheet.status].text if sheet.status in STATUS else sheet.status
     if not sheet.complies:
-        return f"{count} specifications, but the mission does not comply with them: {stands}"
-    return f"{count} specifications that meet every requirement together: check says {stands}"
+        return f"{count}, but the mission does not comply with them: {stands}"
+    return f"{count} that meet{'s' if number == 1 else ''} every requirement together: check says {stands}"
 
 
 def _terms(sheet: SpecificationSheet) -> str:

@@ -192,23 +192,28 @@ def as_needs(report: Report, style: Style) -> str:
             found.append((identity.of(requirement_id(one)), _requirement_need(one, mission, file)))
         for row in mission.rows:
             found.append((identity.of(row.id, row.requirement_id), _row_need(row, mission, file)))
+    return needs_document(report.version, "BUDGET", found)
+
+
+def needs_document(version: str, prefix: str, found: Sequence[tuple[tuple[str, ...], dict[str, Any]]]) -> str:
+    """Write needs, each with the parts of its name, which become its id behind a prefix."""
     names = [name for name, _ in found]
     needs: dict[str, dict[str, Any]] = {}
-    for wanted, (_, need) in zip(distinct([_identifier(name) for name in names], names), found, strict=True):
-        identifier = _unused(wanted, needs)
-        needs[identifier] = {"id": identifier, **need}
-    version = {
-        "creator": {"program": "bisar-budget", "version": report.version},
+    for wanted, (_, need) in zip(distinct([identifier(prefix, name) for name in names], names), found, strict=True):
+        unique = _unused(wanted, needs)
+        needs[unique] = {"id": unique, **need}
+    current = {
+        "creator": {"program": "bisar-budget", "version": version},
         "needs": needs,
         "needs_amount": len(needs),
     }
-    document = {"project": "bisar-budget", "current_version": report.version, "versions": {report.version: version}}
+    document = {"project": "bisar-budget", "current_version": version, "versions": {version: current}}
     return json.dumps(document, indent=1, allow_nan=False) + "\n"
 
 
-def _identifier(name: tuple[str, ...]) -> str:
+def identifier(prefix: str, name: tuple[str, ...]) -> str:
     """Spell a name by the default pattern of Sphinx-Needs, `[A-Z0-9_]{5,}`."""
-    return "_".join(["BUDGET", *(re.sub("[^A-Z0-9]+", "_", stem(part).upper()).strip("_") for part in name)])
+    return "_".join([prefix, *(re.sub("[^A-Z0-9]+", "_", stem(part).upper()).strip("_") for part in name)])
 
 
 def _unused(identifier: str, needs: Container[str]) -> str:
