@@ -97,6 +97,12 @@ def stated_along_other_axes(axes: Sequence[str]) -> str:
 
 
 @phrase
+def no_specifications(why: str) -> str:
+    """Said of a file that names the errors to specify, where there is no sheet of them."""
+    return f"no specifications: {why}"
+
+
+@phrase
 def no_requirement() -> str:
     """Said of an aggregate that nothing is asked of."""
     return "no requirement in the file: computed, not judged"

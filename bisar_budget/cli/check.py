@@ -313,6 +313,10 @@ def check(
             from bisar_budget.cli.studies import with_studies
 
             report = report._replace(missions=tuple(with_studies(report.missions, swept, model, judged_on)))
+        if illustrated:
+            from bisar_budget.cli.studies import with_sheets
+
+            report = report._replace(missions=tuple(with_sheets(report.missions, model, judged_on)))
         report = report._replace(options=tuple(_options(shown_day, today)), day=shown_day)
         if says_faults:
             _say_faults(report.missions)

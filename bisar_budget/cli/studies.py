@@ -1,4 +1,4 @@
-"""Sweeps that reports of `check` show: `--sweep KEY=VALUES`."""
+"""Sweeps that reports of `check` show, `--sweep KEY=VALUES`, and the sheets of files that name what to specify."""
 
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -13,10 +13,11 @@ from bisar_budget.cli.streams import fail
 from bisar_budget.design.cases import Cases, Grid, grid
 from bisar_budget.design.quantities import QuestionError, tree_of
 from bisar_budget.design.sweep import sweep
-from bisar_budget.findings.mission import MissionFindings, UnusableMission
+from bisar_budget.findings.mission import FileWarning, MissionFindings, UnusableMission
 from bisar_budget.findings.status import complying
 from bisar_budget.findings.trade import TradeStudy
 from bisar_budget.mission.model import Mission
+from bisar_budget.phrases import no_specifications
 from bisar_budget.report import FORMATS
 from bisar_budget.report.drawing.trades import Gathered, uses_of_rows
 from bisar_budget.report.tables import Described
@@ -115,3 +116,24 @@ def gathered(
         found.add(part)
         advance(part.stop - part.start)
     return found
+
+
+# ---------------------------------------------------------------- specifications
+def with_sheets(
+    missions: Sequence[MissionFindings | UnusableMission], model: str | None, today: date
+) -> list[MissionFindings | UnusableMission]:
+    """Add the sheet of specifications to each mission whose file names what to specify, or say why there is none."""
+    return [_with_sheet(found, model, today) if isinstance(found, MissionFindings) else found for found in missions]
+
+
+def _with_sheet(found: MissionFindings, model: str | None, today: date) -> MissionFindings:
+    mission = found.analysed().mission
+    if not mission.allocation.specify:
+        return found
+    from bisar_budget.design.allocate import allocate
+
+    try:
+        return found._replace(sheet=allocate(mission, model=model, today=today))
+    except QuestionError as error:
+        said = FileWarning(mission.line(("allocation", "specify")), no_specifications(str(error)))
+        return found._replace(warnings=(*found.warnings, said))

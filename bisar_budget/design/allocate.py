@@ -27,8 +27,7 @@ from bisar_budget.design.table import Variation
 from bisar_budget.design.varied import is_held, varied
 from bisar_budget.effects.declared import CUBIC, END_OF_IMAGE, LOCATION, QUADRATIC
 from bisar_budget.faults import MissionError, SetValue
-from bisar_budget.findings.mission import MissionFindings
-from bisar_budget.findings.requirement import JudgedRequirement, Override
+from bisar_budget.findings.specification import Broken, RowUse, Specification, SpecificationSheet
 from bisar_budget.mission.changes import ACCEPTED_ERRORS, parts_of
 from bisar_budget.mission.load import folder_of
 from bisar_budget.mission.model import MetricSplits, Mission
@@ -50,93 +49,6 @@ _CLOSE = 1e-9  # of what a row may use
 _NOTHING = 1e-13  # of a row: what rounding leaves of it
 NEGLIGIBLE = "negligible"  # begins the ids of effects that no requirement takes
 _WARN_ONLY = ("autofocus_pull_in", "spatial_variance")  # kinds of rows that warn and never fail
-
-
-# ---------------------------------------------------------------- what is found
-class Specification(NamedTuple):
-    """The largest size of one error, and what is to be ordered.
-
-    `value` is the size as found, `ordered` the same rounded down, `text` that as the file would have it; None, and
-    empty, where no requirement limits it. `found_text` is the value in the same unit, `remark` what the number means
-    to a supplier. `declared` is what the file has today, the largest of three axes. `shares` are the parts of what
-    each requirement may use, by its row in which the error takes most of it. `parts` are those of the catalogue that
-    keep to what is ordered.
-    """
-
-    key: str
-    weight: float
-    unit: str
-    value: float | None
-    ordered: float | None
-    text: str
-    declared: float | None
-    declared_text: str
-    shares: Mapping[str, float]
-    parts: tuple[str, ...] = ()
-    found_text: str = ""
-    remark: str = ""
-
-
-class RowUse(NamedTuple):
-    """How one row that can fail is used by the sizes as found.
-
-    `requirement` judges it; None: the effect has no requirement, and must stay negligible. `used` is its utilization,
-    `allowed` what it may be; `fixed` is the part of that which all other errors take, `shares` those of the specified
-    ones. `multiplier` says what the row is worth: Σ multiplier·share over rows is the weight of each error.
-    """
-
-    id: str
-    requirement: str | None
-    used: float
-    allowed: float
-    fixed: float
-    shares: Mapping[str, float]
-    multiplier: float
-
-
-class Broken(NamedTuple):
-    """A row that the other errors leave no room in, by its requirement, with what they use of it."""
-
-    id: str
-    requirement: str | None
-    used: float
-    allowed: float
-
-
-class SpecificationSheet(NamedTuple):
-    """Specifications of one mission that hold together.
-
-    `status` is that of the check with what is ordered in place, and `requirements` how each then stands. `rows` are
-    those that limit a specification, `broken` those in which there is no room: then there are no values. `reserve` is
-    the part of every limit that is kept free. `notes` say what was taken otherwise than the file has it. `findings`
-    are those of the check.
-    """
-
-    file: str
-    name: str
-    model: str
-    combine: str
-    status: str
-    reserve: float
-    requirements: tuple[JudgedRequirement, ...]
-    specifications: tuple[Specification, ...]
-    rows: tuple[RowUse, ...]
-    broken: tuple[Broken, ...] = ()
-    notes: tuple[str, ...] = ()
-    changes: tuple[SetValue, ...] = ()
-    overrides: tuple[Override, ...] = ()
-    findings: MissionFindings | None = None
-    is_equal: tuple[SetValue, ...] = ()  # what balanced shares were replaced by
-
-    @property
-    def complies(self) -> bool:
-        """Whether the mission meets every requirement with what is ordered."""
-        return not self.broken and self.status not in ("fail", "not_evaluated", "error")
-
-    @property
-    def ordered(self) -> tuple[SetValue, ...]:
-        """What the mission file has to say so that `check` holds it to what is ordered."""
-        return (*self.is_equal, *(SetValue(one.key, one.text) for one in self.specifications if one.text))
 
 
 # ---------------------------------------------------------------- the search

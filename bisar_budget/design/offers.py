@@ -4,9 +4,9 @@ from datetime import date
 from typing import NamedTuple
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.design.allocate import Specification, SpecificationSheet
 from bisar_budget.design.quantities import QuestionError, number_of, tree_of
 from bisar_budget.findings.requirement import JudgedRequirement
+from bisar_budget.findings.specification import SpecificationSheet
 from bisar_budget.mission.model import Mission
 
 
@@ -47,14 +47,6 @@ def offer(sheet: SpecificationSheet, mission: Mission, today: date) -> Offer:
             value, text = None, ""
         else:
             value, text = number.value, "" if number.value is None else number.text(number.value)
-        figures.append(OfferedFigure(one.key, value, text, one.text, _is_inside(one, value)))
+        figures.append(OfferedFigure(one.key, value, text, one.text, one.holds(value)))
     found = check_mission(mission, today)
     return Offer(mission.file, found.status, tuple(figures), found.requirements)
-
-
-def _is_inside(one: Specification, value: float | None) -> bool:
-    if one.ordered is None:
-        return True
-    if value is None:
-        return False
-    return (value if one.unit == "dB" else abs(value)) <= one.ordered * (1 + 1e-12 if one.ordered > 0 else 1 - 1e-12)

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from bisar_budget.analysis.scene import SceneEdge
     from bisar_budget.findings.images import ImageEvidence, Verdict
     from bisar_budget.findings.monte_carlo import MonteCarlo
+    from bisar_budget.findings.specification import SpecificationSheet
     from bisar_budget.findings.trade import TradeStudy
 
 
@@ -71,6 +72,7 @@ class MissionFindings(NamedTuple):
     monte_carlo: "MonteCarlo | None" = None  # if errors were drawn
     document: Document = Document()
     study: "TradeStudy | None" = None  # of other values, if a report shows them
+    sheet: "SpecificationSheet | None" = None  # of the errors that the file has specified, likewise
     changes: tuple[SetValue, ...] = ()  # values that options put in place of the file's
     requirements: tuple[JudgedRequirement, ...] = ()
     kinds: DeclaredKinds = DeclaredKinds()

@@ -172,3 +172,24 @@ def test_one_mission_is_written_and_one_offer_compared(run, mission, tmp_path) -
     assert run("allocate", mission, other, "-o", tmp_path / "x.yaml").exit_code == 2
     assert run("allocate", mission, other, "--compare", other).exit_code == 2
     assert run("allocate", mission, other).exit_code == 0
+
+
+class TestReport:
+    """A compliance report of a mission whose file names what to specify has the sheet in its annex."""
+
+    @pytest.mark.parametrize("suffix", ["html", "md"])
+    def test_the_annex_has_the_sheet_and_its_drawing(self, run, tmp_path, suffix: str) -> None:
+        path, report = tmp_path / "m.yaml", tmp_path / f"report.{suffix}"
+        path.write_text(mission_text(**RSS, allocation__specify=[KEY, "timing_error.quadratic"]))
+        run("check", path, "--report", report)
+        text = report.read_text()
+        assert "Specifications, rounded down to two digits" in text
+        assert "not declared: 2" in text
+        assert document(run, path)["specifications"][0]["text"] in text
+        assert "shares" in text
+
+    def test_a_report_says_why_there_is_none(self, run, tmp_path) -> None:
+        path, report = tmp_path / "m.yaml", tmp_path / "report.md"
+        path.write_text(mission_text(allocation__combine="each", allocation__specify=[KEY]))
+        assert run("check", path, "--report", report).exit_code in (0, 1)
+        assert "no specifications: combine: each holds every error alone to its limit" in report.read_text()

@@ -14,6 +14,7 @@ from bisar_budget.faults import changes_words, printable
 from bisar_budget.findings.images import ImageEvidence, PointImage
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.monte_carlo import MonteCarlo
+from bisar_budget.findings.specification import SpecificationSheet
 from bisar_budget.findings.status import STATUS
 from bisar_budget.findings.trade import Axis, Trade, TradeStudy
 from bisar_budget.report.compliance import document as doc
@@ -26,6 +27,7 @@ from bisar_budget.report.compliance.rows import (
     matrix_table,
     undeclared_table,
 )
+from bisar_budget.report.compliance.specifications import specified
 from bisar_budget.report.drawing.evidence_drawings import (
     chip_caption,
     chip_png,
@@ -53,6 +55,10 @@ def annex(page: Page, *, several: bool) -> list[doc.Chapter]:
     """The annex of a mission; none where there is nothing beyond the summary."""
     found = page.found
     sections = [] if found.study is None else [_studied(page, found.study)]
+    if found.sheet is not None:
+        sections.append(
+            doc.Chapter("Specifications", list(_specified(page, found.sheet)), f"{page.anchor}-specified")
+        )
     if found.verdicts is not None:
         sections.append(doc.Chapter("Image evidence", list(_evidence(page)), f"{page.anchor}-evidence"))
     if found.monte_carlo is not None:
@@ -67,6 +73,24 @@ def annex(page: Page, *, several: bool) -> list[doc.Chapter]:
     title = f"Annex: {page.name}" if several else "Annex"
     whole = doc.Chapter(title, sections, f"{page.anchor}-annex", level=2, style="annex", is_article=True)
     return [whole] if sections else []
+
+
+# ---------------------------------------------------------------------- specifications
+def _specified(page: Page, sheet: SpecificationSheet) -> Iterator[doc.Block]:
+    """The sheet of the errors that the file has specified, and what it declares of them."""
+    outside = sum(one.declared is not None and not one.holds(one.declared) for one in sheet.specifications)
+    silent = sum(one.declared is None and one.ordered is not None for one in sheet.specifications)
+    said = list[str]()
+    if not sheet.broken:
+        said.append(
+            f"of what the file declares {counted(outside, 'figure')} {'is' if outside == 1 else 'are'} larger"
+        )
+        said += [f"not declared: {silent}"] if silent else []
+    told = "; ".join(["", *said])
+    what = "Sizes that together meet every requirement, of the errors that "
+    yield doc.Paragraph((what, doc.Code("allocation.specify"), f" names{told}."))
+    yield from specified(sheet, f"{page.anchor}-specified")
+    yield doc.Paragraph(doc.Code(f"bisar-budget allocate {quote(page.file)}"), "command")
 
 
 # ---------------------------------------------------------------------- a sweep

@@ -1,8 +1,8 @@
 """What uses up every row that limits a specification, as stacked bars: errors by their numbers on the sheet."""
 
-from bisar_budget.design.allocate import RowUse, SpecificationSheet
 from bisar_budget.faults import printable
 from bisar_budget.findings.requirement import NAMES
+from bisar_budget.findings.specification import RowUse, SpecificationSheet
 from bisar_budget.report.drawing import svg
 from bisar_budget.report.words.sentences import percent
 

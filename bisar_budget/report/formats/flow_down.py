@@ -3,9 +3,9 @@
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from bisar_budget.design.allocate import Specification, SpecificationSheet
 from bisar_budget.faults import printable
 from bisar_budget.findings.requirement import NAMES
+from bisar_budget.findings.specification import Specification, SpecificationSheet
 from bisar_budget.mission.changes import parts_of
 from bisar_budget.report import Style
 from bisar_budget.report.formats.specification_sheet import Answer

@@ -6,20 +6,19 @@ import json
 from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
-from bisar_budget.design.allocate import Broken, Specification, SpecificationSheet
 from bisar_budget.design.offers import Offer
 from bisar_budget.faults import changes_words, printable
 from bisar_budget.findings.requirement import NAMES
+from bisar_budget.findings.specification import Specification, SpecificationSheet
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
 from bisar_budget.report.compliance import document as doc
-from bisar_budget.report.drawing.share_bars import LIMITS, limiting, share_bars
+from bisar_budget.report.compliance.specifications import broken_words, parts_words, remarks, side, specified, way_out
 from bisar_budget.report.formats.text_table import requirement_table
 from bisar_budget.report.words.requirements import overrides_lines, overrides_words, requirement_lines
 from bisar_budget.report.words.sentences import counted, percent, table, wrapped
 
 _FORMAT = "bisar-budget/allocate/1"
-_LISTED = 3  # parts of the catalogue that a table names
 _COLUMNS = ("file", "key", "value", "ordered", "unit", "text", "declared", "weight", "parts")
 
 
@@ -135,23 +134,23 @@ def _lines(answer: Answer, style: Style) -> Iterator[str]:
     yield from overrides_lines(sheet)
     yield ""
     if sheet.broken:
-        yield from table([["row", "used", "may use", ""], *(_broken(one) for one in sheet.broken)])
+        yield from table([["row", "used", "may use", ""], *(broken_words(one) for one in sheet.broken)])
         yield ""
-        yield from wrapped(_way_out(sheet), "")
+        yield from wrapped(way_out(sheet), "")
         return
     yield from table([["specification", "ordered", "today", "largest share"], *map(_line, sheet.specifications)])
     yield ""
     if sheet.findings is not None:
         yield from requirement_table(sheet.findings, style)
         yield ""
-    keeping = [f"Parts that keep to {one.key}: {_parts(one)}." for one in sheet.specifications if one.parts]
-    for text in [*_remarks(sheet), *keeping]:
+    keeping = [f"Parts that keep to {one.key}: {parts_words(one)}." for one in sheet.specifications if one.parts]
+    for text in [*remarks(sheet), *keeping]:
         yield from wrapped(text, "  ")
     if offer is not None:
         yield ""
         yield from wrapped(_offered(offer), "  ")
         head = ["figure", "offered", "ordered", ""]
-        lines = [[one.key, one.text or "-", one.ordered or "free", _side(one.is_inside)] for one in offer.figures]
+        lines = [[one.key, one.text or "-", one.ordered or "free", side(one.is_inside)] for one in offer.figures]
         yield from table([head, *lines])
 
 
@@ -171,38 +170,10 @@ def _terms(sheet: SpecificationSheet) -> str:
     return f"{sheet.model} model, {how}, {percent(sheet.reserve)} of each limit in reserve"
 
 
-def _broken(one: Broken) -> list[str]:
-    over = "over its limit" if one.used > 1 else "within its limit, but not with the reserve"
-    return [one.id, percent(one.used), percent(one.allowed), over]
-
-
-def _way_out(sheet: SpecificationSheet) -> str:
-    if all(one.used <= 1 for one in sheet.broken):
-        least = 1 - max(one.used for one in sheet.broken)
-        return (
-            f"The other errors use that much by themselves. A smaller --reserve, below {percent(least)}, leaves room."
-        )
-    return "The other errors, which are fixed, use that much by themselves: make them smaller, or specify them too."
-
-
 def _line(one: Specification) -> list[str]:
     most = max(one.shares, key=lambda key: one.shares[key], default="")
     share = f"{percent(one.shares[most])} of {NAMES[most]}" if most else "limited by nothing"
     return [one.key, one.text or "free", one.declared_text or "-", share]
-
-
-def _remarks(sheet: SpecificationSheet) -> Iterator[str]:
-    """What a reader of a sheet should know of it."""
-    for row in limiting(sheet):
-        if row.requirement is None and row.id.startswith("negligible"):
-            effect = row.id.partition(".")[2]
-            yield f"{effect.capitalize()} phase is kept negligible, since no requirement takes it: that limits sizes."
-        elif row.requirement is None:
-            yield f"{row.id.partition('.')[2]} is limited by where the image ends."
-    for one in sheet.specifications:
-        if one.remark:
-            yield f"{one.key} {one.text}: {one.remark}."
-    yield from (f"{note[0].upper()}{note[1:]}." for note in sheet.notes)
 
 
 def _offered(offer: Offer) -> str:
@@ -210,10 +181,6 @@ def _offered(offer: Offer) -> str:
     outside = sum(not one.is_inside for one in offer.figures)
     figures = "every figure is inside" if not outside else f"{outside} of {len(offer.figures)} figures are outside"
     return f"Offer {printable(offer.file)}: the mission as a whole says {stands}; {figures}."
-
-
-def _side(is_inside: bool) -> str:
-    return "inside" if is_inside else "OUTSIDE"
 
 
 # ---------------------------------------------------------------- for a board, and a supplier
@@ -249,20 +216,11 @@ def _chapter(answer: Answer, anchor: str) -> doc.Chapter:
         doc.Paragraph(_verdict(sheet), f"verdict {'pass' if sheet.complies else 'fail'}"),
         doc.Facts([("File", doc.Name(printable(sheet.file))), ("Terms", _terms(sheet)), *_outside(sheet)]),
     ]
-    if sheet.broken:
-        heads = [*doc.heads("Row"), *doc.numbers("Used", "May use"), *doc.heads("")]
-        rows: list[doc.Line] = [[doc.Name(name), *cells] for name, *cells in map(_broken, sheet.broken)]
-        blocks.append(doc.TextTable("Rows without room", "Rows in which other errors leave no room", heads, rows))
-        blocks.append(doc.Paragraph(_way_out(sheet)))
-    else:
-        blocks += [*_specified(sheet), *_required(sheet), *_drawn(sheet, anchor)]
-        remarks = list(_remarks(sheet))
-        if remarks:
-            blocks.append(doc.Items([[text] for text in remarks]))
+    blocks += [*_required(sheet), *specified(sheet, anchor)]
     if offer is not None:
         heads = [*doc.heads("Figure"), *doc.numbers("Offered", "Ordered"), *doc.heads("")]
         lines: list[doc.Line] = [
-            [doc.Name(one.key), one.text or "–", one.ordered or "free", _side(one.is_inside)] for one in offer.figures
+            [doc.Name(one.key), one.text or "–", one.ordered or "free", side(one.is_inside)] for one in offer.figures
         ]
         blocks += [doc.Paragraph(_offered(offer)), doc.TextTable("Offer", "Offer against the sheet", heads, lines)]
     return doc.Chapter(printable(sheet.name), blocks, anchor, level=2, is_article=True)
@@ -274,39 +232,11 @@ def _outside(sheet: SpecificationSheet) -> Iterator[tuple[str, str]]:
         yield "From outside the file", said
 
 
-def _specified(sheet: SpecificationSheet) -> Iterator[doc.Block]:
-    keys = [key for key in NAMES if any(key in one.shares for one in sheet.specifications)]
-    heads = [
-        *doc.numbers("No."),
-        *doc.heads("Specification"),
-        *doc.numbers("Ordered", "Found", "Today", *(f"Of {NAMES[key]}" for key in keys)),
-        *doc.heads("Parts"),
-    ]
-    rows: list[doc.Line] = []
-    for number, one in enumerate(sheet.specifications, 1):
-        shares = [percent(one.shares[key]) if one.shares.get(key, 0.0) > LIMITS else "–" for key in keys]
-        cells = [one.text or "free", one.found_text or "–", one.declared_text or "–", *shares, _parts(one) or "–"]
-        rows.append([str(number), doc.Name(one.key), *cells])
-    caption = "Specifications, rounded down to two digits; shares are those of what a limit may use."
-    yield doc.TextTable("Specifications", caption, heads, rows)
-
-
-def _parts(one: Specification) -> str:
-    """Some of the parts of the catalogue that keep to a specification."""
-    more = f" and {len(one.parts) - _LISTED} more" if len(one.parts) > _LISTED else ""
-    return f"{', '.join(one.parts[:_LISTED])}{more}"
-
-
 def _required(sheet: SpecificationSheet) -> Iterator[doc.Block]:
     heads = [*doc.heads("Requirement"), *doc.numbers("Allowed", "Reached", "Use"), *doc.heads("Status", "Decided by")]
-    if sheet.findings is not None:
+    if sheet.findings is not None and not sheet.broken:
         rows: list[doc.Line] = [
             [one.name, one.allowed, one.reached, one.use, doc.Badge(one.status), doc.Name(one.decided_by)]
             for one in requirement_lines(sheet.findings)
         ]
         yield doc.TextTable("Requirements", "Requirements, with what is ordered in place", heads, rows)
-
-
-def _drawn(sheet: SpecificationSheet, anchor: str) -> Iterator[doc.Block]:
-    if limiting(sheet):
-        yield doc.Figure(f"{anchor}-shares.svg", anchor, "What uses up each limit", "Shares", share_bars(sheet))
