@@ -7,10 +7,11 @@ from typing import NamedTuple
 import numpy as np
 
 from bisar_budget import units
-from bisar_budget.design.quantities import Number, QuestionError, number_of
+from bisar_budget.design.quantities import Number, QuestionError, as_number, number_of
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.mission.changes import ACCEPTED_ERRORS, is_error, parts_of
 from bisar_budget.mission.model import Mission
+from bisar_budget.mission.parts import taken_figures
 from bisar_budget.ranges.exact_ranges import Floats
 from bisar_budget.units import Dimension, parse_quantity
 
@@ -149,6 +150,10 @@ def _number(mission: Mission, tree: dict[str, object], key: str) -> Number:
     if not is_error(key):
         raise QuestionError(f"{key}: is no error that can be specified; {ACCEPTED_ERRORS}")
     number = number_of(tree, key, is_for_each=True)
+    if number.value is None:  # the figure of a part that the mission names
+        taken = next((one.value for one in taken_figures(mission) if one.key == key), None)
+        of_each = [as_number(key, number.reader, one) for one in (taken if isinstance(taken, list) else [taken])]
+        number = max(of_each, key=lambda one: abs(one.value or 0.0))
     error = getattr(mission.platforms, parts[1]).motion_error if parts[0] == "platforms" else None
     if error is not None and error.covariance is not None and parts[3] in ("position", "velocity"):
         raise QuestionError(f"{key}: the file has a covariance of {parts[1]}, which is fixed; {ACCEPTED_ERRORS}")
