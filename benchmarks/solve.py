@@ -34,7 +34,7 @@ def timed(task: Callable[[], object]) -> float:
 def compare(name: str, mission: Mission, runs: int) -> None:
     """Print medians of all three, in turn."""
     tasks = (
-        lambda: [check_mission(mission, DAY, is_bare=True) for _ in range(PLACES)],
+        lambda: [check_mission(mission, DAY) for _ in range(PLACES)],
         lambda: solve(mission, "collection.aperture_time", today=DAY),
         lambda: sensitivity(mission, today=DAY),
     )
