@@ -18,7 +18,7 @@ from bisar_budget.mission.tree import MAX_BYTES, Tree
 
 _ACCEPTED = "accepted: KEY=VALUE, such as radar.bandwidth=150MHz"
 _MAX_KEY = 500  # characters; a path of the schema has a tenth
-_NAMED_BY_IDS = "requirement_ids"  # its keys are ids of rows, which have dots
+_OF_DOTTED = (("requirement_ids",), ("allocation", "specify"))  # keys of theirs are ids of rows, or whole paths
 
 
 def read_changes(texts: Sequence[str]) -> tuple[SetValue, ...]:
@@ -70,7 +70,7 @@ def _apply(tree: Tree, change: SetValue) -> None:
     path: KeyPath = ()
     first_new: KeyPath | None = None
     while True:
-        name, rest = next_name(container, parts, is_of_ids=path == (_NAMED_BY_IDS,))
+        name, rest = next_name(container, parts, is_of_ids=path in _OF_DOTTED)
         if name is None:
             tree.changes[path] = change
             is_list = isinstance(container, list)

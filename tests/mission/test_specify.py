@@ -2,7 +2,7 @@
 
 import pytest
 
-from bisar_budget.faults import MissionError
+from bisar_budget.faults import MissionError, SetValue
 from bisar_budget.mission.load import parse_mission
 from tests.conftest import mission_text
 
@@ -46,3 +46,9 @@ def test_what_is_no_key_of_an_error_or_no_weight_is_a_fault(specify: object, sai
 def test_a_key_that_is_misspelt_is_told_which_was_meant() -> None:
     (line,) = faults([f"{KEY}s"])
     assert f"Did you mean '{KEY}'?" in line
+
+
+def test_an_option_gives_one_key_its_weight() -> None:
+    changes = [SetValue(f"allocation.specify.{KEY}", "2"), SetValue("allocation.specify.timing_error.quadratic", "3")]
+    found = parse_mission(mission_text(), "m.yaml", changes=changes).allocation.specify
+    assert found == {KEY: 2.0, "timing_error.quadratic": 3.0}
