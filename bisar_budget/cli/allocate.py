@@ -1,5 +1,6 @@
 """`bisar-budget allocate`: one specification for every error, such that all together meet every requirement."""
 
+import math
 import sys
 from collections.abc import Iterator, Sequence
 from datetime import datetime
@@ -81,6 +82,8 @@ def allocate(
     in place. Exit code: 0, 1 if there are none, or the mission does not comply with them, or with the offer of
     --compare, 2 for wrong usage or an unusable mission file.
     """
+    if reserve is not None and math.isnan(reserve):
+        raise click.UsageError("--reserve: nan is no part of a limit; accepted: 0 to 100, in percent.")
     files = expand(missions)
     is_mission = output is not None and output.lower().endswith(_MISSION)
     if is_mission and len(files) > 1:
@@ -93,7 +96,7 @@ def allocate(
         _written(answers, format_name, None if is_mission else output), None if is_mission else output, format_name
     )
     if is_mission and output is not None:
-        _write_mission(answers[0], output)
+        _write_mission(answers[0], output, model)
     is_broken = any(not one.sheet.complies or (one.offer is not None and not one.offer.complies) for one in answers)
     sys.exit(EXIT_BROKEN if is_broken else 0)
 
@@ -156,13 +159,24 @@ def _written(answers: "Sequence[Answer]", format_name: str, output: str | None) 
     return text
 
 
-def _write_mission(answer: "Answer", output: str) -> None:
-    """Write the mission with what is ordered in place, comments kept; nothing where there is no specification."""
+def _write_mission(answer: "Answer", output: str, model: str | None) -> None:
+    """Write the mission with what is ordered in place, comments kept; nothing where there is no specification.
+
+    What is written is read first as it will lie there: files that it names are looked for from its folder.
+    """
+    from bisar_budget.faults import MissionError, SetValue
     from bisar_budget.mission.edited import with_values
+    from bisar_budget.mission.load import parse_mission
 
     sheet, findings = answer.sheet, answer.sheet.findings
     if sheet.broken or findings is None or findings.mission is None:
         complain(f"{output} is not written: there are no specifications.")
         return
     text = (findings.mission.data or b"").decode("utf-8-sig")
-    write_file(output, with_values(text, [*sheet.changes, *sheet.ordered]))
+    of_model = [SetValue("allocation.model", model)] if model else []
+    text = with_values(text, [*sheet.changes, *of_model, *sheet.ordered])
+    try:
+        parse_mission(text, output)
+    except MissionError as error:
+        fail(f"{output} is not written: {error.faults[0]}")
+    write_file(output, text)

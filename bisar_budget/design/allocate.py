@@ -26,6 +26,7 @@ from bisar_budget.design.specified import Specified, specified_errors
 from bisar_budget.design.table import Variation
 from bisar_budget.design.varied import is_held, varied
 from bisar_budget.effects.declared import CUBIC, END_OF_IMAGE, LOCATION, QUADRATIC
+from bisar_budget.effects.oscillators import noise_of
 from bisar_budget.faults import MissionError, SetValue
 from bisar_budget.findings.specification import Broken, RowUse, Specification, SpecificationSheet
 from bisar_budget.mission.changes import ACCEPTED_ERRORS, parts_of
@@ -44,10 +45,13 @@ _STEPS = 24  # between two sizes, where it is looked for the last that leaves an
 _FARTHEST = 3.0  # of what a row may use, up to which a step of the search may go
 _SURELY = 1 - 1e-5  # of a limit: a case by itself settles to digits of its own
 _SHORT_OF_END = 0.995  # of the size from which there is no image: that is found to 0.1 %
-_POINTS = 4  # of a mask of phase noise that are said
+_OFFSETS = (1.0, 10.0, 100.0, 1e3)  # at which the phase noise of an ordered level is said [Hz]
+_SHRINKS = 400  # by a tenth: 18 powers of ten
+_FREE, _WAKING, _WAKES = 1e18, 73, 1e-3  # times a size, in so many steps, and what a row may use more, to be free
 _CLOSE = 1e-9  # of what a row may use
 _NOTHING = 1e-13  # of a row: what rounding leaves of it
-NEGLIGIBLE = "negligible"  # begins the ids of effects that no requirement takes
+# What the ids of rows begin with that have no requirement: effects that none takes, and what a file may state.
+NEGLIGIBLE, ACCEPTED = "negligible", "accepted"
 _WARN_ONLY = ("autofocus_pull_in", "spatial_variance")  # kinds of rows that warn and never fail
 
 
@@ -172,7 +176,10 @@ class _SpecificationSearch:
         for one in self.specified:
             if not is_held(self.stated, one.key, is_stated=True):
                 raise QuestionError(f"{one.key}: decides more than its own size; {ACCEPTED_ERRORS}")
-        self.tiny, self.ends, self.unjudged = tiny, np.full(tiny.shape, math.inf), set[str]()
+        self.tiny, self.unjudged = tiny, set[str]()
+        # Sizes that end an image, and those beyond what a mission file may state, once they were met.
+        self.ends, self.most = np.full(tiny.shape, math.inf), np.full(tiny.shape, math.inf)
+        self.largest = np.array([one.largest for one in self.specified])
 
     def _equal(self, mission: Mission) -> Iterator[SetValue]:
         """Balanced shares follow what is declared, and what is declared is looked for: they are taken as equal."""
@@ -229,11 +236,12 @@ class _SpecificationSearch:
             requirements.append(None)
             powers.append(1.0 if self.combine == "sum" else 2.0)
             uses.append(np.broadcast_to(one.total, sizes.shape[1:]) / level)
-        for place in np.flatnonzero(np.isfinite(self.ends)).tolist():
-            ids.append(f"{END_OF_IMAGE}.{self.specified[place].key}")
-            requirements.append(None)
-            powers.append(2.0)
-            uses.append(sizes[place] / self.ends[place])
+        for name, limits in ((END_OF_IMAGE, self.ends), (ACCEPTED, self.most)):
+            for place in np.flatnonzero(np.isfinite(limits)).tolist():
+                ids.append(f"{name}.{self.specified[place].key}")
+                requirements.append(None)
+                powers.append(2.0)
+                uses.append(sizes[place] / limits[place])
         return _RowUses(ids, requirements, np.array(powers), np.array(uses))
 
     def _power(self, kind: str) -> float:
@@ -244,7 +252,7 @@ class _SpecificationSearch:
     def _allowed(self, ids: Sequence[str]) -> Floats:
         """What each row may use: what has no requirement, and what has no image, stays below the limit."""
         usual = (1 - self.reserve) * _SURELY
-        most = {NEGLIGIBLE: _SURELY, END_OF_IMAGE: min(usual, _SHORT_OF_END)}
+        most = {NEGLIGIBLE: _SURELY, END_OF_IMAGE: min(usual, _SHORT_OF_END), ACCEPTED: _SURELY}
         return np.array([most.get(row.partition(".")[0], usual) for row in ids])
 
     # ---------------------------------------------------------------- steps
@@ -266,7 +274,7 @@ class _SpecificationSearch:
     def found(self, progress: Progress) -> _Found:
         """Search for the sizes: at each step what rows use is taken as it is near the sizes of the step before."""
         sizes = self._begun()
-        inside, cuts = np.minimum(self.tiny, sizes), _Cuts([], [], [])
+        inside, before, is_woken = np.minimum(self.tiny, sizes), _Cuts([], [], []), False
         for done in range(ROUNDS):
             progress(done, ROUNDS)
             near = self._near(sizes)
@@ -275,30 +283,53 @@ class _SpecificationSearch:
                 sizes = np.sqrt(np.minimum(sizes, self.ends) * inside)
                 continue
             some = ~near.is_free
-            if not some.any():
-                break
-            cuts = cuts.with_rows(near) if self.combine == "sum" else _Cuts.of(near)
-            log = largest_sizes(self.weights[some], cuts.rows(some)).log
-            inside, sizes = sizes, sizes.copy()
-            sizes[some] = np.exp(log)
-            if done >= _ABOUT:
-                sizes = np.sqrt(sizes * inside)
-            if np.abs(np.log(sizes / inside)).max() < CHANGES:
-                break
-        return self._kept(sizes)
+            if some.any():
+                log = largest_sizes(self.weights[some], before.with_rows(near).rows(some)).log
+                inside, sizes = sizes, sizes.copy()
+                sizes[some] = np.exp(log)
+                if done >= _ABOUT:
+                    sizes = np.sqrt(sizes * inside)
+                if self.combine == "sum":
+                    before = before.with_rows(near, of=f"mission.{LOCATION}")
+            self.most = np.where(sizes > self.largest, self.largest, self.most)
+            if not some.any() or np.abs(np.log(sizes / inside)).max() < CHANGES:
+                if is_woken or some.all():
+                    break
+                sizes, is_woken = self._woken(sizes, ~some), True
+        return self._kept(sizes, before)
+
+    def _woken(self, sizes: Floats, is_free: Truths) -> Floats:
+        """Sizes at which errors that seem to be limited by nothing begin to use anything; of the others the same."""
+        found = sizes.copy()
+        for place in np.flatnonzero(is_free).tolist():
+            steps = np.geomspace(sizes[place], min(self.largest[place], sizes[place] * _FREE), _WAKING)
+            cases = np.repeat(sizes[:, None], _WAKING, axis=1)
+            cases[place] = steps
+            rows = self._uses(cases)
+            with np.errstate(invalid="ignore"):
+                rises = (rows.uses - rows.uses[:, :1]) / self._allowed(rows.ids)[:, None] > _WAKES
+            first = int(rises.any(axis=0).argmax())
+            found[place] = steps[max(first - 1, 0)]
+            if first and np.isinf(rows.uses[:, first]).any():
+                self.ends[place] = self._end_between(place, found, float(steps[first]))
+        return found
 
     def _find_ends(self, inside: Floats, sizes: Floats) -> None:
         """Note the size of each error, between two, from which there is no image, whatever the others are."""
         for place in self._lost_alone(inside, sizes):
-            low, high = inside[place], min(sizes[place], self.ends[place])
-            for _ in range(2):
-                steps = np.geomspace(low, high, _STEPS)
-                cases = np.repeat(inside[:, None], _STEPS, axis=1)
-                cases[place] = steps
-                is_lost = np.isinf(self._uses(cases).uses).any(axis=0)
-                first = int(is_lost.argmax()) if is_lost.any() else _STEPS - 1
-                low, high = steps[max(first - 1, 0)], steps[first]
-            self.ends[place] = low
+            self.ends[place] = self._end_between(place, inside, min(sizes[place], self.ends[place]))
+
+    def _end_between(self, place: int, inside: Floats, high: float) -> float:
+        """Largest size of an error, between one that leaves an image and one that does not, that still does."""
+        low = float(inside[place])
+        for _ in range(2):
+            steps = np.geomspace(low, high, _STEPS)
+            cases = np.repeat(inside[:, None], _STEPS, axis=1)
+            cases[place] = steps
+            is_lost = np.isinf(self._uses(cases).uses).any(axis=0)
+            first = int(is_lost.argmax()) if is_lost.any() else _STEPS - 1
+            low, high = float(steps[max(first - 1, 0)]), float(steps[first])
+        return low
 
     def _lost_alone(self, inside: Floats, sizes: Floats) -> Iterator[int]:
         """Errors that leave no image at their size, where the others are inside."""
@@ -346,12 +377,16 @@ class _SpecificationSearch:
         is_free: Truths = ~np.any(part > 0, axis=0)
         return _Near(found, allowed, sizes, part, room, is_limit, is_free)
 
-    def _kept(self, sizes: Floats) -> _Found:
+    def _kept(self, sizes: Floats, before: "_Cuts") -> _Found:
         """Keep to what rows may use, to the last digit, and say what each error takes of it."""
         near = self._near(sizes)
-        while near is None:
+        for _ in range(_SHRINKS):
+            if near is not None:
+                break
             sizes = sizes * 0.9
             near = self._near(sizes)
+        if near is None:
+            raise QuestionError("no sizes are found that leave an image")
         for _ in range(ROUNDS):
             used = self._used(near, sizes)
             over = float((used / near.allowed)[near.is_limit].max(initial=0.0))
@@ -362,11 +397,14 @@ class _SpecificationSearch:
         multipliers = np.zeros(limits.sum())
         if some.any():
             whole = near.allowed**near.found.powers
-            of_room = largest_sizes(self.weights[some], _Cuts.of(near).rows(some)).multipliers
-            multipliers = of_room * whole[limits] / near.room[limits]
+            cuts = before.with_rows(near)
+            of_room = largest_sizes(self.weights[some], cuts.rows(some)).multipliers
+            multipliers = of_room[-len(multipliers) :] * whole[limits] / near.room[limits]
         ids = [row for row, is_limit in zip(near.found.ids, limits, strict=True) if is_limit]
         requirements = [row for row, is_limit in zip(near.found.requirements, limits, strict=True) if is_limit]
         parts = near.part[limits] / (near.allowed**near.found.powers)[limits, None]
+        if some.any():
+            self._with_earlier(before, of_room, near, sizes, ids, parts, multipliers)
         sizes = np.where(near.is_free, math.nan, sizes)
         return _Found(
             sizes,
@@ -378,6 +416,29 @@ class _SpecificationSearch:
             parts,
             multipliers,
         )
+
+    @staticmethod
+    def _with_earlier(
+        before: "_Cuts",
+        of_room: Floats,
+        near: "_Near",
+        sizes: Floats,
+        ids: Sequence[str],
+        parts: Floats,
+        multipliers: Floats,
+    ) -> None:
+        """Count what a displacement is worth in other directions to its row: parts are those of all, by worth."""
+        if not any(map(len, before.room)):
+            return
+        place = ids.index(f"mission.{LOCATION}")
+        share, room = np.concatenate(before.share), np.concatenate(before.room)
+        allowed = near.allowed[near.is_limit][place]
+        worth = of_room[: len(room)] * allowed / room
+        whole = multipliers[place] + worth.sum()
+        if whole > 0:
+            earlier = (worth[:, None] * share * sizes / allowed).sum(axis=0)
+            parts[place] = (multipliers[place] * parts[place] + earlier) / whole
+            multipliers[place] = whole
 
     def _used(self, near: "_Near", sizes: Floats) -> Floats:
         """Utilizations with sizes of the rows that are seen near them, (rows,)."""
@@ -397,6 +458,7 @@ class _SpecificationSearch:
         findings = check_mission(
             self._with(texts) if found is not None else self.variation.read(self.equal), self.today
         )
+        rows = () if found is None else tuple(_row_uses(found, self.specified))
         specifications = [
             Specification(
                 key=one.key,
@@ -407,12 +469,12 @@ class _SpecificationSearch:
                 text=text,
                 declared=one.number.value,
                 declared_text="" if one.number.value is None else one.number.text(one.number.value),
-                shares={} if found is None else _shares(found, place),
+                shares=_shares(rows, one.key) if text else {},
                 parts=() if not text else tuple(self._parts(one, number)),
                 found_text="" if math.isnan(value) else one.said(value),
                 remark="" if not text else self._remark(one, number),
             )
-            for place, (one, value, (number, text)) in enumerate(zip(self.specified, values, ordered, strict=True))
+            for one, value, (number, text) in zip(self.specified, values, ordered, strict=True)
         ]
         return SpecificationSheet(
             file=self.given.file,
@@ -423,7 +485,7 @@ class _SpecificationSearch:
             reserve=self.reserve,
             requirements=findings.requirements,
             specifications=tuple(specifications),
-            rows=() if found is None else tuple(_row_uses(found, self.specified)),
+            rows=rows,
             broken=broken,
             notes=tuple(self.notes),
             changes=self.given.changes,
@@ -454,9 +516,14 @@ class _SpecificationSearch:
         if below != ["oscillator", "level"]:
             return ""
         oscillator = getattr(self.stated.platforms, name).oscillator
-        points = [f"{level + number:.4g} dBc/Hz at {offset:g} Hz" for offset, level in oscillator.phase_noise or ()]
-        carrier = format_quantity(oscillator.frequency, "Hz", 4) if points else ""
-        return f"{', '.join(points[:_POINTS])} from {carrier}" if points else ""
+        carrier = oscillator.frequency or self.stated.radar.center_frequency
+        pieces = noise_of(oscillator.noise_alone, carrier, self.stated.collection.aperture_time).pieces
+        points = []
+        for offset in _OFFSETS:
+            density = sum(piece.at(offset) for piece in pieces if piece.low <= offset < piece.high)
+            if density > 0:
+                points.append(f"{10 * math.log10(density / 2) + number:.1f} dBc/Hz at {offset:g} Hz")
+        return f"{', '.join(points)} from {format_quantity(carrier, 'Hz', 4)}" if points else ""
 
     @cached_property
     def _entries(self) -> list[Entry]:
@@ -491,14 +558,10 @@ class _Cuts(NamedTuple):
     power: list[Floats]
     room: list[Floats]
 
-    @classmethod
-    def of(cls, near: _Near) -> "_Cuts":
-        """What is seen near sizes."""
-        return cls([], [], []).with_rows(near)
-
-    def with_rows(self, near: _Near) -> "_Cuts":
-        """These, and what is seen near other sizes."""
-        limits, power = near.is_limit, near.found.powers[near.is_limit]
+    def with_rows(self, near: _Near, of: str = "") -> "_Cuts":
+        """These, and what is seen near other sizes: every row that limits any, or one."""
+        limits = near.is_limit & np.array([not of or row == of for row in near.found.ids])
+        power = near.found.powers[limits]
         share = near.part[limits] / near.sizes ** power[:, None]
         return _Cuts([*self.share, share], [*self.power, power], [*self.room, near.room[limits]])
 
@@ -507,12 +570,12 @@ class _Cuts(NamedTuple):
         return Rows(np.concatenate(self.share)[:, some], np.concatenate(self.power), np.concatenate(self.room))
 
 
-def _shares(found: _Found, place: int) -> dict[str, float]:
+def _shares(rows: Sequence[RowUse], key: str) -> dict[str, float]:
     """Largest part that an error takes of what a row of each requirement may use."""
     shares: dict[str, float] = {}
-    for requirement, part in zip(found.requirements, found.parts[:, place].tolist(), strict=True):
-        if requirement is not None:
-            shares[requirement] = max(shares.get(requirement, 0.0), part)
+    for row in rows:
+        if row.requirement is not None and key in row.shares:
+            shares[row.requirement] = max(shares.get(row.requirement, 0.0), row.shares[key])
     return shares
 
 
@@ -522,8 +585,9 @@ def _row_uses(found: _Found, specified: Sequence[Specified]) -> Iterator[RowUse]
         parts = found.parts[place].tolist()
         used, allowed = float(found.used[place]), float(found.allowed[place])
         shares = {one.key: part for one, part in zip(specified, parts, strict=True) if part > 0}
-        whole = used / allowed
-        fixed = max(0.0, whole ** float(found.powers[place]) - sum(shares.values()))
-        yield RowUse(
-            found.ids[place], found.requirements[place], used, allowed, fixed, shares, float(found.multipliers[place])
-        )
+        whole, worth = (used / allowed) ** float(found.powers[place]), float(found.multipliers[place])
+        # An error that grows faster than its size takes less than what a little more of it would add.
+        excess = max(1.0, sum(shares.values()) / whole) if whole else 1.0
+        shares = {key: part / excess for key, part in shares.items()}
+        fixed = max(0.0, whole - sum(shares.values()))
+        yield RowUse(found.ids[place], found.requirements[place], used, allowed, fixed, shares, worth * excess)

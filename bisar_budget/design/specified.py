@@ -1,7 +1,7 @@
 """The errors that are specified: which keys name one, what their sizes are, in which units they are ordered."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -39,6 +39,8 @@ _TINY: Mapping[Dimension, float] = {
     units.TIME: 1e-14,
     units.ELECTRON_CONTENT: 1e12,
     units.POWER_RATIO: 1e-3,
+    units.PHASE_NOISE: 1e-10,
+    units.TONE: 1e-9,
 }
 _LEAST = 1e-18
 
@@ -63,6 +65,13 @@ class Specified(NamedTuple):
     def nothing(self) -> float:
         """The size that stands for no error."""
         return float(10 ** (_SILENT_DB / 20)) if self.is_level else 0.0
+
+    @property
+    def largest(self) -> float:
+        """The largest size that a mission file may state."""
+        _, _, less, most = self.number.reader.bounds
+        bound = min(less, most) * (1 - 1e-9) if not self.is_level else min(less, most)
+        return float(10 ** (bound / 20)) if self.is_level and bound < math.inf else bound
 
     @property
     def tiny(self) -> float:
@@ -121,6 +130,8 @@ def specified_errors(mission: Mission, tree: dict[str, object], keys: Mapping[st
             "name one with --for KEY"
         )
     found = [Specified(_number(mission, tree, key), weight) for key, weight in asked.items()]
+    if pair := multiplied(list(asked)):
+        raise QuestionError(f"{pair[0]} multiplies {pair[1]}: only both together are limited; accepted: one of them")
     for one, other in ((a, b) for a in found for b in found if a is not b):
         if parts_of(other.key)[: len(parts_of(one.key))] == parts_of(one.key):
             raise QuestionError(f"{other.key}: is specified twice, by {one.key} too; accepted: each error once")
@@ -149,12 +160,35 @@ def _number(mission: Mission, tree: dict[str, object], key: str) -> Number:
     parts = parts_of(key)
     if not is_error(key):
         raise QuestionError(f"{key}: is no error that can be specified; {ACCEPTED_ERRORS}")
-    number = number_of(tree, key, is_for_each=True)
-    if number.value is None:  # the figure of a part that the mission names
-        taken = next((one.value for one in taken_figures(mission) if one.key == key), None)
-        of_each = [as_number(key, number.reader, one) for one in (taken if isinstance(taken, list) else [taken])]
-        number = max(of_each, key=lambda one: abs(one.value or 0.0))
+    number = specified_number(mission, tree, key)
     error = getattr(mission.platforms, parts[1]).motion_error if parts[0] == "platforms" else None
     if error is not None and error.covariance is not None and parts[3] in ("position", "velocity"):
         raise QuestionError(f"{key}: the file has a covariance of {parts[1]}, which is fixed; {ACCEPTED_ERRORS}")
     return number
+
+
+def specified_number(mission: Mission, tree: dict[str, object], key: str) -> Number:
+    """The number of a key with what the file has today: of three axes the largest, else the figure of a part."""
+    number = number_of(tree, key, is_for_each=True)
+    if number.value is not None:
+        return number
+    taken = next((one.value for one in taken_figures(mission) if one.key == key), None)
+    of_each = [as_number(key, number.reader, one) for one in (taken if isinstance(taken, list) else [taken])]
+    return max(of_each, key=lambda one: abs(one.value or 0.0))
+
+
+def multiplied(keys: Sequence[str]) -> tuple[str, str] | None:
+    """Two of the keys that multiply each other: only their product is limited, and either could be anything."""
+    for key in keys:
+        *section, name = parts_of(key)
+        if name not in ("level", "spectrum_level"):
+            continue
+        for other in keys:
+            within = parts_of(other)[: len(section)] == tuple(section) and other != key
+            if within and (name == "spectrum_level" or _is_of_curve(parts_of(other)[len(section)])):
+                return key, other
+    return None
+
+
+def _is_of_curve(name: str) -> bool:
+    return name in ("phase_noise", "power_law", "allan_deviation", "spurs")

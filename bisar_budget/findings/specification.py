@@ -39,7 +39,7 @@ class Specification(NamedTuple):
             return True
         if value is None:
             return False
-        size = value if self.unit == "dB" else abs(value)  # a level may be below 0
+        size = value if self.unit.startswith("dB") else abs(value)  # a level may be below 0
         return size <= self.ordered + 1e-12 * abs(self.ordered)
 
 

@@ -21,9 +21,11 @@ def with_values(text: str, changes: Sequence[SetValue]) -> str:
     changes : sequence of SetValue
         Keys, with their values as the file has them; sections that are not there are made.
     """
+    is_of_dos = "\r\n" in text
+    text = text.replace("\r\n", "\n")
     for change in changes:
         text = _with_value(text, parts_of(change.key), change.text)
-    return text
+    return text.replace("\n", "\r\n") if is_of_dos else text
 
 
 def _with_value(text: str, parts: tuple[str, ...], value: str) -> str:
@@ -34,9 +36,9 @@ def _with_value(text: str, parts: tuple[str, ...], value: str) -> str:
         if inner is None:
             return _beside(text, node, key, rest, value)
         if not rest:
-            return _replaced(text, inner, value)
+            return _replaced(text, inner, value, _end_of_key(node, key))
         if not isinstance(inner, yaml.MappingNode | yaml.SequenceNode):  # a section that has nothing in it
-            return _replaced(text, inner, _nested(rest, value))
+            return _replaced(text, inner, _nested(rest, value), _end_of_key(node, key))
         node, parts = inner, rest
 
 
@@ -56,18 +58,27 @@ def _below(node: Any, name: str) -> Any:
     return node.value[int(name)] if int(name) < len(node.value) else None
 
 
-def _replaced(text: str, node: Any, value: str) -> str:
-    """Put a value in the place of a node; one in lines of its own ends before the comments behind it."""
+def _end_of_key(node: Any, name: str) -> int:
+    """Where the key ends whose value stands in a mapping, or where a list begins."""
+    if not isinstance(node, yaml.MappingNode):
+        return int(node.start_mark.index)
+    return next(int(key.end_mark.index) for key, _ in node.value if key.value == name)
+
+
+def _replaced(text: str, node: Any, value: str, end_of_key: int) -> str:
+    """Put a value in the place of a node; of one in lines of its own comments stay."""
     start, end = node.start_mark.index, node.end_mark.index
-    inside = text[start:end]
     if isinstance(node, yaml.ScalarNode):
         is_apart = start == 0 or text[start - 1].isspace()
         return f"{text[:start]}{'' if is_apart else ' '}{value}{text[end:]}"
     if node.flow_style:
         return f"{text[:start]}{value}{text[end:]}"
-    before = text[:start].rstrip(" \n")
-    kept = inside[len(_without_comments(inside)) :]
-    return f"{before} {value}{kept or chr(10)}{text[end:]}"
+    # A list in lines of its own: the value stands behind the colon, and what its lines remark below it.
+    colon = text.index(":", end_of_key)
+    head, _, inside = text[colon + 1 : end].partition("\n")
+    remarks = [line[line.index("#") :].rstrip() for line in inside.splitlines() if "#" in line]
+    below = "".join(f"{' ' * node.start_mark.column}{remark}\n" for remark in remarks)
+    return f"{text[: colon + 1]} {value}{head.rstrip()}\n{below}{text[end:]}"
 
 
 def _without_comments(inside: str) -> str:

@@ -10,7 +10,7 @@ import pytest
 from bisar_budget.design.allocate import allocate
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.report.drawing.share_bars import limiting, share_bars
-from tests.conftest import TODAY, mission_text
+from tests.conftest import ROOT, TODAY, mission_text
 
 KEY = "platforms.receiver.motion_error.velocity"
 RSS = {"allocation__combine": "rss", "allocation__model": "full", "requirements__location_error": "20 m"}
@@ -99,6 +99,21 @@ class TestMission:
         assert "location_error: 5 m" in there.read_text()
         assert run("check", there).exit_code == 0
 
+    def test_a_model_that_the_sheet_holds_for_is_written(self, run, mission, tmp_path) -> None:
+        there = tmp_path / "specified.yaml"
+        assert run("allocate", mission, "--model", "published", "--reserve", "0", "-o", there).exit_code == 0
+        assert "model: published" in there.read_text()
+        assert run("check", there).exit_code == 0
+
+    def test_a_file_that_could_not_be_read_there_is_not_written(self, run, tmp_path) -> None:
+        """A mission names an orbit beside it, which is not beside what would be written."""
+        there = tmp_path / "elsewhere" / "specified.yaml"
+        given = ROOT / "specs" / "missions" / "sentinel1_elements_besancon.yaml"
+        found = run("allocate", given, "--set", "allocation.combine=rss", "-o", there)
+        assert found.exit_code == 2
+        assert f"{there} is not written" in found.stderr
+        assert not there.exists()
+
     def test_nothing_is_written_where_there_are_no_specifications(self, run, mission, tmp_path) -> None:
         there = tmp_path / "specified.yaml"
         found = run("allocate", mission, "--set", "requirements.location_error=1 m", "--for", KEY, "-o", there)
@@ -131,7 +146,7 @@ class TestOffer:
         assert all(sides.values())
         found = run("allocate", mission, "--compare", offer)
         assert found.exit_code == 0
-        assert "1 of 7 figures are outside" in found.stdout
+        assert "of 7 figures 1 is outside" in found.stdout
         assert "OUTSIDE" in found.stdout
 
     def test_an_offer_with_which_the_mission_fails_is_exit_1(self, run, mission, offer) -> None:
@@ -146,6 +161,32 @@ class TestOffer:
         figures = document(run, mission, "--compare", silent)["offer"]["figures"]
         assert {one["text"]: one["is_inside"] for one in figures}[""] is False
 
+    def test_figures_of_a_part_are_those_of_the_offer(self, run, mission, tmp_path) -> None:
+        path = tmp_path / "part.yaml"
+        path.write_text(mission_text(**RSS, platforms__receiver__motion_error={"sensor": "mosaic-x5-rtk"}))
+        figures = {one["key"]: one for one in document(run, mission, "--compare", path)["offer"]["figures"]}
+        assert figures["platforms.receiver.motion_error.position"]["is_inside"] is True
+
+    def test_a_level_of_another_spectrum_is_not_compared(self, run, tmp_path) -> None:
+        own = {"frequency": "10 MHz", "phase_noise": {"1 Hz": "-95 dBc/Hz", "1 kHz": "-150 dBc/Hz"}}
+        other = own | {"phase_noise": {"1 Hz": "-65 dBc/Hz", "1 kHz": "-120 dBc/Hz"}, "level": "-10 dB"}
+        paths = [tmp_path / "own.yaml", tmp_path / "other.yaml"]
+        rules = {"allocation__combine": "rss", "allocation__model": "full", "requirements__islr": "-20 dB"}
+        for path, one in zip(paths, (own, other), strict=True):
+            path.write_text(mission_text(**rules, platforms__receiver__oscillator=one))
+        key = "platforms.receiver.oscillator.level"
+        (figure,) = document(run, paths[0], "--for", key, "--compare", paths[1])["offer"]["figures"]
+        assert (figure["is_inside"], figure["remark"]) == (None, "another spectrum")
+        (figure,) = document(run, paths[0], "--for", key, "--compare", paths[0])["offer"]["figures"]
+        assert figure["text"] == "0 dB"
+
+    def test_an_offer_for_another_mission_is_said(self, run, mission, tmp_path) -> None:
+        path = tmp_path / "other.yaml"
+        path.write_text(mission_text(**RSS, radar__bandwidth="100 MHz", collection__aperture_time="2 s"))
+        assert "it differs in radar, collection too" in " ".join(
+            run("allocate", mission, "--compare", path).stdout.split()
+        )
+
 
 @pytest.mark.parametrize(
     ("arguments", "code", "said"),
@@ -154,6 +195,7 @@ class TestOffer:
         (["--for", KEY, "--for", KEY], 2, "stands twice"),
         (["--for", f"{KEY}s"], 2, f"Did you mean '{KEY}'"),
         (["--reserve", "100"], 2, "--reserve"),
+        (["--reserve", "nan"], 2, "--reserve: nan is no part of a limit"),
         (["--set", "allocation.combine=each"], 2, "the single allowables are the answer"),
         (["--set", "scene.height_error=500 m"], 1, "other errors leave no room"),
         (["--compare", "nowhere.yaml"], 2, "nowhere.yaml"),

@@ -50,6 +50,7 @@ HELD = [
     ("satellite_fixed", 4, "rss"),
     ("geostationary_drone", 20, "sum"),
     ("satellite_aircraft", 29, "rss"),
+    ("satellite_fixed", 20, "sum"),
 ]
 
 
@@ -112,13 +113,10 @@ def test_the_mission_is_checked_with_what_is_ordered() -> None:
 
 
 def test_an_error_that_nothing_limits_is_free() -> None:
-    """Of a geostationary transmitter the position; a receiver that hears it has no clock error of its own."""
-    given = load_mission(str(ROOT / "specs" / "missions" / "geostationary_direct_path.yaml"))
-    free = {
-        one.key: one.value for one in allocate(family("geostationary_drone", 20, "sum"), today=DAY).specifications
-    }
-    assert free["platforms.transmitter.motion_error.position"] is None
-    assert "timing_error.quadratic" not in list(usual_keys(given))
+    """By the published model a constant clock error has no phase, and nothing requires a location."""
+    given = mission(allocation__model="published")
+    (one,) = allocate(given, keys={"timing_error.constant": 1.0}, today=DAY).specifications
+    assert (one.value, one.ordered, one.text, dict(one.shares)) == (None, None, "", {})
 
 
 def test_other_errors_that_leave_no_room_are_named_with_what_they_use() -> None:
@@ -199,6 +197,32 @@ def test_a_still_platform_has_its_position_only() -> None:
 def test_a_key_that_is_no_error_is_refused(key: str, why: str) -> None:
     with pytest.raises(QuestionError, match=why):
         allocate(mission(), keys={key: 1.0}, today=DAY)
+
+
+def test_a_level_and_what_it_shifts_are_not_specified_together() -> None:
+    """Only their product is limited: it ordered 5e-17 of the one and -62 dB of the other."""
+    given = load_mission(str(ROOT / "specs" / "missions" / "holdover_roof_receiver.yaml"))
+    keys = ["platforms.receiver.oscillator.level", "platforms.receiver.oscillator.power_law.h-2"]
+    with pytest.raises(QuestionError, match=r"level multiplies platforms\.receiver\.oscillator\.power_law\.h-2"):
+        allocate(given, keys=dict.fromkeys(keys, 1.0), today=DAY)
+
+
+def test_an_error_that_is_limited_only_where_it_is_large_is_not_free() -> None:
+    """A constant clock error displaces, and has no phase until it is large: it was free, and 100 us failed."""
+    given = mission()
+    sheet = allocate(given, keys={"timing_error.constant": 1.0}, reserve=0.0, today=DAY)
+    (one,) = sheet.specifications
+    assert one.value is not None
+    assert checked(given, sheet, {one.key: 1.05}).status in ("fail", "not_evaluated")
+
+
+def test_a_size_ends_at_what_a_mission_file_may_state() -> None:
+    """6.6 km of a lever arm ended in a crash: the file takes up to 1 km."""
+    error = {"lever_arm": {"arm": ["1 m", 0, 0], "uncertainty": "1 mm"}, "imu": {"attitude": "0.001 deg"}}
+    given = mission(platforms__receiver__motion_error=error, collection__aperture_time="0.05 s")
+    key = "platforms.receiver.motion_error.lever_arm.uncertainty"
+    (one,) = allocate(given, keys={key: 1.0}, today=DAY).specifications
+    assert one.ordered is None or one.ordered <= 1000
 
 
 def test_an_error_and_an_axis_of_it_are_one() -> None:

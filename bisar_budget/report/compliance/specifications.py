@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 
+from bisar_budget.design.offers import OfferedFigure
 from bisar_budget.findings.requirement import NAMES
 from bisar_budget.findings.specification import Broken, Specification, SpecificationSheet
 from bisar_budget.report.compliance import document as doc
@@ -78,13 +79,16 @@ def remarks(sheet: SpecificationSheet) -> Iterator[str]:
             effect = row.id.partition(".")[2]
             yield f"{effect.capitalize()} phase is kept negligible, since no requirement takes it: that limits sizes."
         elif row.requirement is None:
-            yield f"{row.id.partition('.')[2]} is limited by where the image ends."
+            by = "where the image ends" if row.id.startswith("end") else "what a mission file may state"
+            yield f"{row.id.partition('.')[2]} is limited by {by}."
     for one in sheet.specifications:
         if one.remark:
             yield f"{one.key} {one.text}: {one.remark}."
     yield from (f"{note[0].upper()}{note[1:]}." for note in sheet.notes)
 
 
-def side(is_inside: bool) -> str:
+def side(figure: OfferedFigure) -> str:
     """On which side of a specification a figure is."""
-    return "inside" if is_inside else "OUTSIDE"
+    if figure.is_inside is None:
+        return figure.remark
+    return "inside" if figure.is_inside else "OUTSIDE"

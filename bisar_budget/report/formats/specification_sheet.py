@@ -137,6 +137,9 @@ def _lines(answer: Answer, style: Style) -> Iterator[str]:
         yield from table([["row", "used", "may use", ""], *(broken_words(one) for one in sheet.broken)])
         yield ""
         yield from wrapped(way_out(sheet), "")
+        if offer is not None:
+            yield ""
+            yield from wrapped(_offered(offer), "  ")
         return
     yield from table([["specification", "ordered", "today", "largest share"], *map(_line, sheet.specifications)])
     yield ""
@@ -150,7 +153,7 @@ def _lines(answer: Answer, style: Style) -> Iterator[str]:
         yield ""
         yield from wrapped(_offered(offer), "  ")
         head = ["figure", "offered", "ordered", ""]
-        lines = [[one.key, one.text or "-", one.ordered or "free", side(one.is_inside)] for one in offer.figures]
+        lines = [[one.key, one.text or "-", one.ordered or "free", side(one)] for one in offer.figures]
         yield from table([head, *lines])
 
 
@@ -160,6 +163,8 @@ def _verdict(sheet: SpecificationSheet) -> str:
     number = sum(one.value is not None for one in sheet.specifications)
     count = counted(number, "specification")
     stands = STATUS[sheet.status].text if sheet.status in STATUS else sheet.status
+    if not number:
+        return f"no requirement limits any of these errors: check says {stands}"
     if not sheet.complies:
         return f"{count}, but the mission does not comply with them: {stands}"
     return f"{count} that meet{'s' if number == 1 else ''} every requirement together: check says {stands}"
@@ -178,9 +183,10 @@ def _line(one: Specification) -> list[str]:
 
 def _offered(offer: Offer) -> str:
     stands = STATUS[offer.status].text if offer.status in STATUS else offer.status
-    outside = sum(not one.is_inside for one in offer.figures)
-    figures = "every figure is inside" if not outside else f"{outside} of {len(offer.figures)} figures are outside"
-    return f"Offer {printable(offer.file)}: the mission as a whole says {stands}; {figures}."
+    outside = sum(one.is_inside is False for one in offer.figures)
+    of_all = f"of {counted(len(offer.figures), 'figure')} {outside} {'is' if outside == 1 else 'are'} outside"
+    other = f"; it differs in {', '.join(offer.notes)} too" if offer.notes else ""
+    return f"Offer {printable(offer.file)}: the mission as a whole says {stands}; {of_all}{other}."
 
 
 # ---------------------------------------------------------------- for a board, and a supplier
@@ -220,7 +226,7 @@ def _chapter(answer: Answer, anchor: str) -> doc.Chapter:
     if offer is not None:
         heads = [*doc.heads("Figure"), *doc.numbers("Offered", "Ordered"), *doc.heads("")]
         lines: list[doc.Line] = [
-            [doc.Name(one.key), one.text or "–", one.ordered or "free", side(one.is_inside)] for one in offer.figures
+            [doc.Name(one.key), one.text or "–", one.ordered or "free", side(one)] for one in offer.figures
         ]
         blocks += [doc.Paragraph(_offered(offer)), doc.TextTable("Offer", "Offer against the sheet", heads, lines)]
     return doc.Chapter(printable(sheet.name), blocks, anchor, level=2, is_article=True)
