@@ -71,7 +71,11 @@ def questions(seed: int) -> Iterator[Question]:
     """What is asked about the file of a seed of `tests.fuzz.case`: a sweep, a crossing, of some something else."""
     keys = _keys_of(original(Random(f"hostile {seed}")))
     random = Random(f"question {seed}")
-    for ask in (_sweep, _solve, *((random.choice((_sweep, _sensitivity, _set, _trade)),) * (seed % 8 == 0))):
+    for ask in (
+        _sweep,
+        _solve,
+        *((random.choice((_sweep, _sensitivity, _set, _trade, _allocate)),) * (seed % 8 == 0)),
+    ):
         arguments, files = ask(random, keys)
         if ask is not _set and random.random() < 0.2:
             arguments += ("--set", _assignment(random, keys))
@@ -222,6 +226,19 @@ def _sensitivity(random: Random, keys: Mapping[str, str]) -> tuple[tuple[str, ..
     arguments += ("--row", random.choice(_ROWS)) if random.random() < 0.3 else ()
     arguments += ("--plot", "p.svg") if random.random() < 0.05 else ()
     return arguments + (("--format", "json") if random.random() < 0.5 else ("-o", "o.txt")), {}
+
+
+def _allocate(random: Random, keys: Mapping[str, str]) -> tuple[tuple[str, ...], dict[str, bytes]]:
+    arguments: tuple[str, ...] = ("allocate", MISSION, "--set", f"allocation.combine={random.choice(('rss', 'sum'))}")
+    for _ in range(random.choice((0, 0, 1, 2))):
+        key = _key(random, keys) if random.random() < 0.5 else random.choice(_KEYS)
+        arguments += ("--for", key if random.random() < 0.9 else _edited(key, random))
+    if random.random() < 0.5:
+        arguments += ("--reserve", random.choice((*("0", "5", "20", "99") * 4, *_COUNTS, "nan", "-1", "100")))
+    arguments += ("--compare", MISSION) if random.random() < 0.2 else ()
+    formats = ("json", "csv", "markdown", "html", "needs", "sdoc", "text")
+    written = random.choice(((), ("-o", "o.yaml"), ("-o", "o.txt")))
+    return (*arguments, "--format", random.choice(formats), *written), {}
 
 
 def _trade(random: Random, keys: Mapping[str, str]) -> tuple[tuple[str, ...], dict[str, bytes]]:

@@ -21,11 +21,12 @@ from click.testing import CliRunner, Result
 
 from bisar_budget.cli import cli
 from bisar_budget.design.sweep import Asked
+from bisar_budget.mission.load import parse_mission
 from tests.conftest import APART, ROOT, TODAY
 from tests.fuzz import RAW, RUN
 from tests.fuzz_commands import MISSION, Question, break_parts, flown, radar_file, small_mission, targets
 
-CODES = {"solve": {0, 1, 2}, "check": {0, 1, 2}}
+CODES = {"solve": {0, 1, 2}, "check": {0, 1, 2}, "allocate": {0, 1, 2}}
 SECTION_V = str(ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml")
 # Three parts, which arrays hold.
 SWEEP = ("sweep", SECTION_V, "--vary", "collection.aperture_time=1:2s:17000", "--date", TODAY.isoformat())
@@ -97,6 +98,8 @@ def _read(asked: Question, stdout: str, written: list[Path]) -> None:
                 ElementTree.parse(path)
             except ElementTree.ParseError as error:
                 raise ValueError(error) from None
+        elif path.suffix == ".yaml":
+            parse_mission(path.read_text(encoding="utf-8"), str(path))
         elif path.name != "o.txt":
             raise ValueError(f"{path.name} is left")
 

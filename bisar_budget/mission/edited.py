@@ -75,6 +75,7 @@ def _replaced(text: str, node: Any, value: str, end_of_key: int) -> str:
         return f"{text[:start]}{value}{text[end:]}"
     # A list in lines of its own: the value stands behind the colon, and what its lines remark below it.
     colon = text.index(":", end_of_key)
+    end = len(text[:end].rstrip(" "))  # the next line keeps its indent
     head, _, inside = text[colon + 1 : end].partition("\n")
     remarks = [line[line.index("#") :].rstrip() for line in inside.splitlines() if "#" in line]
     below = "".join(f"{' ' * node.start_mark.column}{remark}\n" for remark in remarks)

@@ -48,6 +48,7 @@ def comments(text: str) -> list[str]:
         ("a: [1 m, 2 m, 3 m]\nb: 1\n", "a", "a: 9\nb: 1\n"),
         ("a: [1 m, 2 m]\n", "a.1", "a: [1 m, 9]\n"),
         ("a:\n  - 1 m\n  - 2 m # of these\n# next\nb: 1\n", "a", "a: 9\n  # of these\n  # next\nb: 1\n"),
+        ("a:\n  b:\n  - 1\n  - 2\n  c:\n  - 3\n", "a.b", "a:\n  b: 9\n  c:\n  - 3\n"),
         ("a: # k: 6\n  - 1 m\n  # k8\n  - 2 m # k9\nb: 1\n", "a", "a: 9 # k: 6\n  # k8\n  # k9\nb: 1\n"),
         ("a: 1 # so\r\nb:\r\n  c: 2\r\n", "b.d", "a: 1 # so\r\nb:\r\n  c: 2\r\n  d: 9\r\n"),
         ("a:\n  b: 1\n  # the end of a\nc: 1\n", "a.d", "a:\n  b: 1\n  d: 9\n  # the end of a\nc: 1\n"),
