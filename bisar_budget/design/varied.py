@@ -228,7 +228,8 @@ def _has_possible_figures(mission: Mission, cases: int) -> NDArray[np.bool_]:
 # ---------------------------------------------------------------------- scaled errors
 # What a factor does not multiply: when and how fast an error changes, and settings.
 _KEPT = (units.FREQUENCY, units.TIME, units.RATIO, units.MEMORY)
-_TIMES, _MEASURES = ("time_tag",), ("arm",)  # by their keys: a time that is an error; a length that is none
+# By their keys: a time and a ratio that are errors, a length that is none.
+_OF_ERRORS, _MEASURES = ("time_tag", "accelerometer_scale_factor"), ("arm",)
 _LEVELS = (units.POWER_RATIO, units.PHASE_NOISE, units.TONE)
 _ERRORS = ("motion_error", "common_motion_error", "timing_error", "propagation", "other_errors")
 _ACCEPTED = (
@@ -262,7 +263,7 @@ def _below(value: Any, reader: Reader, parts: Sequence[str], factor: Any, key: s
         name = parts_of(key)[-1]
         if name in _MEASURES:
             return value, 0
-        is_clock = parts_of(key)[0] == "timing_error" or name in _TIMES
+        is_clock = parts_of(key)[0] == "timing_error" or name in _OF_ERRORS
         return _scaled(value, reader, factor, is_clock=is_clock)
     part, *rest = parts
     reader = _form(reader, value)
@@ -286,7 +287,7 @@ def _scaled(value: Any, reader: Reader, factor: Any, is_clock: bool) -> tuple[An
         for name, below in reader.keys.items():
             if name in _MEASURES or name == "spectrum_level":  # the spectrum is scaled
                 continue
-            inner, found = _scaled(getattr(value, name), below.reader, factor, is_clock or name in _TIMES)
+            inner, found = _scaled(getattr(value, name), below.reader, factor, is_clock or name in _OF_ERRORS)
             value, count = value._replace(**{name: inner}), count + found
         return value, count
     if isinstance(reader, ListOf | Triple):

@@ -374,3 +374,11 @@ def test_a_mission_without_errors_has_nothing_to_solve(run: Callable, tmp_path) 
     done = run("solve", str(file), "--for", "collection.aperture_time")
     assert done.exit_code == 2
     assert "declares no error: nothing decides whether it complies" in done.stderr
+
+
+def test_a_scale_factor_of_accelerometers_is_an_error_that_scales() -> None:
+    """It is a ratio, and was kept as if it were a setting."""
+    error = {"imu": {"accelerometer_scale_factor": "300 ppm", "attitude": "0.01 deg"}}
+    mission = parse_mission(mission_text(platforms__receiver__motion_error=error))
+    imu = scaled(mission, "platforms.receiver.motion_error.imu", 2.0).platforms.receiver.motion_error.imu
+    assert imu.accelerometer_scale_factor == pytest.approx((6e-4,) * 3)
