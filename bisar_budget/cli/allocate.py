@@ -92,11 +92,10 @@ def allocate(
         raise click.UsageError("--compare holds one offer to one mission.")
     spare([*files, *([other] if other else [])], [output])
     answers = list(_answers(load_all(files, model, changes), keys, reserve, other, model, changes, today))
-    deliver(
-        _written(answers, format_name, None if is_mission else output), None if is_mission else output, format_name
-    )
-    if is_mission and output is not None:
+    if is_mission and output is not None:  # first: one that cannot be written leaves no output at all
         _write_mission(answers[0], output, model)
+        output = None
+    deliver(_written(answers, format_name, output), output, format_name)
     is_broken = any(not one.sheet.complies or (one.offer is not None and not one.offer.complies) for one in answers)
     sys.exit(EXIT_BROKEN if is_broken else 0)
 

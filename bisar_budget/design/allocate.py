@@ -250,7 +250,7 @@ class _SpecificationSearch:
         return 1.0 if is_summed or kind in _WARN_ONLY else 2.0
 
     def _allowed(self, ids: Sequence[str]) -> Floats:
-        """What each row may use: what has no requirement, and what has no image, stays below the limit."""
+        """Largest utilization of each row; one without a requirement, or without an image beyond, stays below 1."""
         usual = (1 - self.reserve) * _SURELY
         most = {NEGLIGIBLE: _SURELY, END_OF_IMAGE: min(usual, _SHORT_OF_END), ACCEPTED: _SURELY}
         return np.array([most.get(row.partition(".")[0], usual) for row in ids])
@@ -354,7 +354,7 @@ class _SpecificationSearch:
         return np.where(np.isfinite(alone), alone / (2 * count), self.tiny)
 
     def _near(self, sizes: Floats) -> "_Near | None":
-        """What rows use near sizes; None where these are far beyond what they may use."""
+        """The use of rows near sizes; None where it is far beyond what they may use."""
         count = sizes.size
         cases = np.repeat(sizes[:, None], 2 * count + 1, axis=1)
         for place, factor in enumerate(BESIDE):
@@ -534,7 +534,7 @@ class _SpecificationSearch:
 
 
 class _Near(NamedTuple):
-    """What rows use near sizes, (sizes,): the part of each, of the power of the utilization, and the room for all.
+    """The use of rows near sizes, (sizes,): the part of each, of the power of the utilization, and the room for all.
 
     `is_limit` are the rows that any of the sizes takes part in, `is_free` the sizes that take part in none.
     """

@@ -15,7 +15,7 @@ _CURVES = ("frequency", "phase_noise", "power_law", "allan_deviation", "bandwidt
 
 
 class OfferedFigure(NamedTuple):
-    """What an offer has for a specification: None where its file is silent. `text` is that as the file has it.
+    """The figure of an offer for a specification: None where its file is silent. `text` is that as the file has it.
 
     `is_inside` is None where the two cannot be compared, or nothing is ordered; `remark` then says why.
     """
@@ -76,7 +76,7 @@ def _figure(one: Specification, sheet: SpecificationSheet, mission: Mission, ask
 
 
 def _spectrum(mission: Mission, parts: tuple[str, ...]) -> object:
-    """What a level shifts, without it."""
+    """The spectrum that a level shifts, without the level."""
     platform = getattr(mission.platforms, parts[1])
     if parts[-1] == "level":
         return [getattr(platform.oscillator, name, None) for name in _CURVES]

@@ -112,6 +112,7 @@ class TestMission:
         found = run("allocate", given, "--set", "allocation.combine=rss", "-o", there)
         assert found.exit_code == 2
         assert f"{there} is not written" in found.stderr
+        assert not found.stdout
         assert not there.exists()
 
     def test_nothing_is_written_where_there_are_no_specifications(self, run, mission, tmp_path) -> None:
@@ -181,6 +182,7 @@ class TestOffer:
         assert figure["text"] == "0 dB"
 
     def test_an_offer_for_another_mission_is_said(self, run, mission, tmp_path) -> None:
+        assert document(run, mission, "--compare", mission)["offer"]["differs_in"] == []
         path = tmp_path / "other.yaml"
         path.write_text(mission_text(**RSS, radar__bandwidth="100 MHz", collection__aperture_time="2 s"))
         assert "it differs in radar, collection too" in " ".join(

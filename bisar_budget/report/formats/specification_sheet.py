@@ -98,6 +98,7 @@ def _offer(offer: Offer) -> dict[str, Any]:
         "status": offer.status,
         "complies": offer.complies,
         "figures": [figure._asdict() for figure in offer.figures],
+        "differs_in": list(offer.notes),
     }
 
 
