@@ -171,6 +171,7 @@ ACCELERATION_SENSITIVITY = Dimension(
     usual=("/g",),
 )
 TONE = Dimension("the level of a tone", "dBc", {"dBc": 1.0}, usual=("dBc",))
+LEVELS = (POWER_RATIO, PHASE_NOISE, TONE)  # in decibel
 MEMORY = Dimension("an amount of memory", "B", _scaled("B", "kMGT") | {"KB": 1e3, "MiB": 2.0**20, "GiB": 2.0**30})
 
 DIMENSIONS = tuple(found for found in globals().values() if isinstance(found, Dimension))

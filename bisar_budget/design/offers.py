@@ -8,6 +8,7 @@ from bisar_budget.design.quantities import QuestionError, tree_of
 from bisar_budget.design.specified import specified_number
 from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.findings.specification import Specification, SpecificationSheet
+from bisar_budget.findings.status import exit_code
 from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.model import Mission
 
@@ -43,7 +44,7 @@ class Offer(NamedTuple):
     @property
     def complies(self) -> bool:
         """Whether the mission meets every requirement with the offer, whatever single figures are."""
-        return self.status not in ("fail", "not_evaluated", "error")
+        return exit_code({self.status}, strict=False) == 0
 
 
 def offer(sheet: SpecificationSheet, mission: Mission, today: date) -> Offer:

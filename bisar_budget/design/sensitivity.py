@@ -58,8 +58,6 @@ DIRECTION_STEP = math.radians(0.25)
 LEVEL_STEP = 0.25  # dB
 _EARTH = 6.371e6  # m, mean radius
 
-_LEVELS = (units.POWER_RATIO, units.PHASE_NOISE, units.TONE)
-
 
 # ---------------------------------------------------------------- what is found
 class Skipped(NamedTuple):
@@ -443,7 +441,7 @@ def _stated(number: Number, text: str, nearest_m: float, shares: Mapping[str, An
         return Stated(number, text, value, step, step, f"{math.degrees(step):.2g} deg")
     if number.reader in (DIRECTION, ELEVATION):
         return Stated(number, text, value, DIRECTION_STEP, math.radians(1), "1 deg", part=math.radians(1))
-    if number.dimension in _LEVELS:
+    if number.dimension in units.LEVELS:
         return Stated(number, text, value, LEVEL_STEP, 1.0, "1 dB", part=math.log(10) / 10)
     if value == 0:
         return Skipped(number.key, text, "is 0: there is no part of it")

@@ -17,7 +17,6 @@ from bisar_budget.units import Dimension, parse_quantity
 
 DIGITS = 2  # of a number that is ordered
 _SILENT_DB = -400.0  # a level of nothing
-_LEVELS = (units.POWER_RATIO, units.PHASE_NOISE, units.TONE)
 # Units in which the sizes are ordered, where the file has none: the first in which the number is at least 1.
 _ORDERED_IN: Mapping[Dimension, tuple[str, ...]] = {
     units.LENGTH: ("m", "mm", "um"),
@@ -59,7 +58,7 @@ class Specified(NamedTuple):
     @property
     def is_level(self) -> bool:
         """Whether the number is a level in decibel."""
-        return self.number.dimension in _LEVELS
+        return self.number.dimension in units.LEVELS
 
     @property
     def nothing(self) -> float:

@@ -230,7 +230,6 @@ def _has_possible_figures(mission: Mission, cases: int) -> NDArray[np.bool_]:
 _KEPT = (units.FREQUENCY, units.TIME, units.RATIO, units.MEMORY)
 # By their keys: a time and a ratio that are errors, a length that is none.
 _OF_ERRORS, _MEASURES = ("time_tag", "accelerometer_scale_factor"), ("arm",)
-_LEVELS = (units.POWER_RATIO, units.PHASE_NOISE, units.TONE)
 _ERRORS = ("motion_error", "common_motion_error", "timing_error", "propagation", "other_errors")
 _ACCEPTED = (
     "accepted: platforms.transmitter.motion_error, platforms.receiver.motion_error, common_motion_error, "
@@ -295,7 +294,7 @@ def _scaled(value: Any, reader: Reader, factor: Any, is_clock: bool) -> tuple[An
         pairs = [_scaled(entry, below_reader, factor, is_clock) for entry in value]
         return tuple(entry for entry, _ in pairs), sum(found for _, found in pairs)
     if isinstance(reader, Quantity):
-        if reader.dimension in _LEVELS:
+        if reader.dimension in units.LEVELS:
             return value + 20 * np.log10(factor), 1
         if reader.dimension in _KEPT and not is_clock:
             return value, 0

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from bisar_budget.faults import SetValue
 from bisar_budget.findings.requirement import JudgedRequirement, Override
+from bisar_budget.findings.status import exit_code
 
 if TYPE_CHECKING:
     from bisar_budget.findings.mission import MissionFindings
@@ -97,7 +98,7 @@ class SpecificationSheet(NamedTuple):
     @property
     def complies(self) -> bool:
         """Whether the mission meets every requirement with what is ordered."""
-        return not self.broken and self.status not in ("fail", "not_evaluated", "error")
+        return not self.broken and exit_code({self.status}, strict=False) == 0
 
     @property
     def ordered(self) -> tuple[SetValue, ...]:
