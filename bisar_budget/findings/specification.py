@@ -102,5 +102,5 @@ class SpecificationSheet(NamedTuple):
 
     @property
     def ordered(self) -> tuple[SetValue, ...]:
-        """What the mission file has to say so that `check` holds it to what is ordered."""
+        """The values set in the mission file with which `check` holds it to what is ordered."""
         return (*self.is_equal, *(SetValue(one.key, one.text) for one in self.specifications if one.text))
