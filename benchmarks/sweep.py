@@ -22,12 +22,12 @@ import numpy as np
 from bisar_budget.budget.check import check_mission
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.design.cases import Grid
-from bisar_budget.design.quantities import number_of
 from bisar_budget.design.sweep import sweep
 from bisar_budget.evaluators import LEGENDRE_FITS
 from bisar_budget.faults import SetValue
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.mission.model import Mission
+from bisar_budget.mission.quantities import number_of
 from bisar_budget.mission.tree import read_tree
 
 MISSION = Path(__file__).parent.parent / "specs" / "missions" / "rigling_moses_section_v.yaml"

@@ -103,6 +103,18 @@ def no_specifications(why: str) -> str:
 
 
 @phrase
+def more_than_specified() -> str:
+    """Said of an error that is larger than its specification."""
+    return "the file declares more than is specified"
+
+
+@phrase
+def specified_and_not_declared(key: str) -> str:
+    """Said of an error that has a specification and no size."""
+    return f"{key} is specified, and the file does not declare it"
+
+
+@phrase
 def no_requirement() -> str:
     """Said of an aggregate that nothing is asked of."""
     return "no requirement in the file: computed, not judged"

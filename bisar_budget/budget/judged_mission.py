@@ -35,11 +35,12 @@ from bisar_budget.budget.judged_requirements import (
 )
 from bisar_budget.budget.judged_rows import CODE, REQUIREMENTS, Judged, Judging, Why
 from bisar_budget.budget.random_rows import RandomRows
+from bisar_budget.budget.specification_rows import specification_rows
 from bisar_budget.budget.vibration_rows import Vibrations, pslr_row, spur_rows
 from bisar_budget.budget.waivers import is_waived
 from bisar_budget.effects.declared import END_OF_IMAGE, LOCATION, MODELS
 from bisar_budget.effects.effect import PLATFORMS, subject
-from bisar_budget.findings.row import DECLARE, Row
+from bisar_budget.findings.row import DECLARE, SPECIFICATION, Row
 from bisar_budget.findings.status import STATUS
 from bisar_budget.geometry import BistaticGeometry, norm
 from bisar_budget.mission.model import Mission
@@ -90,7 +91,7 @@ class JudgedMission:
     def is_empty(self) -> bool:
         """Whether no case declares an error at all: nothing was judged."""
         nothing = (
-            row.metric == DECLARE
+            row.metric in (DECLARE, SPECIFICATION)
             or np.all((row.status == CODE["not_declared"]) | (row.why == Why.NOT_DECLARED_AS_REQUIRED))
             for row in self.rows
         )
@@ -187,6 +188,7 @@ class _Judgement:
         yield from Aggregates(self.judging, self.analysis).rows(model)
         if self._scene is not None:
             yield self._scene.row(self.judging, model)
+        yield from specification_rows(self.judging, self.analysis)
 
     def _rows(self, model: str, families: Sequence[FamilyRow]) -> dict[str, Judged]:
         """Rows by their ids: one may be of another family in some of the cases, and is in none of them nowhere."""
@@ -362,7 +364,7 @@ class RowStatuses:
     def judges(self) -> Codes:
         """Place in `KEYS` of the requirement that judges each row, -1: none, since it is not declared."""
         binding = np.array([row.binding for row in self.rows])
-        metric = np.array([[KEYS.index(row.metric)] for row in self.rows])
+        metric = np.array([[KEYS.index(row.metric) if row.metric in KEYS else -1] for row in self.rows])
         judges = np.where((binding >= 0) & (binding < REQUIREMENTS.index(END_OF_IMAGE)), binding, metric)
         return np.where(self.why == Why.NOT_DECLARED_AS_REQUIRED, -1, judges).astype(np.int8)
 

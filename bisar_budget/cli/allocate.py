@@ -113,7 +113,7 @@ def _answers(
     from bisar_budget.budget.waivers import overrides
     from bisar_budget.design.allocate import allocate as allocated
     from bisar_budget.design.offers import offer
-    from bisar_budget.design.quantities import QuestionError
+    from bisar_budget.mission.quantities import QuestionError
     from bisar_budget.report.formats.specification_sheet import Answer
 
     judged_on, from_outside = day(today), outside(today)

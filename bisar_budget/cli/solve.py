@@ -116,7 +116,7 @@ def _answers(
 ) -> "Iterator[tuple[Mission, Any]]":
     """Ask each mission in turn, with a bar; exits where one cannot be asked."""
     from bisar_budget.budget.waivers import overrides
-    from bisar_budget.design.quantities import QuestionError
+    from bisar_budget.mission.quantities import QuestionError
 
     judged_on, from_outside = day(today), outside(today)
     for mission in missions:

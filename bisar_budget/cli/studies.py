@@ -11,12 +11,12 @@ from bisar_budget import __version__
 from bisar_budget.cli.long_work import watched
 from bisar_budget.cli.streams import fail
 from bisar_budget.design.cases import Cases, Grid, grid
-from bisar_budget.design.quantities import QuestionError, tree_of
 from bisar_budget.design.sweep import sweep
 from bisar_budget.findings.mission import FileWarning, MissionFindings, UnusableMission
 from bisar_budget.findings.status import complying
 from bisar_budget.findings.trade import TradeStudy
 from bisar_budget.mission.model import Mission
+from bisar_budget.mission.quantities import QuestionError, tree_of
 from bisar_budget.phrases import no_specifications
 from bisar_budget.report import FORMATS
 from bisar_budget.report.drawing.trades import Gathered, uses_of_rows

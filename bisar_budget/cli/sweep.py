@@ -135,7 +135,7 @@ def sweep(
     spare([mission, *([cases_file] if cases_file else [])], [output, plot])
     from bisar_budget.budget.waivers import overrides
     from bisar_budget.design.cases import TableError
-    from bisar_budget.design.quantities import QuestionError
+    from bisar_budget.mission.quantities import QuestionError
     from bisar_budget.report.drawing.trades import check_plot
     from bisar_budget.report.tables import MissingTablesError
 
@@ -170,7 +170,7 @@ def sweep(
 def _cases(mission: "Mission", varied: Sequence[str], cases_file: str | None, sample: str | None) -> "Cases":
     """Read the cases that the options ask for."""
     from bisar_budget.design import cases
-    from bisar_budget.design.quantities import tree_of
+    from bisar_budget.mission.quantities import tree_of
 
     tree = tree_of(mission)
     if cases_file is None:

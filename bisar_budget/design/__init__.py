@@ -7,7 +7,6 @@ __all__ = [
     "compare",
     "imaged",
     "offers",
-    "quantities",
     "sensitivity",
     "solve",
     "sweep",

@@ -21,10 +21,9 @@ from bisar_budget.budget.judged_mission import JudgedMission, judged_mission
 from bisar_budget.budget.judged_requirements import SMALL_RAD, TENTH
 from bisar_budget.budget.judged_rows import CODE, REQUIREMENTS, Why
 from bisar_budget.design.geometric_program import Rows, largest_sizes
-from bisar_budget.design.quantities import QuestionError, tree_of
 from bisar_budget.design.specified import Specified, specified_errors
 from bisar_budget.design.table import Variation
-from bisar_budget.design.varied import is_held, varied
+from bisar_budget.design.varied import is_held
 from bisar_budget.effects.declared import CUBIC, END_OF_IMAGE, LOCATION, QUADRATIC
 from bisar_budget.effects.oscillators import noise_of
 from bisar_budget.faults import MissionError, SetValue
@@ -33,6 +32,7 @@ from bisar_budget.mission.changes import ACCEPTED_ERRORS, parts_of
 from bisar_budget.mission.load import folder_of
 from bisar_budget.mission.model import MetricSplits, Mission
 from bisar_budget.mission.parts import Entry, PartError, entries, folders
+from bisar_budget.mission.quantities import QuestionError, tree_of, with_number
 from bisar_budget.ranges.exact_ranges import Floats, Truths
 from bisar_budget.units import format_quantity
 from bisar_budget.workers import Progress, unseen
@@ -201,7 +201,7 @@ class _SpecificationSearch:
         """Judge the mission with sizes, (sizes, cases): what errors add up to, or each by itself too."""
         mission = self.stated
         for one, column in zip(self.specified, sizes, strict=True):
-            mission = varied(mission, one.key, one.numbers(column))
+            mission = with_number(mission, one.key, one.numbers(column))
         cases, geometry = sizes.shape[1], self.stated.geometry
         analysis = Analysis(mission, cases, geometry=geometry, nodes=self._nodes, shown={}, is_of_sums=is_of_sums)
         return judged_mission(analysis, self.today)

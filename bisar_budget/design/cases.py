@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bisar_budget.design.quantities import Choices, Number, QuestionError, Varied, choices_of, number_of
 from bisar_budget.faults import Fault, InvalidValueError, printable, shown
 from bisar_budget.mission.changes import parts_of
+from bisar_budget.mission.quantities import Choices, Number, QuestionError, Varied, choices_of, number_of
 from bisar_budget.mission.readers import DIRECTION, TextList
 from bisar_budget.units import Dimension, normal_unit, parse_quantity
 

@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 from bisar_budget.analysis.analysis import Analysis, Case
 from bisar_budget.budget.judged_mission import JudgedMission, judged_mission
 from bisar_budget.budget.requirement_table import rows_in_words
-from bisar_budget.design.quantities import QuestionError, tree_of
 from bisar_budget.design.solve import Imaged
 from bisar_budget.design.table import Standing, Variation, breaking, hold_to_decisions, standing
 from bisar_budget.effects.effect import PLATFORMS
@@ -21,6 +20,7 @@ from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.load import folder_of
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.parts import FIGURES, Part, PartError, entries, evidence, find_part, folders
+from bisar_budget.mission.quantities import QuestionError, tree_of
 from bisar_budget.workers import Progress, unseen
 
 _KINDS = {"motion_error": ("imu", "gnss"), "oscillator": ("oscillator",)}

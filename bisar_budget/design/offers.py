@@ -4,13 +4,13 @@ from datetime import date
 from typing import NamedTuple
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.design.quantities import QuestionError, tree_of
 from bisar_budget.design.specified import specified_number
 from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.findings.specification import Specification, SpecificationSheet
 from bisar_budget.findings.status import exit_code
 from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.model import Mission
+from bisar_budget.mission.quantities import QuestionError, tree_of
 
 _CURVES = ("frequency", "phase_noise", "power_law", "allan_deviation", "bandwidth", "spurs")
 

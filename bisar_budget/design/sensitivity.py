@@ -18,7 +18,6 @@ from bisar_budget.analysis.allocation import is_balanced
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.budget.judged_mission import JudgedMission, judged_mission
 from bisar_budget.budget.judged_rows import Judged
-from bisar_budget.design.quantities import FACTOR, Number, QuestionError, as_number, form_of, tree_of
 from bisar_budget.design.table import Question, Table, Variation, hold_to_decisions, standing
 from bisar_budget.design.varied import scaled
 from bisar_budget.effects.effect import MOTION, PLATFORMS
@@ -28,6 +27,7 @@ from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.model import MISSION, SHARES, Mission
 from bisar_budget.mission.parts import taken_figures
 from bisar_budget.mission.propagation import DELAYS
+from bisar_budget.mission.quantities import FACTOR, Number, QuestionError, as_number, form_of, tree_of
 from bisar_budget.mission.readers import (
     DIRECTION,
     ELEVATION,

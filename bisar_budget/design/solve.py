@@ -18,7 +18,6 @@ import numpy as np
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.budget.judged_mission import JudgedMission, judged_mission
 from bisar_budget.budget.judged_requirements import ALIKE
-from bisar_budget.design.quantities import FACTOR, Number, QuestionError, Range, number_of, range_of, tree_of
 from bisar_budget.design.table import (
     GEOMETRY,
     REASON,
@@ -34,6 +33,7 @@ from bisar_budget.faults import MissionError, SetValue
 from bisar_budget.findings.images import Verdict
 from bisar_budget.findings.requirement import Override
 from bisar_budget.mission.model import Mission
+from bisar_budget.mission.quantities import FACTOR, Number, QuestionError, Range, number_of, range_of, tree_of
 from bisar_budget.workers import Progress, unseen
 
 _OF_ALL = ", or --scale for all of them"

@@ -7,11 +7,11 @@ from typing import NamedTuple
 import numpy as np
 
 from bisar_budget import units
-from bisar_budget.design.quantities import Number, QuestionError, as_number, number_of
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.mission.changes import ACCEPTED_ERRORS, is_error, parts_of
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.parts import taken_figures
+from bisar_budget.mission.quantities import Number, QuestionError, as_number, number_of
 from bisar_budget.ranges.exact_ranges import Floats
 from bisar_budget.units import Dimension, parse_quantity
 

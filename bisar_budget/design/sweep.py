@@ -14,7 +14,6 @@ import numpy as np
 
 from bisar_budget.budget.check import check_mission
 from bisar_budget.design.cases import Cases, words_of
-from bisar_budget.design.quantities import Choices, Number, QuestionError
 from bisar_budget.design.table import (
     GEOMETRY,
     IN_UNIT,
@@ -31,6 +30,7 @@ from bisar_budget.faults import Fault, MissionError, SetValue, fault_words, show
 from bisar_budget.findings.row import Row, unknown_id
 from bisar_budget.mission.load import mission_of, named_by
 from bisar_budget.mission.model import Mission
+from bisar_budget.mission.quantities import Choices, Number, QuestionError
 from bisar_budget.mission.tree import read_tree
 from bisar_budget.workers import MapBlocks, in_processes
 

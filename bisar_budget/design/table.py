@@ -21,8 +21,7 @@ from bisar_budget.budget.judged_mission import JudgedMission, field, judged_miss
 from bisar_budget.budget.judged_requirements import first_highest
 from bisar_budget.budget.judged_rows import REQUIREMENTS, WHOLE, Judged
 from bisar_budget.constants import SPEED_OF_LIGHT
-from bisar_budget.design.quantities import FACTOR, Number, QuestionError, number_of, tree_of
-from bisar_budget.design.varied import is_held, is_image, scaled, varied
+from bisar_budget.design.varied import is_held, is_image, scaled
 from bisar_budget.faults import MissionError, SetNumber, SetValue
 from bisar_budget.findings.row import unknown_id
 from bisar_budget.findings.status import RANK, STATUS
@@ -30,6 +29,7 @@ from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.load import Named, mission_of
 from bisar_budget.mission.model import Mission
+from bisar_budget.mission.quantities import FACTOR, Number, QuestionError, number_of, tree_of, with_number
 from bisar_budget.mission.stacked import picked, stacked
 from bisar_budget.mission.tree import Tree, read_tree
 from bisar_budget.workers import Progress, unseen
@@ -392,7 +392,7 @@ class Table:
             if one.reader is FACTOR:
                 mission = scaled(mission, one.key, found[one.key][some])
             elif one.key not in self.to_read:
-                mission = varied(mission, one.key, found[one.key][some])
+                mission = with_number(mission, one.key, found[one.key][some])
         geometries = mission.geometry
         is_sure = is_image(mission, geometries, some.size)
         if is_sure.all():

@@ -4,7 +4,7 @@ How they come into it, where they cannot, which cases then are missions, and how
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any, cast
 
@@ -12,12 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget import units
-from bisar_budget.design.quantities import QuestionError
 from bisar_budget.effects.effect import MOTION, PLATFORMS
 from bisar_budget.geometry import STILL, BistaticGeometry, PlatformState, norm
 from bisar_budget.mission.changes import parts_of
-from bisar_budget.mission.covariance import EIGENVALUE_TOLERANCE, KINDS, Covariance, error_index
-from bisar_budget.mission.instruments import RISE, STEEPEST, Imu, LeverArm, PowerLaw
+from bisar_budget.mission.covariance import EIGENVALUE_TOLERANCE
+from bisar_budget.mission.instruments import RISE, STEEPEST
 from bisar_budget.mission.model import (
     MISSION,
     PLACE_KEYS,
@@ -25,93 +24,22 @@ from bisar_budget.mission.model import (
     MetricSplits,
     Mission,
     Shares,
-    Simulation,
     flies_on_earth,
     least_age,
 )
 from bisar_budget.mission.platforms import (
     FARTHEST_BY,
     LEAST_BASELINE,
-    CommonMotionError,
     MotionError,
     Platform,
     has_body_axes,
     least_baseline,
 )
 from bisar_budget.mission.propagation import LEAST_ELEVATION_DEG, least_elevations
+from bisar_budget.mission.quantities import QuestionError
 from bisar_budget.mission.readers import ListOf, OneOf, Quantity, Reader, Section, Triple
 from bisar_budget.mission.vibrations import Spectrum
 from bisar_budget.ranges.exact_ranges import Floats
-from bisar_budget.units import Dimension, parse_quantity
-
-# Sections that a file may leave out, and keys whose scalar stands for each of three axes.
-_SECTIONS: Mapping[str, Callable[[], Any]] = {
-    "imu": Imu,
-    "lever_arm": LeverArm,
-    "common_motion_error": CommonMotionError,
-    "simulation": Simulation,
-}
-_TRIPLES = ("position", "velocity", "acceleration", *Imu._fields[:-1], "uncertainty")
-# Curves of an oscillator, with the dimension of what their points are named by.
-_CURVES: Mapping[str, Dimension] = {
-    "phase_noise": units.FREQUENCY,
-    "spurs": units.FREQUENCY,
-    "allan_deviation": units.TIME,
-    "spectrum": units.FREQUENCY,
-}
-POWERS = dict(zip(("h-2", "h-1", "h0", "h1", "h2"), PowerLaw._fields, strict=True))
-
-
-def varied(mission: Mission, key: str, number: Any) -> Mission:
-    """Put a number, or an array of numbers, into a mission in the place of a key."""
-    found: Mission = _with_value(mission, parts_of(key), number)
-    return found
-
-
-def _with_value(value: Any, parts: Sequence[str], number: Any) -> Any:
-    """The same below a value; a scalar for each axis goes into all."""
-    if not parts:
-        return (number, number, number) if isinstance(value, tuple) else number
-    if isinstance(value, Covariance):
-        return _with_element(value, parts, number)
-    part, *rest = parts
-    if part.isdigit():
-        place = int(part)
-        return (*value[:place], _with_value(value[place], rest, number), *value[place + 1 :])
-    if part in _CURVES:
-        return value._replace(**{part: _with_point(getattr(value, part), part, ".".join(rest), number)})
-    part = POWERS.get(part, part)
-    below = getattr(value, part)
-    if below is None and rest:
-        below = _SECTIONS[part]()
-    if below is None and part in _TRIPLES:
-        below = ()
-    return value._replace(**{part: _with_value(below, rest, number)})
-
-
-def _with_point(curve: Any, name: str, point: str, number: Any) -> Any:
-    """A curve with another ordinate at one of its points."""
-    if isinstance(curve, Spectrum):
-        return curve._replace(points=_with_point(curve.points, name, point, number))
-    here = parse_quantity(point, _CURVES[name])
-    return tuple((at, number if at == here else ordinate) for at, ordinate in curve)
-
-
-def _with_element(covariance: Covariance, parts: Sequence[str], number: Any) -> Covariance:
-    """A covariance with another sigma, a sigma of each axis, or the correlation of a pair."""
-    kind, *rest = parts
-    if kind in KINDS:
-        first = 3 * KINDS.index(kind)
-        places = [first + int(axis) for axis in rest] or range(first, first + 3)
-        sigmas = tuple(number if place in places else one for place, one in enumerate(covariance.sigmas))
-        return covariance._replace(sigmas=sigmas)
-    pair = {error_index(name.strip()) for name in ".".join(rest).split("-")}
-    rows = [
-        tuple(number if i != j and {i, j} == pair else rho for j, rho in enumerate(row))
-        for i, row in enumerate(covariance.correlation)
-    ]
-    return covariance._replace(correlation=tuple(rows))
-
 
 # ---------------------------------------------------------------- where arrays can stand, which cases are missions
 SAFE = 1 + 1e-6  # nearer to a border of what forms an image, a case is checked by itself

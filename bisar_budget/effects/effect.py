@@ -28,9 +28,10 @@ class Subject(NamedTuple):
     """The thing that a row or an error is about. `subject` makes it, with its id; nobody reads an id to find out.
 
     `owner` is the one whose share it counts against: transmitter, receiver, clock, or mission for what is nobody's.
-    `kind` is position, velocity, acceleration, time_tag, vibration, timing, propagation, terrain, other, or the name
-    of a sum. `axis` is the axis of `frame`, the term of the clock, the figure of a sensor or the air, the name of
-    another error, the sort of a vibration, and `entry` the place of one in the file.
+    `kind` is position, velocity, acceleration, time_tag, vibration, timing, propagation, terrain, other,
+    specification, or the name of a sum. `axis` is the axis of `frame`, the term of the clock, the figure of a sensor
+    or the air, the name of another error, the key that is specified, the sort of a vibration, and `entry` the place
+    of one in the file.
     """
 
     id: str
@@ -44,7 +45,7 @@ class Subject(NamedTuple):
 @cache
 def subject(owner: str, kind: str, axis: str = "", frame: str = "scene", entry: int | None = None) -> Subject:
     """Name an error or a sum as the contract does."""
-    if kind in ("timing", "other"):  # of one owner each
+    if kind in ("timing", "other", "specification"):  # of one owner each
         parts = [kind, axis]
     elif kind == "propagation":
         parts = [kind, owner, axis]

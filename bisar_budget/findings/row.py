@@ -13,6 +13,7 @@ from bisar_budget.mission.readers import did_you_mean
 from bisar_budget.phrases import Note
 
 DECLARE = "declare"  # requirements.declare, and the metric of its row
+SPECIFICATION = "specification"  # the metric of rows that hold what is declared to `specifications`
 
 
 class AppliedWaiver(NamedTuple):

@@ -12,6 +12,7 @@ __all__ = [
     "parts",
     "platforms",
     "propagation",
+    "quantities",
     "readers",
     "revision",
     "stacked",

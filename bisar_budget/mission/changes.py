@@ -18,7 +18,7 @@ from bisar_budget.mission.tree import MAX_BYTES, Tree
 
 _ACCEPTED = "accepted: KEY=VALUE, such as radar.bandwidth=150MHz"
 _MAX_KEY = 500  # characters; a path of the schema has a tenth
-_OF_DOTTED = (("requirement_ids",), ("allocation", "specify"))  # keys of theirs are ids of rows, or whole paths
+_OF_DOTTED = (("requirement_ids",), ("specifications",), ("allocation", "specify"))  # by ids of rows, or whole paths
 
 
 def read_changes(texts: Sequence[str]) -> tuple[SetValue, ...]:
@@ -278,11 +278,18 @@ def is_error(key: str) -> bool:
     return any(part in _ERRORS for part in parts[:3]) and parts[-1] not in _NO_SIZES
 
 
-def report_specified(tree: Tree) -> None:
-    """Say of `allocation.specify` which of its keys are no errors."""
-    given = tree.root["allocation"]["specify"]
+def name_of_error(key: str) -> str:
+    """The key of an error as rows name it: `receiver.velocity` for `platforms.receiver.motion_error.velocity`."""
+    return ".".join(part for part in parts_of(key) if part not in ("platforms", "motion_error"))
+
+
+def report_specified(tree: Tree, *section: str) -> None:
+    """Say of a section that names errors, such as `allocation.specify`, which of its keys are none."""
+    given = tree.root
+    for name in section:
+        given = given[name]
     for place, key in enumerate(given):
-        path = ("allocation", "specify", key if isinstance(given, dict) else place)
+        path = (*section, key if isinstance(given, dict) else place)
         if ".".join(_names(key)) not in all_keys():
             near = nearest_keys(key)
             tree.report(path, Problem("names no key of a mission file", ACCEPTED_ERRORS, near, is_of_key=True))

@@ -115,7 +115,11 @@ def mission_of(
         if mission is not INVALID and mission.allocation.specify:
             from bisar_budget.mission.changes import report_specified
 
-            report_specified(tree)
+            report_specified(tree, "allocation", "specify")
+        if mission is not INVALID and mission.specifications:
+            from bisar_budget.mission.quantities import with_specifications
+
+            mission = with_specifications(mission, tree)
         if mission is INVALID and names_files(tree.root):
             from bisar_budget.mission.paths import reader_of, report_files
 

@@ -35,6 +35,7 @@ from bisar_budget.mission.readers import (
     Quantity,
     Reader,
     Section,
+    SizeMap,
     Text,
     TextMap,
     Version,
@@ -45,6 +46,7 @@ from bisar_budget.mission.readers import (
 from bisar_budget.paths.instant import Instant
 
 if TYPE_CHECKING:
+    from bisar_budget.mission.quantities import Number
     from bisar_budget.paths.earth import SceneAxes
 
 
@@ -386,6 +388,13 @@ class Mission(NamedTuple):
     other_errors: Annotated[tuple[OtherError, ...], Key(ListOf(OtherError))] = ()
     requirements: Annotated[Requirements, Key(Section(Requirements))] = Requirements()
     requirement_ids: Annotated[Mapping[str, str], Key(TextMap(), "Row id to the project's own requirement id.")] = {}
+    specifications: Annotated[
+        Mapping[str, "Number"],
+        Key(
+            SizeMap(),
+            "Largest sizes that suppliers are held to, by the keys of errors; `check` holds the file's own to them.",
+        ),
+    ] = {}
     allocation: Annotated[AllocationRules, Key(Section(AllocationRules))] = AllocationRules()
     autofocus: Annotated[Autofocus, Key(Section(Autofocus))] = Autofocus()
     simulation: Annotated[Simulation | None, Key(Section(Simulation))] = None

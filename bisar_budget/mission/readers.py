@@ -352,6 +352,28 @@ class TextMap(Reader):
         return {"type": "object", "additionalProperties": Label().schema(definitions), "maxProperties": _MAX_IDS}
 
 
+class SizeMap(Reader):
+    """A mapping of keys of the file to sizes; what each size may be depends on its key, and is read later."""
+
+    def read(self, value: Any, path: KeyPath, report: Report) -> Any:
+        """Hold each size to be one value."""
+        if not isinstance(value, dict):
+            report(path, Problem("must be a mapping of keys of errors to sizes"))
+            return INVALID
+        if len(value) > _MAX_IDS:
+            report(path, Problem(f"must have at most {_MAX_IDS} entries, has {len(value)}"))
+            return INVALID
+        many = [key for key, size in value.items() if isinstance(size, dict | list)]
+        for key in many:
+            report((*path, key), Problem("must be one size, which holds for each axis", "accepted: such as 2 mm/s"))
+        return INVALID if many or INVALID in value.values() else value
+
+    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
+        """Object of quantities."""
+        size = {"type": ["string", "number"]}
+        return {"type": "object", "additionalProperties": size, "maxProperties": _MAX_IDS}
+
+
 _WEIGHT = Quantity(units.RATIO, gt=0, ge=1e-6, le=1e6)
 
 

@@ -13,13 +13,13 @@ import numpy as np
 
 from bisar_budget import __version__
 from bisar_budget.design.cases import Cases, Grid, in_unit
-from bisar_budget.design.quantities import Number
 from bisar_budget.design.table import Column, Part, Swept, Values
 from bisar_budget.faults import changes_words, printable
 from bisar_budget.findings.requirement import Override
 from bisar_budget.findings.status import STATUS
 from bisar_budget.memory import OF_TABLES, hold_room
 from bisar_budget.mission.model import Mission
+from bisar_budget.mission.quantities import Number
 from bisar_budget.report.words.sentences import spreadsheet_text
 
 if TYPE_CHECKING:

@@ -9,13 +9,13 @@ from typing import Any
 import pytest
 
 from bisar_budget.budget.check import check_mission, check_missions
-from bisar_budget.design.quantities import QuestionError
-from bisar_budget.design.varied import scaled, varied
+from bisar_budget.design.varied import scaled
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.faults import SetValue
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.mission.model import Mission
+from bisar_budget.mission.quantities import QuestionError, with_number
 from bisar_budget.mission.stacked import stacked
 from bisar_budget.ranges.point_paths import CLOSE
 from tests.conftest import ROOT, mission_text
@@ -40,7 +40,7 @@ def variants(mission: Mission) -> list[Mission]:
     """The mission with other errors, and at another frequency: some pass, some fail, some leave no image."""
     errors = [with_errors_times(mission, factor) for factor in (1.0, 0.01, 30.0, 1e4)]
     frequency = mission.radar.center_frequency
-    return [varied(one, "radar.center_frequency", frequency * part) for one in errors for part in (1.0, 1.3)]
+    return [with_number(one, "radar.center_frequency", frequency * part) for one in errors for part in (1.0, 1.3)]
 
 
 def assert_alike(one: Any, other: Any, where: str) -> None:

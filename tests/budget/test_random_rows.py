@@ -9,7 +9,6 @@ import pytest
 
 from bisar_budget.budget.check import check_mission, check_missions
 from bisar_budget.constants import MAINLOBE_ENERGY
-from bisar_budget.design.varied import varied
 from bisar_budget.effects.declared import QUADRATIC
 from bisar_budget.effects.spectra import PowerLawPiece, synchronized_parts
 from bisar_budget.faults import MissionError
@@ -17,6 +16,7 @@ from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.row import Row
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import Mission
+from bisar_budget.mission.quantities import with_number
 from bisar_budget.report.explain.explanation import explain
 from bisar_budget.report.words.sentences import row_size
 from bisar_budget.units import format_quantity
@@ -251,7 +251,7 @@ class TestBandwidth:
         changes = {"platforms": {"receiver": {"oscillator": {"frequency": "10 MHz", "phase_noise": self.LEVELS}}}}
         mission = parse_mission(json.dumps(merged(MISSION, changes)))
         key, bands = "platforms.receiver.oscillator.bandwidth", [2e3, 5e4]
-        both = check_missions([varied(mission, key, band) for band in bands], TODAY)
+        both = check_missions([with_number(mission, key, band) for band in bands], TODAY)
         alone = [row(found, "receiver.oscillator").islr_db for _, found in sorted(both, key=lambda one: one[0])]
         assert alone == pytest.approx([self.row_of(bandwidth=f"{band} Hz").islr_db for band in bands])
 

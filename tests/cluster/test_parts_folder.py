@@ -19,11 +19,11 @@ pytest.importorskip("pyarrow")
 from bisar_budget import __version__
 from bisar_budget.cluster.parts_folder import PartsFolder, parts_folder, question_of
 from bisar_budget.design.cases import grid
-from bisar_budget.design.quantities import tree_of
 from bisar_budget.design.sweep import Asked, Chunks
 from bisar_budget.design.table import Part
 from bisar_budget.faults import ClusterError
 from bisar_budget.mission.load import load_mission
+from bisar_budget.mission.quantities import tree_of
 from tests.conftest import ROOT, mission_text
 
 SECTION_V = str(ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml")

@@ -10,13 +10,13 @@ from hypothesis import strategies as st
 
 from bisar_budget.budget.check import check_mission
 from bisar_budget.design.allocate import SpecificationSheet, allocate
-from bisar_budget.design.quantities import QuestionError, number_of, tree_of
 from bisar_budget.design.specified import Specified, specified_errors, usual_keys
 from bisar_budget.design.table import Variation
 from bisar_budget.faults import SetValue
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.mission.model import Mission
+from bisar_budget.mission.quantities import QuestionError, number_of, tree_of
 from tests.conftest import ROOT, mission_text
 from tests.families import mission_text as of_family
 

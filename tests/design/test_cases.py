@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from bisar_budget import units
 from bisar_budget.design.cases import MAX_VALUES, CaseTable, TableError, grid, in_unit, sample, some_of, table
-from bisar_budget.design.quantities import QuestionError
+from bisar_budget.mission.quantities import QuestionError
 from bisar_budget.mission.tree import read_tree
 from bisar_budget.units import parse_quantity
 from tests.conftest import ROOT

@@ -11,12 +11,12 @@ import pytest
 from bisar_budget.budget.check import check_mission
 from bisar_budget.design import compare
 from bisar_budget.design.compare import Comparison
-from bisar_budget.design.quantities import QuestionError
 from bisar_budget.faults import SetValue
 from bisar_budget.findings.images import Verdict
 from bisar_budget.mission.changes import read_changes
 from bisar_budget.mission.load import load_mission
 from bisar_budget.mission.parts import entries, folders
+from bisar_budget.mission.quantities import QuestionError
 from tests.conftest import ROOT, mission_text
 
 MISSIONS = ROOT / "specs" / "missions"

@@ -17,13 +17,13 @@ from bisar_budget.budget.check import check_mission
 from bisar_budget.cli.long_work import watched_checks
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.design import sensitivity as asking
-from bisar_budget.design.quantities import QuestionError
 from bisar_budget.design.sensitivity import Sensitivity, Slope
 from bisar_budget.faults import SetValue
 from bisar_budget.mission.changes import read_changes
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.mission.model import names_parts
 from bisar_budget.mission.parts import taken_figures
+from bisar_budget.mission.quantities import QuestionError
 from bisar_budget.report.drawing import tornado
 from tests.conftest import ROOT, mission_text
 from tests.drawing import Drawing

@@ -12,13 +12,13 @@ from bisar_budget.analysis import scene
 from bisar_budget.budget.check import check_mission
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.design import solve as solving
-from bisar_budget.design.quantities import QuestionError
 from bisar_budget.design.solve import Solution, State
 from bisar_budget.design.table import breaking
 from bisar_budget.design.varied import scaled
 from bisar_budget.faults import SetValue
 from bisar_budget.mission.changes import read_changes
 from bisar_budget.mission.load import load_mission, parse_mission
+from bisar_budget.mission.quantities import QuestionError
 from tests.conftest import ROOT, mission_text
 from tests.standing import standing
 

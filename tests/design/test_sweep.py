@@ -13,13 +13,13 @@ from hypothesis import strategies as st
 from bisar_budget.budget.check import check_mission
 from bisar_budget.design.cases import CaseTable, Grid, sample
 from bisar_budget.design.cases import grid as cases_of
-from bisar_budget.design.quantities import QuestionError, number_of, tree_of
 from bisar_budget.design.sweep import sweep
 from bisar_budget.design.table import breaking
 from bisar_budget.faults import MissionError, SetValue
 from bisar_budget.mission.changes import apply_changes
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.mission.model import flies_on_earth
+from bisar_budget.mission.quantities import QuestionError, number_of, tree_of
 from bisar_budget.mission.tree import read_tree
 from tests.conftest import ROOT, mission_text, row
 from tests.families import FAMILIES

@@ -445,14 +445,14 @@ class TestCourses:
 
     def test_many_cases_are_each_as_one(self) -> None:
         text = "{time_tag: 1 ms, imu: {attitude: 1 mrad}, lever_arm: {arm: [1, 2, 3], uncertainty: 5 mm}}"
-        from bisar_budget.design.varied import varied
+        from bisar_budget.mission.quantities import with_number
 
         mission, values = mission_of(text), np.array([-2.0, 0.0, 0.5, 4.0])
         key = "platforms.receiver.motion_error.lever_arm.arm.0"
-        many = varied(mission, key, values)
+        many = with_number(mission, key, values)
         together = random_errors(many, many.geometry, values.size)
         for case, value in enumerate(values.tolist()):
-            alone = random_errors(varied(mission, key, value))
+            alone = random_errors(with_number(mission, key, value))
             for one, other in zip(together, alone, strict=True):
                 assert one.id == other.id
                 for model in ("published", "full"):

@@ -11,13 +11,13 @@ import pytest
 
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.constants import EARTH_RADIUS, SPEED_OF_LIGHT
-from bisar_budget.design.varied import varied
 from bisar_budget.effects.air_delays import TROPOSPHERE, group_delay, metres_per_unit, obliquity
 from bisar_budget.effects.random_effect import RandomError, SensorCases
 from bisar_budget.effects.random_errors import random_errors
 from bisar_budget.geometry import PlatformState
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import Mission
+from bisar_budget.mission.quantities import with_number
 from bisar_budget.ranges.exact_ranges import FINE, STILL, ExactRanges, Found, aperture_nodes, followed
 
 HALF_PERCENT = 0.005
@@ -279,10 +279,10 @@ def test_many_cases_are_those_of_each() -> None:
     """Heights from within the air to an orbit, in arrays."""
     mission, key = parse_mission(SECTION_V), "platforms.transmitter.position.2"
     heights = np.array([4e3, 30e3, 79e3, 90e3, 300e3, 500e3])
-    together = varied(mission, key, heights)
+    together = with_number(mission, key, heights)
     many = random_errors(together, together.geometry, heights.size)
     for case, height in enumerate(heights):
-        for one, alone in zip(many, random_errors(varied(mission, key, float(height))), strict=True):
+        for one, alone in zip(many, random_errors(with_number(mission, key, float(height))), strict=True):
             assert one.id == alone.id
             assert one.full.of(case)[:5] == pytest.approx(alone.full[:5], rel=1e-9)
             assert one.published.of(case)[:5] == pytest.approx(alone.published[:5], rel=1e-9)

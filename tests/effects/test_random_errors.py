@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.design.varied import varied
 from bisar_budget.effects.navigation_errors import specific_force
 from bisar_budget.effects.random_effect import RandomError
 from bisar_budget.effects.random_errors import in_one_case, random_errors
 from bisar_budget.effects.spectra import PowerLawPiece, synchronized_parts
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.mission.model import Mission
+from bisar_budget.mission.quantities import with_number
 from bisar_budget.ranges.exact_ranges import FINE, STILL, ExactRanges, Found, aperture_nodes, followed
 from tests.conftest import ROOT
 
@@ -264,10 +264,10 @@ platforms:
     def test_cases_together_are_what_each_is_alone(self) -> None:
         mission = parse_mission(self.TURN.replace("{IMU}", "{attitude: 1 mrad, accelerometer_scale_factor: 0.1 %}"))
         sides = np.array([-4.0, 0.0, 2.5])
-        together = varied(mission, "platforms.receiver.acceleration.0", sides)
+        together = with_number(mission, "platforms.receiver.acceleration.0", sides)
         both = random_errors(together, together.geometry, sides.size)
         for place, side in enumerate(sides.tolist()):
-            alone = random_errors(varied(mission, "platforms.receiver.acceleration.0", side))
+            alone = random_errors(with_number(mission, "platforms.receiver.acceleration.0", side))
             for one, other in zip(both, alone, strict=True):
                 found = in_one_case(mission, one, place).full
                 assert found[:5] == pytest.approx(other.full[:5], rel=1e-9)

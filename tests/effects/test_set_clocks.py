@@ -14,11 +14,11 @@ import pytest
 
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.constants import SPEED_OF_LIGHT
-from bisar_budget.design.quantities import number_of, tree_of
 from bisar_budget.effects.random_errors import random_errors
 from bisar_budget.effects.spectra import PowerLawPiece, heard_parts, set_parts, tone
 from bisar_budget.faults import MissionError
 from bisar_budget.mission.load import parse_mission
+from bisar_budget.mission.quantities import number_of, tree_of
 from bisar_budget.monte_carlo.probability import monte_carlo
 from bisar_budget.ranges.exact_ranges import aperture_nodes
 from bisar_budget.simulate.point import simulate_point

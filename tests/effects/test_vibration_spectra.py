@@ -8,13 +8,13 @@ import pytest
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.vibration_limits import highest_echo, level_of
 from bisar_budget.constants import SPEED_OF_LIGHT, STANDARD_GRAVITY
-from bisar_budget.design.varied import varied
 from bisar_budget.effects.oscillator_acceleration import accelerated_tones, pieces_by_acceleration
 from bisar_budget.effects.random_effect import RandomError
 from bisar_budget.effects.random_errors import random_errors
 from bisar_budget.effects.vibration_spectra import displacement_rms
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import Mission
+from bisar_budget.mission.quantities import with_number
 from bisar_budget.ranges.exact_ranges import FINE, STILL, ExactRanges, Found, aperture_nodes, followed
 
 G = STANDARD_GRAVITY
@@ -365,10 +365,10 @@ def test_below_a_cycle_per_aperture_a_tone_is_a_phase() -> None:
 def test_many_cases_are_each_case(key: str, numbers: list[float]) -> None:
     text = "{spectrum: {20 Hz: 0.04 g^2/Hz, 1 kHz: 0.01 g^2/Hz}, spectrum_level: 0 dB}"
     base = mission(text, "acceleration_sensitivity: 1e-9 /g", path=TURN)
-    many = varied(base, key, np.array(numbers))
+    many = with_number(base, key, np.array(numbers))
     together = random_errors(many, many.geometry, len(numbers))
     for case, number in enumerate(numbers):
-        alone = random_errors(varied(base, key, number))
+        alone = random_errors(with_number(base, key, number))
         for one, other in zip(together, alone, strict=True):
             assert one.full.of(case)[:5] == pytest.approx(other.full[:5], rel=1e-9, nan_ok=True)
             assert np.broadcast_to(one.declared, (len(numbers),))[case] == pytest.approx(other.declared)
@@ -377,7 +377,9 @@ def test_many_cases_are_each_case(key: str, numbers: list[float]) -> None:
 def test_a_tone_in_g_keeps_its_g() -> None:
     """Its amplitude in metres follows the frequency, also where that is an array."""
     base = mission("{sinusoidal: [{amplitude: [1 g, 0, 0], frequency: 50 Hz}]}")
-    many = varied(base, "platforms.receiver.motion_error.vibration.sinusoidal.0.frequency", np.array([25.0, 50.0]))
+    many = with_number(
+        base, "platforms.receiver.motion_error.vibration.sinusoidal.0.frequency", np.array([25.0, 50.0])
+    )
     (line,) = many.platforms.receiver.motion_error.vibration.sinusoidal
     east, *_ = line.displacement
     assert east == pytest.approx(G / (2 * math.pi * np.array([25.0, 50.0])) ** 2)

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pytest
 
-from bisar_budget.design.quantities import QuestionError, number_of, range_of, tree_of
 from bisar_budget.design.sensitivity import sensitivity
 from bisar_budget.faults import Fault, MissionError
 from bisar_budget.mission import model
@@ -13,6 +12,7 @@ from bisar_budget.mission.instruments import Imu, Oscillator, Synchronization
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.parts import ImuPart, OscillatorPart
 from bisar_budget.mission.platforms import CommonMotionError, MotionError, OrbitSource, TrajectorySource, Vibration
+from bisar_budget.mission.quantities import QuestionError, number_of, range_of, tree_of
 from bisar_budget.mission.readers import LATER
 from tests.conftest import TODAY, mission_text
 

@@ -5,11 +5,11 @@ import math
 import pytest
 
 from bisar_budget.constants import STANDARD_GRAVITY
-from bisar_budget.design.quantities import number_of, tree_of
 from bisar_budget.design.varied import scaled
 from bisar_budget.faults import Fault, MissionError
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import Mission, mission_schema
+from bisar_budget.mission.quantities import number_of, tree_of
 from bisar_budget.mission.vibrations import AcceleratedSinusoid, Sinusoid
 from tests.conftest import mission_text
 

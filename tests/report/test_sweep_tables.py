@@ -13,11 +13,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bisar_budget.design.cases import Cases, grid, grid_of, table, table_of
-from bisar_budget.design.quantities import QuestionError
 from bisar_budget.design.sweep import sweep
 from bisar_budget.design.table import Column, Part, Swept, Values
 from bisar_budget.faults import SetValue
 from bisar_budget.mission.load import load_mission
+from bisar_budget.mission.quantities import QuestionError
 from bisar_budget.mission.tree import read_tree
 from bisar_budget.report import tables
 from bisar_budget.report.tables import TABLES, Described, MissingTablesError, dataset, slabs, writer_of

@@ -14,12 +14,12 @@ from matplotlib.colors import to_rgb
 from matplotlib.image import imread
 
 from bisar_budget.design.cases import grid
-from bisar_budget.design.quantities import QuestionError
 from bisar_budget.design.table import Column, Part, Swept
 from bisar_budget.faults import SetValue
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.load import load_mission
 from bisar_budget.mission.model import Mission
+from bisar_budget.mission.quantities import QuestionError
 from bisar_budget.mission.tree import read_tree
 from bisar_budget.report.drawing.figure import drawing_file
 from bisar_budget.report.drawing.svg import text_width

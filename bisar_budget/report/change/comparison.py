@@ -140,6 +140,7 @@ def loosenings(before: MissionFindings, after: MissionFindings) -> Iterator[Loos
     """List what the second of two findings holds less than the first; both carry their mission."""
     missions = (before.analysed().mission, after.analysed().mission)
     yield from _looser_requirements(*missions)
+    yield from _looser_specifications(*missions)
     yield from _declarations(*missions)
     yield from _rules(before, after)
     yield from _waivers(*missions)
@@ -163,6 +164,14 @@ def _looser_requirements(before: Mission, after: Mission) -> Iterator[Loosened]:
         if key != "declare" and old is not None and (new is None or _is_above(new, old)):
             path = ("requirements", key)
             yield Loosened(dotted(path), _said(before, path, old), _said(after, path, new))
+
+
+def _looser_specifications(before: Mission, after: Mission) -> Iterator[Loosened]:
+    """Specifications that are gone or larger."""
+    for key, old in before.specifications.items():
+        path, new = ("specifications", key), after.specifications.get(key)
+        if old.value is not None and (new is None or new.value is None or _is_above(new.value, old.value)):
+            yield Loosened(dotted(path), _said(before, path, old.value), _said(after, path, new and new.value))
 
 
 def _declarations(before: Mission, after: Mission) -> Iterator[Loosened]:

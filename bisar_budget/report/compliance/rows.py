@@ -9,7 +9,7 @@ from bisar_budget.effects.declared import END_OF_IMAGE
 from bisar_budget.effects.effect import MOTION_UNITS, ErrorSource, Subject
 from bisar_budget.effects.random_effect import RandomError
 from bisar_budget.findings.mission import MissionFindings
-from bisar_budget.findings.row import DECLARE, Row, worst_first
+from bisar_budget.findings.row import DECLARE, SPECIFICATION, Row, worst_first
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.model import Mission
 from bisar_budget.report import Style
@@ -213,6 +213,8 @@ def what_sets_it(page: Page, row: Row) -> str:
     if binding == "location_error":
         value = requirements.location_error
         return "none stated" if value is None else f"displacement ≤ {limit_words(value, 'm')}"
+    if row.metric == SPECIFICATION:
+        return "specified size of the error"
     if row.metric == DECLARE:
         return f"declared: {', '.join(requirements.declare)}"
     if row.subject.kind == "autofocus_pull_in":

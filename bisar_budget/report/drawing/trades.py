@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget.design.cases import Cases, Floats, Grid
-from bisar_budget.design.quantities import Number, QuestionError, Varied
 from bisar_budget.design.table import Part, Values
 from bisar_budget.findings.trade import Axis, Trade
+from bisar_budget.mission.quantities import Number, QuestionError, Varied
 from bisar_budget.mission.readers import DIRECTION
 from bisar_budget.report.drawing.svg import Point
 from bisar_budget.report.tables import Described

@@ -28,9 +28,10 @@ from bisar_budget.effects.vibration import cubic_part, lines_of, near_lines, qua
 from bisar_budget.faults import KeyPath, changes_words, printable
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.requirement import JudgedRequirement
-from bisar_budget.findings.row import DECLARE, Row
+from bisar_budget.findings.row import DECLARE, SPECIFICATION, Row
 from bisar_budget.findings.status import STATUS
 from bisar_budget.geometry import dot, without_rounding
+from bisar_budget.mission.changes import name_of_error
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import Platform
 from bisar_budget.mission.vibrations import AcceleratedSinusoid
@@ -153,6 +154,12 @@ def _to_utilization(mission: Mission, found: MissionFindings, row: Row) -> Itera
         yield from _spatial_variance(analysis, found, row)
     elif row.subject.kind == LOCATION:
         yield from _location_aggregate(mission, together, found, row)
+    elif row.metric == SPECIFICATION:
+        key = next(key for key in mission.specifications if name_of_error(key) == row.subject.axis)
+        path = ("specifications", key)
+        yield from step(f"Specified in {place(mission, path)}", as_written(mission, path))
+        if row.declared is not None:
+            yield from step("Declared, of three axes the largest", f"{key} = {row_size(row.declared, row, found)}")
     elif row.metric == DECLARE:
         yield from declarations(mission)
     if row.declared is not None and row.allowable is not None and row.utilization is not None and row.unit != "dB":

@@ -159,6 +159,11 @@ RULES = {
         "requirements.declare names errors that the file must declare. What is missing is not evaluated: declare it, "
         "a zero where there is none.",
     ),
+    "specification": (
+        "Declared error within its specification",
+        "An error may be at most what specifications says of it. Take a part that meets the specification, or find "
+        "new specifications with `bisar-budget allocate` that leave it more.",
+    ),
     "autofocus_pull_in": (
         "All errors together within what autofocus corrects",
         "Autofocus corrects one total of n_pull·π radians, not each error separately (Rigling & Moses, Section VI). "

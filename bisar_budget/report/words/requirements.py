@@ -9,7 +9,7 @@ from bisar_budget.faults import printable
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.monte_carlo import MonteCarlo, Requirement
 from bisar_budget.findings.requirement import DeclaredKinds, JudgedRequirement, Override
-from bisar_budget.findings.row import Row
+from bisar_budget.findings.row import SPECIFICATION, Row
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report.words.sentences import percent, requirement_size, wrapped
 from bisar_budget.units import format_quantity
@@ -108,10 +108,13 @@ def verdict(mission: MissionFindings, *, is_brief: bool = False) -> str:
     if mission.is_empty:
         return "the file declares no error" + ("" if is_brief else ", so nothing is judged; the allowables follow")
     statuses = [one.status for one in mission.requirements]
+    specified = [row.status for row in mission.rows if row.metric == SPECIFICATION]
     counts = (
         (statuses.count("fail"), "requirement", ("is", "are"), "not met"),
         (statuses.count("not_evaluated"), "requirement", ("cannot", "cannot"), "be judged"),
         (len(unjudged_effects(mission)), "effect", ("is", "are"), "judged by no requirement"),
+        (specified.count("fail"), "specification", ("is", "are"), "exceeded"),
+        (specified.count("not_evaluated"), "specification", ("has", "have"), "no declared error"),
     )
     said, named = [], ""
     for count, what, verbs, outcome in counts:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from bisar_budget.faults import KeyPath, Place, printable
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.requirement import JudgedRequirement
-from bisar_budget.findings.row import DECLARE, Row
+from bisar_budget.findings.row import DECLARE, SPECIFICATION, Row
 from bisar_budget.units import format_in, given_unit
 
 # What can set an allowable, in words; of a requirement the terminal has room for the first.
@@ -25,7 +25,7 @@ def matters(row: Row) -> bool:
     """Whether a row is declared or limits something; along other axes than the file's, only if it does not pass."""
     if row.status in ("info", "pass"):
         is_some = row.declared is not None if row.unit == "dB" else bool(row.declared)  # 0 dB is a noise as it is
-        return row.is_independent and (row.status == "pass" or is_some)
+        return (row.is_independent or row.metric == SPECIFICATION) and (row.status == "pass" or is_some)
     return row.status != "not_declared"
 
 

@@ -1,14 +1,21 @@
-"""The number of a mission file that a question is about: its reader, its value, how it is written."""
+"""Numbers of a mission by their keys: reader, value and unit of one in the file, and its place in a mission."""
 
+import functools
 import math
 import re
+from collections.abc import Callable, Mapping, Sequence
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from bisar_budget import units
-from bisar_budget.faults import InvalidValueError, fault_words, shown
-from bisar_budget.mission.changes import apply_changes, nearest_keys, next_name, parts_of
-from bisar_budget.mission.model import MISSION, Mission
+from bisar_budget.faults import InvalidValueError, Problem, fault_words, shown
+from bisar_budget.mission.changes import apply_changes, nearest_keys, next_name, parts_of, report_specified
+from bisar_budget.mission.covariance import KINDS, Covariance, error_index
+from bisar_budget.mission.instruments import Imu, LeverArm, PowerLaw
+from bisar_budget.mission.model import MISSION, Mission, Simulation
+from bisar_budget.mission.platforms import CommonMotionError, MotionError
 from bisar_budget.mission.readers import (
     DIRECTION,
     ELEVATION,
@@ -23,7 +30,8 @@ from bisar_budget.mission.readers import (
     TextList,
     Triple,
 )
-from bisar_budget.mission.tree import read_tree
+from bisar_budget.mission.tree import Tree, read_tree
+from bisar_budget.mission.vibrations import Spectrum
 from bisar_budget.units import Dimension, parse_quantity
 
 DIGITS = 8  # of values that are said: both sides of a crossing stay within 1e-6
@@ -48,6 +56,11 @@ class Number(NamedTuple):
     def dimension(self) -> Dimension:
         """Kind of quantity that it is."""
         return self.reader.dimension
+
+    @property
+    def is_level(self) -> bool:
+        """Whether it is a level in decibel."""
+        return self.dimension in units.LEVELS
 
     @property
     def scale(self) -> tuple[float, float]:
@@ -252,3 +265,149 @@ def range_of(number: Number, between: str | None) -> Range:
             f"--between {shown(between or '')}: is {'empty' if low == high else 'reversed'}; accepted: A < B"
         )
     return Range(low, high, is_log=low > 0 and high / low >= 4)
+
+
+# ---------------------------------------------------------------- a number in its place
+# Sections that a file may leave out, and keys whose scalar stands for each of three axes.
+_SECTIONS: Mapping[str, Callable[[], Any]] = {
+    "imu": Imu,
+    "lever_arm": LeverArm,
+    "common_motion_error": CommonMotionError,
+    "simulation": Simulation,
+}
+_TRIPLES = ("position", "velocity", "acceleration", *Imu._fields[:-1], "uncertainty")
+# Curves of an oscillator, with the dimension of what their points are named by.
+_CURVES: Mapping[str, Dimension] = {
+    "phase_noise": units.FREQUENCY,
+    "spurs": units.FREQUENCY,
+    "allan_deviation": units.TIME,
+    "spectrum": units.FREQUENCY,
+}
+POWERS = dict(zip(("h-2", "h-1", "h0", "h1", "h2"), PowerLaw._fields, strict=True))
+
+
+def with_number(mission: Mission, key: str, number: Any) -> Mission:
+    """Put a number, or an array of numbers, into a mission in the place of a key."""
+    found: Mission = _with_value(mission, parts_of(key), number)
+    return found
+
+
+def _with_value(value: Any, parts: Sequence[str], number: Any) -> Any:
+    """The same below a value; a scalar for each axis goes into all."""
+    if not parts:
+        return (number, number, number) if isinstance(value, tuple) else number
+    if isinstance(value, Covariance):
+        return _with_element(value, parts, number)
+    part, *rest = parts
+    if part.isdigit():
+        place = int(part)
+        return (*value[:place], _with_value(value[place], rest, number), *value[place + 1 :])
+    if part in _CURVES:
+        return value._replace(**{part: _with_point(getattr(value, part), part, ".".join(rest), number)})
+    part = POWERS.get(part, part)
+    below = getattr(value, part)
+    if below is None and rest:
+        below = _SECTIONS[part]()
+    if below is None and part in _TRIPLES:
+        below = ()
+    return value._replace(**{part: _with_value(below, rest, number)})
+
+
+def _with_point(curve: Any, name: str, point: str, number: Any) -> Any:
+    """A curve with another ordinate at one of its points."""
+    if isinstance(curve, Spectrum):
+        return curve._replace(points=_with_point(curve.points, name, point, number))
+    here = parse_quantity(point, _CURVES[name])
+    return tuple((at, number if at == here else ordinate) for at, ordinate in curve)
+
+
+def _with_element(covariance: Covariance, parts: Sequence[str], number: Any) -> Covariance:
+    """A covariance with another sigma, a sigma of each axis, or the correlation of a pair."""
+    kind, *rest = parts
+    if kind in KINDS:
+        first = 3 * KINDS.index(kind)
+        places = [first + int(axis) for axis in rest] or range(first, first + 3)
+        sigmas = tuple(number if place in places else one for place, one in enumerate(covariance.sigmas))
+        return covariance._replace(sigmas=sigmas)
+    pair = {error_index(name.strip()) for name in ".".join(rest).split("-")}
+    rows = [
+        tuple(number if i != j and {i, j} == pair else rho for j, rho in enumerate(row))
+        for i, row in enumerate(covariance.correlation)
+    ]
+    return covariance._replace(correlation=tuple(rows))
+
+
+def value_at(mission: Mission, key: str) -> Any:
+    """Find what a mission has in the place of a key, in SI: a number, a tuple of one for each axis, or None.
+
+    Of a covariance it is the sigma, of a figure of a part that figure.
+    """
+    return _value_below(mission, parts_of(key))
+
+
+def _value_below(value: Any, parts: Sequence[str]) -> Any:
+    if not parts or value is None:
+        return value
+    if isinstance(value, Covariance):
+        return _element(value, parts)
+    part, *rest = parts
+    if part.isdigit():
+        return _value_below(value[int(part)], rest) if int(part) < len(value) else None
+    if part in _CURVES:
+        return _point(getattr(value, part), part, ".".join(rest))
+    if isinstance(value, MotionError) and part in ("position", "velocity", "acceleration"):
+        return _value_below(value.stated(part), rest)
+    return _value_below(getattr(value, POWERS.get(part, part)), rest)
+
+
+def _point(curve: Any, name: str, point: str) -> Any:
+    points = curve.points if isinstance(curve, Spectrum) else curve or ()
+    here = parse_quantity(point, _CURVES[name])
+    return next((ordinate for at, ordinate in points if at == here), None)
+
+
+def _element(covariance: Covariance, parts: Sequence[str]) -> Any:
+    kind, *axis = parts
+    if kind not in KINDS:
+        return None  # a correlation is no size
+    return covariance.of(kind)[int(axis[0])] if axis else covariance.of(kind)
+
+
+# ---------------------------------------------------------------- sizes that errors are held to
+def with_specifications(mission: Mission, tree: Tree) -> Mission:
+    """Read the sizes of `specifications`, each as the number of its key; what is wrong is a fault of the tree."""
+    faults = len(tree.faults)
+    report_specified(tree, "specifications")
+    if len(tree.faults) > faults:
+        return mission
+    read = {}
+    for key, text in mission.specifications.items():
+        path = ("specifications", key)
+        try:
+            number = number_of(tree.root, key, is_for_each=True)
+        except QuestionError as error:
+            problem, _, accepted = str(error).removeprefix(f"{key}: ").partition("; ")
+            tree.report(path, Problem(problem, accepted, is_of_key=True))
+            continue
+        size = number.reader.read(text, path, tree.report)
+        if size is not INVALID and size <= 0 and not number.is_level:
+            tree.report(path, Problem("must be greater than 0", "accepted: the largest size that the error may have"))
+        read[key] = as_number(key, number.reader, text)._replace(value=size)
+    return mission._replace(specifications=read)
+
+
+def largest_at(mission: Mission, number: Number) -> Any:
+    """Find the size that a mission states for an error: of three axes the largest; None where it states none.
+
+    A spectrum without a level has 0 dB.
+    """
+    value = value_at(mission, number.key)
+    if value is None and parts_of(number.key)[-1] in ("level", "spectrum_level"):
+        *section, _ = parts_of(number.key)
+        owner = _value_below(mission, section)
+        has_curve = owner is not None and (section[-1] == "oscillator" or owner.spectrum is not None)
+        return 0.0 if has_curve else None
+    if number.is_level or value is None:
+        return value
+    each = [np.abs(one) for one in (value if isinstance(value, tuple) else (value,))]
+    return functools.reduce(np.maximum, each)
