@@ -159,12 +159,12 @@ def _written(answers: "Sequence[Answer]", format_name: str, output: str | None) 
 
 
 def _write_mission(answer: "Answer", output: str, model: str | None) -> None:
-    """Write the mission with what is ordered in place, comments kept; nothing where there is no specification.
+    """Write the mission with what is ordered in place and as specifications; nothing where there are none.
 
     What is written is read first as it will lie there: files that it names are looked for from its folder.
     """
     from bisar_budget.faults import MissionError, SetValue
-    from bisar_budget.mission.edited import with_values
+    from bisar_budget.mission.edited import with_section, with_values
     from bisar_budget.mission.load import parse_mission
 
     sheet, findings = answer.sheet, answer.sheet.findings
@@ -174,6 +174,7 @@ def _write_mission(answer: "Answer", output: str, model: str | None) -> None:
     text = (findings.mission.data or b"").decode("utf-8-sig")
     of_model = [SetValue("allocation.model", model)] if model else []
     text = with_values(text, [*sheet.changes, *of_model, *sheet.ordered])
+    text = with_section(text, "specifications", {one.key: one.text for one in sheet.specifications if one.text})
     try:
         parse_mission(text, output)
     except MissionError as error:

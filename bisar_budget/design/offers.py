@@ -9,7 +9,7 @@ from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.findings.specification import Specification, SpecificationSheet
 from bisar_budget.findings.status import exit_code
 from bisar_budget.mission.changes import parts_of
-from bisar_budget.mission.model import Mission
+from bisar_budget.mission.model import AllocationRules, MetricSplits, Mission
 from bisar_budget.mission.quantities import QuestionError, tree_of
 
 _CURVES = ("frequency", "phase_noise", "power_law", "allan_deviation", "bandwidth", "spurs")
@@ -51,11 +51,12 @@ def offer(sheet: SpecificationSheet, mission: Mission, today: date) -> Offer:
     """Hold the mission of an offer to a sheet.
 
     A figure is inside where it is no larger than what is ordered, of three axes the largest one, those of parts that
-    the offer names too. A level shifts a spectrum: of another spectrum it says nothing.
+    the offer names too. A level shifts a spectrum: of another spectrum it says nothing. Specifications in the offer's
+    own file do not count.
     """
     asked = None if sheet.findings is None else sheet.findings.mission
     figures = tuple(_figure(one, sheet, mission, asked) for one in sheet.specifications)
-    found = check_mission(mission, today)
+    found = check_mission(mission._replace(specifications={}), today)
     notes = () if asked is None else tuple(_differences(asked, mission))
     return Offer(mission.file, found.status, figures, found.requirements, notes)
 
@@ -84,10 +85,19 @@ def _spectrum(mission: Mission, parts: tuple[str, ...]) -> object:
     return platform.motion_error.vibration.spectrum
 
 
+def _rules(mission: Mission) -> AllocationRules:
+    """The rules of the allocation, whatever is specified, with balanced shares as a sheet takes them: as equal."""
+    split = mission.allocation.split
+    if isinstance(split, MetricSplits) and split.quadratic_phase_error == "balanced":
+        split = split._replace(quadratic_phase_error="equal")
+    return mission.allocation._replace(split="equal" if split == "balanced" else split, specify={})
+
+
 def _differences(asked: Mission, offered: Mission) -> list[str]:
     """Sections in which the mission of an offer is another one than that of the sheet."""
-    sections = ("radar", "collection", "scene", "requirements", "allocation")
+    sections = ("radar", "collection", "scene", "requirements")
     found = [name for name in sections if getattr(asked, name) != getattr(offered, name)]
+    found += ["allocation"] if _rules(asked) != _rules(offered) else []
     for name in ("transmitter", "receiver"):
         one, other = getattr(asked.platforms, name), getattr(offered.platforms, name)
         found += [f"the place of the {name}"] if one.state != other.state else []

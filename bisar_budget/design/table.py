@@ -23,7 +23,7 @@ from bisar_budget.budget.judged_rows import REQUIREMENTS, WHOLE, Judged
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.design.varied import is_held, is_image, scaled
 from bisar_budget.faults import MissionError, SetNumber, SetValue
-from bisar_budget.findings.row import unknown_id
+from bisar_budget.findings.row import SPECIFICATION, unknown_id
 from bisar_budget.findings.status import RANK, STATUS
 from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.changes import parts_of
@@ -123,8 +123,9 @@ def _verdict(
     does_break = np.array([name in breaks for name in STATUS])
     codes, uses = np.array([one.status for one in rows]), np.array([one.utilization for one in rows])  # (rows, cases)
     status = judged.status if row_id is None else codes[0]
-    # What only ever warns decides nothing, unless a warning does.
+    # What only ever warns decides nothing, unless a warning does, nor does a specification that is met in full.
     may_decide = np.array([["warn" in breaks or one.subject.kind != "autofocus_pull_in"] for one in rows])
+    may_decide = may_decide & (does_break[codes] | np.array([[one.metric != SPECIFICATION] for one in rows]))
     decides = may_decide & _IS_JUDGED[codes] & (does_break[codes] | ~does_break[status])
     decides &= ~np.isnan(uses) | (codes != RANK["not_evaluated"])
     known = np.where(decides, np.where(np.isnan(uses), -1.0, uses), -2.0)

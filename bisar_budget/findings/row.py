@@ -137,5 +137,12 @@ def unknown_id(row_id: str, known: Iterable[str], file: str, of_what: str = "row
 
 
 def worst_first(rows: Sequence[Row]) -> list[Row]:
-    """Sort rows by status, then by utilization, the highest first; equals keep their order."""
-    return sorted(rows, key=lambda row: (RANK[row.status], -(row.utilization or 0.0)))
+    """Sort rows by status, then by utilization, the highest first; equals keep their order.
+
+    A specification that is met comes last of what passes: it may be used in full.
+    """
+
+    def use(row: Row) -> float:
+        return 0.0 if row.metric == SPECIFICATION and row.status == "pass" else row.utilization or 0.0
+
+    return sorted(rows, key=lambda row: (RANK[row.status], -use(row)))

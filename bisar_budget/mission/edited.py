@@ -1,6 +1,6 @@
 """A mission file with other values in place, and all else of it as it was written, comments included."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import yaml
@@ -25,6 +25,32 @@ def with_values(text: str, changes: Sequence[SetValue]) -> str:
     text = text.replace("\r\n", "\n")
     for change in changes:
         text = _with_value(text, parts_of(change.key), change.text)
+    return text.replace("\n", "\r\n") if is_of_dos else text
+
+
+def with_section(text: str, name: str, values: Mapping[str, str]) -> str:
+    """Put a section of keys and values into the text of a mission file, in place of one that it has, else at its end.
+
+    A key of the section may have dots.
+    """
+    is_of_dos, text = "\r\n" in text, text.replace("\r\n", "\n")
+    root: Any = yaml.compose(text, Loader=_LOADER)
+    inline = f"{name}: {{{', '.join(f'{key}: {value}' for key, value in values.items())}}}"
+    lines = "\n".join([f"{name}:", *(f"  {key}: {value}" for key, value in values.items())])
+    there = next(((key, value) for key, value in root.value if key.value == name), None)
+    if there is None:
+        end = root.end_mark.index
+        if root.flow_style:
+            inside = text[: end - 1].rstrip().removesuffix(",")
+            text = f"{inside}, {inline}{text[end - 1 :]}"
+        else:
+            inside = _without_comments(text[:end])
+            text = f"{inside}\n{lines}{text[len(inside) :] or chr(10)}"
+    else:
+        key, value = there
+        start, end = key.start_mark.index, value.end_mark.index
+        whole = text[start:end] if value.flow_style else _without_comments(text[start:end])
+        text = f"{text[:start]}{inline if value.flow_style else lines}{text[start + len(whole) :]}"
     return text.replace("\n", "\r\n") if is_of_dos else text
 
 

@@ -390,7 +390,9 @@ def with_specifications(mission: Mission, tree: Tree) -> Mission:
             tree.report(path, Problem(problem, accepted, is_of_key=True))
             continue
         size = number.reader.read(text, path, tree.report)
-        if size is not INVALID and size <= 0 and not number.is_level:
+        if size is INVALID:
+            continue
+        if size <= 0 and not number.is_level:
             tree.report(path, Problem("must be greater than 0", "accepted: the largest size that the error may have"))
         read[key] = as_number(key, number.reader, text)._replace(value=size)
     return mission._replace(specifications=read)

@@ -92,6 +92,28 @@ class TestMission:
         again = json.loads(run("check", there, "--format", "json").stdout)["missions"][0]
         assert [one["utilization"] for one in again["requirements"]] == [one["used"] for one in found["requirements"]]
 
+    def test_check_holds_the_mission_to_what_is_ordered_from_then_on(self, run, mission, tmp_path) -> None:
+        """A sheet of the mission as written takes the place of the one before."""
+        written = tmp_path / "w.yaml"
+        run("allocate", mission, "-o", written)
+        rows = json.loads(run("check", written, "--format", "json").stdout)["missions"][0]["rows"]
+        held = [row for row in rows if row["metric"] == "specification"]
+        assert len(held) == 7
+        assert all((row["status"], row["utilization"]) == ("pass", 1.0) for row in held)
+        ((_, ordered),) = {(row["id"], row["declared"]) for row in held if row["id"].endswith("receiver.velocity")}
+        more = run("check", written, "--set", f"{KEY}={1.01 * ordered} m/s", "-q")
+        assert more.exit_code == 1
+        assert "1 specification exceeded" in more.stdout
+        anew = tmp_path / "anew.yaml"
+        again = run("allocate", written, "--reserve", "60", "-o", anew)
+        assert again.exit_code == 0
+        assert run("check", anew, "-q").exit_code == 0
+
+    def test_specifications_that_the_file_has_limit_no_new_ones(self, run, mission) -> None:
+        before = document(run, mission)
+        after = document(run, mission, "--set", f"specifications.{KEY}=1 um/s")
+        assert after["specifications"] == before["specifications"]
+
     def test_options_are_written_too(self, run, mission, tmp_path) -> None:
         there = tmp_path / "specified.yaml"
         option = "requirements.location_error=5 m"
@@ -180,6 +202,17 @@ class TestOffer:
         assert (figure["is_inside"], figure["remark"]) == (None, "another spectrum")
         (figure,) = document(run, paths[0], "--for", key, "--compare", paths[0])["offer"]["figures"]
         assert figure["text"] == "0 dB"
+
+    def test_specifications_of_its_own_file_do_not_count(self, run, mission, offer) -> None:
+        offer.write_text(f"{offer.read_text()}\nspecifications: {{{KEY}: 1 mm/s}}\n")
+        assert run("check", offer, "-q").exit_code == 1
+        assert run("allocate", mission, "--compare", offer).exit_code == 0
+
+    def test_balanced_shares_are_no_difference(self, run, mission, offer) -> None:
+        found = document(run, mission, "--set", "allocation.split=balanced", "--compare", offer)
+        assert "allocation" not in found["offer"]["differs_in"]
+        found = document(run, mission, "--set", "allocation.coverage_factor=2", "--compare", offer)
+        assert "allocation" not in found["offer"]["differs_in"]  # options hold for both
 
     def test_an_offer_for_another_mission_is_said(self, run, mission, tmp_path) -> None:
         assert document(run, mission, "--compare", mission)["offer"]["differs_in"] == []

@@ -10,7 +10,9 @@ from hypothesis import strategies as st
 
 from bisar_budget.budget.check import check_mission
 from bisar_budget.design.allocate import SpecificationSheet, allocate
+from bisar_budget.design.row_uses import SpecifiedMission
 from bisar_budget.design.specified import Specified, specified_errors, usual_keys
+from bisar_budget.design.suitable_parts import catalogue, suitable_parts
 from bisar_budget.design.table import Variation
 from bisar_budget.faults import SetValue
 from bisar_budget.findings.mission import MissionFindings
@@ -238,6 +240,26 @@ def test_a_part_keeps_to_an_order_by_its_largest_figure() -> None:
     (one,) = allocate(given, keys={key: 1.0}, reserve=0.0, today=DAY).specifications
     assert one.ordered is not None
     assert ("stim300" in one.parts) == (one.ordered >= math.radians(0.3) / 3600)
+
+
+def test_an_oscillator_keeps_to_a_level_where_its_noise_is_nowhere_above_the_spectrum() -> None:
+    """The BVA oscillator has a flicker floor of 8e-14: h₋₁ = σ²/(2·ln 2)."""
+    file = mission(platforms__receiver__oscillator={"power_law": {"h-1": 1e-25}})
+    of = SpecifiedMission(file, {"platforms.receiver.oscillator.level": 1.0}, 0.0, None, DAY)
+    floor = 10 * math.log10((8e-14) ** 2 / (2 * math.log(2)) / 1e-25)
+    (one,), among = of.specified, catalogue(of)
+    assert "bva" in suitable_parts(of, one, floor + 0.01, among)
+    assert "bva" not in suitable_parts(of, one, floor - 0.01, among)
+
+
+def test_an_oscillator_that_says_nothing_of_some_offsets_keeps_to_none() -> None:
+    """Its Allan deviation tells noise up to 1 kHz; the mask goes on."""
+    for last, is_told in (("900 Hz", True), ("10 kHz", False)):
+        mask = {"frequency": "10 MHz", "phase_noise": {"1 Hz": "-60 dBc/Hz", last: "-60 dBc/Hz"}}
+        file = mission(platforms__receiver__oscillator=mask)
+        of = SpecifiedMission(file, {"platforms.receiver.oscillator.level": 1.0}, 0.0, None, DAY)
+        (one,) = of.specified
+        assert ("bva" in suitable_parts(of, one, 0.0, catalogue(of))) == is_told
 
 
 @given(

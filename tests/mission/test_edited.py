@@ -5,7 +5,7 @@ import difflib
 import pytest
 
 from bisar_budget.faults import SetValue
-from bisar_budget.mission.edited import with_values
+from bisar_budget.mission.edited import with_section, with_values
 from bisar_budget.mission.load import parse_mission
 from tests.conftest import ROOT
 
@@ -61,3 +61,24 @@ def comments(text: str) -> list[str]:
 )
 def test_one_value(text: str, key: str, edited: str) -> None:
     assert with_values(text, [SetValue(key, "9")]) == edited
+
+
+@pytest.mark.parametrize(
+    ("text", "edited"),
+    [
+        ("a: 1 # so\n", "a: 1 # so\ns:\n  a.b: 1 m\n  c: 2\n"),
+        ("a: 1", "a: 1\ns:\n  a.b: 1 m\n  c: 2\n"),
+        ("a: 1\n# the end\n", "a: 1\ns:\n  a.b: 1 m\n  c: 2\n# the end\n"),
+        ("a:\n  b: 1\n\n", "a:\n  b: 1\ns:\n  a.b: 1 m\n  c: 2\n\n"),
+        ("s:\n  d: 1 # old\n# next\na: 1\n", "s:\n  a.b: 1 m\n  c: 2\n# next\na: 1\n"),
+        ("s: {d: 1} # of these\na: 1\n", "s: {a.b: 1 m, c: 2} # of these\na: 1\n"),
+        ("a: 1\ns:\n  d: 1\n", "a: 1\ns:\n  a.b: 1 m\n  c: 2\n"),
+        ("{a: 1, s: {d: 1}}\n", "{a: 1, s: {a.b: 1 m, c: 2}}\n"),
+        ("{a: 1}\n", "{a: 1, s: {a.b: 1 m, c: 2}}\n"),
+        ("{\n  a: 1,\n}\n", "{\n  a: 1, s: {a.b: 1 m, c: 2}}\n"),
+        ("a: 1\r\nb: 2\r\n", "a: 1\r\nb: 2\r\ns:\r\n  a.b: 1 m\r\n  c: 2\r\n"),
+    ],
+)
+def test_a_section(text: str, edited: str) -> None:
+    assert with_section(text, "s", {"a.b": "1 m", "c": "2"}) == edited
+    assert with_section(edited, "s", {"a.b": "1 m", "c": "2"}) == edited
