@@ -179,6 +179,14 @@ class Flight:
         transmitter, receiver = (Path(actual=one.measured, measured=one.measured) for one in self.paths)
         return Flight(transmitter, receiver, np.zeros_like(self.clock), np.zeros_like(self.clock))
 
+    def range_error(self, scatterer: GroundVector, seen_at: GroundVector) -> Floats:
+        """Range sum of a ground point as recorded, less that of another by the measured paths, (times,). [m]"""
+        there, here = np.array([*scatterer, 0.0]), np.array([*seen_at, 0.0])
+        total: Floats = np.zeros(self.clock.shape)
+        for one in self.paths:
+            total += np.linalg.norm(one.actual - there, axis=1) - np.linalg.norm(one.measured - here, axis=1)
+        return total + SPEED_OF_LIGHT * self.seen
+
     def record(
         self, scatterers: Floats, amplitudes: Complexes, slow_time: Floats, frequency: Floats, **noise: Any
     ) -> "PhaseHistory":
@@ -427,9 +435,13 @@ class NoGroundPointError(ValueError):
 class ExactEffect:
     """Displacement (east, north) [m]; phases at the aperture edge, signed like the range error [rad]."""
 
-    displacement: tuple[float, float]
+    displacement: GroundVector
     quadratic: float
     cubic: float
+
+    def moved(self, by: GroundVector) -> GroundVector:
+        """The displacement and another one together."""
+        return self.displacement[0] + by[0], self.displacement[1] + by[1]
 
 
 def exact_effect(

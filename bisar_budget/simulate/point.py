@@ -224,9 +224,9 @@ def simulate_point(
         slow = declared.smooth()
         smooth = collection.flight(slow, fine)
         former, scene_former = _formers(collection, image_former, collection.range_lines(declared), smooth)
-        displaced = [_sum(place, moved.displacement) for place, moved in zip(standing, effects, strict=True)]
-        left = _range_error(smooth, (0.0, 0.0), effect.displacement)
-        recorded = [_range_error(smooth, place, (0.0, 0.0)) for place in standing]
+        displaced = [moved.moved(place) for place, moved in zip(standing, effects, strict=True)]
+        left = smooth.range_error((0.0, 0.0), effect.displacement)
+        recorded = [smooth.range_error(place, (0.0, 0.0)) for place in standing]
         shown = [former.place(*one) for one in zip(displaced, recorded, strict=True)]
         in_scene_shown = [scene_former.place(*one) for one in zip(displaced, recorded, strict=True)]
         smear = former.left(shown[0], left, recorded[0])
@@ -384,10 +384,6 @@ def _formers(
     return plane, exact if plane.is_polar else plane
 
 
-def _sum(place: GroundVector, by: GroundVector) -> GroundVector:
-    return place[0] + by[0], place[1] + by[1]
-
-
 def _middle(places: Sequence[GroundVector] | Floats) -> GroundVector:
     """Middle of the box around some places, on which a patch is centred."""
     low, high = np.min(places, axis=0), np.max(places, axis=0)
@@ -485,15 +481,6 @@ def pulses_for(mission: Mission, cells: int) -> int:
             f"{2 * cells} pulses; omit the key to get what it takes"
         )
     return given
-
-
-def _range_error(flight: Flight, scatterer: GroundVector, seen_at: GroundVector) -> Floats:
-    """Range sum of a ground point as recorded, less that of another by the measured paths. [m]"""
-    there, here = np.array([*scatterer, 0.0]), np.array([*seen_at, 0.0])
-    total: Floats = np.zeros(flight.clock.shape)
-    for one in flight.paths:
-        total += np.linalg.norm(one.actual - there, axis=1) - np.linalg.norm(one.measured - here, axis=1)
-    return total + SPEED_OF_LIGHT * flight.seen
 
 
 def _measured(image: Complexes, spacing: float, mask_m: float | None) -> ImpulseResponse:

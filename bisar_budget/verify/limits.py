@@ -78,8 +78,8 @@ def verify_mission(
         Rows with a limit, in the order of `check`, and both platforms' vibration together.
     """
     mission = mission._replace(places={})  # the parser's marks cannot go to another process, and nobody asks here
-    known = cases(Study(mission))
-    wanted = [row_id for row_id in known if fnmatchcase(row_id, only)]
+    known = cases(Study(mission), only)
+    wanted = list(known)
     jobs = min(jobs, len(wanted))
     if mapped is None and jobs > 1:
         mapped = in_processes(jobs)
@@ -101,12 +101,12 @@ def verify_mission(
 
 def rows_to_verify(mission: Mission, only: str = "*") -> list[str]:
     """Ids of the rows that `verify_mission` would verify."""
-    return [row_id for row_id in cases(Study(mission)) if fnmatchcase(row_id, only)]
+    return list(cases(Study(mission), only))
 
 
-def cases(study: Study) -> dict[str, Case]:
-    """Row ids in the order of `check`, with the call that verifies each."""
-    return dict(_cases(study))
+def cases(study: Study, only: str = "*") -> dict[str, Case]:
+    """Row ids that match a glob, in the order of `check`, with the call that verifies each."""
+    return {row_id: case for row_id, case in _cases(study) if fnmatchcase(row_id, only)}
 
 
 def _warns_of_the_total(study: Study) -> bool:
@@ -239,11 +239,10 @@ def seconds_to_verify(mission: Mission, only: str = "*", jobs: int = 1) -> float
     mission = mission._replace(places={})
     study = Study(mission)
     study.collection = sizes = _Sizes(mission, study)
-    known = cases(study)
-    wanted = [row_id for row_id in known if fnmatchcase(row_id, only)]
-    for row_id in wanted:
+    wanted = cases(study, only)
+    for case in wanted.values():
         with suppress(_NotFormedError):
-            known[row_id]()
+            case()
     asked = [max(1.0, size) for size in sizes.asked]
     if _BESIDE * sum(asked) * _SLOWEST <= _LONG:
         return 0.0

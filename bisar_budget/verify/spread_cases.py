@@ -54,7 +54,7 @@ from bisar_budget.simulate.realisations import (
 )
 from bisar_budget.verify import reasons
 from bisar_budget.verify.aperture_reading import measured_shift
-from bisar_budget.verify.phase_cases import TOLERANCE, compare, moved
+from bisar_budget.verify.phase_cases import TOLERANCE, compare
 from bisar_budget.verify.study import Study
 
 TOLERANCE_DB = 0.5
@@ -381,7 +381,7 @@ def _place(study: Study, blank: Verdict, error: RandomError, rng: np.random.Gene
             images = study.images(errors)
             shift = measured_shift(images.chip, images.reference, study.read(images))
             drawn += images.effect.displacement
-            seen += moved(images.effect.displacement, shift.displacement)
+            seen += images.effect.moved(shift.displacement)
     except ValueError as fault:
         return blank._replace(reason=reasons.no_image_of_a_time_series(str(fault)))
     shown = float(np.dot(drawn, seen) / np.dot(drawn, drawn))
