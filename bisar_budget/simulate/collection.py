@@ -215,11 +215,6 @@ class PointCollection:
         """Resolution of the range sum, c/B. [m]"""
         return SPEED_OF_LIGHT / self.radar.bandwidth
 
-    @property
-    def relative_bandwidth(self) -> float:
-        """Over the centre frequency: range cells that a wavelength of range error walks."""
-        return self.radar.bandwidth / self.radar.center_frequency
-
     def window(self, count: int) -> Floats:
         """Weights over the aperture, or the band, at the centres of equal cells."""
         return taylor_window(count) if self.is_tapered else np.ones(count)
