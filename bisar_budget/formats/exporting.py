@@ -28,7 +28,7 @@ from bisar_budget.mission.model import Mission, Simulation, has_instruments
 from bisar_budget.paths.earth import Geodetic, SceneAxes, axes_at, geodetic
 from bisar_budget.paths.instant import Instant, parse_instant
 from bisar_budget.simulate.collection import PointCollection
-from bisar_budget.simulate.phase_history import Errors, Flight, phase_history
+from bisar_budget.simulate.phase_history import Errors, Flight
 from bisar_budget.simulate.point import SimulationError, declared_errors, pulses_for
 from bisar_budget.simulate.realisations import has_unset_clocks
 from bisar_budget.simulate.targets import Targets
@@ -111,18 +111,8 @@ def export_phase_history(mission: Mission, targets: Targets) -> Exported:
     flown = collection.flight(errors, slow_time, np.random.default_rng(settings.seed))
     scatterers, amplitudes = _scene(mission, targets, plan.half)
     rng = np.random.default_rng(settings.seed)
-    history = phase_history(
-        scatterers,
-        amplitudes,
-        slow_time=slow_time,
-        frequency=frequency,
-        transmitter=flown.transmitter,
-        receiver=flown.receiver,
-        clock_error=flown.clock,
-        electrons=flown.electrons,
-        noise_power=10 ** (settings.noise / 10) if settings.noise is not None else 0.0,
-        rng=rng,
-    )
+    noise = {"noise_power": 10 ** (settings.noise / 10) if settings.noise is not None else 0.0, "rng": rng}
+    history = flown.record(scatterers, amplitudes, slow_time, frequency, **noise)
     remarks = []
     scene = mission.scene
     if scene.latitude is None or scene.longitude is None or scene.height is None:

@@ -155,7 +155,8 @@ def map_drift(image: Complexes, sub_apertures: int = 2) -> Focused:
         size = size + step
         if np.abs(step).max() < _DRIFT_SETTLED:
             break
-    total[band] = _without_trend(shapes @ size)
+    phase = shapes @ size
+    total[band] = phase - np.polyval(np.polyfit(place, phase, 1), place)
     return Focused(image=_corrected(image, total), phase=total)
 
 
@@ -245,11 +246,6 @@ def _corrected(image: Complexes, phase: Floats) -> Complexes:
 def _place(count: int) -> Floats:
     """Aperture samples from -1 to 1, at the centres of equal cells."""
     return (2 * np.arange(count) - (count - 1)) / count
-
-
-def _without_trend(phase: Floats) -> Floats:
-    place = _place(phase.size)
-    return np.asarray(phase - np.polyval(np.polyfit(place, phase, 1), place), dtype=float)
 
 
 def _threshold(pixels: int) -> float:

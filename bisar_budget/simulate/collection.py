@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,12 +19,12 @@ from bisar_budget.simulate.phase_history import (
     ExactEffect,
     Flight,
     Floats,
+    PhaseHistory,
     cell_centres,
     direct_path_error,
     direct_path_ways,
     exact_effect,
     path,
-    phase_history,
 )
 
 OVERSAMPLING = 2.5  # samples of an image per resolution cell
@@ -215,11 +215,6 @@ class PointCollection:
         """Resolution of the range sum, c/B. [m]"""
         return SPEED_OF_LIGHT / self.radar.bandwidth
 
-    @property
-    def relative_bandwidth(self) -> float:
-        """Over the centre frequency: range cells that a wavelength of range error walks."""
-        return self.radar.bandwidth / self.radar.center_frequency
-
     def window(self, count: int) -> Floats:
         """Weights over the aperture, or the band, at the centres of equal cells."""
         return taylor_window(count) if self.is_tapered else np.ones(count)
@@ -243,6 +238,22 @@ class PointCollection:
         group = errors.electrons.at(slow_time)
         seen = clock + seen_course(group, errors.electrons.mean, CONTENT) / square
         return Flight(transmitter, receiver, clock, seen, group)
+
+    def record(
+        self,
+        flight: Flight,
+        scatterers: Floats,
+        amplitudes: Complexes,
+        slow_time: Floats,
+        frequencies: int,
+        **noise: Any,
+    ) -> PhaseHistory:
+        """Phase history of scatterers (n, 3) at so many frequencies over the band, under the window."""
+        frequency = self.radar.center_frequency + cell_centres(self.radar.bandwidth, frequencies)
+        history = flight.record(scatterers, amplitudes, slow_time, frequency, **noise)
+        if self.is_tapered:
+            history.samples[:] *= np.outer(self.window(slow_time.size), self.window(frequencies))
+        return history
 
     def effect(self, errors: Errors, seen_from: GroundVector = (0.0, 0.0)) -> ExactEffect:
         """Displacement and phases of a point of the ground, by exact ranges.
@@ -301,18 +312,9 @@ class PointCollection:
             flight = flight.as_measured()
         frequencies = self._frequencies(grid, flight, scatterer)
         self._require_memory(grid.shape[0] * grid.shape[1], slow_time.size, frequencies)
-        history = phase_history(
-            np.array([[*scatterer, 0.0]]),
-            np.ones(1, dtype=complex),
-            slow_time=slow_time,
-            frequency=self.radar.center_frequency + cell_centres(self.radar.bandwidth, frequencies),
-            transmitter=flight.transmitter,
-            receiver=flight.receiver,
-            clock_error=flight.clock,
-            electrons=flight.electrons,
+        history = self.record(
+            flight, np.array([[*scatterer, 0.0]]), np.ones(1, dtype=complex), slow_time, frequencies
         )
-        if self.is_tapered:
-            history.samples[:] *= np.outer(self.window(slow_time.size), self.window(frequencies))
         image = backprojection(history, grid, self.kernel)
         image = image * self.range_lines(errors).baseband(grid, self.wavelength)
         return Chip(image, grid, spacing)

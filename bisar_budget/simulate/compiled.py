@@ -21,8 +21,6 @@ from bisar_budget.simulate.image_formation import (
     carrier_frequency,
     cells_per_metre,
     harmonics,
-    kernel,
-    kernel_transform,
     profile_length,
     range_profiles,
 )
@@ -209,6 +207,24 @@ def _reference(history: PhaseHistory) -> Floats:
     return total
 
 
+def _kernel(offset: Floats) -> Floats:
+    """Exponential of a semicircle over ±_TAPS/2 cells, 1 at the centre.
+
+    Source: Barnett, Magland & af Klinteberg, "A parallel non-uniform fast Fourier transform library based on an
+    'exponential of semicircle' kernel", 2019; the shape parameter is theirs for the oversampling.
+    """
+    shape = 0.976 * math.pi * _TAPS * (1 - 1 / (2 * _OVERSAMPLING))
+    return np.exp(shape * (np.sqrt(np.clip(1 - (2 * offset / _TAPS) ** 2, 0.0, None)) - 1))
+
+
+def _kernel_transform(angle: Floats) -> Floats:
+    """Fourier transform of the kernel at an angular frequency per cell, by Gauss-Legendre quadrature."""
+    nodes, weights = np.polynomial.legendre.leggauss(64)
+    offset = nodes * _TAPS / 2
+    transform: Floats = np.cos(np.outer(angle, offset)) @ (weights * _kernel(offset)) * _TAPS / 2
+    return transform
+
+
 def _profile_blocks(history: PhaseHistory, needed: _Needed, spline: Spline) -> Iterator[_Block]:
     """Take from each profile what is needed, and refine that.
 
@@ -218,11 +234,11 @@ def _profile_blocks(history: PhaseHistory, needed: _Needed, spline: Spline) -> I
     length, factor, order = profile_length(history, _OVERSAMPLING), _REFINEMENT[spline], _ORDER[spline]
     coarse = cells_per_metre(history, length)
     harmonic = harmonics(history)
-    transform = kernel_transform(2 * math.pi * harmonic / length, _TAPS, _OVERSAMPLING)
+    transform = _kernel_transform(2 * math.pi * harmonic / length)
     transform = transform * np.sinc(harmonic / (length * factor)) ** (order + 1)
     # Weights of the taps for each of the places between two samples.
     offset = np.arange(factor) / factor - (np.arange(_TAPS)[:, None] - _TAPS // 2 + 1)
-    weights = kernel(offset, _TAPS, _OVERSAMPLING).astype(np.float32)
+    weights = _kernel(offset).astype(np.float32)
     reference = _reference(history)
     first, count = needed
     pulses = min(history.slow_time.size, max(1, int(_BLOCK_BYTES / (8 * count * factor + PROFILE_BYTES * length))))

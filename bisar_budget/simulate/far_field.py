@@ -13,6 +13,7 @@ import numpy as np
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.geometry import GroundVector
 from bisar_budget.simulate.image_formation import direct_sum
+from bisar_budget.simulate.impulse_response import lagrange_weight
 from bisar_budget.simulate.phase_history import Complexes, Floats, PhaseHistory
 
 _TOLERANCE = 1e-8  # asked of the non-uniform FFT
@@ -213,9 +214,5 @@ def _interpolated(rows: Complexes, place: Floats) -> Complexes:
     line = np.arange(rows.shape[0])[:, None]
     total = np.zeros(place.shape, dtype=complex)
     for tap in range(_STENCIL):
-        weight: Floats = np.ones(place.shape)
-        for other in range(_STENCIL):
-            if other != tap:
-                weight *= (offset - other) / (tap - other)
-        total += weight * rows[line, first + tap]
+        total += lagrange_weight(offset, tap, _STENCIL) * rows[line, first + tap]
     return total

@@ -2,14 +2,13 @@
 
 A former by exact ranges, (4), puts a response at the displaced point itself and takes pixels along lines of equal
 range. One by plane waves, (7) to (14), puts it where plane waves have the recorded range history, and takes straight
-lines along the axes (x′, y′) of (10).
+lines along the axes (x′, y′) of (10). Both have the same methods; places are east, north [m].
 """
 
 import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -31,38 +30,6 @@ _DIRECT_BYTES = 30e6  # what the sums over all pulses and frequencies hold of a 
 Told = Callable[[int], None]
 
 
-class Former(Protocol):
-    """The interface of an image former for `simulate_point`. Places are east, north [m]; images are at baseband."""
-
-    @property
-    def bytes_held(self) -> float:
-        """Beside the images and the phase history. [B]"""
-
-    def place(self, displaced: GroundVector, recorded: Floats) -> GroundVector:
-        """Where it puts a point, given its displaced point and its differential range over slow time. [m]"""
-
-    def left(self, place: GroundVector, left: Floats, recorded: Floats) -> Floats:
-        """The range history that is left at a place, given what exact ranges leave at the displaced point. [m]"""
-
-    def cells(self, centre: GroundVector) -> tuple[float, float]:
-        """Resolution along x′ and y′, peak to first null. [m]"""
-
-    def look(self, centre: GroundVector) -> Floats:
-        """Direction of x′, a unit vector (2,)."""
-
-    def offsets(self, places: Floats, centre: GroundVector) -> Floats:
-        """Resolution cells from the centre, along x′ and y′, of places (n, 2): (n, 2)."""
-
-    def grid(self, centre: GroundVector, spacing: tuple[float, float], shape: tuple[int, int]) -> Floats:
-        """Pixels of a patch, x′ along the first axis, (nx, ny, 3). [m]"""
-
-    def image(self, history: PhaseHistory, grid: Floats, told: Told) -> Complexes:
-        """Form the image at pixels (nx, ny, 3)."""
-
-    def seconds(self, some: PhaseHistory, pulses: int, grid: Floats) -> float:
-        """About how long an image of so many pulses takes, measured with some of them. [s]"""
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class ExactRangeFormer:
     """Matched filter (4) or backprojection, which equals it."""
@@ -79,50 +46,46 @@ class ExactRangeFormer:
         return _DIRECT_BYTES if self.is_direct else bytes_held(self.kernel)
 
     def place(self, displaced: GroundVector, recorded: Floats) -> GroundVector:
-        """Where it puts a point."""
+        """Where it puts a point, given its displaced point and its differential range over slow time. [m]"""
         return displaced
 
     def left(self, place: GroundVector, left: Floats, recorded: Floats) -> Floats:
-        """The range history that is left at a place."""
+        """The range history that is left at a place, given what exact ranges leave at the displaced point. [m]"""
         return left
 
     def cells(self, centre: GroundVector) -> tuple[float, float]:
-        """Resolution."""
+        """Resolution along x′ and y′, peak to first null. [m]"""
         return self.lines.cells(centre, self.bandwidth, self.wavelength)
 
     def look(self, centre: GroundVector) -> Floats:
-        """Direction of x′."""
+        """Direction of x′, a unit vector (2,)."""
         by_range = self.lines.gradients(np.asarray(centre))[0]
         towards: Floats = -by_range / float(np.hypot(*by_range))
         return towards
 
     def offsets(self, places: Floats, centre: GroundVector) -> Floats:
-        """Cells from the centre, by range sum and by its change over the aperture."""
-        middle = np.asarray([centre])
-        nearer = self.lines.range_sum(middle) - self.lines.range_sum(places)
-        way = 1 if self.lines.turns_left(centre) else -1
-        turned = way * (self._change(places) - self._change(middle))
-        return np.stack((nearer * self.bandwidth / SPEED_OF_LIGHT, turned / self.wavelength), axis=1)
+        """Resolution cells from the centre along x′ and y′, by range sum and by its change over the aperture.
 
-    def _change(self, places: Floats) -> Floats:
-        """Change of the range sum over the aperture. [m]"""
-        total: Floats = np.zeros(len(places))
+        Places (n, 2) give (n, 2).
+        """
+        points = np.pad(np.concatenate(([centre], places)), ((0, 0), (0, 1)))
+        nearer, turned = self.lines.range_sum(points), np.zeros(len(points))
         for one in (self.lines.transmitter, self.lines.receiver):
-            for when, sign in ((0, -1), (2, 1)):
-                total += sign * np.linalg.norm(np.c_[places, np.zeros(len(places))] - one[when], axis=1)
-        return total
+            turned += np.linalg.norm(points - one[2], axis=1) - np.linalg.norm(points - one[0], axis=1)
+        way = 1 if self.lines.turns_left(centre) else -1
+        cells = nearer[0] - nearer, way * (turned - turned[0])
+        return np.stack((cells[0] * self.bandwidth / SPEED_OF_LIGHT, cells[1] / self.wavelength), axis=1)[1:]
 
     def grid(self, centre: GroundVector, spacing: tuple[float, float], shape: tuple[int, int]) -> Floats:
-        """Pixels along lines of equal range and of equal Doppler."""
+        """Pixels of a patch along lines of equal range and of equal Doppler, (nx, ny, 3). [m]"""
         return self.lines.grid(centre, spacing, shape)
 
     def image(self, history: PhaseHistory, grid: Floats, told: Told) -> Complexes:
-        """Form the image."""
-
+        """Form the image at pixels (nx, ny, 3)."""
         return _in_blocks(lambda part: self._formed(history, part), grid, told)
 
     def seconds(self, some: PhaseHistory, pulses: int, grid: Floats) -> float:
-        """About how long an image takes."""
+        """About how long an image of so many pulses takes, measured with some of them. [s]"""
         is_quick = not self.is_direct and self.kernel != "numpy"
         return _extrapolated(self._formed, some, pulses, grid, _TRIED_QUICKLY if is_quick else _TRIED)
 
@@ -178,7 +141,7 @@ class PlaneWaves:
         return SPEED_OF_LIGHT / along, SPEED_OF_LIGHT / across
 
     def look(self, centre: GroundVector) -> Floats:
-        """Direction of x′."""
+        """Direction of x′, a unit vector (2,)."""
         return np.array([math.cos(self.azimuth), math.sin(self.azimuth)])
 
     def offsets(self, places: Floats, centre: GroundVector) -> Floats:
@@ -219,6 +182,9 @@ class PlaneWaves:
         wavenumber = 2 * math.pi * self.center_frequency / SPEED_OF_LIGHT
         carrier: Complexes = np.exp(1j * wavenumber * (points[..., :2] @ self.middle))
         return carrier
+
+
+Former = ExactRangeFormer | PlaneWaves
 
 
 def _extrapolated(

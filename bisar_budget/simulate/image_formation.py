@@ -195,34 +195,6 @@ def _read(spline: Complexes, cell: Floats) -> Complexes:
 
 
 # ---------------------------------------------------------------------- range profiles
-def kernel(offset: Floats, taps: int, oversampling: int) -> Floats:
-    """Exponential of a semicircle over ±taps/2 cells, 1 at the centre.
-
-    Source: Barnett, Magland & af Klinteberg, "A parallel non-uniform fast Fourier transform library based on an
-    'exponential of semicircle' kernel", 2019; the shape parameter is theirs for the oversampling.
-    """
-    inside = np.clip(1 - (2 * offset / taps) ** 2, 0.0, None)
-    return np.exp(kernel_shape(taps, oversampling) * (np.sqrt(inside) - 1))
-
-
-def kernel_shape(taps: int, oversampling: int) -> float:
-    """Shape parameter of the kernel."""
-    return 0.976 * math.pi * taps * (1 - 1 / (2 * oversampling))
-
-
-def kernel_transform(angle: Floats, taps: int, oversampling: int) -> Floats:
-    """Fourier transform of the kernel at an angular frequency per cell, by Gauss-Legendre quadrature."""
-    nodes, weights = _gauss()
-    offset = nodes * taps / 2
-    return np.cos(np.outer(angle, offset)) @ (weights * kernel(offset, taps, oversampling)) * taps / 2
-
-
-@cache
-def _gauss() -> tuple[Floats, Floats]:
-    nodes, weights = np.polynomial.legendre.leggauss(64)
-    return nodes, weights
-
-
 def profile_length(history: PhaseHistory, oversampling: int) -> int:
     """Samples of a profile, a power of two: they span the c/Δf after which it repeats."""
     return 1 << (history.frequency.size * oversampling - 1).bit_length()

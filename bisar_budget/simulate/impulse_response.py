@@ -349,13 +349,16 @@ def _interpolated(image: Complexes, row: Floats, column: Floats) -> Complexes:
     return total
 
 
-def _weights(place: Floats) -> tuple[np.ndarray[tuple[int], np.dtype[np.int64]], Floats]:
-    """First sample of each stencil, (n,), and the stencil's weights, (taps, n)."""
+def _weights(place: Floats) -> tuple[np.ndarray[tuple[int], np.dtype[np.int64]], list[Floats]]:
+    """First sample of each stencil, (n,), and the stencil's weights, (n,) for each tap."""
     first = np.floor(place).astype(np.int64) - _TAPS // 2 + 1
-    offset = place - first
-    weights = np.ones((_TAPS, place.size))
-    for tap in range(_TAPS):
-        for other in range(_TAPS):
-            if other != tap:
-                weights[tap] *= (offset - other) / (tap - other)
-    return first, weights
+    return first, [lagrange_weight(place - first, tap, _TAPS) for tap in range(_TAPS)]
+
+
+def lagrange_weight(offset: Floats, tap: int, taps: int) -> Floats:
+    """Weight of one sample of a stencil of Lagrange, for places so far from its first sample."""
+    weight: Floats = np.ones(offset.shape)
+    for other in range(taps):
+        if other != tap:
+            weight *= (offset - other) / (tap - other)
+    return weight

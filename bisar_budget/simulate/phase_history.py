@@ -7,7 +7,7 @@ Frame: scene centre at the origin, x east, y north, z up. SI units.
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -179,6 +179,30 @@ class Flight:
         transmitter, receiver = (Path(actual=one.measured, measured=one.measured) for one in self.paths)
         return Flight(transmitter, receiver, np.zeros_like(self.clock), np.zeros_like(self.clock))
 
+    def range_error(self, scatterer: GroundVector, seen_at: GroundVector) -> Floats:
+        """Range sum of a ground point as recorded, less that of another by the measured paths, (times,). [m]"""
+        there, here = np.array([*scatterer, 0.0]), np.array([*seen_at, 0.0])
+        total: Floats = np.zeros(self.clock.shape)
+        for one in self.paths:
+            total += np.linalg.norm(one.actual - there, axis=1) - np.linalg.norm(one.measured - here, axis=1)
+        return total + SPEED_OF_LIGHT * self.seen
+
+    def record(
+        self, scatterers: Floats, amplitudes: Complexes, slow_time: Floats, frequency: Floats, **noise: Any
+    ) -> "PhaseHistory":
+        """What the receiver records of scatterers: `phase_history` at these slow times."""
+        return phase_history(
+            scatterers,
+            amplitudes,
+            slow_time=slow_time,
+            frequency=frequency,
+            transmitter=self.transmitter,
+            receiver=self.receiver,
+            clock_error=self.clock,
+            electrons=self.electrons,
+            **noise,
+        )
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PhaseHistory:
@@ -244,12 +268,12 @@ def path(
     ValueError
         Wideband vibration without a generator, or in a band that holds no frequency of the pulses.
     """
-    tau = slow_time[:, None]
-    actual = _flown(state, tau)
+    actual = _placed(state, slow_time)
     if error is None:
         return Path(actual=actual, measured=actual)
     # (22): p̃ + ṽτ + ãτ²/2
-    measured = _flown(state, tau + error.time_tag) if error.time_tag else actual
+    tau = slow_time[:, None]
+    measured = _placed(state, slow_time + error.time_tag) if error.time_tag else actual
     measured = measured + np.asarray(error.position) + np.asarray(error.velocity) * tau
     measured = measured + np.asarray(error.acceleration) * tau**2 / 2
     if error.course is not None:
@@ -265,13 +289,9 @@ def path(
     return Path(actual=actual, measured=measured + sight * along[:, None])
 
 
-def _flown(state: PlatformState, tau: Floats) -> Floats:
-    """Where a platform is at slow times (times, 1), (times, 3). [m]"""
-    place = np.asarray(state.position) + np.asarray(state.velocity) * tau
-    place = place + np.asarray(state.acceleration) * tau**2 / 2
-    for power, bend in enumerate(state.bends, 3):
-        place = place + np.asarray(bend) * tau**power
-    return np.asarray(place)
+def _placed(state: PlatformState, slow_time: Floats) -> Floats:
+    """Positions of a path, (times, 3). [m]"""
+    return np.stack(np.broadcast_arrays(*state.place(slow_time)), axis=1)
 
 
 def _noise(slow_time: Floats, band: tuple[float, float] | None, rng: np.random.Generator) -> Floats:
@@ -301,19 +321,14 @@ def direct_path_ways(geometry: BistaticGeometry, slow_time: Floats) -> tuple[Flo
 
     They lead along u_t − b and u_r + b. A platform that changes nothing has none.
     """
-    transmitter, receiver = (path(state, slow_time).actual for state in (geometry.transmitter, geometry.receiver))
-
-    def unit(vectors: Floats) -> Floats:
-        units: Floats = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
-        return units
-
-    def inverse(sight: Floats) -> Floats:
-        square = np.sum(sight**2, axis=1, keepdims=True)
-        ways: Floats = np.where(square > _NO_SIGHT, sight / np.maximum(square, _NO_SIGHT), 0.0)
-        return ways
-
-    b = unit(transmitter - receiver)
-    return inverse(unit(transmitter) - b), inverse(unit(receiver) + b)
+    places = (PlatformState(position=one.place(slow_time), velocity=one.velocity) for one in geometry.both)
+    moved = BistaticGeometry(**dict(zip(("transmitter", "receiver"), places, strict=True)))
+    sights = (np.stack(one, axis=1) for one in moved.sights(has_direct_path=True))
+    squares = ((sight, np.sum(sight**2, axis=1, keepdims=True)) for sight in sights)
+    transmitter, receiver = (
+        np.where(square > _NO_SIGHT, sight / np.maximum(square, _NO_SIGHT), 0.0) for sight, square in squares
+    )
+    return transmitter, receiver
 
 
 def direct_path_error(paths: tuple[Path, Path]) -> Floats:
@@ -420,9 +435,13 @@ class NoGroundPointError(ValueError):
 class ExactEffect:
     """Displacement (east, north) [m]; phases at the aperture edge, signed like the range error [rad]."""
 
-    displacement: tuple[float, float]
+    displacement: GroundVector
     quadratic: float
     cubic: float
+
+    def moved(self, by: GroundVector) -> GroundVector:
+        """The displacement and another one together."""
+        return self.displacement[0] + by[0], self.displacement[1] + by[1]
 
 
 def exact_effect(

@@ -31,7 +31,6 @@ from bisar_budget.simulate.phase_history import (
     PathSinusoid,
     PhaseHistory,
     cell_centres,
-    phase_history,
 )
 from bisar_budget.simulate.realisations import drawn_errors, oscillator_sinusoids
 from bisar_budget.simulate.targets import Target, Targets
@@ -225,9 +224,9 @@ def simulate_point(
         slow = declared.smooth()
         smooth = collection.flight(slow, fine)
         former, scene_former = _formers(collection, image_former, collection.range_lines(declared), smooth)
-        displaced = [_sum(place, moved.displacement) for place, moved in zip(standing, effects, strict=True)]
-        left = _range_error(smooth, (0.0, 0.0), effect.displacement)
-        recorded = [_range_error(smooth, place, (0.0, 0.0)) for place in standing]
+        displaced = [moved.moved(place) for place, moved in zip(standing, effects, strict=True)]
+        left = smooth.range_error((0.0, 0.0), effect.displacement)
+        recorded = [smooth.range_error(place, (0.0, 0.0)) for place in standing]
         shown = [former.place(*one) for one in zip(displaced, recorded, strict=True)]
         in_scene_shown = [scene_former.place(*one) for one in zip(displaced, recorded, strict=True)]
         smear = former.left(shown[0], left, recorded[0])
@@ -237,7 +236,6 @@ def simulate_point(
         raise SimulationError(f"the declared errors leave no image of a point: {error}") from None
     plan.require_memory(settings.memory_limit, mission.collection.pulses)
     slow_time = cell_centres(T, plan.pulses)
-    frequency = mission.radar.center_frequency + cell_centres(mission.radar.bandwidth, plan.frequencies)
     rng = np.random.default_rng(settings.seed)
     lines = former.grid(_middle(shown), plan.rotated.spacing, plan.rotated.shape)
     scene = ground_grid(_middle(in_scene_shown), 0.0, plan.in_scene.size, plan.in_scene.shape)
@@ -245,21 +243,9 @@ def simulate_point(
     amplitudes = np.concatenate(([10 ** (one.level_db / 20) for one in targets.points], clutter_amplitudes))
 
     def history(flight: Flight, places: Floats) -> PhaseHistory:
-        formed = phase_history(
-            np.c_[places, np.zeros(len(places))],
-            amplitudes.astype(complex),
-            slow_time=slow_time,
-            frequency=frequency,
-            transmitter=flight.transmitter,
-            receiver=flight.receiver,
-            clock_error=flight.clock,
-            electrons=flight.electrons,
-            noise_power=10 ** (settings.noise / 10) if settings.noise is not None else 0.0,
-            rng=rng,
-        )
-        if collection.is_tapered:
-            formed.samples[:] *= np.outer(collection.window(plan.pulses), collection.window(plan.frequencies))
-        return formed
+        scatterers, power = np.c_[places, np.zeros(len(places))], settings.noise
+        noise = {"noise_power": 0.0 if power is None else 10 ** (power / 10), "rng": rng}
+        return collection.record(flight, scatterers, amplitudes.astype(complex), slow_time, plan.frequencies, **noise)
 
     done = 0
 
@@ -274,14 +260,7 @@ def simulate_point(
     begun, few = time.perf_counter(), cell_centres(T, _FEW_PULSES)
     still = collection.flight(slow, few)
     places = np.pad(np.concatenate((standing, clutter)), ((0, 0), (0, 1)))
-    some = phase_history(
-        places,
-        amplitudes.astype(complex),
-        slow_time=few,
-        frequency=frequency,
-        transmitter=still.transmitter,
-        receiver=still.receiver,
-    )
+    some = collection.record(still, places, amplitudes.astype(complex), few, plan.frequencies)
     recording = 2 * (time.perf_counter() - begun) * plan.pulses / few.size
     rotating = 2 * former.seconds(some, plan.pulses, lines)
     foreseen(recording + rotating + scene_former.seconds(some, plan.pulses, scene))
@@ -405,10 +384,6 @@ def _formers(
     return plane, exact if plane.is_polar else plane
 
 
-def _sum(place: GroundVector, by: GroundVector) -> GroundVector:
-    return place[0] + by[0], place[1] + by[1]
-
-
 def _middle(places: Sequence[GroundVector] | Floats) -> GroundVector:
     """Middle of the box around some places, on which a patch is centred."""
     low, high = np.min(places, axis=0), np.max(places, axis=0)
@@ -506,15 +481,6 @@ def pulses_for(mission: Mission, cells: int) -> int:
             f"{2 * cells} pulses; omit the key to get what it takes"
         )
     return given
-
-
-def _range_error(flight: Flight, scatterer: GroundVector, seen_at: GroundVector) -> Floats:
-    """Range sum of a ground point as recorded, less that of another by the measured paths. [m]"""
-    there, here = np.array([*scatterer, 0.0]), np.array([*seen_at, 0.0])
-    total: Floats = np.zeros(flight.clock.shape)
-    for one in flight.paths:
-        total += np.linalg.norm(one.actual - there, axis=1) - np.linalg.norm(one.measured - here, axis=1)
-    return total + SPEED_OF_LIGHT * flight.seen
 
 
 def _measured(image: Complexes, spacing: float, mask_m: float | None) -> ImpulseResponse:

@@ -89,8 +89,8 @@ def _drawn_parts(
     kind, figure = error.subject.kind, error.subject.axis
     if kind == "random":
         process = process_of(mission, error)
-        draw, sizes = _correlated(process), _of_largest(process.sigma)
-        of_axis = [(axis, size * draw(times, draws, rng)) for axis, size in enumerate(sizes) if size]
+        sizes = _of_largest(process.sigma)
+        of_axis = [(axis, size * _correlated(process, times, draws, rng)) for axis, size in enumerate(sizes) if size]
         common, names = mission.common_motion_error, [error.owner]
         if error.owner not in PLATFORMS and common is not None:
             names, frame = [*PLATFORMS], common.frame
@@ -104,9 +104,8 @@ def _drawn_parts(
     if kind == "lever_arm" and figure == "uncertainty":
         sizes = _of_largest(lever.uncertainty if lever is not None and lever.uncertainty else (1.0, 1.0, 1.0))
         body = np.moveaxis(body_axes(state, times), 1, 2)
-        return {
-            error.owner: [(size * _bias(0)(times, draws, rng), way) for size, way in zip(sizes, body, strict=True)]
-        }
+        drawn = [size * rng.standard_normal((draws, 1)) * np.ones(times.size) for size in sizes]
+        return {error.owner: list(zip(drawn, body, strict=True))}
     figure = "attitude" if kind == "lever_arm" else figure
     sizes = _of_largest(getattr(motion.imu, figure, None) or (1.0, 1.0, 1.0))
     pushes = acceleration_errors(figure, axes_now, np.array(specific_force(mission, state)))
@@ -214,14 +213,6 @@ MOVING = ("imu", "random", "lever_arm")  # kinds of error that move platforms
 _Draw = Callable[[Floats, int, np.random.Generator], tuple[Floats, Floats]]
 
 
-def _bias(order: int) -> Callable[[Floats, int, np.random.Generator], Floats]:
-    def draw(times: Floats, draws: int, rng: np.random.Generator) -> Floats:
-        found: Floats = rng.standard_normal((draws, 1)) * times**order / math.factorial(order)
-        return found
-
-    return draw
-
-
 def _biased(order: int) -> _Draw:
     """What a bias makes of a position, and the tilt that goes with it: two integrals less."""
 
@@ -257,17 +248,13 @@ def _walk(integrals: int) -> _Draw:
     return draw
 
 
-def _correlated(process: GaussMarkov) -> Callable[[Floats, int, np.random.Generator], Floats]:
+def _correlated(process: GaussMarkov, times: Floats, draws: int, rng: np.random.Generator) -> Floats:
     """First-order Gauss-Markov noise of variance 1, by its recursion from time to time."""
-
-    def draw(times: Floats, draws: int, rng: np.random.Generator) -> Floats:
-        found = rng.standard_normal((times.size, draws))
-        for index, step in enumerate(np.diff(times).tolist(), 1):
-            decay = math.exp(-step / process.correlation_time)
-            found[index] = decay * found[index - 1] + math.sqrt(1 - decay**2) * found[index]
-        return found.T
-
-    return draw
+    found = rng.standard_normal((times.size, draws))
+    for index, step in enumerate(np.diff(times).tolist(), 1):
+        decay = math.exp(-step / process.correlation_time)
+        found[index] = decay * found[index - 1] + math.sqrt(1 - decay**2) * found[index]
+    return found.T
 
 
 # By figure: draws of a position error by a unit of acceleration, or of its rate or noise, and of the tilt itself.
@@ -320,7 +307,12 @@ def phase_courses(
     if interval is None:
         pieces = _below(pieces, highest)
     if sync is not None and sync.is_direct_path:
-        return _heard_twice(mission, error, size, _Tones(pieces, T), times, draws, rng)
+        if error.owner == "transmitter":  # both paths have its phase at one time
+            return np.zeros((draws, times.size))
+        tones, later = _Tones(pieces, T), times + float(mission.geometry.echo_delay)
+        waves_of = (tones.draw(rng) for _ in range(draws))
+        heard_twice: Floats = size * np.stack([one.at(later) - one.at(times) for one in waves_of])
+        return heard_twice
     is_set = sync is not None and sync.is_holdover and not error.subject.axis
     setting = _Setting(pieces, T, sync.age or T, sync.averaging or T) if sync is not None and is_set else None
     tones = _Tones(pieces, T) if setting is None else setting.tones
@@ -345,26 +337,6 @@ def phase_courses(
 def _below(pieces: tuple[PowerLawPiece, ...], highest: float) -> tuple[PowerLawPiece, ...]:
     """Pieces of a spectrum up to a frequency."""
     return tuple(piece._replace(high=min(piece.high, highest)) for piece in pieces if piece.low < highest)
-
-
-def _heard_twice(
-    mission: Mission,
-    error: RandomError,
-    size: float,
-    tones: "_Tones",
-    times: Floats,
-    draws: int,
-    rng: np.random.Generator,
-) -> Floats:
-    """Phases of an oscillator at the echo less those at the direct path, (draws, times); the transmitter has none."""
-    found = np.zeros((draws, times.size))
-    if error.owner == "transmitter":
-        return found
-    later = times + float(mission.geometry.echo_delay)
-    for index in range(draws):
-        drawn = tones.draw(rng)
-        found[index] = drawn.at(later) - drawn.at(times)
-    return size * found
 
 
 def _fastest(mission: Mission, error: RandomError) -> float:

@@ -34,13 +34,9 @@ _NUMBERS = ("(11)", "(19)", "(22)", "(25)", "(30)", "(31)")
 
 
 def equations() -> tuple[Equation, ...]:
-    """Return the equations that a report shows, the paper's first."""
-    return (*(equation for equation in paper.equations() if _is_shown(equation)), *full.equations())
-
-
-def _is_shown(equation: Equation) -> bool:
-    """Whether a report shows it: of (30) the one at mid-aperture."""
-    return equation.number in _NUMBERS and not equation.right.has(paper.tau_i)
+    """Return the equations that a report shows, the paper's first; of (30) the one at mid-aperture."""
+    shown = (one for one in paper.equations() if one.number in _NUMBERS and not one.right.has(paper.tau_i))
+    return (*shown, *full.equations())
 
 
 def named() -> Iterator[tuple[str, Expr]]:

@@ -207,7 +207,7 @@ def table() -> Table:
         number="Full model",
         title="Differential range errors with the line of sight turning as it does",
         columns=("Constant β̃₀", "Linear β̃₁", "Quadratic β̃₂", "Cubic β̃₃", "Quartic β̃₄"),
-        rows=published.coefficient_rows(range_error(), PLATFORMS, is_numbered=False),
+        rows=published.coefficient_rows(range_error(), is_numbered=False),
         notes=(
             "Derived here. u and its derivatives are those of the unit vector to the platform at τ = 0.",
             "With synchronization.method direct_path w_t, w_r stand for u_t, u_r, and there is no clock.",

@@ -71,39 +71,37 @@ def motion_errors(platform: PlatformSymbols) -> tuple[Symbol, ...]:
     return tuple(kind[axis] for axis in range(3) for kind in kinds)
 
 
-def single_error(expression: Expr, error: Symbol, platforms: tuple[PlatformSymbols, ...] = PLATFORMS) -> Expr:
+def single_error(expression: Expr, error: Symbol) -> Expr:
     """Keep what one error alone does: every other error is set to zero."""
-    every = [*clock_coefficients, *(e for platform in platforms for e in motion_errors(platform))]
+    every = [*clock_coefficients, *(e for platform in PLATFORMS for e in motion_errors(platform))]
     return expression.xreplace({other: Integer(0) for other in every if other != error})
 
 
-def coefficient_rows(
-    beta: Sequence[Expr], platforms: tuple[PlatformSymbols, ...], *, is_numbered: bool
-) -> tuple[TableRow, ...]:
+def coefficient_rows(beta: Sequence[Expr], *, is_numbered: bool) -> tuple[TableRow, ...]:
     """Rows of a table of coefficients of the range error: the clock alone, then each motion error alone."""
-    motion_free = {e: 0 for platform in platforms for e in motion_errors(platform)}
+    motion_free = {e: 0 for platform in PLATFORMS for e in motion_errors(platform)}
     clock = Eq(Function("ttilde")(tau), dr.clock_polynomial(), evaluate=False)
     number = 1 if is_numbered else None
     rows = [TableRow(number, real("ttilde"), clock, tuple(cell.subs(motion_free) for cell in beta))]
-    for platform in platforms:
+    for platform in PLATFORMS:
         polynomial = dr.error_polynomial(platform)
         for index, error in enumerate(motion_errors(platform)):
             axis = index // 3
             track = Function(f"{AXES[axis]}tilde_{platform.subscript}")(tau)
-            label = Eq(track, single_error(polynomial[axis], error, platforms), evaluate=False)
-            cells = tuple(single_error(cell, error, platforms) for cell in beta)
+            label = Eq(track, single_error(polynomial[axis], error), evaluate=False)
+            cells = tuple(single_error(cell, error) for cell in beta)
             rows.append(TableRow(2 + index if is_numbered else None, error, label, cells))
     return tuple(rows)
 
 
 @cache
-def table_1(platforms: tuple[PlatformSymbols, ...] = PLATFORMS) -> Table:
+def table_1() -> Table:
     """Table I: coefficients β̃₀ … β̃₃ of the range error, for the clock and each motion error alone."""
     return Table(
         number="Table I",
         title="Differential range errors induced by motion measurement errors",
         columns=("Constant β̃₀", "Linear β̃₁", "Quadratic β̃₂", "Cubic β̃₃"),
-        rows=coefficient_rows(dr.coefficients(dr.range_error(platforms)), platforms, is_numbered=True),
+        rows=coefficient_rows(dr.coefficients(dr.range_error()), is_numbered=True),
         notes=("Rows are numbered as printed; the paper prints the transmitter's and has the receiver's by t to r.",),
     )
 
@@ -121,18 +119,18 @@ def limit(phase: Expr, error: Symbol, budget: Expr) -> Expr:
 
 
 @cache
-def table_2(platforms: tuple[PlatformSymbols, ...] = PLATFORMS, budget: Expr = EQUAL_SHARE_QPE) -> Table:
+def table_2() -> Table:
     """Table II: quadratic phase error and largest allowable error, with the bars that the print omits."""
-    beta_2 = dr.coefficients(dr.range_error(platforms))[2]
+    beta_2, budget = dr.coefficients(dr.range_error())[2], EQUAL_SHARE_QPE
     rows = []
-    for platform in platforms:
+    for platform in PLATFORMS:
         errors = [*platform.velocity_error, *platform.acceleration_error]
         powers = [tau] * 3 + [tau**2 / 2] * 3
         for index, (error, power) in enumerate(zip(errors, powers, strict=True)):
-            qpe = edge_phase(single_error(beta_2, error, platforms), 2)
+            qpe = edge_phase(single_error(beta_2, error), 2)
             allowable = limit(qpe, error, budget)
             if error in list(platform.acceleration_error):
-                allowable = dr.in_angles(allowable, platforms)  # x/R is printed as cos φ̄ cos θ̄
+                allowable = dr.in_angles(allowable)  # x/R is printed as cos φ̄ cos θ̄
             track = Function(f"{AXES[index % 3]}tilde_{platform.subscript}")(tau)
             rows.append(
                 TableRow(
@@ -143,7 +141,7 @@ def table_2(platforms: tuple[PlatformSymbols, ...] = PLATFORMS, budget: Expr = E
                 )
             )
     clock = clock_coefficients[2]
-    clock_qpe = edge_phase(single_error(beta_2, clock, platforms), 2).subs(wavelength, c / center_frequency)
+    clock_qpe = edge_phase(single_error(beta_2, clock), 2).subs(wavelength, c / center_frequency)
     rows.append(
         TableRow(
             number=None,

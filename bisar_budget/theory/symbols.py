@@ -60,7 +60,8 @@ class PlatformSymbols:
 
     def exact_slant_range(self) -> Expr:
         """Return |r| in terms of the position's components. [m]"""
-        return _norm(self.position)
+        # Matrix.norm() wraps real components in Abs, which only hides the square.
+        return sqrt(sum(component**2 for component in self.position))
 
 
 def platform(name: str, subscript: str) -> PlatformSymbols:
@@ -83,11 +84,6 @@ def platform(name: str, subscript: str) -> PlatformSymbols:
         azimuth=real(f"phibar_{subscript}"),
         elevation=real(f"thetabar_{subscript}"),
     )
-
-
-def _norm(vector: Matrix) -> Expr:
-    # Matrix.norm() wraps real components in Abs, which only hides the square.
-    return sqrt(sum(component**2 for component in vector))
 
 
 TRANSMITTER = platform("transmitter", "t")

@@ -122,7 +122,9 @@ def read_aperture(
     place = 2 * slow_time / collection.aperture_time
     slope = np.polynomial.legendre.legder([0.0, 0.0, *fit[2:]])
     mean = float(np.mean(place * np.polynomial.legendre.legval(place, slope)))
-    walked = mean / (2 * math.pi) * collection.relative_bandwidth * OVERSAMPLING
+    radar = collection.radar
+    # Range cells that a wavelength of range error walks: the bandwidth over the centre frequency.
+    walked = mean / (2 * math.pi) * (radar.bandwidth / radar.center_frequency) * OVERSAMPLING
     # The image's phase is −2π/λ times the range error; P₂ = (3t² - 1)/2, P₃ = (5t³ - 3t)/2.
     return ApertureReading(float(-1.5 * fit[2]), float(-2.5 * fit[3]), across, -walked, min(1.0, covered * 1.02))
 

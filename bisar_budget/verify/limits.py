@@ -3,14 +3,13 @@
 import math
 import time
 from collections.abc import Iterable, Iterator
-from contextlib import nullcontext, suppress
+from contextlib import suppress
 from fnmatch import fnmatchcase
 from functools import partial
 
 import numpy as np
 
 from bisar_budget.analysis.spread import stated_powers
-from bisar_budget.analysis.vibration_limits import tone_limits
 from bisar_budget.budget.aggregates import Aggregates
 from bisar_budget.budget.judged_rows import Judging
 from bisar_budget.budget.pull_in import ROOM
@@ -18,9 +17,7 @@ from bisar_budget.budget.random_rows import RandomRows
 from bisar_budget.budget.verdicts import rows_worth_showing
 from bisar_budget.effects.declared import QUADRATIC
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
-from bisar_budget.effects.oscillator_acceleration import accelerated_tones
-from bisar_budget.effects.oscillators import spurs_of
-from bisar_budget.effects.vibration import SLOWEST, lines_of, unit_of_line
+from bisar_budget.effects.vibration import SLOWEST, lines_of
 from bisar_budget.faults import printable
 from bisar_budget.findings.images import FLOOR_DB, ImageEvidence, PointImage, Verdict, VerifiedMission
 from bisar_budget.findings.mission import MissionFindings
@@ -30,19 +27,16 @@ from bisar_budget.simulate.impulse_response import upsampled
 from bisar_budget.simulate.phase_history import Errors, Floats
 from bisar_budget.verify import phase_cases
 from bisar_budget.verify.spread_cases import (
-    UNDECLARED_CYCLES,
     Case,
     limits_of,
-    verify_accelerated_tone,
+    tone_cases,
     verify_islr,
     verify_pslr,
     verify_random,
-    verify_spread_tone,
-    verify_spur,
     vibration_cases,
 )
 from bisar_budget.verify.study import Responses, Study
-from bisar_budget.workers import MapBlocks, Progress, unseen, worker_pool
+from bisar_budget.workers import MapBlocks, Progress, in_processes, unseen
 
 __all__ = ["Study", "form_image_evidence", "rows_to_verify", "seconds_to_verify", "verify_mission"]
 
@@ -84,21 +78,18 @@ def verify_mission(
         Rows with a limit, in the order of `check`, and both platforms' vibration together.
     """
     mission = mission._replace(places={})  # the parser's marks cannot go to another process, and nobody asks here
-    known = cases(Study(mission))
-    wanted = [row_id for row_id in known if fnmatchcase(row_id, only)]
+    known = cases(Study(mission), only)
+    wanted = list(known)
     jobs = min(jobs, len(wanted))
-    with worker_pool(jobs, "spawn") if jobs > 1 and mapped is None else nullcontext() as pool:
-        found: Iterable[tuple[str, Verdict]]
-        if mapped is not None:
-            found = mapped(_verify_row, mission, wanted, f"{{}} of {printable(mission.name)}".format)
-        elif pool is not None:
-            found = zip(wanted, pool.map(partial(_verify_row, mission), wanted), strict=True)
-        else:
-            found = ((row_id, known[row_id]()) for row_id in wanted)
-        rows = {}
-        for row_id, verdict in found:
-            rows[row_id] = verdict
-            progress(len(rows), len(wanted))
+    if mapped is None and jobs > 1:
+        mapped = in_processes(jobs)
+    found: Iterable[tuple[str, Verdict]] = ((row_id, known[row_id]()) for row_id in wanted)
+    if mapped is not None:
+        found = mapped(_verify_row, mission, wanted, f"{{}} of {printable(mission.name)}".format)
+    rows = {}
+    for row_id, verdict in found:
+        rows[row_id] = verdict
+        progress(len(rows), len(wanted))
     return VerifiedMission(
         file=mission.file,
         name=mission.name,
@@ -110,12 +101,12 @@ def verify_mission(
 
 def rows_to_verify(mission: Mission, only: str = "*") -> list[str]:
     """Ids of the rows that `verify_mission` would verify."""
-    return [row_id for row_id in cases(Study(mission)) if fnmatchcase(row_id, only)]
+    return list(cases(Study(mission), only))
 
 
-def cases(study: Study) -> dict[str, Case]:
-    """Row ids in the order of `check`, with the call that verifies each."""
-    return dict(_cases(study))
+def cases(study: Study, only: str = "*") -> dict[str, Case]:
+    """Row ids that match a glob, in the order of `check`, with the call that verifies each."""
+    return {row_id: case for row_id, case in _cases(study) if fnmatchcase(row_id, only)}
 
 
 def _warns_of_the_total(study: Study) -> bool:
@@ -144,19 +135,6 @@ def _order(one: Subject) -> tuple[int, int]:
     return (("sinusoidal", "sinusoidal.sum", "wideband").index(one.axis), one.entry or 0)
 
 
-def _of_tones_by_islr(study: Study) -> Iterator[tuple[Subject, Case]]:
-    """Lines of vibration where ISLR holds their power."""
-    metric, limits = tone_limits(study.mission, study.allocation)
-    for name, limit in limits.items() if metric == "islr" else ():
-        T, size = study.collection.aperture_time, limit.by(study.model)
-        lines = [(line.frequency * T, line.per_metre) for line in lines_of(study.mission, name)]
-        for index, (turns, per_metre) in enumerate(lines or [(UNDECLARED_CYCLES, 1.0)]):
-            if turns >= SLOWEST:
-                one = subject(name, "vibration", "sinusoidal", entry=index)
-                blank = study.blank(one.id, size * per_metre, unit_of_line(study.mission, name, index))
-                yield one, partial(verify_spread_tone, study, blank, name, size, turns)
-
-
 def _of_instruments(study: Study) -> Iterator[tuple[str, Case]]:
     """Sensors and clocks that have a limit, and what all noise spreads together."""
     for error in study.analysis.random:
@@ -169,31 +147,8 @@ def _of_instruments(study: Study) -> Iterator[tuple[str, Case]]:
     if required is not None:
         for power in stated_powers(study.mission):
             yield power.subject.id, partial(phase_cases.stated, study, power.subject.id, required, "dB")
-    metric, limits = tone_limits(study.mission, study.allocation)
-    for spur in spurs_of(study.mission):
-        limit = limits.get(spur.name)
-        if limit is None:
-            continue
-        row_id, size = subject(spur.name, "oscillator", "spur", entry=spur.entry).id, limit.by(study.model)
-        if metric == "pslr":
-            yield row_id, partial(verify_spur, study, spur, row_id, size)
-        else:
-            level = 20 * math.log10(math.pi * size / study.collection.wavelength)
-            blank = study.blank(row_id, level, "dB")
-            cycles = spur.frequency * study.collection.aperture_time
-            yield row_id, partial(verify_spread_tone, study, blank, spur.name, size, cycles)
-    for one in accelerated_tones(study.mission):
-        limit, cycles = limits.get(one.name), one.frequency * study.collection.aperture_time
-        if limit is None or cycles < SLOWEST or not one.per_unit:
-            continue
-        size = limit.by(study.model)
-        sensitivity = 2 * math.pi / study.collection.wavelength * size / one.per_unit
-        needed = study.mission.requirements.pslr if metric == "pslr" else None
-        blank = study.blank(one.subject.id, sensitivity, "s^2/m", requirement_db=needed)
-        if metric == "pslr":
-            yield one.subject.id, partial(verify_accelerated_tone, study, one, blank, size)
-        else:
-            yield one.subject.id, partial(verify_spread_tone, study, blank, one.name, size, cycles)
+    for of_tone, case in tone_cases(study):
+        yield of_tone.id, case
     if study.mission.requirements.pslr is not None:
         yield "mission.pslr", partial(verify_pslr, study)
     if study.mission.requirements.islr is not None:
@@ -217,7 +172,7 @@ def _cases(study: Study) -> Iterator[tuple[str, Case]]:
             if line.frequency * study.collection.aperture_time < SLOWEST:
                 one = subject(name, "vibration", "sinusoidal", entry=index)
                 slow[one] = partial(phase_cases.slow_vibration, study, one, line)
-    swaying = slow | dict(_of_tones_by_islr(study)) | dict(vibration_cases(study))
+    swaying = slow | dict(vibration_cases(study))
     for owner in (*PLATFORMS, "mission"):
         for one in sorted((one for one in swaying if one.owner == owner), key=_order):
             yield one.id, swaying[one]
@@ -284,11 +239,10 @@ def seconds_to_verify(mission: Mission, only: str = "*", jobs: int = 1) -> float
     mission = mission._replace(places={})
     study = Study(mission)
     study.collection = sizes = _Sizes(mission, study)
-    known = cases(study)
-    wanted = [row_id for row_id in known if fnmatchcase(row_id, only)]
-    for row_id in wanted:
+    wanted = cases(study, only)
+    for case in wanted.values():
         with suppress(_NotFormedError):
-            known[row_id]()
+            case()
     asked = [max(1.0, size) for size in sizes.asked]
     if _BESIDE * sum(asked) * _SLOWEST <= _LONG:
         return 0.0

@@ -90,7 +90,7 @@ def _bound_elsewhere(study: Study, source: ErrorSource) -> Verdict:
             reason=reasons.bound_by_the_cubic_phase(),
         )
     shift = measured_shift(images.chip, images.reference, reading)
-    measured = moved(images.effect.displacement, shift.displacement)
+    measured = images.effect.moved(shift.displacement)
     required = requirements.location_error or 0.0
     pixel = min(images.chip.spacing)
     excess = math.hypot(*measured) - required
@@ -221,11 +221,6 @@ def _without_image(study: Study, blank: Verdict, error: ValueError) -> Verdict:
     return blank._replace(reason=reasons.no_image_formed(str(error)))
 
 
-def moved(place: GroundVector, by: GroundVector) -> GroundVector:
-    """Sum of two displacements."""
-    return (place[0] + by[0], place[1] + by[1])
-
-
 def compare(excess: float, tolerance: float) -> str:
     """Say what an excess over the budget means for the limit."""
     if abs(excess) <= tolerance:
@@ -301,7 +296,7 @@ def _of_response(images: Responses, reading: ApertureReading) -> dict[str, Any]:
     chip, reference, found = images.chip, images.reference, dict[str, Any]()
     try:
         shift = measured_shift(chip, reference, reading)
-        found["measured_displacement_m"] = moved(images.effect.displacement, shift.displacement)
+        found["measured_displacement_m"] = images.effect.moved(shift.displacement)
         found["measured_smear_azimuth_rad"] = shift.smear_azimuth
     except ValueError:
         pass
@@ -372,7 +367,7 @@ def location(study: Study, requirement: float) -> Verdict:
     except ValueError as error:
         return blank._replace(reason=reasons.no_image_formed(str(error)))
     assert said is not None
-    measured = moved(effect.displacement, shift.displacement)
+    measured = effect.moved(shift.displacement)
     seen = [("all of them together", said, measured)]
     if not study.is_full:
         # Together, errors may hide each other: the sign each is declared with is not the sign it will fly with.

@@ -15,15 +15,15 @@ from functools import partial
 import numpy as np
 
 from bisar_budget.analysis.spread import declared_powers, islr_db, mainlobe_energy, shown_islr_db, spread_limit, tones
-from bisar_budget.analysis.vibration_limits import echo_phase, highest_echo, vibration_limits
+from bisar_budget.analysis.vibration_limits import echo_phase, highest_echo, tone_limits, vibration_limits
 from bisar_budget.budget.random_rows import HELD, ISLR, held_effect, limits_for, sizes_at
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.air_delays import CONTENT, seen_course
 from bisar_budget.effects.declared import CUBIC, LOCATION
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.navigation_errors import process_of
-from bisar_budget.effects.oscillator_acceleration import AcceleratedTone
-from bisar_budget.effects.oscillators import Spur
+from bisar_budget.effects.oscillator_acceleration import accelerated_tones
+from bisar_budget.effects.oscillators import spurs_of
 from bisar_budget.effects.random_effect import RandomError
 from bisar_budget.effects.vibration import SLOWEST, Line, lines_of, near_lines, sight_of, unit_of_line, worst_phases
 from bisar_budget.findings.images import Verdict
@@ -54,7 +54,7 @@ from bisar_budget.simulate.realisations import (
 )
 from bisar_budget.verify import reasons
 from bisar_budget.verify.aperture_reading import measured_shift
-from bisar_budget.verify.phase_cases import TOLERANCE, compare, moved
+from bisar_budget.verify.phase_cases import TOLERANCE, compare
 from bisar_budget.verify.study import Study
 
 TOLERANCE_DB = 0.5
@@ -99,36 +99,42 @@ def vibration_cases(study: Study) -> Iterator[tuple[Subject, Case]]:
     """
     mission, T = study.mission, study.collection.aperture_time
     pslr, islr = mission.requirements.pslr, mission.requirements.islr
-    amplitude, rms = (
-        {name: limit.by(study.model) for name, limit in vibration_limits(mission, study.allocation, metric).items()}
-        for metric in ("pslr", "islr")
+    tone, rms = (
+        {name: limit.by(study.model) for name, limit in limits.items()}
+        for limits in (tone_limits(mission, study.allocation)[1], vibration_limits(mission, study.allocation, "islr"))
     )
     lines = {name: lines_of(mission, name) for name in PLATFORMS}
 
-    def blank(of: Subject, limits: Mapping[str, float], requirement_db: float, per_metre: float = 1.0) -> Verdict:
+    def blank(
+        of: Subject, limits: Mapping[str, float], requirement_db: float | None, per_metre: float = 1.0
+    ) -> Verdict:
         # Both together: the larger of two limits stands for the row.
         unit = unit_of_line(mission, of.owner, of.entry or 0) if of.axis == "sinusoidal" and len(limits) == 1 else "m"
         return study.blank(of.id, max(limits.values()) * per_metre, unit, requirement_db=requirement_db)
 
     for name in PLATFORMS:
+        for index, (_, frequency, per_metre) in enumerate(lines[name] or [Line(0.0, None)]):
+            cycles = UNDECLARED_CYCLES if frequency is None else frequency * T
+            if cycles < SLOWEST or not tone:
+                continue  # a phase, which `phase_cases` looks at; or nothing holds it
+            one, alone = subject(name, "vibration", "sinusoidal", entry=index), {name: tone[name]}
+            unseen = blank(one, alone, pslr, per_metre)
+            if pslr is not None:
+                yield one, partial(_sinusoidal, study, unseen, alone, frequency)
+            else:
+                yield one, partial(_spread_tone, study, unseen, name, tone[name], cycles)
         if pslr is not None:
-            alone = {name: amplitude[name]}
-            for index, (_, frequency, per_metre) in enumerate(lines[name] or [Line(0.0, None)]):
-                if frequency is not None and frequency * T < SLOWEST:
-                    continue  # a phase, which `phase_cases` looks at
-                one = subject(name, "vibration", "sinusoidal", entry=index)
-                yield one, partial(_sinusoidal, study, blank(one, alone, pslr, per_metre), alone, frequency)
             for index, members in enumerate(near_lines([line.frequency * T for line in lines[name]])):
                 one = subject(name, "vibration", "sinusoidal.sum", entry=index)
                 near = [lines[name][member] for member in members]
-                yield one, partial(_near, study, blank(one, alone, pslr), name, amplitude[name], near)
+                yield one, partial(_near, study, blank(one, {name: tone[name]}, pslr), name, tone[name], near)
         if islr is not None:
             one, alone = subject(name, "vibration", "wideband"), {name: rms[name]}
             yield one, partial(_wideband, study, blank(one, alone, islr), alone)
     if pslr is not None:
         frequency = next((line.frequency for name in PLATFORMS for line in lines[name]), None)
         both = subject("mission", "vibration", "sinusoidal")
-        yield both, partial(_sinusoidal, study, blank(both, amplitude, pslr), amplitude, frequency)
+        yield both, partial(_sinusoidal, study, blank(both, tone, pslr), tone, frequency)
     if islr is not None:
         both = subject("mission", "vibration", "wideband")
         yield both, partial(_wideband, study, blank(both, rms, islr), rms)
@@ -256,20 +262,34 @@ def _model(study: Study, error: RandomError) -> str:
     return max((one.name for one in study.models), key=lambda name: max(error.effect(name)[:2]))
 
 
-def verify_spur(study: Study, spur: Spur, row_id: str, amplitude: float) -> Verdict:
-    """A tone at its limit: the motion of the platform that makes the same phase. [m]"""
-    level = 20 * math.log10(math.pi * amplitude / study.collection.wavelength)
-    blank = study.blank(row_id, level, "dB", requirement_db=study.mission.requirements.pslr)
-    sinusoids = {spur.name: (PathSinusoid(amplitude, spur.frequency),)}
-    return echo(study, blank, sinusoids, "the tone alone")
+def tone_cases(study: Study) -> Iterator[tuple[Subject, Case]]:
+    """Give the subject of each oscillator's tone that has a limit, and the call that verifies it.
+
+    In an image it is the motion of its platform that makes the same phase.
+    """
+    mission, wavelength = study.mission, study.collection.wavelength
+    metric, limits = tone_limits(mission, study.allocation)
+    needed = mission.requirements.pslr if metric == "pslr" else None
+    sizes = {name: limit.by(study.model) for name, limit in limits.items()}
+
+    def case(of: Subject, stated: float, unit: str, frequency: float) -> tuple[Subject, Case]:
+        blank, size = study.blank(of.id, stated, unit, requirement_db=needed), sizes[of.owner]
+        if metric == "islr":
+            return of, partial(_spread_tone, study, blank, of.owner, size, frequency * study.collection.aperture_time)
+        return of, partial(echo, study, blank, {of.owner: (PathSinusoid(size, frequency),)}, "the tone alone")
+
+    for spur in spurs_of(mission):
+        if spur.name in sizes:
+            of = subject(spur.name, "oscillator", "spur", entry=spur.entry)
+            yield case(of, 20 * math.log10(math.pi * sizes[spur.name] / wavelength), "dB", spur.frequency)
+    for tone in accelerated_tones(mission):
+        is_fast = tone.frequency * study.collection.aperture_time >= SLOWEST
+        if tone.name in sizes and is_fast and tone.per_unit:
+            sensitivity = 2 * math.pi / wavelength * sizes[tone.name] / tone.per_unit
+            yield case(tone.subject, sensitivity, "s^2/m", tone.frequency)
 
 
-def verify_accelerated_tone(study: Study, tone: AcceleratedTone, blank: Verdict, amplitude: float) -> Verdict:
-    """A tone of an oscillator that vibrates, at its limit: the motion [m] that makes the same phase."""
-    return echo(study, blank, {tone.name: (PathSinusoid(amplitude, tone.frequency),)}, "the tone alone")
-
-
-def verify_spread_tone(study: Study, blank: Verdict, owner: str, amplitude: float, cycles: float) -> Verdict:
+def _spread_tone(study: Study, blank: Verdict, owner: str, amplitude: float, cycles: float) -> Verdict:
     """A tone where ISLR holds it, at its limit: a motion [m] of so many cycles per aperture."""
     phase = 2 * math.pi * amplitude / study.collection.wavelength
     return _power(study, blank, [], owner, echoes=[(phase / math.sqrt(2), cycles)])
@@ -361,7 +381,7 @@ def _place(study: Study, blank: Verdict, error: RandomError, rng: np.random.Gene
             images = study.images(errors)
             shift = measured_shift(images.chip, images.reference, study.read(images))
             drawn += images.effect.displacement
-            seen += moved(images.effect.displacement, shift.displacement)
+            seen += images.effect.moved(shift.displacement)
     except ValueError as fault:
         return blank._replace(reason=reasons.no_image_of_a_time_series(str(fault)))
     shown = float(np.dot(drawn, seen) / np.dot(drawn, drawn))
@@ -390,9 +410,11 @@ def _sigma(study: Study, error: RandomError, rng: np.random.Generator, is_cubic:
 
 def _drawn_effects(study: Study, error: RandomError, rng: np.random.Generator) -> Found:
     """Effects of many histories of a sensor or the air, by exact ranges, (draws,)."""
-    if error.subject.kind != "propagation":
-        return study.exact_effects(_courses(study, error, rng))
     moments = aperture_nodes(study.collection.aperture_time)
+    if error.subject.kind == "random":  # not smooth between the nodes, as what is integrated is
+        return study.exact_effects(_smooth_noise(study, error, rng))
+    if error.subject.kind != "propagation":
+        return study.exact_effects(position_courses(study.mission, error, moments, _DRAWS, rng))
     group = delay_courses(study.mission, error, moments, _DRAWS, rng)
     mean = (group @ nodes(FINE).fit[0])[:, None]
     return study.exact_effects({"clock": seen_course(group, mean, error.subject.axis)})
@@ -410,13 +432,6 @@ def _left_at_the_point(study: Study, error: RandomError, times: Floats, group: F
         sight = position / np.linalg.norm(position, axis=0)
         seen = seen + np.multiply.outer(found.east, sight[0]) + np.multiply.outer(found.north, sight[1])
     return np.asarray(seen)
-
-
-def _courses(study: Study, error: RandomError, rng: np.random.Generator) -> dict[str, Floats]:
-    """Position errors of platforms at the nodes of exact ranges, (draws, nodes, 3) each. [m]"""
-    if error.subject.kind == "random":  # not smooth between the nodes, as what is integrated is
-        return _smooth_noise(study, error, rng)
-    return position_courses(study.mission, error, aperture_nodes(study.collection.aperture_time), _DRAWS, rng)
 
 
 def _fits(study: Study, error: RandomError, rng: np.random.Generator) -> tuple[Floats, int]:

@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bisar_budget.analysis.analysis import Analysis, Model
-from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.declared import QUADRATIC
 from bisar_budget.effects.effect import PLATFORMS, ErrorSource, Subject
 from bisar_budget.findings.images import Verdict
@@ -246,13 +245,11 @@ class Study:
         time = np.linspace(-half, half, 257)
         point = np.array([*effect.displacement, 0.0])
         flight = self.collection.flight(errors.smooth(), time)
-        left: Floats = SPEED_OF_LIGHT * flight.seen
+        left = flight.range_error((0.0, 0.0), effect.displacement)
         slopes: Floats = np.zeros((time.size, 2))
         for one in flight.paths:
             sight = one.measured - point
-            distance = np.linalg.norm(sight, axis=1)
-            left = left + np.linalg.norm(one.actual, axis=1) - distance
-            slopes = slopes - sight[:, :2] / distance[:, None]
+            slopes = slopes - sight[:, :2] / np.linalg.norm(sight, axis=1, keepdims=True)
         lines = self.collection.range_lines(errors)
         cells = lines.cells(effect.displacement, self.mission.radar.bandwidth, self.collection.wavelength)
         by_range = slopes[time.size // 2]
