@@ -90,21 +90,8 @@ def teme(elements: Elements) -> Callable[[Instant], Vector]:
     satellite = Satrec()
     epoch = elements.epoch.day - _DAY_OF_1950 + elements.epoch.seconds / DAY
     # The derivatives of the mean motion are no part of SGP4, and the number is ours to keep.
-    satellite.sgp4init(
-        WGS72,
-        "i",
-        0,
-        epoch,
-        elements.drag,
-        0.0,
-        0.0,
-        elements.eccentricity,
-        elements.perigee,
-        elements.inclination,
-        elements.anomaly,
-        elements.mean_motion,
-        elements.node,
-    )
+    shape = (elements.eccentricity, elements.perigee, elements.inclination, elements.anomaly)
+    satellite.sgp4init(WGS72, "i", 0, epoch, elements.drag, 0.0, 0.0, *shape, elements.mean_motion, elements.node)
     if satellite.error:
         raise PathFileError(f"{elements.where}: SGP4 refuses {elements.object}: {_failure(satellite.error)}")
 
@@ -232,6 +219,7 @@ def _motion_of(turns: float, where: str) -> float:
 
 # ---------------------------------------------------------------------- two-line element sets
 _COLUMNS = 69
+_DECIMAL = r"\d+\.\d*"
 
 
 def read_tle(text: str, name: str, wanted: str | None, center: Instant) -> Orbit:
@@ -319,20 +307,20 @@ def _from_lines(first: tuple[int, str], second: tuple[int, str], object_name: st
     if line_1[62].strip() not in _PLAIN_TYPES:
         raise PathFileError(f"{where_1}: the elements are of type {line_1[62]}, which SGP4 does not propagate")
 
-    def field(start: int, end: int, called: str, form: str, before: str = "") -> float:
-        """Number in columns of line 2, counted from 1."""
-        return _column(line_2, where_2, start, end, called, form, before)
+    def angle(start: int, end: int, most: float, called: str) -> float:
+        """Angle in columns of line 2, counted from 1."""
+        return _angle_of(_column(line_2, where_2, start, end, called, _DECIMAL), most, called, where_2)
 
     return Elements(
         name=object_name,
         number=number,
         epoch=_epoch(line_1, where_1),
-        mean_motion=_motion_of(field(53, 63, "mean motion", r"\d+\.\d*"), where_2),
-        eccentricity=field(27, 33, "eccentricity", r"\d{7}", "0."),
-        inclination=_angle_of(field(9, 16, "inclination", r"\d+\.\d*"), 180, "inclination", where_2),
-        node=_angle_of(field(18, 25, "ascending node", r"\d+\.\d*"), 360, "ascending node", where_2),
-        perigee=_angle_of(field(35, 42, "argument of perigee", r"\d+\.\d*"), 360, "argument of perigee", where_2),
-        anomaly=_angle_of(field(44, 51, "mean anomaly", r"\d+\.\d*"), 360, "mean anomaly", where_2),
+        mean_motion=_motion_of(_column(line_2, where_2, 53, 63, "mean motion", _DECIMAL), where_2),
+        eccentricity=_column(line_2, where_2, 27, 33, "eccentricity", r"\d{7}", "0."),
+        inclination=angle(9, 16, 180, "inclination"),
+        node=angle(18, 25, 360, "ascending node"),
+        perigee=angle(35, 42, 360, "argument of perigee"),
+        anomaly=angle(44, 51, 360, "mean anomaly"),
         drag=_drag(line_1, where_1),
         kind="two-line elements",
         where=where_1,

@@ -65,38 +65,12 @@ def parse_instant(text: str, *, needs_zone: bool = True) -> Instant | None:
 # ---------------------------------------------------------------------- other time systems
 # TAI - UTC: table of the Earth orientation centre of the IERS, Bulletin C 52 (2016-07-06) and before. No leap second
 # came after that of 2016-12-31; one that is announced later needs a line here.
-# The day from which a difference holds; it grew by one second each time, from 10 s on.
-_DATES = (
-    (1972, 1),
-    (1972, 7),
-    (1973, 1),
-    (1974, 1),
-    (1975, 1),
-    (1976, 1),
-    (1977, 1),
-    (1978, 1),
-    (1979, 1),
-    (1980, 1),
-    (1981, 7),
-    (1982, 7),
-    (1983, 7),
-    (1985, 7),
-    (1988, 1),
-    (1990, 1),
-    (1991, 1),
-    (1992, 7),
-    (1993, 7),
-    (1994, 7),
-    (1996, 1),
-    (1997, 7),
-    (1999, 1),
-    (2006, 1),
-    (2009, 1),
-    (2012, 7),
-    (2015, 7),
-    (2017, 1),
+# The month from which a difference holds; it grew by one second each time, from 10 s on.
+_LEAPS = (
+    "1972-01 1972-07 1973-01 1974-01 1975-01 1976-01 1977-01 1978-01 1979-01 1980-01 1981-07 1982-07 1983-07 1985-07 "
+    "1988-01 1990-01 1991-01 1992-07 1993-07 1994-07 1996-01 1997-07 1999-01 2006-01 2009-01 2012-07 2015-07 2017-01"
 )
-_DAYS = tuple(date(year, month, 1).toordinal() - _MJD_OF_ORDINAL for year, month in _DATES)
+_DAYS = tuple(date.fromisoformat(f"{month}-01").toordinal() - _MJD_OF_ORDINAL for month in _LEAPS.split())
 FIRST_DAY = _DAYS[0]  # before it UTC ran at another rate than TAI
 
 # What TAI is ahead. GPS: IS-GPS-200, 20.3.3.5.2.4, 19 leap seconds at its epoch. TT: IAU 1991, Recommendation IV.
