@@ -8,12 +8,11 @@ import numpy as np
 from bisar_budget.design.row_uses import SpecifiedMission
 from bisar_budget.design.specified import Specified
 from bisar_budget.effects.oscillators import noise_of
-from bisar_budget.effects.spectra import PowerLawPiece
+from bisar_budget.effects.spectra import PowerLawPiece, density
 from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.instruments import Oscillator
 from bisar_budget.mission.load import folder_of
 from bisar_budget.mission.parts import Entry, OscillatorPart, PartError, entries, folders
-from bisar_budget.ranges.exact_ranges import Floats
 from bisar_budget.units import format_quantity
 
 _OFFSETS = (1.0, 10.0, 100.0, 1e3)  # at which the phase noise of an ordered level is said [Hz]
@@ -52,14 +51,14 @@ def _quiet_oscillators(of: SpecifiedMission, name: str, level: float, among: Seq
     last = max(piece.high for piece in pieces)
     first = min([_SLOW / aperture, *(piece.low for piece in pieces if piece.low)])
     offsets = np.geomspace(first, last * (1 - 1e-9), 1 + math.ceil(_PER_DECADE * math.log10(last / first)))
-    most = _density(pieces, offsets) * 10 ** (level / 10) * _SAME
+    most = density(pieces, offsets) * 10 ** (level / 10) * _SAME
     for entry in among:
         part = entry.part
         if not isinstance(part, OscillatorPart):
             continue
         alone = Oscillator(part.frequency, part.phase_noise, part.allan_deviation, part.power_law)
-        density = _density(noise_of(alone, carrier, aperture).pieces, offsets)
-        if np.all((density > 0) & (density <= most)):
+        noise = density(noise_of(alone, carrier, aperture).pieces, offsets)
+        if np.all((noise > 0) & (noise <= most)):
             yield entry.id
 
 
@@ -69,11 +68,9 @@ def ordered_noise(of: SpecifiedMission, one: Specified, level: float) -> str:
     if below != ["oscillator", "level"]:
         return ""
     carrier, pieces = _spectrum(of, name)
-    densities = zip(_OFFSETS, _density(pieces, np.array(_OFFSETS)).tolist(), strict=True)
+    found = zip(_OFFSETS, density(pieces, np.array(_OFFSETS)).tolist(), strict=True)
     points = [
-        f"{10 * math.log10(density / 2) + level:.1f} dBc/Hz at {offset:g} Hz"
-        for offset, density in densities
-        if density > 0
+        f"{10 * math.log10(size / 2) + level:.1f} dBc/Hz at {offset:g} Hz" for offset, size in found if size > 0
     ]
     return f"{', '.join(points)} from {format_quantity(carrier, 'Hz', 4)}" if points else ""
 
@@ -83,11 +80,3 @@ def _spectrum(of: SpecifiedMission, name: str) -> tuple[float, Sequence[PowerLaw
     oscillator = getattr(of.stated.platforms, name).oscillator
     carrier = oscillator.frequency or of.stated.radar.center_frequency
     return carrier, noise_of(oscillator.noise_alone, carrier, of.stated.collection.aperture_time).pieces
-
-
-def _density(pieces: Sequence[PowerLawPiece], offsets: Floats) -> Floats:
-    """One-sided density at offsets; 0 where the spectrum says nothing. [rad²/Hz]"""
-    found = np.zeros_like(offsets)
-    for one in pieces:
-        found += np.where((one.low <= offsets) & (offsets < one.high), one.density * offsets**-one.slope, 0.0)
-    return found

@@ -132,6 +132,15 @@ class PowerLawPiece(NamedTuple):
         return float(self.density * (high**exponent - (low**exponent if low else 0.0)) / exponent)
 
 
+def density(pieces: Sequence[PowerLawPiece], frequency: Floats) -> Floats:
+    """Density of a spectrum at frequencies, (n,) in Hz; 0 where no piece is."""
+    found = np.zeros(frequency.size)
+    for piece in pieces:
+        inside = (frequency >= piece.low) & (frequency < piece.high)
+        found[inside] += piece.density * frequency[inside] ** -piece.slope
+    return found
+
+
 def parts(pieces: Sequence[PowerLawPiece], aperture_time: Any, above: Any = 0.0) -> Parts:
     """Integrate a spectrum with the parts of a tone, to 1e-4.
 

@@ -25,7 +25,7 @@ from bisar_budget.effects.oscillator_acceleration import (
 from bisar_budget.effects.oscillators import noise_of
 from bisar_budget.effects.random_effect import RandomError
 from bisar_budget.effects.random_errors import random_errors
-from bisar_budget.effects.spectra import PowerLawPiece
+from bisar_budget.effects.spectra import PowerLawPiece, density
 from bisar_budget.effects.vibration import SLOWEST, counted
 from bisar_budget.effects.vibration_spectra import pieces_of_vibration
 from bisar_budget.geometry import PlatformState
@@ -464,11 +464,7 @@ class _Tones:
     @staticmethod
     def _size(pieces: tuple[PowerLawPiece, ...], frequency: Floats, width: Floats) -> Floats:
         """Sigma of what a tone has of cosine, and of sine: √(S·Δf)."""
-        density = np.zeros(frequency.size)
-        for piece in pieces:
-            inside = (frequency >= piece.low) & (frequency < piece.high)
-            density[inside] += piece.density * frequency[inside] ** -piece.slope
-        found: Floats = np.sqrt(density * width)
+        found: Floats = np.sqrt(density(pieces, frequency) * width)
         return found
 
     def draw(self, rng: np.random.Generator) -> _Drawn:
