@@ -2,7 +2,7 @@
 
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext, suppress
 from functools import partial
 from io import StringIO
 from time import monotonic, perf_counter
@@ -12,7 +12,7 @@ import click
 
 from bisar_budget.cli.streams import complain
 from bisar_budget.constants import MAX_DRAWS, MAX_DRAWS_HERE
-from bisar_budget.faults import printable
+from bisar_budget.faults import ClusterError, printable
 
 if TYPE_CHECKING:
     from bisar_budget.budget.check import Draws
@@ -138,6 +138,8 @@ def kept(asked: "Asked", output: str, jobs: int, workers: "Workers | None", *, i
                     progress(done, count)
             yield asked.swept(folder.parts(chunks.starts))
         except BaseException:
+            with suppress(ClusterError, OSError):
+                folder.find(chunks, True)  # Ctrl-C may come between a part's rename and its note
             dated = f" --date {question['--date was']}" if question["--date was"] else ""
             complain(f"{folder.path} keeps {said()}; the same command with --resume{dated} goes on from there.")
             raise

@@ -111,6 +111,8 @@ class PartsFolder:
                     "or remove the folder"
                 )
             start = int(name[5:17])
+            if start in self.done:
+                continue
             if not os.path.isfile(self._file(start)):  # a pipe would be waited for, and a device never ends
                 continue
             with suppress(

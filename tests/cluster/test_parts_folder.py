@@ -192,6 +192,24 @@ def test_a_sweep_goes_on_with_what_is_not_done(run, ended, monkeypatch: pytest.M
     assert not os.path.exists(f"{output}.parts")
 
 
+def test_a_part_that_was_just_written_when_ctrl_c_came_is_kept_and_counted(run, tmp_path, monkeypatch) -> None:
+    """The folder had one part more than was said."""
+    output = tmp_path / "t.csv"
+    replace = os.replace
+
+    def ended(source: str, target: str) -> None:
+        replace(source, target)
+        if target.endswith("8192.parquet"):
+            raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr(os, "replace", ended)
+        found = run("sweep", SECTION_V, *ASKED, "-o", str(output), "--resume")
+    assert found.exit_code == 130
+    assert f"{output}.parts keeps 2 of 3 parts; " in found.stderr
+    assert len(os.listdir(f"{output}.parts")) == 2
+
+
 def test_two_commands_do_not_share_a_folder(run, ended) -> None:
     """Each would write the parts of the other, and the first that ends takes them away."""
     fcntl = pytest.importorskip("fcntl", reason="Windows has no such locks")

@@ -6,7 +6,7 @@ import socket
 import subprocess
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from datetime import date
 from pathlib import Path
 from types import SimpleNamespace
@@ -19,9 +19,11 @@ pytest.importorskip("distributed")
 pytest.importorskip("pyarrow")
 
 from bisar_budget import __version__
-from bisar_budget.cli import cli
+from bisar_budget.cli import cli, long_work
+from bisar_budget.cli.streams import complain
 from bisar_budget.cluster import scheduler
 from bisar_budget.cluster.scheduler import UnlikeWorkerError, Workers
+from bisar_budget.design import sweep
 from bisar_budget.design.cases import grid
 from bisar_budget.design.sweep import Asked, Chunks, part_of
 from bisar_budget.faults import ClusterError
@@ -36,26 +38,43 @@ SECTION_V, ORBIT = (
     for name in ("rigling_moses_section_v", "sentinel1_elements_besancon")
 )
 HEIGHT, TIME = "scene.height", "collection.aperture_time"
-# The place of the scene decides the path of a satellite: each case is read, and a part takes a tenth of a second.
-# Twice as many parts as are given out at once: of a command that was held up while its workers went on, half is left.
+# The place of the scene decides the path of a satellite: each case is read, and a part takes some hundredths of a
+# second. Twice as many parts as are given out at once: of a command that was held up while its workers went on, half
+# is left.
 ASKED = (
-    *("sweep", ORBIT, "--vary", f"{HEIGHT}=350:420m:128", "--vary", f"{TIME}=0.4:0.6s:32"),
+    *("sweep", ORBIT, "--vary", f"{HEIGHT}=350:420m:16", "--vary", f"{TIME}=0.4:0.6s:32"),
     *("--column", "transmitter.velocity.radial.allowable", "--date", "2026-01-01"),
 )
-PARTS = 64
+CASES, PARTS = 8, 64  # in a part, and parts
+# The command with such parts, that looks soon who works and waits shortly for what a lost worker had.
+IMPATIENT = f"""
+from bisar_budget.cli import main
+from bisar_budget.cluster import scheduler
+from bisar_budget.design import sweep
+sweep._FEW, scheduler._LOOK, scheduler._FETCH = {CASES}, 0.5, 2.0
+main()
+"""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def small_parts() -> Iterator[None]:
+    """Parts of commands in this process too."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(sweep, "_FEW", CASES)
+        yield
 
 
 @pytest.fixture(scope="module")
-def expected(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+def expected(small_parts: None, tmp_path_factory: pytest.TempPathFactory) -> bytes:
     """The table without a scheduler."""
     output = tmp_path_factory.mktemp("expected") / "t.csv"
     assert CliRunner(**APART).invoke(cli, [*ASKED, "-o", str(output), "--jobs", "1"]).exit_code == 0
     return output.read_bytes()
 
 
-def command(*arguments: str) -> "subprocess.Popen[bytes]":
-    line = [sys.executable, "-m", "bisar_budget", *ASKED, *arguments]
-    return subprocess.Popen(line, cwd=ROOT, stderr=subprocess.PIPE, preexec_fn=heed_signals)
+def command(*arguments: str, **options: Any) -> "subprocess.Popen[bytes]":
+    line = [sys.executable, "-c", IMPATIENT, *ASKED, *arguments]
+    return subprocess.Popen(line, cwd=ROOT, stderr=subprocess.PIPE, preexec_fn=heed_signals, **options)
 
 
 def kept(output: Path) -> int:
@@ -117,18 +136,16 @@ def test_what_is_done_when_a_sweep_is_ended_is_not_done_again(
 
 def test_processes_of_its_own(run, tmp_path: Path) -> None:
     """Of a grid in NetCDF, whose parts are not whole rows of it. Ctrl-C, which they get too, is not their affair."""
-    asked = [text.replace(":128", ":48") for text in ASKED]
-    assert run(*asked, "-o", str(tmp_path / "a.nc")).exit_code == 0
-    line = [sys.executable, "-m", "bisar_budget", *asked, "-o", str(tmp_path / "b.nc"), "--scheduler", "local:1"]
-    options: dict[str, Any] = {"cwd": ROOT, "stderr": subprocess.PIPE, "preexec_fn": heed_signals}
-    with subprocess.Popen(line, start_new_session=True, **options) as process:
+    assert run(*ASKED, "-o", str(tmp_path / "a.nc"), "--jobs", "1").exit_code == 0
+    arguments = ("-o", str(tmp_path / "b.nc"), "--scheduler", "local:1")
+    with command(*arguments, start_new_session=True) as process:
         wait_until(lambda: kept(tmp_path / "b.nc") >= 2)
         os.killpg(process.pid, signal.SIGINT)
         code, said = ended(process)
     assert code == 130
     assert len(said.strip().splitlines()) == 1
     assert "parts; the same command with --resume goes on from there." in said
-    with subprocess.Popen([*line, "--resume"], **options) as process:
+    with command(*arguments, "--resume") as process:
         code, said = ended(process)
     assert code == 0
     assert len(said.splitlines()) == 2
@@ -321,13 +338,16 @@ def test_a_scheduler_without_workers_is_given_up(run, tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_worker_that_comes_in_time_does_the_work(expected: bytes, run, tmp_path: Path) -> None:
+def test_a_worker_that_comes_in_time_does_the_work(
+    expected: bytes, run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     from distributed import LocalCluster
 
     output = tmp_path / "t.csv"
     with LocalCluster(n_workers=0, processes=False, dashboard_address="127.0.0.1:0", protocol="tcp") as empty:
-        later = threading.Timer(2, empty.scale, (1,))
-        later.start()
+        later = threading.Timer(0.5, empty.scale, (1,))
+        # It is started when the command says that it waits.
+        monkeypatch.setattr(long_work, "complain", lambda text: (complain(text), later.start()))
         found = run(*ASKED, "-o", str(output), "--scheduler", empty.scheduler_address)
         later.join()
     assert found.exit_code == 0, found.stderr
@@ -343,10 +363,9 @@ def test_workers_that_all_went_away_are_given_up(cluster: Cluster, tmp_path: Pat
         for worker in cluster.workers:
             worker.kill()
         code, said = ended(process)
-    lost = len(cluster.workers)
-    cluster.workers.clear()
-    for _ in range(lost):
-        cluster.replace_worker()
+    there = cluster.joined()
+    cluster.workers[:] = [cluster.start_worker() for _ in cluster.workers]
+    wait_until(lambda: cluster.joined() == there + len(cluster.workers))
     done = kept(output)
     assert code == 2
     assert 2 <= done < PARTS
