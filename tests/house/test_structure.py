@@ -4,6 +4,7 @@ import ast
 import subprocess
 import sys
 from collections import defaultdict
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -45,9 +46,15 @@ def floor(name: str) -> int:
     return next(index for index, rooms in enumerate(FLOORS) if name in rooms)
 
 
+@cache
+def parsed(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+@cache
 def imports(path: Path) -> set[str]:
     found: set[str] = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in ast.walk(parsed(path)):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
@@ -74,7 +81,7 @@ def test_imports_go_down(path: Path) -> None:
 
 def door(name: str) -> set[str]:
     """What a room lets others use: names of its modules, or, of `report`, what its `__init__` defines."""
-    tree = ast.parse((PACKAGE / name / "__init__.py").read_text(encoding="utf-8"))
+    tree = parsed(PACKAGE / name / "__init__.py")
     (named,) = [
         node.value
         for node in tree.body
@@ -106,7 +113,7 @@ def test_only_theory_imports_sympy(path: Path) -> None:
 def test_only_the_command_prints(path: Path) -> None:
     if room(module_name(path)) == "cli":
         return
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in ast.walk(parsed(path)):
         assert not (isinstance(node, ast.Call) and getattr(node.func, "id", "") == "print")
 
 
@@ -156,7 +163,7 @@ def test_no_name_has_two_meanings() -> None:
     """A class has its name alone, and so has a module, but those that stand beside another by design."""
     classes, modules = defaultdict(list), defaultdict(list)
     for path in MODULES:
-        tree = ast.parse(path.read_text(encoding="utf-8"))
+        tree = parsed(path)
         names = {node.name for node in ast.walk(tree) if isinstance(node, ast.ClassDef)}
         for name in names:
             classes[name].append(room(module_name(path)))
