@@ -41,8 +41,8 @@ def with_section(text: str, name: str, values: Mapping[str, str]) -> str:
     if there is None:
         end = root.end_mark.index
         if root.flow_style:
-            inside = text[: end - 1].rstrip().removesuffix(",")
-            text = f"{inside}, {inline}{text[end - 1 :]}"
+            last = root.value[-1][1].end_mark.index  # a remark may stand behind it
+            text = f"{text[:last]}, {inline}{text[last:]}"
         else:
             inside = _without_comments(text[:end])
             text = f"{inside}\n{lines}{text[len(inside) :] or chr(10)}"

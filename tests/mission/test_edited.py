@@ -75,7 +75,7 @@ def test_one_value(text: str, key: str, edited: str) -> None:
         ("a: 1\ns:\n  d: 1\n", "a: 1\ns:\n  a.b: 1 m\n  c: 2\n"),
         ("{a: 1, s: {d: 1}}\n", "{a: 1, s: {a.b: 1 m, c: 2}}\n"),
         ("{a: 1}\n", "{a: 1, s: {a.b: 1 m, c: 2}}\n"),
-        ("{\n  a: 1,\n}\n", "{\n  a: 1, s: {a.b: 1 m, c: 2}}\n"),
+        ("{\n  a: 1, # so\n}\n", "{\n  a: 1, s: {a.b: 1 m, c: 2}, # so\n}\n"),
         ("a: 1\r\nb: 2\r\n", "a: 1\r\nb: 2\r\ns:\r\n  a.b: 1 m\r\n  c: 2\r\n"),
     ],
 )
