@@ -1,4 +1,4 @@
-"""What rows of the budget use with errors of given sizes, and what each error adds to a row near sizes. SI, radians.
+"""Rows of the budget with errors of given sizes: how much each uses, and what each error adds to it. SI, radians.
 
 Each row that can fail is held to what it may use. What an error adds to it is a power of the size: the square where
 errors combine by root-sum-square or powers add, the size itself where they add up.

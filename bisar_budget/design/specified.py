@@ -56,21 +56,16 @@ class Specified(NamedTuple):
         return self.number.key
 
     @property
-    def is_level(self) -> bool:
-        """Whether the number is a level in decibel."""
-        return self.number.dimension in units.LEVELS
-
-    @property
     def nothing(self) -> float:
         """The size that stands for no error."""
-        return float(10 ** (_SILENT_DB / 20)) if self.is_level else 0.0
+        return float(10 ** (_SILENT_DB / 20)) if self.number.is_level else 0.0
 
     @property
     def largest(self) -> float:
         """The largest size that a mission file may state."""
         _, _, less, most = self.number.reader.bounds
-        bound = min(less, most) * (1 - 1e-9) if not self.is_level else min(less, most)
-        return float(10 ** (bound / 20)) if self.is_level and bound < math.inf else bound
+        bound = min(less, most) * (1 - 1e-9) if not self.number.is_level else min(less, most)
+        return float(10 ** (bound / 20)) if self.number.is_level and bound < math.inf else bound
 
     @property
     def tiny(self) -> float:
@@ -79,7 +74,7 @@ class Specified(NamedTuple):
 
     def numbers(self, sizes: Floats) -> Floats:
         """Numbers of the file for sizes: themselves, or levels of amplitudes."""
-        if not self.is_level:
+        if not self.number.is_level:
             return sizes
         with np.errstate(divide="ignore"):
             found: Floats = np.maximum(20 * np.log10(sizes), _SILENT_DB)

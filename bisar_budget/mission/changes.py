@@ -283,13 +283,11 @@ def name_of_error(key: str) -> str:
     return ".".join(part for part in parts_of(key) if part not in ("platforms", "motion_error"))
 
 
-def report_specified(tree: Tree, *section: str) -> None:
-    """Say of a section that names errors, such as `allocation.specify`, which of its keys are none."""
-    given = tree.root
-    for name in section:
-        given = given[name]
+def report_specified(tree: Tree) -> None:
+    """Say of `allocation.specify` which of its keys are no errors."""
+    given = tree.root["allocation"]["specify"]
     for place, key in enumerate(given):
-        path = (*section, key if isinstance(given, dict) else place)
+        path = ("allocation", "specify", key if isinstance(given, dict) else place)
         if ".".join(_names(key)) not in all_keys():
             near = nearest_keys(key)
             tree.report(path, Problem("names no key of a mission file", ACCEPTED_ERRORS, near, is_of_key=True))

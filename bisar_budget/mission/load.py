@@ -115,7 +115,7 @@ def mission_of(
         if mission is not INVALID and mission.allocation.specify:
             from bisar_budget.mission.changes import report_specified
 
-            report_specified(tree, "allocation", "specify")
+            report_specified(tree)
         if mission is not INVALID and mission.specifications:
             from bisar_budget.mission.quantities import with_specifications
 

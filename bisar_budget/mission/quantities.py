@@ -11,7 +11,14 @@ import numpy as np
 
 from bisar_budget import units
 from bisar_budget.faults import InvalidValueError, Problem, fault_words, shown
-from bisar_budget.mission.changes import apply_changes, nearest_keys, next_name, parts_of, report_specified
+from bisar_budget.mission.changes import (
+    ACCEPTED_ERRORS,
+    apply_changes,
+    is_error,
+    nearest_keys,
+    next_name,
+    parts_of,
+)
 from bisar_budget.mission.covariance import KINDS, Covariance, error_index
 from bisar_budget.mission.instruments import Imu, LeverArm, PowerLaw
 from bisar_budget.mission.model import MISSION, Mission, Simulation
@@ -376,13 +383,12 @@ def _element(covariance: Covariance, parts: Sequence[str]) -> Any:
 # ---------------------------------------------------------------- sizes that errors are held to
 def with_specifications(mission: Mission, tree: Tree) -> Mission:
     """Read the sizes of `specifications`, each as the number of its key; what is wrong is a fault of the tree."""
-    faults = len(tree.faults)
-    report_specified(tree, "specifications")
-    if len(tree.faults) > faults:
-        return mission
     read = {}
     for key, text in mission.specifications.items():
         path = ("specifications", key)
+        if not is_error(key):
+            tree.report(path, Problem("names no error that can be specified", ACCEPTED_ERRORS, is_of_key=True))
+            continue
         try:
             number = number_of(tree.root, key, is_for_each=True)
         except QuestionError as error:

@@ -8,7 +8,7 @@ library would, in a fifth of the import time: `check` starts in every commit of 
 
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sized
 from typing import Any, NamedTuple
 
 from bisar_budget import units
@@ -330,6 +330,19 @@ class Day(Reader):
         return {"type": "string", "format": "date"}
 
 
+def _is_few(
+    value: Any, kind: type[Sized] | tuple[type[Sized], ...], else_said: str, path: KeyPath, report: Report
+) -> bool:
+    """Whether a value is of a kind, and has no more entries than there can be ids; says what is wrong if not."""
+    if not isinstance(value, kind):
+        report(path, Problem(else_said))
+        return False
+    if len(value) > _MAX_IDS:
+        report(path, Problem(f"must have at most {_MAX_IDS} entries, has {len(value)}"))
+        return False
+    return True
+
+
 class TextMap(Reader):
     """A mapping of any key to text; `of` says what the keys are."""
 
@@ -338,11 +351,7 @@ class TextMap(Reader):
 
     def read(self, value: Any, path: KeyPath, report: Report) -> Any:
         """Read each value at its own place."""
-        if not isinstance(value, dict):
-            report(path, Problem("must be a mapping of keys to values"))
-            return INVALID
-        if len(value) > _MAX_IDS:
-            report(path, Problem(f"must have at most {_MAX_IDS} entries, has {len(value)}"))
+        if not _is_few(value, dict, "must be a mapping of keys to values", path, report):
             return INVALID
         result = {key: _read(Text(), text, (*path, key), report) for key, text in value.items()}
         return INVALID if any(text is INVALID for text in result.values()) else result
@@ -357,11 +366,7 @@ class SizeMap(Reader):
 
     def read(self, value: Any, path: KeyPath, report: Report) -> Any:
         """Hold each size to be one value."""
-        if not isinstance(value, dict):
-            report(path, Problem("must be a mapping of keys of errors to sizes"))
-            return INVALID
-        if len(value) > _MAX_IDS:
-            report(path, Problem(f"must have at most {_MAX_IDS} entries, has {len(value)}"))
+        if not _is_few(value, dict, "must be a mapping of keys of errors to sizes", path, report):
             return INVALID
         many = [key for key, size in value.items() if isinstance(size, dict | list)]
         for key in many:
@@ -382,11 +387,7 @@ class Weights(Reader):
 
     def read(self, value: Any, path: KeyPath, report: Report) -> Any:
         """Read each key and weight at its own place."""
-        if not isinstance(value, dict | list):
-            report(path, Problem("must be keys with their weights, or a list of keys"))
-            return INVALID
-        if len(value) > _MAX_IDS:
-            report(path, Problem(f"must have at most {_MAX_IDS} entries, has {len(value)}"))
+        if not _is_few(value, (dict, list), "must be keys with their weights, or a list of keys", path, report):
             return INVALID
         if isinstance(value, list):
             names = [_read(Text(), name, (*path, place), report) for place, name in enumerate(value)]

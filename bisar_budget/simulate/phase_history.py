@@ -190,7 +190,7 @@ class Flight:
     def record(
         self, scatterers: Floats, amplitudes: Complexes, slow_time: Floats, frequency: Floats, **noise: Any
     ) -> "PhaseHistory":
-        """What the receiver records of scatterers: `phase_history` at these slow times."""
+        """The phase history of scatterers as the receiver records it at these slow times: `phase_history`."""
         return phase_history(
             scatterers,
             amplitudes,

@@ -42,7 +42,7 @@ def row_of(findings: MissionFindings, name: str) -> Row:
     [("4.999999 mm/s", "pass"), ("5 mm/s", "pass"), ("5.000001 mm/s", "fail"), ("[-6 mm/s, 0 m/s, 0 m/s]", "fail")],
 )
 def test_all_of_it_may_be_used_and_no_more(declared: str, status: str) -> None:
-    """Of three axes the largest counts, whatever its sign."""
+    """The largest of three axes counts, whatever its sign."""
     changes = {"platforms__receiver__motion_error": f"{{velocity: {declared}}}"}
     row = row_of(found(f"{{{VELOCITY}: 5 mm/s}}", **changes), "receiver.velocity")
     assert row.status == status
@@ -77,6 +77,22 @@ def test_levels_are_compared_in_decibel(level: str, status: str) -> None:
     )
     assert row.status == status
     assert row.utilization == pytest.approx(10 ** ((float(level.split()[0]) - 2) / 20))
+
+
+@pytest.mark.parametrize(
+    ("figure", "name", "size", "status"),
+    [
+        ("{power_law: {h-1: 1e-24}}", "power_law.h-1", "1e-24", "pass"),
+        ("{power_law: {h-1: 1e-24}}", "power_law.h-1", "9.9e-25", "fail"),
+        (MASK.replace("LEVEL", "0 dB"), "phase_noise.1 Hz", "-110 dBc/Hz", "pass"),
+        (MASK.replace("LEVEL", "0 dB"), "phase_noise.1 Hz", "-110.1 dBc/Hz", "fail"),
+    ],
+)
+def test_points_of_a_spectrum_are_held_too(figure: str, name: str, size: str, status: str) -> None:
+    """They are keys that `allocate` takes, and writes."""
+    key = f"platforms.receiver.oscillator.{name}"
+    findings = found(f"{{{key}: {size}}}", platforms__receiver__oscillator=figure)
+    assert row_of(findings, f"receiver.oscillator.{name}").status == status
 
 
 def test_a_spectrum_without_a_level_has_0_db() -> None:
@@ -129,7 +145,7 @@ def test_many_cases_at_once_are_those_of_each() -> None:
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ("{platforms.receiver.motion_error.velcity: 1 mm/s}", "names no key of a mission file"),
+        ("{platforms.receiver.motion_error.velcity: 1 mm/s}", "'velcity' is not a known key"),
         ("{collection.aperture_time: 1 s}", "names no error that can be specified"),
         (f"{{{VELOCITY}: 3 m}}", "must be a speed"),
         (f"{{{VELOCITY}: 0 m/s}}", "must be greater than 0"),
