@@ -9,6 +9,7 @@ from bisar_budget import units
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.faults import Changed, KeyPath, Place, Problem, SetValue, shown
 from bisar_budget.geometry import BistaticGeometry
+from bisar_budget.mission.earth_orientation import EARTH_ORIENTATION, EarthOrientation
 from bisar_budget.mission.instruments import SYNCHRONIZATION, Synchronization
 from bisar_budget.mission.platforms import INSTANT, CommonMotionError, Platforms, without_image
 from bisar_budget.mission.propagation import PROPAGATION, Propagation, too_low
@@ -374,6 +375,9 @@ class Mission(NamedTuple):
     platforms: Annotated[Platforms, Key(Section(Platforms))]
     document: Annotated[Document, Key(Section(Document), "Number, issue and author, for the reports.")] = Document()
     scene: Annotated[Scene, Key(Section(Scene))] = Scene()
+    earth_orientation: Annotated[
+        EarthOrientation | None, Key(EARTH_ORIENTATION, "How the Earth is turned, for orbits in axes of the stars.")
+    ] = None
     common_motion_error: Annotated[
         CommonMotionError | None, Key(Section(CommonMotionError), "The same for both platforms.")
     ] = None

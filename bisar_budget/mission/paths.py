@@ -27,8 +27,7 @@ from bisar_budget.mission.platforms import (
 from bisar_budget.mission.propagation import too_low
 from bisar_budget.mission.readers import INVALID, Report
 from bisar_budget.paths import earth
-from bisar_budget.paths.elements import read_omm, read_tle
-from bisar_budget.paths.ephemeris import read_oem
+from bisar_budget.paths.eof import read_eof
 from bisar_budget.paths.flight import (
     Fitted,
     Log,
@@ -41,24 +40,24 @@ from bisar_budget.paths.flight import (
 )
 from bisar_budget.paths.flight_log import hold_to_motion, read_csv
 from bisar_budget.paths.instant import Instant
-from bisar_budget.paths.messages import decoded
+from bisar_budget.paths.oem import read_oem
+from bisar_budget.paths.omm import read_omm
+from bisar_budget.paths.orientation import UNKNOWN, Orientation, read_finals
 from bisar_budget.paths.sbet import read_accuracy, read_sbet
+from bisar_budget.paths.sp3 import read_sp3
+from bisar_budget.paths.tle import read_tle
 from bisar_budget.resources import DISK, Files, UnreadableError
 from bisar_budget.units import format_quantity
 
 Beside = Callable[[str], bytes]  # content of a file that a mission names
 
-_FILES = ("tle", "omm", "oem", "file", "accuracy")  # keys of a path that name one
+_ORBITS = {"tle": read_tle, "omm": read_omm, "oem": read_oem, "eof": read_eof, "sp3": read_sp3}
+_FILES = (*_ORBITS, "file", "accuracy")  # keys of a path that name one
 _MOST_BYTES = 500_000_000
 _LOGS_KEPT = 2  # of a mission that is read again and again, such as by `solve`
 _logs: dict[tuple[object, ...], Log] = {}  # by what they were read from; the bytes themselves are let go
 _PATHS_KEPT = 256  # of cases that a sweep reads: where nothing that a path follows from changes
 _paths: dict[tuple[object, ...], FlownPath] = {}  # by what they follow from
-_ORBITS = {
-    "tle": lambda data, name, *of: read_tle(decoded(data, name), name, *of),
-    "omm": read_omm,
-    "oem": read_oem,
-}
 _FARTHEST_M = 4.1e8  # of a satellite from the Earth's centre
 _LOST = 0.1  # of the slant range: a satellite that may be farther off leaves nothing of the geometry
 _NOISE_M = 1.0  # residual of a log that is doubted where the file declares no position error; as of an ephemeris
@@ -110,6 +109,13 @@ def report_files(root: Any, read: Beside, report: Report) -> None:
                     read(file)
                 except PathFileError as error:
                     report(("platforms", name, key, form), _of_file(file, error))
+    stated = root.get("earth_orientation")
+    file = stated.get("file") if isinstance(stated, dict) else None
+    if isinstance(file, str):
+        try:
+            read(file)
+        except PathFileError as error:
+            report(("earth_orientation", "file"), _of_file(file, error))
 
 
 def with_paths(mission: Mission, read: Beside, report: Report) -> Any:
@@ -125,6 +131,9 @@ def with_paths(mission: Mission, read: Beside, report: Report) -> Any:
         Takes what is wrong, and where.
     """
     axes, platforms, is_valid = mission.scene.axes, mission.platforms, True
+    if (wrong := _unusable_orientation(mission, read)) is not None:
+        report(("earth_orientation", "file"), wrong)
+        return INVALID
     for name in platforms._fields:
         platform: Platform = getattr(platforms, name)
         try:
@@ -149,6 +158,20 @@ def with_paths(mission: Mission, read: Beside, report: Report) -> Any:
             report((), problem)
             is_valid = False
     return mission._replace(platforms=platforms) if is_valid else INVALID
+
+
+def _unusable_orientation(mission: Mission, read: Beside) -> Problem | None:
+    """Say what keeps the table of the Earth's orientation from being used, whether a path needs it or not."""
+    stated, center = mission.earth_orientation, mission.collection.center_time
+    if stated is None or stated.file is None:
+        return None
+    if center is None:
+        return Problem("needs an instant", "accepted: collection.center_time")
+    try:
+        _orientation(mission, center, read)
+    except PathFileError as error:
+        return _of_file(stated.file, error)
+    return None
 
 
 def _with_path(mission: Mission, platform: Platform, axes: earth.SceneAxes | None, read: Beside) -> Platform:
@@ -201,18 +224,32 @@ def _of_orbit(mission: Mission, route: OrbitSource, axes: earth.SceneAxes, read:
     form = next(form for form in _ORBITS if getattr(route, form) is not None)
     named = getattr(route, form)
     file = named if isinstance(named, str) else None
+    orientation, table = _orientation(mission, center, read)
     try:
         data = read(file) if file is not None else "\n".join(named).encode()
         digest, T = hashlib.sha256(data).hexdigest(), mission.collection.aperture_time
 
         def found() -> FlownPath:
-            orbit = _ORBITS[form](data, file or "the element set", route.object, center)
-            return _orbit_path(orbit, file, center, axes, T)
+            orbit = _ORBITS[form](data, file or "the element set", route.object, center, orientation)
+            path = _orbit_path(orbit, file, center, axes, T)
+            return path._replace(orientation=table) if orbit.is_turned else path
 
-        path: FlownPath = _kept(_paths, _PATHS_KEPT, (form, file, digest, route.object, center, axes, T), found)
+        key = (form, file, digest, route.object, center, axes, T, orientation, table)
+        path: FlownPath = _kept(_paths, _PATHS_KEPT, key, found)
     except PathFileError as error:
         raise _UnusablePathError(("orbit", form), _of_file(file, error)) from None
     return path._replace(sha256=digest)
+
+
+def _orientation(mission: Mission, center: Instant, read: Beside) -> tuple[Orientation, tuple[str, str] | None]:
+    """How the Earth is turned in the middle of the aperture, and the table that says it with its SHA-256."""
+    stated = mission.earth_orientation
+    if stated is None:
+        return UNKNOWN, None
+    if stated.file is None:
+        return stated.orientation, None
+    data = read(stated.file)  # that it can be read is known, see `with_paths`
+    return read_finals(data, stated.file, center), (stated.file, hashlib.sha256(data).hexdigest())
 
 
 def _kept(kept: dict[tuple[object, ...], Any], most: int, key: tuple[object, ...], made: Callable[[], Any]) -> Any:

@@ -199,7 +199,7 @@ class CommonMotionError(NamedTuple):
 
 # ---------------------------------------------------------------------- where a platform flies
 _FILE = Reference()
-_ORBIT_WAYS = ("tle", "omm", "oem")
+_ORBIT_WAYS = ("tle", "omm", "oem", "eof", "sp3")
 
 
 class _Lines(Reader):
@@ -230,8 +230,10 @@ class OrbitSource(NamedTuple):
             "File of two-line elements, or the two lines; SGP4.",
         ),
     ] = None
-    omm: Annotated[str | None, Key(_FILE, "Orbit mean-elements message, XML, JSON or CSV; SGP4.")] = None
+    omm: Annotated[str | None, Key(_FILE, "Orbit mean-elements message, text, XML, JSON or CSV; SGP4.")] = None
     oem: Annotated[str | None, Key(_FILE, "Orbit ephemeris message, text or XML; interpolated as it says.")] = None
+    eof: Annotated[str | None, Key(_FILE, "Orbit file of a Sentinel, POEORB or RESORB; Hermite.")] = None
+    sp3: Annotated[str | None, Key(_FILE, "Orbits of GNSS or low satellites, SP3-c or SP3-d; object: G05.")] = None
     object: Annotated[str | None, Key(Reference(), "Name or catalogue number, where a file has several.")] = None
 
     @staticmethod
@@ -346,6 +348,7 @@ class FlownPath(NamedTuple):
     doubt_of: str = ""
     is_doubted: bool = False
     accuracy: tuple[str, str] | None = None  # file that states its errors, and its SHA-256
+    orientation: tuple[str, str] | None = None  # table by which it is turned to the Earth, and its SHA-256
 
 
 class Platform(NamedTuple):

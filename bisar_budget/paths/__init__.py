@@ -3,11 +3,15 @@
 # What other rooms may use.
 __all__ = [
     "earth",
-    "elements",
-    "ephemeris",
+    "eof",
     "flight",
     "flight_log",
     "instant",
     "messages",
+    "oem",
+    "omm",
+    "orientation",
     "sbet",
+    "sp3",
+    "tle",
 ]

@@ -58,7 +58,7 @@ class Orbit:
 
     `place` takes an instant and gives Earth-fixed coordinates [m]. `words` says what it is, for reports; `epoch` is
     that of the elements. `doubt` says at an instant how far the truth may be; `doubts` are warnings of it, where it
-    is more than usual, and `remedy` is what makes it less.
+    is more than usual, and `remedy` is what makes it less. An orbit that `is_turned` comes from axes of the stars.
     """
 
     place: Callable[[Instant], Vector]
@@ -68,6 +68,7 @@ class Orbit:
     doubts: Callable[[Instant], Sequence[str]] = lambda _: ()
     doubt: Callable[[Instant], PathDoubt] = lambda _: NO_DOUBT
     remedy: str = ""
+    is_turned: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,9 +5,10 @@ XML is that of others: no reference is followed, no entity is expanded.
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from sys import intern
+from typing import Protocol, TypeVar
 from xml.parsers import expat
 
 from bisar_budget.faults import shown
@@ -34,6 +35,11 @@ def decoded(data: bytes, name: str) -> str:
         raise PathFileError(f"{name}:{line}: is not a text in UTF-8 (byte {data[error.start]:#04x})") from None
 
 
+def is_markup(data: bytes) -> bool:
+    """Whether a file is XML, and not text of keywords."""
+    return data.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] == b"<"
+
+
 def epoch_in(text: str) -> Instant | None:
     """Instant from a calendar date, or a year and its day: CCSDS 301.0-B, ASCII time codes A and B."""
     text = text.strip()
@@ -58,6 +64,62 @@ def number_in(text: object) -> float | None:
     except OverflowError:
         return None
     return value if math.isfinite(value) else None
+
+
+# ---------------------------------------------------------------------- objects
+_LISTED = 10  # objects that an error names
+_LONGEST_LIST = 400  # characters
+
+
+class _Named(Protocol):
+    """An object of a file: how messages call it, and the names that a mission may choose it by."""
+
+    @property
+    def object(self) -> str: ...
+
+    @property
+    def names(self) -> tuple[str, ...]: ...
+
+
+_Candidate = TypeVar("_Candidate", bound=_Named)
+
+
+def object_key(text: str) -> str:
+    """A name or number as it is compared: neither case nor spaces, and a number without its leading zeros."""
+    text = " ".join(text.split()).casefold()
+    return text.lstrip("0") or "0" if text.isdecimal() and text.isascii() else text
+
+
+def one_object(
+    found: Sequence[_Candidate], name: str, wanted: str | None, number: str = "OBJECT_ID"
+) -> Sequence[_Candidate]:
+    """What a file has of the object that is wanted, or of the only one.
+
+    The last of an object's `names` is its own alone; `number` is what messages call it.
+    """
+    if wanted is not None:
+        key = object_key(wanted)
+        ours = [one for one in found if key in one.names]
+        if not ours:
+            raise PathFileError(f"{name}: has no object {shown(wanted)}; it has {_listed(found)}")
+        found = ours
+    count = len({one.names[-1] for one in found})
+    if count > 1:
+        said = "objects" if wanted is None else "objects of that name"
+        by = number if wanted is not None or number == "" else f"name or {number}"
+        raise PathFileError(f"{name}: has {count} {said}: {_listed(found)}; choose one by its {by or 'name'}")
+    return found
+
+
+def _listed(found: Sequence[_Named]) -> str:
+    names = list(dict.fromkeys(one.object for one in found))
+    more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
+    return cut(", ".join(names[:_LISTED])) + more
+
+
+def cut(text: str) -> str:
+    """A list that a message can hold."""
+    return text if len(text) <= _LONGEST_LIST else f"{text[:_LONGEST_LIST]}..."
 
 
 # ---------------------------------------------------------------------- XML
@@ -108,7 +170,9 @@ def parse_markup(data: bytes, name: str) -> MessageElement:
         if count > _MOST or len(open_ones) > _DEEPEST:
             raise here(f"has more than {_MOST} elements, or {_DEEPEST} in each other")
         one = MessageElement(
-            intern(tag.rpartition(":")[2]), parser.CurrentLineNumber, intern(attributes.get("units", ""))
+            intern(tag.rpartition(":")[2]),
+            parser.CurrentLineNumber,
+            intern(attributes.get("units") or attributes.get("unit", "")),  # as CCSDS has it, and ESA
         )
         open_ones[-1].children.append(one)
         open_ones.append(one)

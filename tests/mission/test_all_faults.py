@@ -27,11 +27,11 @@ SECTIONS = {
         "must be a calendar date",
     ),
     "word": ("requirements: {declare: [imus]}", "imus", "requirements.declare[0]", "is not a known choice"),
-    "later": (
-        "earth_orientation: {ut1_minus_utc: 0.1 s}",
+    "half": (
+        "earth_orientation: {polar_motion_x: 0.1 arcsec}",
+        "{polar",
         "earth_orientation",
-        "earth_orientation",
-        "is not computed by this version yet",
+        "lacks ut1_minus_utc",
     ),
 }
 PLATFORM = {

@@ -34,8 +34,6 @@ def faults(**changes: object) -> tuple[Fault, ...]:
 @pytest.mark.parametrize(
     ("changes", "key"),
     [
-        ({"platforms__receiver": {"orbit": {"eof": "a.EOF"}}}, "platforms.receiver.orbit.eof"),
-        ({"platforms__receiver": {"orbit": {"sp3": "a.sp3", "object": "G05"}}}, "platforms.receiver.orbit.sp3"),
         *(
             ({"platforms__receiver": {"trajectory": {"file": "a.csv", key: "1"}}}, f"{OF_RECEIVER}trajectory.{key}")
             for key in ("time_scale", "geoid_separation")
@@ -44,7 +42,6 @@ def faults(**changes: object) -> tuple[Fault, ...]:
             ({"platforms__receiver": {"trajectory": {"file": "a", "format": one}}}, f"{OF_RECEIVER}trajectory.format")
             for one in ("pos", "nmea", "gpx", "ulog")
         ),
-        ({"earth_orientation": {"ut1_minus_utc": "-0.1 s"}}, "earth_orientation"),
     ],
 )  # fmt: skip
 def test_what_is_not_computed_yet_is_one_error_that_says_so(changes: dict[str, object], key: str) -> None:
@@ -65,27 +62,6 @@ def test_the_table_names_sections_of_the_file_and_keys_that_they_do_not_have() -
     by_name = {kind.__name__: kind for kind in kinds}
     for name, keys in LATER.items():
         assert keys.keys().isdisjoint(by_name[name]._fields), name
-
-
-def test_a_key_that_is_to_come_hides_no_other_fault() -> None:
-    found = faults(
-        **{
-            f"{ERROR}velocity": "1 m",
-            f"{ERROR}vibraton": 1,
-            "earth_orientation": {"islr": 1},
-        }
-    )
-    assert sorted(fault.key.rpartition(".")[2] for fault in found) == [
-        "earth_orientation",
-        "velocity",
-        "vibraton",
-    ]
-
-
-def test_a_question_about_one_says_so_too() -> None:
-    mission = parse_mission(mission_text(), "m.yaml")
-    with pytest.raises(QuestionError, match=r"earth_orientation\.ut1_minus_utc: is not computed by this version yet"):
-        number_of(tree_of(mission), "earth_orientation.ut1_minus_utc")
 
 
 @pytest.mark.parametrize(("value", "is_valid"), [("0.999999", False), ("0.5", False), ("1", True), ("1.01", True)])

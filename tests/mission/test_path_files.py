@@ -19,9 +19,10 @@ from bisar_budget.faults import MissionError
 from bisar_budget.geometry import Vector
 from bisar_budget.mission import paths
 from bisar_budget.mission.load import load_mission
-from bisar_budget.paths import earth, elements
-from bisar_budget.paths.ephemeris import read_oem
+from bisar_budget.paths import earth
 from bisar_budget.paths.instant import Instant
+from bisar_budget.paths.oem import read_oem
+from bisar_budget.paths.tle import read_tle
 from bisar_budget.units import format_quantity
 from tests.conftest import TODAY, mission_text
 from tests.paths.flown import flight, geodetic_csv, sbet, smrmsg
@@ -36,7 +37,7 @@ FLIGHT = {"latitude": "48.2 deg", "longitude": "11.1 deg", "altitude": "3 km", "
 
 def overpass(center: Instant) -> earth.Geodetic:
     """A place some 300 km beside the satellite of `TLE`."""
-    below = earth.geodetic(elements.read_tle(TLE, "x", None, center).place(center))
+    below = earth.geodetic(read_tle(TLE.encode(), "x", None, center).place(center))
     return earth.Geodetic(below.latitude, below.longitude + 0.05 / math.cos(below.latitude), 500.0)
 
 
@@ -528,7 +529,7 @@ def test_elements_are_refused_from_a_tenth_of_the_slant_range_on(folder: Path, d
     center = EPOCH.after(days * 86400)
     (folder / "m.yaml").write_text(satellite(center))
     scene = earth.earth_fixed(overpass(center))
-    away = math.dist(elements.read_tle(TLE, "x", None, center).place(center), scene)
+    away = math.dist(read_tle(TLE.encode(), "x", None, center).place(center), scene)
     if 1e3 + 2e3 * days <= away / 10:
         assert load_mission(str(folder / "m.yaml")).platforms.transmitter.path.doubt_m > 6e4
         return

@@ -8,9 +8,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from bisar_budget.paths import messages
-from bisar_budget.paths.elements import read_omm, read_tle
-from bisar_budget.paths.ephemeris import read_oem
 from bisar_budget.paths.flight import PathFileError
+from bisar_budget.paths.oem import read_oem
+from bisar_budget.paths.omm import read_omm
+from bisar_budget.paths.tle import read_tle
 from tests.paths.orbit_files import (
     CENTER,
     CONSTANTS,
@@ -122,10 +123,10 @@ TLES = {
     "two objects": (sets(LINE_1, LINE_2, OTHER), "x: has 2 objects: 39634, 270001; choose one by its name or number"),
 }
 OMMS = {
-    "empty": (b"", "x: is empty; accepted: XML, JSON, CSV with a line of keywords"),
+    "empty": (b"", "x: is empty; accepted: text of keywords, XML, JSON, CSV with a line of keywords"),
     "text": (
         b"No GP data found",
-        "x: is no orbit mean-elements message; accepted: XML, JSON, CSV with a line of keywords",
+        "x: is no orbit mean-elements message; accepted: text of keywords, XML, JSON, CSV with a line of keywords",
     ),
     "without NORAD_CAT_ID": (without("NORAD_CAT_ID"), "x: record 1: has no NORAD_CAT_ID"),
     "without EPOCH": (without("EPOCH"), "x: record 1: has no EPOCH"),
@@ -251,7 +252,7 @@ OEMS = {
 @pytest.mark.parametrize(("text", "said"), TLES.values(), ids=TLES)
 def test_element_sets(text: str, said: str) -> None:
     with pytest.raises(PathFileError) as error:
-        read_tle(text, "x", None, CENTER)
+        read_tle(text.encode(), "x", None, CENTER)
     assert str(error.value) == said
 
 
@@ -273,7 +274,7 @@ def test_ephemeris_messages(data: str | bytes, said: str) -> None:
 def test_apertures_of_any_year_are_refused(center: str) -> None:
     at = instant(center)
     with pytest.raises(PathFileError, match=r"more than a century from the aperture$"):
-        read_tle(TLE, "x", None, at).place(at)
+        read_tle(TLE.encode(), "x", None, at).place(at)
     with pytest.raises(PathFileError, match=r"^x: has no place at "):
         read_oem(OEM.encode(), "x", None, at)
 
@@ -296,9 +297,9 @@ def test_samples_of_another_century_give_no_traceback(kind: str) -> None:
 def test_what_is_too_large_is_not_read(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(messages, "LARGEST_BYTES", 1_000_000)
     text = "#" * 1_000_001
-    for read in (lambda: read_tle(text, "x", None, CENTER), lambda: read_omm(text.encode(), "x", None, CENTER)):
+    for reader in (read_tle, read_omm):
         with pytest.raises(PathFileError, match=r"^x: is larger than 1 MB; keep the objects needed$"):
-            read()
+            reader(text.encode(), "x", None, CENTER)
     with pytest.raises(PathFileError, match=r"^x: is larger than 1 MB; keep the time needed$"):
         read_oem(text.encode(), "x", None, INSIDE)
     monkeypatch.setattr(messages, "_MOST", 1000)
@@ -348,7 +349,7 @@ def test_bytes_that_were_changed_give_an_orbit_or_an_error(
             text = data.decode("utf-8", "replace")
             if mends:
                 text = "\n".join(checked(line) if line[:1] in ("1", "2") else line for line in text.split("\n"))
-            orbit = read_tle(text, "x", wanted, CENTER)
+            orbit = read_tle(text.encode(), "x", wanted, CENTER)
         elif "oem" in form:
             orbit = read_oem(data, "x", wanted, INSIDE)
         else:

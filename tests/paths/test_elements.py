@@ -16,6 +16,8 @@ from bisar_budget.paths import elements
 from bisar_budget.paths.earth import Geodetic, axes_at
 from bisar_budget.paths.flight import Orbit, PathFileError, interpolated
 from bisar_budget.paths.instant import Instant
+from bisar_budget.paths.omm import read_omm
+from bisar_budget.paths.tle import element_sets, read_tle
 from tests.conftest import ROOT
 from tests.paths.orbit_files import (
     CENTER,
@@ -55,11 +57,11 @@ def published() -> dict[int, tuple[str, list[list[float]]]]:
 @pytest.mark.parametrize("number", VERIFIED)
 def test_sgp4_gives_the_published_places(number: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """To 1e-5 m: the last digit that is printed is 1e-5 m, and rounding it moves a place by 0.87e-5 m at most."""
-    monkeypatch.setattr(elements, "from_teme", lambda place, _: place)
+    monkeypatch.setattr(elements, "from_teme", lambda place, *_: place)
     text, rows = published()[number]
-    read = next(elements.element_sets(text, "ver.tle"))
+    read = next(element_sets(text, "ver.tle"))
     exact = elements.teme(read)
-    smooth = elements.read_tle(text, "ver.tle", None, CENTER).place
+    smooth = read_tle(text.encode(), "ver.tle", None, CENTER).place
     assert len(rows) >= 5
     for minutes, *place_km in rows:
         place = [1000 * one for one in place_km]
@@ -88,7 +90,7 @@ def turned_by_ut1(place: Vector, dut1: float) -> np.ndarray:
 def test_skyfield_has_the_satellite_at_the_same_place(hours: float) -> None:
     """Earth-fixed. Skyfield has UT1 of tables; without that difference, 1e-5 m: its rounding of Julian dates."""
     at = EPOCH.after(3600 * hours)
-    place = elements.read_tle(TLE, "s.tle", None, at).place(at)
+    place = read_tle(TLE.encode(), "s.tle", None, at).place(at)
     time = skyfield_time(at)
     theirs = EarthSatellite(LINE_1, LINE_2, None, TIMESCALE).at(time).frame_xyz(itrs).m
     assert np.linalg.norm(theirs - turned_by_ut1(place, time.dut1)) < 1e-5
@@ -125,7 +127,7 @@ def test_skyfield_sees_the_satellite_of_the_example_in_the_same_direction(tau: f
 def test_an_aperture_of_a_second_is_smooth_to_a_micrometre(days: int) -> None:
     """The polynomial of a budget against places that it does not go through; old elements too."""
     center = EPOCH.after(86400 * days + 4321.123456789)
-    orbit = elements.read_tle(TLE, "s.tle", None, center)
+    orbit = read_tle(TLE.encode(), "s.tle", None, center)
     axes = axes_at(Geodetic(0.8, 0.2, 100.0))
 
     def place(tau: float) -> Vector:
@@ -143,7 +145,7 @@ def test_an_aperture_of_a_second_is_smooth_to_a_micrometre(days: int) -> None:
 
 def test_smoothing_stays_within_the_rounding_of_sgp4() -> None:
     """SGP4 solves Kepler's equation to 1e-12 rad; a seventh of that is seen."""
-    exact = elements.teme(next(elements.element_sets(TLE, "s.tle")))
+    exact = elements.teme(next(element_sets(TLE, "s.tle")))
     smooth = elements.smooth(exact)
     for seconds in np.linspace(-3000, 3000, 37):
         at = EPOCH.after(float(seconds) + 0.123)
@@ -162,8 +164,8 @@ MESSAGES = {
 
 @pytest.mark.parametrize("data", MESSAGES.values(), ids=MESSAGES)
 def test_a_message_places_what_its_element_set_does(data: bytes) -> None:
-    orbit = elements.read_omm(data, "s.omm", None, CENTER)
-    lines = elements.read_tle(TLE, "s.tle", None, CENTER)
+    orbit = read_omm(data, "s.omm", None, CENTER)
+    lines = read_tle(TLE.encode(), "s.tle", None, CENTER)
     # 1e-10 of the mean motion's last digit and its conversion: 1e-6 m after a day.
     assert math.dist(orbit.place(CENTER), lines.place(CENTER)) < 1e-5
     assert orbit.words == "orbit mean elements of SENTINEL-1A (39634), epoch 2026-05-31T10:12:13.122Z, SGP4"
@@ -175,7 +177,7 @@ def test_a_message_places_what_its_element_set_does(data: bytes) -> None:
 
 
 def test_an_epoch_may_be_a_day_of_the_year() -> None:
-    orbit = elements.read_omm(omm_json(EPOCH="2026-151T10:12:13.122432Z"), "s.json", None, CENTER)
+    orbit = read_omm(omm_json(EPOCH="2026-151T10:12:13.122432Z"), "s.json", None, CENTER)
     assert orbit.epoch == EPOCH
 
 
@@ -199,7 +201,7 @@ MANY = f"0 SENTINEL-1A\r\n{LINE_1}\r\n{LINE_2}\r\n\r\n# another\r\n0 OBJECT B\r\
 )
 def test_an_object_is_chosen_by_name_or_number(wanted: str, said: str) -> None:
     """T0001 is 270001: T is the 18th letter without I and O, from A for 10 on (Space-Track, alpha-5)."""
-    assert said in elements.read_tle(MANY, "many.tle", wanted, CENTER).words
+    assert said in read_tle(MANY.encode(), "many.tle", wanted, CENTER).words
 
 
 @pytest.mark.parametrize(
@@ -214,12 +216,12 @@ def test_an_object_is_chosen_by_name_or_number(wanted: str, said: str) -> None:
 def test_the_nearest_epoch_is_taken(at: str, epoch: str) -> None:
     days = ("26153.00000000", "26151.42515188", "26154.50000000")
     text = "".join(f"{with_epoch(day)}\n{LINE_2}\n" for day in days)
-    orbit = elements.read_tle(text, "s.tle", None, instant(at))
+    orbit = read_tle(text.encode(), "s.tle", None, instant(at))
     assert orbit.words == f"two-line elements of 39634, epoch {epoch}, SGP4"
 
 
 def orbit_of(text: str) -> Orbit:
-    return elements.read_tle(text, "s.tle", None, CENTER)
+    return read_tle(text.encode(), "s.tle", None, CENTER)
 
 
 def test_old_elements_are_doubted() -> None:
@@ -243,7 +245,7 @@ def test_a_satellite_that_comes_down_has_no_place_afterwards() -> None:
         "1 28872U 05037B   05333.02012661  .25992681  00000-0  24476-3 0  1534",
         "2 28872  96.4736 157.9986 0303955 244.0492 110.6523 16.46015938 10708",
     ]
-    orbit = elements.read_tle("\n".join(lines), "down.tle", None, CENTER)
+    orbit = read_tle("\n".join(lines).encode(), "down.tle", None, CENTER)
     assert orbit.epoch is not None
     assert math.hypot(*orbit.place(orbit.epoch.after(600))) > 6.4e6
     with pytest.raises(PathFileError, match=r"^down\.tle:1: SGP4 has no place of 28872 at .*: it has decayed$"):

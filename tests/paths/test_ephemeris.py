@@ -14,9 +14,10 @@ from skyfield.positionlib import Geocentric
 from bisar_budget.geometry import Vector
 from bisar_budget.paths import elements
 from bisar_budget.paths.earth import Geodetic, axes_at
-from bisar_budget.paths.ephemeris import read_oem
 from bisar_budget.paths.flight import Orbit, PathFileError, interpolated
 from bisar_budget.paths.instant import Instant, has_leap_second, tai, tai_less_utc, utc
+from bisar_budget.paths.oem import read_oem
+from bisar_budget.paths.tle import element_sets, read_tle
 from tests.conftest import ROOT
 from tests.paths.orbit_files import CENTER, RADIUS, START, TLE, TURN_RATE, instant, oem, oem_xml, on_circle
 from tests.paths.test_elements import skyfield_time, turned_by_ut1
@@ -189,7 +190,7 @@ def test_axes_of_the_stars_turn_as_skyfield_has_them(frame: str) -> None:
 
 
 def test_teme_turns_as_that_of_elements() -> None:
-    exact = elements.smooth(elements.teme(next(elements.element_sets(TLE, "s.tle"))))
+    exact = elements.smooth(elements.teme(next(element_sets(TLE, "s.tle"))))
 
     def path(time: float) -> tuple[Vector, Vector]:
         place, before, after = (exact(CENTER.after(time - 300 + off)) for off in (0.0, -0.05, 0.05))
@@ -197,7 +198,7 @@ def test_teme_turns_as_that_of_elements() -> None:
         return place, velocity  # type: ignore[return-value]
 
     text = oem(frame="TEME", path=path, step=30.0, times=lambda time: CENTER.after(time - 300))
-    theirs = elements.read_tle(TLE, "s.tle", None, CENTER).place(CENTER.after(7.0))
+    theirs = read_tle(TLE.encode(), "s.tle", None, CENTER).place(CENTER.after(7.0))
     # Velocities are differences of places rounded to 1e-7 m.
     assert math.dist(read(text, CENTER).place(CENTER.after(7.0)), theirs) < 1e-4
 
@@ -306,7 +307,7 @@ def test_without_pyerfa_an_error_says_what_to_install(monkeypatch: pytest.Monkey
 def test_only_axes_of_the_stars_need_pyerfa(frame: str, loaded: str) -> None:
     code = f"""
 import sys
-from bisar_budget.paths.ephemeris import read_oem
+from bisar_budget.paths.oem import read_oem
 from bisar_budget.paths.instant import Instant
 center = Instant({START.day}, {START.seconds + 600})
 read_oem({oem(frame=frame).encode()!r}, "c.oem", None, center).place(center)

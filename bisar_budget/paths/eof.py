@@ -1,0 +1,159 @@
+"""Orbit files of the Sentinels (EOF, Earth Explorer File): XML with a state vector every ten seconds.
+
+Source: Sentinels POD service file format specification (GMES-GSEG-EOPG-FS-10-0075), and ESA's Earth Observation
+mission file format standard (PE-TN-ESA-GS-0001). State vectors are of the axes of ITRF, their velocities those over
+the turning ground.
+"""
+
+from collections.abc import Iterator
+from itertools import pairwise
+
+from bisar_budget.faults import shown
+from bisar_budget.paths.ephemeris import APART, OWN_VELOCITY, Interpolation, Segment, orbit_through, velocity_off
+from bisar_budget.paths.flight import Orbit, PathDoubt, PathFileError, Sample
+from bisar_budget.paths.instant import FIRST_DAY, Instant, tai
+from bisar_budget.paths.messages import (
+    LATEST,
+    MessageElement,
+    epoch_in,
+    hold_to_size,
+    is_markup,
+    number_in,
+    object_key,
+    parse_markup,
+)
+from bisar_budget.paths.orientation import UNKNOWN, Orientation
+
+_COORDINATES = (("X", "m"), ("Y", "m"), ("Z", "m"), ("VX", "m/s"), ("VY", "m/s"), ("VZ", "m/s"))
+_SYSTEMS = ("UTC", "TAI")
+_FARTHEST = 1e9  # m, m/s
+_HERMITE = Interpolation(True, 7)
+# Accuracy of position that is required of a type of file: ESA, product news of the Copernicus POD service.
+_ACCURACY = {"AUX_POEORB": 0.05, "AUX_RESORB": 0.10}  # m
+
+
+def read_eof(
+    data: bytes, name: str, wanted: str | None, center: Instant, orientation: Orientation = UNKNOWN
+) -> Orbit:
+    """Orbit from an orbit file of a Sentinel, interpolated after Hermite, degree 7.
+
+    Parameters
+    ----------
+    data : bytes
+        A whole file.
+    name : str
+        What messages call it.
+    wanted : str, optional
+        The satellite, as `Sentinel-1A` or `S1A`; the file has one.
+    center : Instant
+        Middle of the aperture.
+    orientation : Orientation
+        Not needed: the axes are those of the Earth.
+
+    Raises
+    ------
+    PathFileError
+        The file is no such file, is of other axes, or has times that do not rise, or as of `orbit_through`.
+    """
+    hold_to_size(len(data), name, "time")
+    if not is_markup(data):
+        raise PathFileError(f"{name}:1: is not XML, which orbit files of the Sentinels are")
+    top = parse_markup(data, name)
+    files = list(top.all("Earth_Explorer_File"))
+    if not files:
+        raise PathFileError(f"{name}:1: is no Earth Explorer File; accepted: AUX_POEORB, AUX_RESORB and the like")
+    (file, *_) = files
+    frame = _text(file, "Ref_Frame")
+    if frame not in (None, "EARTH_FIXED"):
+        raise PathFileError(f"{name}: Ref_Frame must be EARTH_FIXED (got {shown(str(frame))})")
+    system = _text(file, "Time_Reference") or "UTC"
+    if system not in _SYSTEMS:
+        raise PathFileError(f"{name}: Time_Reference must be UTC or TAI (got {shown(system)})")
+    samples, lines, flawed = _samples(file, system, name)
+    if len(samples) < _HERMITE.nodes:
+        raise PathFileError(f"{name}: has {len(samples)} state vectors, at least {_HERMITE.nodes} are needed")
+    off = velocity_off(samples)
+    if not off <= OWN_VELOCITY:
+        raise PathFileError(
+            f"{name}:{lines[0]}: velocities are {100 * off:.2g} % off what the places do; they must be those"
+            " over the ground"
+        )
+    kind, satellite = _text(file, "File_Type") or "EOF", shown(_text(file, "Mission") or "?")
+    stated = _ACCURACY.get(kind, 0.0)
+    kinds = ", ".join(sorted(set(flawed)))
+    flaws = f"{name}: {len(flawed)} of {len(samples)} state vectors are not of nominal quality: {kinds}"
+    segment = Segment(
+        object=satellite,
+        names=(_short(satellite), object_key(satellite)),
+        samples=samples,
+        first=samples[0].time,
+        last=samples[-1].time,
+        where=f"{name}:{lines[0]}",
+        words=f"{shown(kind)} of {satellite}, {_HERMITE.words}",
+        interpolation=_HERMITE,
+        accuracy=PathDoubt(stated, f"{100 * stated:.2g} cm that {kind} may be off"),
+        remarks=(flaws,) if flawed else (),
+    )
+    return orbit_through([segment], name, wanted, center, orientation)
+
+
+def _short(satellite: str) -> str:
+    """S1A of Sentinel-1A."""
+    return object_key(satellite).replace("sentinel-", "s").replace("sentinel", "s").replace(" ", "")
+
+
+def _text(file: MessageElement, key: str) -> str | None:
+    found = next(file.all(key), None)
+    return None if found is None else found.text.strip()
+
+
+def _samples(file: MessageElement, system: str, name: str) -> tuple[list[Sample], list[int], list[str]]:
+    """State vectors, the lines where each begins, and what is said of those that are not of nominal quality."""
+    samples, lines, flawed = [], [], []
+    for vector in file.all("OSV"):
+        samples.append(_sample(vector, system, name))
+        lines.append(vector.line)
+        quality = next(vector.all("Quality"), None)
+        if quality is not None and quality.text.strip().upper() != "NOMINAL":
+            flawed.append(shown(quality.text.strip()))
+    for (before, after), line in zip(pairwise(samples), lines[1:], strict=True):
+        if after.time.since(before.time) < APART:
+            raise PathFileError(
+                f"{name}:{line}: the time is not after that of the state vector before; times must rise"
+            )
+    return samples, lines, flawed
+
+
+def _sample(vector: MessageElement, system: str, name: str) -> Sample:
+    parts = {one.name: one for one in vector.children}
+    x, y, z, u, v, w = _numbers(vector, parts, name)
+    return Sample(_time(vector, parts, system, name), (x, y, z), (u, v, w))
+
+
+def _numbers(vector: MessageElement, parts: dict[str, MessageElement], name: str) -> Iterator[float]:
+    for key, unit in _COORDINATES:
+        part = parts.get(key)
+        if part is None:
+            raise PathFileError(f"{name}:{vector.line}: the state vector has no {key}")
+        if part.units not in ("", unit):
+            raise PathFileError(f"{name}:{part.line}: {key} must be in {unit} (got {shown(part.units)})")
+        number = number_in(part.text)
+        if number is None or abs(number) > _FARTHEST:
+            raise PathFileError(
+                f"{name}:{part.line}: {key} must be a number of {unit} (got {shown(part.text.strip())})"
+            )
+        yield number
+
+
+def _time(vector: MessageElement, parts: dict[str, MessageElement], system: str, name: str) -> Instant:
+    """Time of a state vector, of TAI, by the system that the file is referred to."""
+    if system not in parts:
+        raise PathFileError(f"{name}:{vector.line}: the state vector has no {system}")
+    written = parts[system].text.strip()
+    found = epoch_in(written.removeprefix(f"{system}="))
+    if found is None or not FIRST_DAY < found.day < LATEST:
+        raise PathFileError(
+            f"{name}:{parts[system].line}: {system} must be a time such as {system}=2026-05-31T10:12:13.000000"
+            f" (got {shown(written)})"
+        )
+    return found if system == "TAI" else tai(found)
