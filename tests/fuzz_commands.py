@@ -21,7 +21,7 @@ from tests.formats.flown import SAMPLES, sample, written
 from tests.fuzz import TEXTS, UNITS, damaged, original, places, tree_of
 from tests.mission.test_path_files import aircraft, satellite
 from tests.paths.flown import earth_fixed_csv, flight, geodetic_csv, sbet, smrmsg
-from tests.paths.orbit_files import TLE, oem, oem_xml, omm_csv, omm_json, omm_xml
+from tests.paths.orbit_files import TLE, oem, oem_xml, omm_csv, omm_json, omm_text, omm_xml
 
 MISSION = "m.yaml"  # the file that a question is about
 # Keys that a file may lack.
@@ -285,6 +285,7 @@ def _flights() -> tuple[Callable[[], tuple[str, dict[str, bytes]]], ...]:
         orbit("omm", "a.json", omm_json()),
         orbit("omm", "a.xml", omm_xml()),
         orbit("omm", "a.csv", omm_csv()),
+        orbit("omm", "a.txt", omm_text()),
         orbit("oem", "a.oem", oem()),
         orbit("oem", "a.oem.xml", oem_xml(oem())),
         route({"flight.csv": geodetic_csv(log)}),

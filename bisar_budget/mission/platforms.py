@@ -350,6 +350,11 @@ class FlownPath(NamedTuple):
     accuracy: tuple[str, str] | None = None  # file that states its errors, and its SHA-256
     orientation: tuple[str, str] | None = None  # table by which it is turned to the Earth, and its SHA-256
 
+    @property
+    def beside(self) -> Mapping[str, tuple[str, str] | None]:
+        """Files that say more of it, each with its SHA-256, by what they say."""
+        return {"accuracy": self.accuracy, "earth_orientation": self.orientation}
+
 
 class Platform(NamedTuple):
     """Its path over the aperture, in one of five ways, and the motion error."""

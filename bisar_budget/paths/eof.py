@@ -118,9 +118,7 @@ def _samples(file: MessageElement, system: str, name: str) -> tuple[list[Sample]
             flawed.append(shown(quality.text.strip()))
     for (before, after), line in zip(pairwise(samples), lines[1:], strict=True):
         if after.time.since(before.time) < APART:
-            raise PathFileError(
-                f"{name}:{line}: the time is not after that of the state vector before; times must rise"
-            )
+            raise PathFileError(f"{name}:{line}: the time is not after that of the state vector before it")
     return samples, lines, flawed
 
 

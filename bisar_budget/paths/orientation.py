@@ -120,6 +120,7 @@ def celestial_turn(is_j2000: bool, orientation: Orientation = UNKNOWN) -> Turn:
 # ---------------------------------------------------------------------- tables of the IERS
 _ROW = ((7, 15), (18, 27), (27, 36), (37, 46), (46, 55), (58, 68), (68, 78))  # columns of a row, from 0
 _ROWS = ("MJD", "x of the pole", "its error", "y of the pole", "its error", "UT1 - UTC", "its error")
+_FINAL = {1: (134, 144), 3: (144, 154), 5: (154, 165)}  # of Bulletin B, where they are known
 
 
 def read_finals(data: bytes, name: str, instant: Instant) -> Orientation:
@@ -144,7 +145,8 @@ def read_finals(data: bytes, name: str, instant: Instant) -> Orientation:
 
     Notes
     -----
-    Columns: the IERS' readme.finals2000A. UT1 - UTC jumps with a leap second, UT1 - TAI does not.
+    Columns: the IERS' readme.finals2000A; the values of Bulletin B where the row has them, else of Bulletin A.
+    UT1 - UTC jumps with a leap second, UT1 - TAI does not.
     """
     first: list[float] | None = None
     begins = ends = None
@@ -174,6 +176,8 @@ def read_finals(data: bytes, name: str, instant: Instant) -> Orientation:
 def _row(line: str, where: str) -> list[float] | None:
     """Numbers of a row, None where it has only its date."""
     cells = [line[first:last].strip() for first, last in _ROW]
+    for index, (first, last) in _FINAL.items():
+        cells[index] = line[first:last].strip() or cells[index]
     if cells[0] and not any(cells[1:]):
         return None
     found = []

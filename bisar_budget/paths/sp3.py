@@ -79,9 +79,7 @@ class _Header:
     def __init__(self, lines: Sequence[str], name: str) -> None:
         first = lines[0].lstrip("\ufeff")
         if not _FIRST_LINE.match(first):
-            raise PathFileError(
-                f"{name}:1: must begin with #c or #d and P or V, as SP3 does (got {shown(first[:20])})"
-            )
+            raise PathFileError(f"{name}:1: must begin like #cP or #dV, as SP3 does (got {shown(first[:20])})")
         self.frame = shown(first[46:51].strip()) or "ITRF"
         self.system = "GPS"
         ids: list[str] = []

@@ -85,6 +85,15 @@ def omm_xml() -> bytes:
 """.encode()
 
 
+def omm_text() -> bytes:
+    """As CCSDS has it, a keyword and a value in each line, some with their unit."""
+    units = {"MEAN_MOTION": "rev/day", "INCLINATION": "deg", "BSTAR": "1/ER"}
+    lines = ["CCSDS_OMM_VERS = 2.0", "CREATION_DATE = 2026-05-31T12:00:00", "ORIGINATOR = TESTS", "COMMENT a comment"]
+    for key, value in {**CONSTANTS, **MESSAGE}.items():
+        lines.append(f"{key:<20} = {value}" + (f" [{units[key]}]" if key in units else ""))
+    return ("\n".join(lines) + "\n").encode()
+
+
 RADIUS, TURN_RATE = 7_071_000.0, 1.0617e-3  # m, rad/s
 START = instant("2026-06-01T05:00:00Z")
 

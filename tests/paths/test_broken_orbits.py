@@ -8,9 +8,13 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from bisar_budget.paths import messages
+from bisar_budget.paths.eof import read_eof
 from bisar_budget.paths.flight import PathFileError
+from bisar_budget.paths.instant import Instant
 from bisar_budget.paths.oem import read_oem
 from bisar_budget.paths.omm import read_omm
+from bisar_budget.paths.orientation import read_finals
+from bisar_budget.paths.sp3 import read_sp3
 from bisar_budget.paths.tle import read_tle
 from tests.paths.orbit_files import (
     CENTER,
@@ -26,10 +30,12 @@ from tests.paths.orbit_files import (
     oem_xml,
     omm_csv,
     omm_json,
+    omm_text,
     omm_xml,
 )
 from tests.paths.test_elements import OTHER
 from tests.paths.test_ephemeris import interpolation
+from tests.paths.test_sp3 import FILES, low
 
 INSIDE = START.after(600)
 OEM = oem()
@@ -317,6 +323,16 @@ GOOD = {
     "csv": omm_csv(),
     "oem": oem(interpolation=interpolation("HERMITE", 5)).encode(),
     "oem in xml": oem_xml(oem(count=10, step=120.0, frame="GCRF")),
+    "omm in text": omm_text(),
+    "eof": (FILES / "S1A_RESORB_20230823_excerpt.EOF").read_bytes(),
+    "sp3": (FILES / "igs15904_G05_G16.sp3").read_bytes()[:4000],
+    "sp3 with velocities": low().encode(),
+    "finals": (FILES / "finals2000A_excerpt.all").read_bytes(),
+}
+MIDDLES = {
+    "eof": (read_eof, instant("2023-08-23T14:10:00Z")),
+    "sp3": (read_sp3, instant("2010-07-01T02:00:00Z")),
+    "sp3 with velocities": (read_sp3, INSIDE),
 }
 TOKENS = [
     b"", b" ", b"\n", b"\r\n", b"0", b"9", b"-", b"+", b".", b"e", b"E99", b"1e308", b"NaN", b"inf", b"=", b",", b'"',
@@ -350,6 +366,14 @@ def test_bytes_that_were_changed_give_an_orbit_or_an_error(
             if mends:
                 text = "\n".join(checked(line) if line[:1] in ("1", "2") else line for line in text.split("\n"))
             orbit = read_tle(text.encode(), "x", wanted, CENTER)
+        elif form == "finals":
+            assert all(math.isfinite(one) for one in read_finals(data, "x", Instant(57753, 100.0))[2:])
+            return
+        elif form in MIDDLES:
+            reader, at = MIDDLES[form]
+            orbit = reader(data, "x", None if wanted == "39634" else "G05", at)
+            assert all(math.isfinite(one) for one in orbit.place(at))
+            return
         elif "oem" in form:
             orbit = read_oem(data, "x", wanted, INSIDE)
         else:

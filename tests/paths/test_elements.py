@@ -31,6 +31,7 @@ from tests.paths.orbit_files import (
     instant,
     omm_csv,
     omm_json,
+    omm_text,
     omm_xml,
 )
 
@@ -158,6 +159,7 @@ MESSAGES = {
     "json, one message": json.dumps(MESSAGE).encode(),
     "json of texts": json.dumps([{key: str(value) for key, value in {**MESSAGE, **CONSTANTS}.items()}]).encode(),
     "csv": omm_csv(),
+    "text": omm_text(),
     "csv with a mark of its encoding": b"\xef\xbb\xbf" + omm_csv(),
 }
 
@@ -174,6 +176,32 @@ def test_a_message_places_what_its_element_set_does(data: bytes) -> None:
     assert lines.epoch is not None
     assert abs(orbit.epoch.since(EPOCH)) < 1e-9
     assert abs(lines.epoch.since(EPOCH)) < 1e-9
+
+
+def test_a_text_gives_the_last_digit_of_xml() -> None:
+    text, xml = (read_omm(data, "s.omm", None, CENTER).place(CENTER) for data in (omm_text(), omm_xml()))
+    assert text == xml
+
+
+def test_a_text_of_several_messages() -> None:
+    later = omm_text().replace(b"2026-05-31T10", b"2026-06-01T04").replace(b"84.7034", b"85.7034")
+    both = read_omm(omm_text() + later, "s.omm", None, CENTER)
+    assert both.place(CENTER) == read_omm(later, "s.omm", None, CENTER).place(CENTER)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "said"),
+    [
+        (b"OBJECT_ID            =", b"OBJECT_ID", "s:10: must be a keyword, = and its value (got OBJECT_ID"),
+        (b"OBJECT_ID  ", b"OBJECT_NAME", "s:10: OBJECT_NAME is there twice in the message of line 1"),
+        (b"REF_FRAME", b"REF_FRANE", "s:1: has no REF_FRAME"),
+        (b"= TEME", b"= GCRF", "s:1: REF_FRAME must be TEME (got GCRF)"),
+    ],
+)
+def test_a_text_that_is_refused(before: bytes, after: bytes, said: str) -> None:
+    with pytest.raises(PathFileError) as error:
+        read_omm(omm_text().replace(before, after), "s", None, CENTER)
+    assert str(error.value).startswith(said)
 
 
 def test_an_epoch_may_be_a_day_of_the_year() -> None:

@@ -44,10 +44,12 @@ def moved_inputs(before: Mission, after: Mission) -> Iterator[Moved]:
         if None not in files and files[0].file == files[1].file and files[0].sha256 != files[1].sha256:
             contents = [file.sha256 and file.sha256[:12] for file in files]
             yield Moved(f"platforms.{name}: content of {files[1].file}", "", *contents)
-        stated = [file.accuracy for file in files if file is not None and file.accuracy is not None]
-        if len(stated) == 2 and stated[0][0] == stated[1][0] and stated[0][1] != stated[1][1]:
-            contents = [digest[:12] for _, digest in stated]
-            yield Moved(f"platforms.{name}: content of {stated[1][0]}", "", *contents)
+        before_, after_ = ({} if file is None else file.beside for file in files)
+        for said in before_.keys() & after_.keys():
+            old_one, new_one = before_[said], after_[said]
+            if old_one and new_one and old_one[0] == new_one[0] and old_one[1] != new_one[1]:
+                contents = [digest[:12] for _, digest in (old_one, new_one)]
+                yield Moved(f"platforms.{name}: content of {new_one[0]}", "", *contents)
 
 
 def written(mission: Mission) -> dict[KeyPath, str]:

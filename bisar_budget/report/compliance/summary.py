@@ -438,6 +438,9 @@ def _validity(page: Page) -> Iterator[doc.Block]:
         yield doc.Paragraph(" ".join(texts))
 
 
+_BESIDE = {"accuracy": "Accuracy", "earth_orientation": "The Earth’s orientation"}  # files that say more of a path
+
+
 def _assumptions(page: Page) -> Iterator[tuple[str, str]]:
     """Assumptions of the verdict, and where it holds."""
     mission, found = page.mission, page.found
@@ -455,8 +458,9 @@ def _assumptions(page: Page) -> Iterator[tuple[str, str]]:
         yield f"Path of the {name}", path_words(path)
         if path.sha256 is not None:
             yield f"File of the {name}’s path", f"{path.file or 'in the mission file'}, SHA-256 {path.sha256}"
-        if path.accuracy is not None:
-            yield f"Accuracy of the {name}’s path", "{}, SHA-256 {}".format(*path.accuracy)
+        for said, file in path.beside.items():
+            if file is not None:
+                yield f"{_BESIDE[said]} of the {name}’s path", "{}, SHA-256 {}".format(*file)
     yield "Combination", _RULES[found.combine]
     yield "Phases", f"at the centre frequency, c = {SPEED_OF_LIGHT / 1e3:.3f} km/s; at the aperture edge, ±T/2"
     factor = f"{found.coverage_factor:g} times the file’s value" if found.coverage_factor != 1 else "the file’s value"

@@ -213,7 +213,10 @@ def _platform(mission: MissionFindings, name: str) -> dict[str, Any]:
             "residual_rms_m": path.rms,
             "samples": path.samples,
             "doubt_m": path.doubt_m,
-            "accuracy": None if path.accuracy is None else dict(zip(("file", "sha256"), path.accuracy, strict=True)),
+            **{
+                said: None if file is None else dict(zip(("file", "sha256"), file, strict=True))
+                for said, file in path.beside.items()
+            },
         }
     return found
 

@@ -1,0 +1,109 @@
+"""Turning the Earth by UT1 and the pole: against ERFA and the tables of the IERS."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bisar_budget.paths.flight import PathFileError
+from bisar_budget.paths.instant import DAY, Instant
+from bisar_budget.paths.oem import read_oem
+from bisar_budget.paths.orientation import UNKNOWN, Orientation, from_teme, read_finals
+from bisar_budget.paths.tle import read_tle
+from tests.paths.orbit_files import CENTER, START, TLE, oem, on_circle
+
+erfa = pytest.importorskip("erfa")
+
+ARCSEC = math.radians(1 / 3600)
+FINALS = (Path(__file__).parent / "files" / "finals2000A_excerpt.all").read_bytes()
+TURNED = Orientation(-0.172, (0.2 * ARCSEC, 0.4 * ARCSEC), 0.0, 0.0)
+PLACE = (5.1e6, -3.2e6, 3.7e6)
+
+
+@pytest.mark.parametrize("frame", ["GCRF", "TEME"])
+def test_a_place_is_turned_as_erfa_has_it(frame: str) -> None:
+    """To 0.1 mm; the matrix of polar motion is ERFA's pom00, with s' of 0.1 mas left out in TEME: below 1 mm."""
+    at = START.after(615)
+    orbit = read_oem(oem(frame=frame).encode(), "c.oem", None, at, TURNED)
+    dut1 = (2400000.5 + at.day, (at.seconds - 0.172) / DAY)
+    wobble = erfa.pom00(*TURNED.pole, 0.0)
+    if frame == "GCRF":
+        tt = (2400000.5 + at.day, (at.seconds + 37 + 32.184) / DAY)
+        matrix = wobble @ erfa.c2tcio(erfa.c2i06a(*tt), erfa.era00(*dut1), np.eye(3))
+    else:
+        matrix = wobble @ erfa.rz(erfa.gmst82(*dut1), np.eye(3))
+    expected = matrix @ np.array(on_circle(615)[0])
+    assert math.dist(orbit.place(at), expected) < (1e-3 if frame == "GCRF" else 1e-4)
+
+
+def test_ut1_turns_elements_as_far_as_it_says() -> None:
+    still, turned = (read_tle(TLE.encode(), "s", None, CENTER, one).place(CENTER) for one in (UNKNOWN, TURNED))
+    eastward = 0.172 * 7.292115e-5 * math.hypot(*still[:2])
+    level = from_teme(PLACE, CENTER, TURNED._replace(pole=(0.0, 0.0)))
+    assert math.dist(level, from_teme(PLACE, CENTER)) == pytest.approx(
+        0.172 * 7.292115e-5 * math.hypot(*PLACE[:2]), rel=1e-6
+    )
+    assert math.dist(still, turned) == pytest.approx(eastward, abs=0.45 * ARCSEC * math.hypot(*still))
+
+
+def test_words_and_doubts() -> None:
+    text = oem(frame="GCRF").encode()
+    at = START.after(600)
+    stated = read_oem(text, "c.oem", None, at, TURNED)
+    assert stated.words.endswith(", UT1 - UTC -0.172 s")
+    assert stated.doubts(at) == ()
+    assert stated.doubt(at).words == "interpolation of the ephemeris, the Earth's orientation"
+    assert stated.doubt(at).size < 1e-3
+    without_pole = read_oem(text, "c.oem", None, at, Orientation(-0.172, ut1_doubt=0.0))
+    (said,) = without_pole.doubts(at)
+    assert said == "c.oem:4: GCRF is turned to the Earth to about 21 m: UT1 or the pole is not known better"
+    assert without_pole.doubt(at).size == pytest.approx(0.6 * ARCSEC * math.hypot(*on_circle(600)[0]), rel=1e-3)
+    fixed = read_oem(oem().encode(), "c.oem", None, at, TURNED)
+    assert "UT1" not in fixed.words
+    assert not fixed.is_turned
+
+
+# UT1 - UTC and the pole by astropy.utils.iers 7, of the same table, on both sides of the leap second of 2016-12-31.
+@pytest.mark.parametrize(
+    ("day", "part", "ut1", "pole"),
+    [
+        (57753, 0.25, -0.407995625, (0.081101, 0.263011)),
+        (57754, 0.5, 0.5907562, (0.0803625, 0.2633345)),
+        (60179, 0.6, -0.0023712600000010235, (0.2920666, 0.428307)),
+    ],
+)
+def test_the_table_of_the_iers(day: int, part: float, ut1: float, pole: tuple[float, float]) -> None:
+    """To what the digits of the table give: 1e-7 s and 1e-6 arcsec. Astropy takes parts of a day as doubles."""
+    found = read_finals(FINALS, "finals", Instant(day, part * DAY))
+    assert found.ut1_minus_utc == pytest.approx(ut1, abs=2e-8)
+    assert np.array(found.pole) / ARCSEC == pytest.approx(pole, abs=1e-7)
+    assert 5e-6 < found.ut1_doubt < 2e-5
+    assert found.pole_doubt < 1e-4 * ARCSEC
+
+
+def test_the_second_that_a_day_has_more_is_no_jump_of_the_earth() -> None:
+    before, after = (read_finals(FINALS, "f", Instant(57753, seconds)) for seconds in (DAY - 1, DAY + 0.5))
+    assert after.ut1_minus_utc - before.ut1_minus_utc == pytest.approx(0, abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("data", "day", "said"),
+    [
+        (FINALS, 57757, "finals: has no values for 2017-01-04T00:00:00.000Z; it covers 2016-12-29 to 2023-08-25"),
+        (FINALS, 61755, "finals: has no values for 2027-12-"),
+        (b"", 57753, "finals: has no row of values"),
+        (b"1 39634U 14016A   26151.42515188\n", 57753, "finals:1: MJD must be a number, in the columns of the IERS'"),
+        (FINALS.replace(b"-0.4077600", b"-4.0776000"), 57753, "finals:3: cannot be a row of the IERS' finals2000A"),
+        (
+            FINALS.replace(b"57754.00", b"57752.00"),
+            57753,
+            "finals:4: the day 57752 is not after 57753 of a row before",
+        ),
+        (b"\xff\xfe\x00" * 100, 57753, "finals:1: MJD must be a number"),
+    ],
+)
+def test_what_is_refused(data: bytes, day: int, said: str) -> None:
+    with pytest.raises(PathFileError) as error:
+        read_finals(data, "finals", Instant(day, 0.0))
+    assert str(error.value).startswith(said)

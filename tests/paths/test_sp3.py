@@ -1,0 +1,178 @@
+"""Orbits in SP3: GNSS satellites against epochs that were left out, every part of the format, and what is refused."""
+
+import math
+from pathlib import Path
+
+import pytest
+
+from bisar_budget.paths.flight import Orbit, PathFileError
+from bisar_budget.paths.instant import Instant
+from bisar_budget.paths.sp3 import read_sp3
+from tests.paths.orbit_files import START, instant, on_circle
+
+FILES = Path(__file__).parent / "files"
+TEXT = (FILES / "igs15904_G05_G16.sp3").read_text()
+NOON = instant("2010-07-01T11:59:45Z")  # of GPS time, which was 15 s ahead
+
+
+def read(text: str, wanted: str | None = "G05", at: Instant = NOON) -> Orbit:
+    return read_sp3(text.encode(), "g.sp3", wanted, at)
+
+
+def epochs(text: str) -> list[str]:
+    """The lines of each epoch."""
+    return ["*" + one for one in text[text.index("\n*") + 1 : text.index("EOF")].split("*")[1:]]
+
+
+def epoch_of(block: str) -> Instant:
+    hour, minute = block.split()[4:6]
+    return instant("2010-07-01T00:00:00Z").after(3600 * int(hour) + 60 * int(minute) - 15)
+
+
+def place_of(block: str, satellite: str) -> list[float]:
+    line = next(line for line in block.splitlines() if line.startswith(f"P{satellite}"))
+    return [1000 * float(line[first : first + 14]) for first in (4, 18, 32)]
+
+
+def without(text: str, left_out: set[int]) -> str:
+    blocks = epochs(text)
+    kept = [block for n, block in enumerate(blocks) if n not in left_out]
+    return text[: text.index("\n*") + 1] + "".join(kept) + "EOF\n"
+
+
+@pytest.mark.parametrize("satellite", ["G05", "G16"])
+def test_every_other_epoch_comes_back(satellite: str) -> None:
+    """At half an hour between places: to 1 cm two hours and more from an end; places are written to 1 mm.
+
+    Nearer to the end it is to what is doubted and 5 cm.
+    """
+    blocks = epochs(TEXT)
+    half = without(TEXT, set(range(1, 96, 2)))
+    for n in range(1, 94, 2):
+        at = epoch_of(blocks[n])
+        orbit = read(half, satellite, at)
+        off = math.dist(orbit.place(at), place_of(blocks[n], satellite))
+        assert off < (0.01 if 9 <= n <= 85 else 0.05 + 4 * orbit.doubt(at).size)
+
+
+def test_what_is_said_of_it() -> None:
+    orbit = read(TEXT)
+    assert orbit.words == "SP3 of G05, IGS05, Lagrange degree 15"
+    doubt = orbit.doubt(NOON)
+    assert doubt.size == pytest.approx(0.004, abs=1e-3)  # 2² mm, and an interpolation of less than 1 mm
+    assert doubt.words == "interpolation of the ephemeris and 0.004 m that the file states"
+    assert orbit.doubts(NOON) == ()
+    assert orbit.place(epoch_of(epochs(TEXT)[48])) == pytest.approx(place_of(epochs(TEXT)[48], "G05"), abs=1e-6)
+
+
+def test_one_satellite_has_to_be_named() -> None:
+    with pytest.raises(PathFileError, match=r"^g.sp3: has 2 objects: G05, G16; choose one by its name or OBJECT_ID$"):
+        read(TEXT, None)
+    with pytest.raises(PathFileError, match=r"^g.sp3: has no object G06; it has G05, G16$"):
+        read(TEXT, "G06")
+
+
+@pytest.mark.parametrize(
+    ("system", "ahead"),
+    [("GPS", 15), ("GAL", 15), ("QZS", 15), ("IRN", 15), ("BDT", 1), ("TAI", 34), ("UTC", 0), ("GLO", 0)],
+)
+def test_time_systems(system: str, ahead: int) -> None:
+    """In 2010 TAI was 34 s ahead of UTC."""
+    text = TEXT.replace("%c G  cc GPS", f"%c G  cc {system}", 1)
+    at = instant("2010-07-01T12:00:00Z").after(-ahead)
+    assert read(text, "G05", at).place(at) == pytest.approx(place_of(epochs(TEXT)[48], "G05"), abs=1e-6)
+
+
+def test_the_first_version_has_numbers_for_satellites() -> None:
+    text = TEXT.replace("#cP", "#aP", 1).replace("PG05", "P  5").replace("G05G16", "  5 16").replace("PG16", "P 16")
+    text = text.replace("%c G  cc GPS", "%c cc cc ccc", 1)
+    assert read(text).place(NOON) == read(TEXT).place(NOON)
+
+
+def test_no_polynomial_goes_over_a_place_that_is_missing_or_a_manoeuvre() -> None:
+    blocks = epochs(TEXT)
+    line = next(line for line in blocks[48].splitlines() if line.startswith("PG05"))
+    absent = TEXT.replace(line, "PG05      0.000000      0.000000      0.000000 999999.999999")
+    with pytest.raises(PathFileError, match=r"^g.sp3: has no place at 2010-07-01T11:59:45.000Z; its useable time is"):
+        read(absent)
+    moved = TEXT.replace(line, f"{line:<78}M")
+    assert read(moved, "G05", NOON.after(60)).span[0] == NOON  # type: ignore[index]
+    assert read(moved, "G16", NOON.after(60)).span[0] == epoch_of(blocks[0])  # type: ignore[index]
+    gone = TEXT.replace(line + "\n", "")
+    with pytest.raises(PathFileError, match=r"^g.sp3: has no place at"):
+        read(gone)
+
+
+def test_a_predicted_place_is_said() -> None:
+    blocks = epochs(TEXT)
+    line = next(line for line in blocks[40].splitlines() if line.startswith("PG05"))
+    text = TEXT.replace(line, f"{line:<79}P")
+    assert read(text).doubts(NOON) == ("g.sp3: places of G05 around the aperture are predicted",)
+    early = epoch_of(blocks[20])
+    assert read(text, "G05", early).doubts(early) == ()
+
+
+def low(step: float = 30.0, count: int = 41, *, speed: float = 1.0) -> str:
+    """A low satellite with velocities, as those of science missions are written."""
+    lines = [
+        "#dV2026  6  1  5  0  0.00000000      41 ORBIT IGS20 FIT  TST",
+        "## 0 0.0 30.00000000 0 0.0",
+        "+    1   L47" + "  0" * 16,
+        "++         0" + "  0" * 16,
+        "%c L  cc UTC ccc cccc cccc cccc cccc ccccc ccccc ccccc ccccc",
+    ]
+    for n in range(count):
+        place, velocity = on_circle(step * n)
+        whole, rest = divmod(step * n, 60)
+        lines.append(f"*  2026  6  1  5 {int(whole):2d} {rest:11.8f}")
+        lines.append("PL47" + "".join(f"{one / 1000:14.6f}" for one in place) + f"{0:14.6f}")
+        lines.append("VL47" + "".join(f"{10 * speed * one:14.6f}" for one in velocity) + f"{0:14.6f}")
+    return "\n".join([*lines, "EOF", ""])
+
+
+def test_velocities_of_a_low_satellite_are_used() -> None:
+    """Places are written to 1 mm; ITRF is that of the header."""
+    at = START.after(615)
+    orbit = read(low(), None, at)
+    assert orbit.words == "SP3 of L47, IGS20, Hermite degree 7"
+    assert math.dist(orbit.place(at), on_circle(615)[0]) < 1e-3
+    other = read(low(speed=1.07), None, at)  # velocities against the stars
+    assert other.words.startswith("SP3 of L47, IGS20, Lagrange degree ")
+    assert math.dist(other.place(at), on_circle(615)[0]) < 2e-3
+
+
+LINE = TEXT.splitlines().index(epochs(TEXT)[0].splitlines()[0]) + 1
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "said"),
+    [
+        ("#cP", "#eP", "g.sp3:1: must begin like #cP or #dV, as SP3 does (got #eP2010"),
+        (
+            "GPS ccc",
+            "XYZ ccc",
+            "g.sp3:13: the time system XYZ is not known; accepted: GPS, GAL, QZS, IRN, BDT, TAI, UTC",
+        ),
+        ("*  2010  7  1  0 15", "*  2010  7  1  0  0", f"g.sp3:{LINE + 3}: the epoch is not after the one before it"),
+        ("*  2010  7  1  0 15", "*  2010  7 41  0 15", f"g.sp3:{LINE + 3}: must be an epoch such as *  2026  5 31"),
+        ("PG05 -25251.856884", "PG05 -2525x.856884", f"g.sp3:{LINE + 1}: must be a number of km in columns 5 to 18"),
+        ("PG05 -25251.856884", "PGX5 -25251.856884", f"g.sp3:{LINE + 1}: must name a satellite in columns 2 to 4"),
+        ("PG16", "PG05", f"g.sp3:{LINE + 2}: G05 has two places at one epoch"),
+        ("PG16", "XG16", f"g.sp3:{LINE + 2}: must be an epoch, a place or a velocity (got XG16"),
+    ],
+)
+def test_what_is_refused(before: str, after: str, said: str) -> None:
+    with pytest.raises(PathFileError) as error:
+        read(TEXT.replace(before, after, 1))
+    assert str(error.value).startswith(said)
+
+
+def test_a_file_without_epochs() -> None:
+    with pytest.raises(PathFileError, match=r"^g.sp3: has no epoch, a line that begins with \*$"):
+        read(TEXT[: TEXT.index("\n*")])
+
+
+def test_two_places_are_too_few() -> None:
+    """One line through two points has no error that could be estimated: that is no small error."""
+    with pytest.raises(PathFileError, match=r"the ephemeris is too sparse around"):
+        read(low(count=2), None, START.after(15))
