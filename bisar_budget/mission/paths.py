@@ -37,6 +37,7 @@ from bisar_budget.paths.flight import (
     interpolated,
     slow_times,
     smoothed,
+    stretch_around,
 )
 from bisar_budget.paths.flight_log import hold_to_motion, read_csv
 from bisar_budget.paths.instant import Instant
@@ -326,14 +327,15 @@ def _log_path(
         known = _known(axes, "trajectory")
         log = replace(log, places=known.places(log.places), is_earth_fixed=False)
     times = slow_times(log, mission.collection.center_time, route.center, aperture_time, route.file)
-    hold_to_motion(times, log.places, aperture_time, route.file)
+    hold_to_motion(times, log.places, stretch_around(times, aperture_time), route.file)
     fitted = smoothed(times, log.places, aperture_time)
     words = log.words
     if log.start is None:
         words += f", {route.center or 0.0:.12g} s of it at mid-aperture"
     path = _flown(fitted, words, route.file, digest)
     # The root mean square is what a sigma is compared with: the largest of thousands of places is four of them.
-    return path._replace(doubt_of="residual of the smoothed log, root mean square", is_doubted=fitted.rms > _NOISE_M)
+    words = "residual of the smoothed log at places left out, root mean square"
+    return path._replace(doubt_m=fitted.missed, doubt_of=words, is_doubted=fitted.missed > _NOISE_M)
 
 
 def _log(route: TrajectorySource, data: bytes, digest: str) -> Log:
@@ -412,8 +414,9 @@ def _flown(fitted: Fitted, words: str, file: str | None = None, digest: str | No
         farthest=fitted.farthest,
         rms=fitted.rms,
         samples=fitted.samples or None,
+        stretch=fitted.stretch or None,
         doubts=fitted.doubts,
-        doubt_m=fitted.rms if fitted.samples else fitted.farthest,
+        doubt_m=fitted.farthest,
         doubt_of="polynomial that is flown",
         is_doubted=bool(fitted.doubts),
     )

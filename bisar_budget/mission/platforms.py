@@ -327,7 +327,7 @@ class FlownPath(NamedTuple):
 
     `source` says where it comes from, empty where the file states it; `file` and `sha256` are those of the file it
     was read from, `age` that of its elements [s]. Of a fit the order, the residual at most and root mean square [m],
-    and the number of places of a log. `doubts` are warnings, for reports.
+    the number of places of a log and the stretch of time that they are from [s]. `doubts` are warnings, for reports.
 
     `doubt_m` is how far the truth may be from it by what its own source says: the age of elements, the interpolation
     of an ephemeris, the residual of a smoothed log; `doubt_of` says which. Where the file declares no position error,
@@ -343,6 +343,7 @@ class FlownPath(NamedTuple):
     farthest: float | None = None
     rms: float | None = None
     samples: int | None = None
+    stretch: float | None = None
     doubts: tuple[str, ...] = ()
     doubt_m: float = 0.0
     doubt_of: str = ""

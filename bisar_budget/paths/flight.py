@@ -22,11 +22,14 @@ Floats = NDArray[np.float64]
 
 _NODES = 15  # Chebyshev points of an interpolation, so many coefficients
 _LEAST_WINDOW = 10.0  # s; in a shorter one rounding of an Earth-fixed place, 1e-9 m, is an acceleration
+_LOOKS = 65  # at the aperture, for what is between places
 _UNSEEN_M = 1e-7  # a coefficient that moves the path by less is rounding
 _ROUGH_M = 5e-3  # a path that is farther from its polynomial is not smooth; messages have places to 1 mm
 _TRIFLE_M = 1e-3
 _STRAY = 8  # times the usual residual; noise of thousands of places reaches 4
 _HIGHEST = 8  # order of a smoothed path
+_FEWEST = 5  # places of a log that give a path
+_ENOUGH = 9  # of them that say what is noise; of a log that has fewer in the aperture, places beside it help
 _WIDEST_GAP = 5  # usual intervals between samples
 _ROUNDED = 1 + 1e-6  # of an interval whose ends are rounded
 
@@ -89,7 +92,8 @@ class Log:
 class Fitted:
     """A path as a polynomial, its order, and how far it is from the file's places, at most and root mean square [m].
 
-    `samples` is how many of a log's places the polynomial smooths; none of an orbit, which is interpolated.
+    `samples` is how many of a log's places the polynomial smooths, over `stretch` [s]; none of an orbit, which is
+    interpolated. `missed` is how far the path goes by a place of the log that it does not know, root mean square [m].
     `doubts` are warnings.
     """
 
@@ -99,6 +103,8 @@ class Fitted:
     rms: float
     samples: int = 0
     doubts: tuple[str, ...] = ()
+    stretch: float = 0.0
+    missed: float = 0.0
 
 
 def interpolated(places: Callable[[Floats], Floats], aperture_time_s: float, widest_s: float = math.inf) -> Fitted:
@@ -128,17 +134,30 @@ def interpolated(places: Callable[[Floats], Floats], aperture_time_s: float, wid
     return Fitted(state, len(state.bends) + 2, farthest, rms, doubts=doubts)
 
 
+def stretch_around(times: Floats, aperture_time_s: float) -> float:
+    """Time around the middle of an aperture whose places of a log are smoothed. [s]
+
+    It is the aperture, or as much longer as holds nine places: a log at 1 Hz has three in 3 s.
+    """
+    apart = np.sort(np.abs(times))[:_ENOUGH]
+    return max(aperture_time_s, 2 * float(apart.max(initial=0.0)))
+
+
 def smoothed(times: Floats, places: Floats, aperture_time_s: float) -> Fitted:
-    """Path that fits the places of a log within the aperture by least squares.
+    """Path that fits the places of a log around the aperture by least squares.
 
     The order is that of the least Bayesian information criterion (Schwarz 1978), to 8 at most and to half the
     samples: what a platform does faster is in the log's noise, or is vibration. Samples with correlated residuals
     count as fewer. A slow error of the log, which looks like motion, is then not fitted as if it were white noise.
 
+    `missed` leaves out each place in the aperture, and the ones next to it, in turn (Allen 1974): that is noise, what
+    the polynomial does not follow, and what the platform did between two places, of which a log that is slow for its
+    motion says nothing. Where the fit makes more of noise than a place has, as in a gap, it is that much more.
+
     Parameters
     ----------
     times : (n,) ndarray
-        Slow time; what is outside the aperture is not used. [s]
+        Slow time, rising; what is outside the stretch is not used. [s]
     places : (n, 3) ndarray
         In the scene's axes. [m]
     aperture_time_s : float
@@ -147,16 +166,23 @@ def smoothed(times: Floats, places: Floats, aperture_time_s: float) -> Fitted:
     Raises
     ------
     PathFileError
-        Fewer than five places within the aperture.
+        Fewer than five places in all.
+
+    Notes
+    -----
+    A residual r of a place of the leverage h is r/(1 - h) of the fit without it (Belsley, Kuh & Welsch 1980, 2.1).
     """
-    half = aperture_time_s / 2
+    stretch = stretch_around(times, aperture_time_s)
+    half = stretch / 2
     inside = np.abs(times) <= half * (1 + 1e-9)
     count = int(inside.sum())
-    if count < 5:
+    if count < _FEWEST:
         raise PathFileError(
-            f"has {count} places in the aperture of {aperture_time_s:g} s, at least 5 are needed; sample faster"
+            f"has {count} places around the aperture of {aperture_time_s:g} s, at least {_FEWEST} are needed; keep"
+            " more of the log"
         )
-    at, wanted = times[inside] / half, places[inside]
+    used = times[inside]
+    at, wanted = used / half, places[inside]
     fits = [least_squares(at, wanted, order) for order in range(2, min(_HIGHEST, (count - 1) // 2) + 1)]
     independent = _independent(fits[-1][1])
 
@@ -173,12 +199,30 @@ def smoothed(times: Floats, places: Floats, aperture_time_s: float) -> Fitted:
     farthest, usual = float(apart.max()), float(np.median(apart))
     doubts: tuple[str, ...] = ()
     if farthest > _STRAY * usual + _TRIFLE_M:
-        when = float(times[inside][apart.argmax()])
+        when = float(used[apart.argmax()])
         doubts = (
             f"a place of the log, {when:+.4g} s from mid-aperture, is {farthest:.3g} m from the smooth path; half of "
             f"the places are within {usual:.2g} m",
         )
-    return Fitted(path_of(powers_of(found, half)), len(found) - 1, farthest, rms, count, doubts)
+    first = max(int(np.searchsorted(used, -aperture_time_s / 2)) - 1, 0)
+    near = slice(first, int(np.searchsorted(used, aperture_time_s / 2, "right")) + 1)
+    order = len(found) - 1
+    missed = float(np.sqrt(np.mean((apart / (1 - _leverage(at, at, order)))[near] ** 2)))
+    # Noise of places beside a gap may be more in it.
+    widest = _leverage(at, np.linspace(-1, 1, _LOOKS) * (aperture_time_s / stretch), order)
+    missed *= max(1.0, math.sqrt(float(widest.max())))
+    path = path_of(powers_of(found, half))
+    return Fitted(path, order, farthest, rms, count, doubts, stretch, missed)
+
+
+def _leverage(at: Floats, where: Floats, order: int) -> Floats:
+    """Variance that a fit of an order to places at (n,) has elsewhere (m,), over that of a place.
+
+    At a place it is its own part in the fit, less than 1.
+    """
+    triangle = np.linalg.qr(legendre.legvander(at, order))[1]
+    found: Floats = np.sum(np.linalg.solve(triangle.T, legendre.legvander(where, order).T) ** 2, axis=0)
+    return np.minimum(found, 1 - 1e-9) if where is at else found
 
 
 def slow_times(

@@ -394,28 +394,28 @@ _BESIDE = 3  # steps on each side that a step is compared with
 _BEYOND = 10  # samples beyond each end of the aperture that say what is usual
 
 
-def hold_to_motion(times: Floats, places: Floats, aperture_time_s: float, name: str) -> None:
+def hold_to_motion(times: Floats, places: Floats, stretch_s: float, name: str) -> None:
     """Refuse a log that no platform can have flown.
 
     Parameters
     ----------
     times : (n,) ndarray
-        Slow time, rising; what is far outside the aperture is not looked at. [s]
+        Slow time, rising; what is far outside the stretch is not looked at. [s]
     places : (n, 3) ndarray
         In any axes. [m]
-    aperture_time_s : float
-        Length of the aperture. [s]
+    stretch_s : float
+        Time around the middle of the aperture whose places are used. [s]
     name : str
         What messages call the log.
 
     Raises
     ------
     PathFileError
-        The places in the aperture are one place to 1 mm. Or places are those before them while the platform moves by
+        The places in the stretch are one place to 1 mm. Or places are those before them while the platform moves by
         more than 0.1 m, at its mean speed in the aperture. Or a step is off the median of seven around it by more
         than 0.1 m, by more than 3 g would make it, and by more than 20 times what is usual.
     """
-    half = aperture_time_s / 2 * (1 + 1e-9)
+    half = stretch_s / 2 * (1 + 1e-9)
     first, last = int(np.searchsorted(times, -half, "left")), int(np.searchsorted(times, half, "right"))
     at, flown = times[first:last], places[first:last]
     if at.size < 2 * _BESIDE - 1:  # too few for a path, too
@@ -423,7 +423,7 @@ def hold_to_motion(times: Floats, places: Floats, aperture_time_s: float, name: 
     extent = float(np.linalg.norm(flown - flown[0], axis=1).max())
     if extent <= _STILL_M:
         raise PathFileError(
-            f"{name}: stands still: its {at.size} places in the aperture are the same to {1e3 * _STILL_M:g} mm",
+            f"{name}: stands still: its {at.size} places around the aperture are the same to {1e3 * _STILL_M:g} mm",
             "accepted: the log of a platform that moves",
             "A fixed platform needs no log: give its place, and speed 0",
         )
@@ -444,9 +444,9 @@ def _hold_to_new_places(at: Floats, flown: Floats, extent: float, name: str) -> 
     missed = extent * float(durations[longest] / (at[-1] - at[0]))
     if missed > _LEAST_M:
         raise PathFileError(
-            f"{name}: repeats places: {int(is_held.sum())} of {at.size} in the aperture are the place before; from "
-            f"{at[begins[longest]]:+.4g} s of mid-aperture on for {durations[longest]:.3g} s, in which the platform "
-            f"moves {format_quantity(missed, 'm')}",
+            f"{name}: repeats places: {int(is_held.sum())} of {at.size} around the aperture are the place before;"
+            f" from {at[begins[longest]]:+.4g} s of mid-aperture on for {durations[longest]:.3g} s, in which the"
+            f" platform moves {format_quantity(missed, 'm')}",
             f"accepted: repeats in which it moves at most {_LEAST_M:g} m",
             "Leave out places that were not measured anew, or write more digits",
         )

@@ -67,8 +67,8 @@ class TestALog:
             one = row(found, f"receiver.position.{axis}")
             assert one.status == "not_evaluated"
             assert one.reason == (
-                f"the path may be {format_quantity(doubt.doubt, 'm')} off (residual of the smoothed log, root mean "
-                "square), 86.6 mm is declared: state it in platforms.receiver.motion_error.position"
+                f"the path may be {format_quantity(doubt.doubt, 'm')} off (residual of the smoothed log at "
+                "places left out, root mean square), 86.6 mm is declared: state it in platforms.receiver.motion_error.position"
             )
         assert row(found, "receiver.velocity.x").status != "not_evaluated"
 
@@ -250,4 +250,5 @@ def test_json_has_the_doubt_of_each_path(run: Callable[..., Any], tmp_path: Path
     mission = logged(tmp_path, noisy(0.02), position="5 cm")
     found = json.loads(run("check", tmp_path / "m.yaml", "--format", "json").stdout)["missions"][0]
     path = mission.platforms.receiver.path
-    assert found["geometry"]["receiver"]["path"]["doubt_m"] == path.doubt_m == path.rms
+    assert found["geometry"]["receiver"]["path"]["doubt_m"] == path.doubt_m
+    assert path.doubt_m == pytest.approx(path.rms, rel=0.05)  # of a hundred places few change what is fitted to them

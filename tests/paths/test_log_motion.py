@@ -66,7 +66,7 @@ def test_a_drone_that_hovers_is_no_fault() -> None:
 
 def test_a_log_that_stands_still_is_refused() -> None:
     error = said(np.full((TIMES.size, 3), 1234.5))
-    assert str(error) == "a.csv: stands still: its 201 places in the aperture are the same to 1 mm"
+    assert str(error) == "a.csv: stands still: its 201 places around the aperture are the same to 1 mm"
     assert error.hint == "A fixed platform needs no log: give its place, and speed 0"
     # It may move before and after: what the aperture needs is frozen.
     frozen = flown(noise=0.0)
@@ -89,8 +89,8 @@ def test_a_log_that_holds_its_places_is_refused() -> None:
     held = np.repeat(flown()[::5], 5, axis=0)[: TIMES.size]
     error = said(held)
     assert str(error) == (
-        "a.csv: repeats places: 160 of 201 in the aperture are the place before; from -2 s of mid-aperture on for "
-        "0.08 s, in which the platform moves 4.8 m"
+        "a.csv: repeats places: 160 of 201 around the aperture are the place before; from -2 s of mid-aperture on "
+        "for 0.08 s, in which the platform moves 4.8 m"
     )
     assert error.hint == "Leave out places that were not measured anew, or write more digits"
 

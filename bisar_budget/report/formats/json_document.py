@@ -212,6 +212,7 @@ def _platform(mission: MissionFindings, name: str) -> dict[str, Any]:
             "residual_max_m": path.farthest,
             "residual_rms_m": path.rms,
             "samples": path.samples,
+            "stretch_s": path.stretch,
             "doubt_m": path.doubt_m,
             **{
                 said: None if file is None else dict(zip(("file", "sha256"), file, strict=True))

@@ -272,7 +272,8 @@ def path_words(path: FlownPath) -> str:
     said += f"; flown as a polynomial of order {path.order}"
     if path.samples:
         rms, farthest = (format_quantity(one, "m") for one in (path.rms, path.farthest))
-        return f"{said} through {path.samples} places, {rms} rms and at most {farthest} from them"
+        within = "" if path.stretch is None else f" in {format_quantity(path.stretch, 's')}"
+        return f"{said} through {path.samples} places{within}, {rms} rms and at most {farthest} from them"
     return f"{said}, at most {format_quantity(path.farthest, 'm')} from it"
 
 
