@@ -27,7 +27,6 @@ from bisar_budget.mission.platforms import (
 from bisar_budget.mission.propagation import too_low
 from bisar_budget.mission.readers import INVALID, Report
 from bisar_budget.paths import earth
-from bisar_budget.paths.eof import read_eof
 from bisar_budget.paths.flight import (
     Fitted,
     Log,
@@ -41,19 +40,15 @@ from bisar_budget.paths.flight import (
 )
 from bisar_budget.paths.flight_log import hold_to_motion, read_csv
 from bisar_budget.paths.instant import Instant
-from bisar_budget.paths.oem import read_oem
-from bisar_budget.paths.omm import read_omm
+from bisar_budget.paths.orbit_formats import ORBIT_FORMATS, hold_to_format
 from bisar_budget.paths.orientation import UNKNOWN, Orientation, read_finals
 from bisar_budget.paths.sbet import read_accuracy, read_sbet
-from bisar_budget.paths.sp3 import read_sp3
-from bisar_budget.paths.tle import read_tle
 from bisar_budget.resources import DISK, Files, UnreadableError
 from bisar_budget.units import format_quantity
 
 Beside = Callable[[str], bytes]  # content of a file that a mission names
 
-_ORBITS = {"tle": read_tle, "omm": read_omm, "oem": read_oem, "eof": read_eof, "sp3": read_sp3}
-_FILES = (*_ORBITS, "file", "accuracy")  # keys of a path that name one
+_FILES = (*ORBIT_FORMATS, "file", "accuracy")  # keys of a path that name one
 _MOST_BYTES = 500_000_000
 _LOGS_KEPT = 2  # of a mission that is read again and again, such as by `solve`
 _logs: dict[tuple[object, ...], Log] = {}  # by what they were read from; the bytes themselves are let go
@@ -222,7 +217,7 @@ def _of_orbit(mission: Mission, route: OrbitSource, axes: earth.SceneAxes, read:
     center = mission.collection.center_time
     if center is None:
         raise _UnusablePathError(("orbit",), Problem("needs an instant", "accepted: collection.center_time"))
-    form = next(form for form in _ORBITS if getattr(route, form) is not None)
+    form = next(form for form in ORBIT_FORMATS if getattr(route, form) is not None)
     named = getattr(route, form)
     file = named if isinstance(named, str) else None
     orientation, table = _orientation(mission, center, read)
@@ -231,7 +226,9 @@ def _of_orbit(mission: Mission, route: OrbitSource, axes: earth.SceneAxes, read:
         digest, T = hashlib.sha256(data).hexdigest(), mission.collection.aperture_time
 
         def found() -> FlownPath:
-            orbit = _ORBITS[form](data, file or "the element set", route.object, center, orientation)
+            name = file or "the element set"
+            hold_to_format(data, name, form)
+            orbit = ORBIT_FORMATS[form].read(data, name, route.object, center, orientation)
             path = _orbit_path(orbit, file, center, axes, T)
             return path._replace(orientation=table) if orbit.is_turned else path
 

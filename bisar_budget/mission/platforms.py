@@ -199,7 +199,6 @@ class CommonMotionError(NamedTuple):
 
 # ---------------------------------------------------------------------- where a platform flies
 _FILE = Reference()
-_ORBIT_WAYS = ("tle", "omm", "oem", "eof", "sp3")
 
 
 class _Lines(Reader):
@@ -239,10 +238,11 @@ class OrbitSource(NamedTuple):
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
         """Hold it to one source."""
-        given = [way for way in _ORBIT_WAYS if values.get(way) is not None]
-        if len(given) != 1 and values.keys() >= set(_ORBIT_WAYS):
+        ways = [key for key in OrbitSource._fields if key != "object"]
+        given = [way for way in ways if values.get(way) is not None]
+        if len(given) != 1 and values.keys() >= set(ways):
             said = f"mixes {' with '.join(given)}" if given else "is empty"
-            yield Problem(said, f"accepted: one of {', '.join(_ORBIT_WAYS)}")
+            yield Problem(said, f"accepted: one of {', '.join(ways)}")
 
 
 class _Instant(Reader):

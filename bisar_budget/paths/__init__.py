@@ -3,15 +3,10 @@
 # What other rooms may use.
 __all__ = [
     "earth",
-    "eof",
     "flight",
     "flight_log",
     "instant",
-    "messages",
-    "oem",
-    "omm",
+    "orbit_formats",
     "orientation",
     "sbet",
-    "sp3",
-    "tle",
 ]

@@ -67,13 +67,13 @@ def read_sp3(
     """
     hold_to_size(len(data), name, "time")
     lines = decoded(data, name).split("\n")
-    header = _Header(lines, name)
+    header = _Heading(lines, name)
     satellites = _satellites(lines, header, name)
     segments = [segment for one in satellites.values() for segment in _segments(one, header, name, tai(center))]
     return orbit_through(segments, name, wanted, center, orientation)
 
 
-class _Header:
+class _Heading:
     """Frame, time system and satellites of a file, with the accuracy that it states of each. [m]"""
 
     def __init__(self, lines: Sequence[str], name: str) -> None:
@@ -120,7 +120,7 @@ def _id(written: str) -> str:
     return (written[:1].strip() or "G") + written[1:].strip().rjust(2, "0")
 
 
-def _satellites(lines: Sequence[str], header: _Header, name: str) -> dict[str, _Satellite]:
+def _satellites(lines: Sequence[str], header: _Heading, name: str) -> dict[str, _Satellite]:
     found: dict[str, _Satellite] = {}
     time: Instant | None = None
     place: tuple[_Satellite, int] | None = None  # what the next line may give the velocity of
@@ -147,7 +147,7 @@ def _satellites(lines: Sequence[str], header: _Header, name: str) -> dict[str, _
 
 
 def _place(
-    line: str, time: Instant, at: int, found: dict[str, _Satellite], header: _Header, name: str
+    line: str, time: Instant, at: int, found: dict[str, _Satellite], header: _Heading, name: str
 ) -> tuple[_Satellite, int] | None:
     """Keep the place of a line; None where it has none."""
     where = f"{name}:{at}"
@@ -204,7 +204,7 @@ def _epoch(line: str, system: str, where: str) -> Instant:
     return found.after(seconds + (tai_less_utc(found.day) if system in _OF_UTC else _AHEAD[system]))
 
 
-def _segments(satellite: _Satellite, header: _Header, name: str, center: Instant) -> Iterator[Segment]:
+def _segments(satellite: _Satellite, header: _Heading, name: str, center: Instant) -> Iterator[Segment]:
     """The stretches of a satellite without a gap or a manoeuvre; `center` is that of the aperture, of TAI."""
     samples = satellite.samples
     steps = sorted(after.time.since(before.time) for before, after in pairwise(samples))

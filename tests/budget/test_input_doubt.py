@@ -68,7 +68,8 @@ class TestALog:
             assert one.status == "not_evaluated"
             assert one.reason == (
                 f"the path may be {format_quantity(doubt.doubt, 'm')} off (residual of the smoothed log at "
-                "places left out, root mean square), 86.6 mm is declared: state it in platforms.receiver.motion_error.position"
+                "places left out, root mean square), 86.6 mm is declared: state it in "
+                "platforms.receiver.motion_error.position"
             )
         assert row(found, "receiver.velocity.x").status != "not_evaluated"
 

@@ -1,5 +1,6 @@
 """Files of orbits that are broken: what is said of each, and that nothing else comes out of any bytes."""
 
+import gzip
 import json
 import math
 
@@ -13,6 +14,7 @@ from bisar_budget.paths.flight import PathFileError
 from bisar_budget.paths.instant import Instant
 from bisar_budget.paths.oem import read_oem
 from bisar_budget.paths.omm import read_omm
+from bisar_budget.paths.orbit_formats import ORBIT_FORMATS, hold_to_format, orbit_format
 from bisar_budget.paths.orientation import read_finals
 from bisar_budget.paths.sp3 import read_sp3
 from bisar_budget.paths.tle import read_tle
@@ -407,3 +409,56 @@ def test_elements_that_nothing_flies_on_give_an_orbit_or_an_error(
         assert all(math.isfinite(one) for one in orbit.place(at))
     except PathFileError as error:
         assert str(error).startswith("x: record 1: ")
+
+
+# ---------------------------------------------------------------------- files of another format
+SHOWN = {  # of each format, as a file shows it
+    "tle": [TLE.encode(), f"{LINE_1}\r\n{LINE_2}\r\n".encode()],
+    "omm": [omm_xml(), omm_json(), omm_csv(), omm_text(), b"\xef\xbb\xbf" + omm_csv()],
+    "oem": [oem().encode(), oem_xml(oem()), b"\n\n" + oem().encode()],
+    "eof": [GOOD["eof"]],
+    "sp3": [GOOD["sp3"], GOOD["sp3 with velocities"]],
+}
+
+
+@pytest.mark.parametrize("form", SHOWN)
+def test_a_format_is_told_by_its_content(form: str) -> None:
+    assert [orbit_format(data) for data in SHOWN[form]] == [form] * len(SHOWN[form])
+    assert SHOWN.keys() == ORBIT_FORMATS.keys()
+
+
+def test_what_is_no_orbit_is_none() -> None:
+    for data in (b"", b"time [s], x [m], y [m], z [m]\n", b"<gpx/>", b"\x00" * 5000, b"1 2 3\n2 3 4\n"):
+        assert orbit_format(data) is None
+
+
+@pytest.mark.parametrize("asked", SHOWN)
+@pytest.mark.parametrize("form", SHOWN)
+def test_a_file_of_another_format_is_named_with_the_key_that_reads_it(form: str, asked: str) -> None:
+    """An EOF as an OEM was called an element that is not there."""
+    data = SHOWN[form][0]
+    if form == asked:
+        hold_to_format(data, "x", asked)
+        return
+    with pytest.raises(PathFileError) as error:
+        hold_to_format(data, "x", asked)
+    assert str(error.value) == f"x: is {ORBIT_FORMATS[form].words}"
+    assert error.value.accepted == f"accepted: {ORBIT_FORMATS[asked].words}"
+    assert error.value.hint == f"orbit.{form} reads it"
+
+
+@pytest.mark.parametrize(
+    ("data", "said", "hint"),
+    [
+        (gzip.compress(TLE.encode()), "x: is a compressed file", "Unpack it"),
+        (b"     3.05           N: GNSS NAV DATA    M: MIXED            RINEX VERSION / TYPE\n", "x: is a RINEX file",
+         "A precise orbit comes as SP3"),
+        (b"CCSDS_OPM_VERS = 2.0\n", "x: is another message of CCSDS", ""),
+        (b"<!DOCTYPE html><html><body>Log in</body></html>", "x: is a page of a web site",
+         "Save the file that it links to"),
+    ],
+)  # fmt: skip
+def test_what_is_often_taken_for_an_orbit_is_named(data: bytes, said: str, hint: str) -> None:
+    with pytest.raises(PathFileError) as error:
+        hold_to_format(data, "x", "oem")
+    assert (str(error.value), error.value.hint) == (said, hint)
