@@ -18,6 +18,7 @@ from bisar_budget.paths.orbit_formats import ORBIT_FORMATS, hold_to_format, orbi
 from bisar_budget.paths.orientation import read_finals
 from bisar_budget.paths.sp3 import read_sp3
 from bisar_budget.paths.tle import read_tle
+from tests.conftest import ROOT
 from tests.paths.orbit_files import (
     CENTER,
     CONSTANTS,
@@ -327,7 +328,7 @@ GOOD = {
     "oem in xml": oem_xml(oem(count=10, step=120.0, frame="GCRF")),
     "omm in text": omm_text(),
     "eof": (FILES / "S1A_RESORB_20230823_excerpt.EOF").read_bytes(),
-    "sp3": (FILES / "igs15904_G05_G16.sp3").read_bytes()[:4000],
+    "sp3": (ROOT / "specs" / "missions" / "paths" / "igs15904_g05_g16.sp3").read_bytes()[:4000],
     "sp3 with velocities": low().encode(),
     "finals": (FILES / "finals2000A_excerpt.all").read_bytes(),
 }

@@ -8,10 +8,11 @@ import pytest
 from bisar_budget.paths.flight import Orbit, PathFileError
 from bisar_budget.paths.instant import Instant
 from bisar_budget.paths.sp3 import read_sp3
+from tests.conftest import ROOT
 from tests.paths.orbit_files import START, instant, on_circle
 
 FILES = Path(__file__).parent / "files"
-TEXT = (FILES / "igs15904_G05_G16.sp3").read_text()
+TEXT = (ROOT / "specs" / "missions" / "paths" / "igs15904_g05_g16.sp3").read_text()
 NOON = instant("2010-07-01T11:59:45Z")  # of GPS time, which was 15 s ahead
 
 
