@@ -7,7 +7,7 @@ import math
 import re
 import struct
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -568,3 +568,151 @@ def test_faults_of_both_paths_are_said_at_once(folder: Path) -> None:
     assert [fault.key.split(".")[1] for fault in error.value.faults] == ["transmitter", "receiver"]
     assert "stands still" in error.value.faults[0].problem
     assert "jumps by 6 km" in error.value.faults[1].problem
+
+
+# ---------------------------------------------------------------------- orbits in files of others
+FILES = Path(__file__).parent.parent / "paths" / "files"
+EOF = "S1A_RESORB_20230823_excerpt.EOF"
+
+
+def sentinel(**changes: Any) -> str:
+    """A mission whose transmitter is a real orbit file of Sentinel-1A, over the sea south of India."""
+    scene = {"latitude": "7 deg", "longitude": "53 deg", "height": 0}
+    receiver = {**FLIGHT, "latitude": "7.01 deg", "longitude": "53.01 deg"}
+    orbit = {"orbit": {"eof": EOF}, "motion_error": {"position": "30 cm"}}
+    return _text(orbit, receiver, scene, "2023-08-23T14:10:00Z", **changes)
+
+
+def test_a_sentinel_by_its_orbit_file(run: Callable[..., Any], tmp_path: Path) -> None:
+    (tmp_path / EOF).write_bytes((FILES / EOF).read_bytes())
+    (tmp_path / "m.yaml").write_text(sentinel())
+    found = json.loads(run("check", tmp_path / "m.yaml", "--format", "json").stdout)["missions"][0]
+    path = found["geometry"]["transmitter"]["path"]
+    assert path["source"] == "AUX_RESORB of Sentinel-1A, Hermite degree 7"
+    assert path["sha256"] == hashlib.sha256((FILES / EOF).read_bytes()).hexdigest()
+    assert path["doubt_m"] == pytest.approx(0.1, abs=1e-3)
+    assert path["residual_max_m"] < 1e-6
+    # 10 cm are more than 5 cm along each axis root-sum-square: what is declared is not the whole truth.
+    (tmp_path / "m.yaml").write_text(sentinel().replace("30 cm", "5 cm"))
+    found = json.loads(run("check", tmp_path / "m.yaml", "--format", "json").stdout)["missions"][0]
+    (reason,) = {one["reason"] for one in found["rows"] if one["id"].startswith("transmitter.position")}
+    assert reason.startswith("the path may be 100 mm off (interpolation of the ephemeris and 10 cm that AUX_RESORB")
+
+
+TABLE = (FILES / "finals2000A_excerpt.all").read_bytes()
+
+
+def turned(stated: Mapping[str, Any] | None, **changes: Any) -> str:
+    """A mission whose transmitter is an ephemeris in axes of the stars, on the day that the table is of."""
+    begins = Instant(60179, 0.0)
+    text = oem(frame="GCRF", times=begins.after)
+    middle = begins.after(600.0)
+    below = earth.geodetic(read_oem(text.encode(), "x", None, middle).place(middle))
+    at = {"latitude": f"{below.latitude} rad", "longitude": f"{below.longitude + 0.05} rad"}
+    receiver = {**FLIGHT, **at, "latitude": f"{below.latitude + 0.001} rad"}
+    more = {} if stated is None else {"earth_orientation": stated}
+    return _text({"orbit": {"oem": "t.oem"}}, receiver, {**at, "height": 0}, middle.as_text(), **more, **changes)
+
+
+@pytest.fixture
+def stars(tmp_path: Path) -> Path:
+    (tmp_path / "t.oem").write_text(oem(frame="GCRF", times=Instant(60179, 0.0).after))
+    (tmp_path / "finals.all").write_bytes(TABLE)
+    return tmp_path
+
+
+class TestEarthOrientation:
+    def place(self, folder: Path, stated: Mapping[str, Any] | None) -> Any:
+        (folder / "m.yaml").write_text(turned(stated))
+        path = load_mission(str(folder / "m.yaml")).platforms.transmitter.path
+        assert path is not None
+        return path
+
+    def test_figures_and_the_table_are_one_path(self, stars: Path) -> None:
+        """UT1 - UTC and the pole at 2023-08-23T00:10 by hand from two rows of the table, Bulletin B."""
+        part = 600 / 86400
+        figures = {
+            "ut1_minus_utc": f"{-0.0027933 + part * (-0.0020899 + 0.0027933)} s",
+            "polar_motion_x": f"{0.291358 + part * (0.292539 - 0.291358)} arcsec",
+            "polar_motion_y": f"{0.429819 + part * (0.427299 - 0.429819)} arcsec",
+        }
+        by_file, by_hand = (self.place(stars, one) for one in ({"file": "finals.all"}, figures))
+        assert by_file.orientation == ("finals.all", hashlib.sha256(TABLE).hexdigest())
+        assert by_hand.orientation is None
+        assert math.dist(by_file.state.position, by_hand.state.position) < 1e-4
+        for path in (by_file, by_hand):
+            assert path.doubt_m < 0.1
+            assert path.doubts == ()
+
+    def test_it_moves_the_satellite_by_what_the_earth_turns(self, stars: Path) -> None:
+        without, moved = (self.place(stars, one) for one in (None, {"ut1_minus_utc": "-0.5 s"}))
+        (folder,) = [stars]
+        level = math.hypot(*without.state.velocity)
+        assert level > 7e3
+        assert math.dist(without.state.position, moved.state.position) == pytest.approx(
+            0.5 * 7.292115e-5 * self.radius(folder), rel=1e-3
+        )
+        assert "UT1 = UTC and without polar motion" in without.doubts[0]
+        assert "GCRF is turned to the Earth to about 21 m" in moved.doubts[0]
+
+    def radius(self, folder: Path) -> float:
+        """Distance of the satellite from the Earth's axis. [m]"""
+        begins = Instant(60179, 0.0)
+        x, y, _ = read_oem((folder / "t.oem").read_bytes(), "x", None, begins.after(600)).place(begins.after(600))
+        return math.hypot(x, y)
+
+    def test_a_sweep_over_it_is_as_checked(self, run: Callable[..., Any], stars: Path) -> None:
+        key, column = "earth_orientation.ut1_minus_utc", "receiver.velocity.x.allowable"
+        (stars / "m.yaml").write_text(turned({"ut1_minus_utc": "0 s"}))
+        swept = run("sweep", stars / "m.yaml", "--vary", f"{key}=-0.5,0.5 s", "--column", column).stdout
+        rows = [line.split(",") for line in swept.splitlines() if not line.startswith("#")]
+        found = [float(row[rows[0].index(column + " [m/s]")]) for row in rows[1:]]
+        for value, one in zip(("-0.5 s", "0.5 s"), found, strict=True):
+            text = run("check", stars / "m.yaml", "--set", f"{key}={value}", "--format", "json").stdout
+            (row,) = [row for row in json.loads(text)["missions"][0]["rows"] if row["id"] == "receiver.velocity.x"]
+            assert one == pytest.approx(row["allowable"], rel=1e-6)  # searched to 1e-8
+        assert found[0] != pytest.approx(found[1], rel=1e-5)
+
+    def test_its_file_stands_in_the_report_and_diff_sees_what_it_says(
+        self, run: Callable[..., Any], stars: Path
+    ) -> None:
+        (stars / "m.yaml").write_text(turned({"file": "finals.all"}))
+        assert hashlib.sha256(TABLE).hexdigest() in run("check", stars / "m.yaml", "--format", "html").stdout
+        found = json.loads(run("check", stars / "m.yaml", "--format", "json").stdout)["missions"][0]
+        path = found["geometry"]["transmitter"]["path"]
+        assert path["earth_orientation"] == {"file": "finals.all", "sha256": hashlib.sha256(TABLE).hexdigest()}
+        git(stars, "init", "-q")
+        git(stars, "add", ".")
+        git(stars, "-c", "user.name=t", "-c", "user.email=t@example.org", "commit", "-q", "-m", "x")
+        (stars / "finals.all").write_bytes(TABLE.replace(b"-0.0027933", b"-0.0028933"))
+        assert "content of finals.all" in run("diff", stars / "m.yaml", "--base", "HEAD").stdout
+
+    @pytest.mark.parametrize(
+        ("stated", "key", "said"),
+        [
+            ({}, "earth_orientation", "lacks ut1_minus_utc"),
+            ({"polar_motion_x": "0.1 arcsec"}, "earth_orientation", "lacks ut1_minus_utc"),
+            (
+                {"ut1_minus_utc": "0.1 s", "polar_motion_x": "0.1 arcsec"},
+                "earth_orientation.polar_motion_x",
+                "has half of the polar motion",
+            ),
+            ({"ut1_minus_utc": "0.91 s"}, "earth_orientation.ut1_minus_utc", "must be at most 900 ms"),
+            ({"ut1_minus_utc": "0.1 m"}, "earth_orientation.ut1_minus_utc", "must be a time"),
+            ({"file": "finals.all", "ut1_minus_utc": "0.1 s"}, "earth_orientation.ut1_minus_utc", "mixes file with"),
+            (
+                {"file": "t.oem"},
+                "earth_orientation.file",
+                "t.oem:1: MJD must be a number, in the columns of the IERS",
+            ),
+            ({"file": "none.all"}, "earth_orientation.file", "none.all cannot be read: No such file"),
+        ],
+    )
+    def test_what_is_refused(self, stars: Path, stated: Mapping[str, Any], key: str, said: str) -> None:
+        (stars / "m.yaml").write_text(turned(stated))
+        with pytest.raises(MissionError) as caught:
+            load_mission(str(stars / "m.yaml"))
+        faults = [fault for fault in caught.value.faults if fault.key == key]
+        assert len(faults) == 1
+        assert faults[0].problem.startswith(said)
+        assert faults[0].line is not None
