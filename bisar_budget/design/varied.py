@@ -49,7 +49,7 @@ def is_held(mission: Mission, key: str, *, is_stated: bool) -> bool:
     """Whether an array can take the place of a number, which the file states or does not.
 
     It cannot where the number decides more than itself: a path of an orbit or a log, the place of the scene on the
-    Earth, an element of a covariance matrix.
+    Earth and how the Earth is turned, an element of a covariance matrix.
     """
     section, *parts = parts_of(key)
     if section == "platforms":
@@ -61,6 +61,8 @@ def is_held(mission: Mission, key: str, *, is_stated: bool) -> bool:
                 return False  # a part holds at the frequency of its own
             return is_stated or parts[2] in ("frequency", "bandwidth", "level")
         return not flies_on_earth(mission) and _is_held_of_path(platform, parts[1], is_stated)
+    if section == "earth_orientation":
+        return False
     if key == "collection.aperture_time" or (section == "scene" and parts[0] in PLACE_KEYS):
         return not flies_on_earth(mission)
     return is_stated or section in _FREE or key in _FREE

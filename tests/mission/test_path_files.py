@@ -662,14 +662,14 @@ class TestEarthOrientation:
         return math.hypot(x, y)
 
     def test_a_sweep_over_it_is_as_checked(self, run: Callable[..., Any], stars: Path) -> None:
-        key, column = "earth_orientation.ut1_minus_utc", "receiver.velocity.x.allowable"
+        key, column = "earth_orientation.ut1_minus_utc", "transmitter.velocity.y.allowable"
         (stars / "m.yaml").write_text(turned({"ut1_minus_utc": "0 s"}))
         swept = run("sweep", stars / "m.yaml", "--vary", f"{key}=-0.5,0.5 s", "--column", column).stdout
         rows = [line.split(",") for line in swept.splitlines() if not line.startswith("#")]
         found = [float(row[rows[0].index(column + " [m/s]")]) for row in rows[1:]]
         for value, one in zip(("-0.5 s", "0.5 s"), found, strict=True):
             text = run("check", stars / "m.yaml", "--set", f"{key}={value}", "--format", "json").stdout
-            (row,) = [row for row in json.loads(text)["missions"][0]["rows"] if row["id"] == "receiver.velocity.x"]
+            (row,) = [row for row in json.loads(text)["missions"][0]["rows"] if row["id"] == "transmitter.velocity.y"]
             assert one == pytest.approx(row["allowable"], rel=1e-6)  # searched to 1e-8
         assert found[0] != pytest.approx(found[1], rel=1e-5)
 
