@@ -177,6 +177,7 @@ def fitted(times: Floats, places: Floats, aperture_time_s: float, wavelength_m: 
 KINDS = ("P1", "P2", "P3", "V1", "V2", "V3")
 FRAMES = {"ECF": "scene", "RIC_ECF": "ric", "RIC_ECI": "ric"}
 ADDED = "bisar-budget"  # what names of our own begin with
+_LARGEST = (1e9, 1e6)  # sigmas of position and velocity that a mission file takes, m and m/s
 _UNCORRELATED = 1e-6  # of a correlation: rounding of a turned covariance
 _NEGATIVE = 2.5e-6  # of an eigenvalue of correlations that are written with six decimals
 
@@ -186,6 +187,7 @@ def sigmas_and_correlations(element: Element) -> Floats:
     sigmas = np.array([element.number(kind) for kind in KINDS])
     if sigmas.min() < 0:
         raise element.fault("has a negative sigma")
+    _hold_to_size(sigmas, element)
     correlation = np.eye(6)
     coefficients = element.maybe("CorrCoefs")
     if coefficients is not None:
@@ -197,6 +199,13 @@ def sigmas_and_correlations(element: Element) -> Floats:
                 correlation[row, column] = correlation[column, row] = value
     covariance: Floats = np.outer(sigmas, sigmas) * correlation
     return covariance
+
+
+def _hold_to_size(sigmas: Floats, element: Element) -> None:
+    """Refuse sigmas (6,) that are no motion error's, before they are squared."""
+    for kind, largest, written in zip((sigmas[:3], sigmas[3:]), _LARGEST, ("m", "m/s"), strict=True):
+        if kind.max() > largest:
+            raise element.fault(f"has a sigma of {kind.max():.3g} {written}, more than {largest:g} {written}")
 
 
 def correlated(covariance: Floats) -> tuple[Floats, Floats]:
@@ -215,6 +224,7 @@ def declared(
     turned covariance is written by its sigmas alone where nothing is correlated.
     """
     name = frame.text()
+    _hold_to_size(np.sqrt(np.abs(covariance).max(axis=1)), frame)
     if name not in FRAMES:
         raise frame.fault(f"must be one of {', '.join(FRAMES)} (got {name!r})")
     target = state.frame("scene") if name == "ECF" else axes.radial(state.position, state.velocity)

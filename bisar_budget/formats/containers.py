@@ -160,7 +160,7 @@ class Element:
                 raise entry.fault("counts its indices from 1")
             found[row, column] = entry.number()
         filled = np.where(np.isnan(found), found.T, found)
-        symmetric: Floats = np.nan_to_num((filled + filled.T) / 2)
+        symmetric: Floats = np.nan_to_num(filled / 2 + filled.T / 2)
         return symmetric
 
     def _attribute(self, name: str, most: int) -> int:

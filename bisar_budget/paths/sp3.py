@@ -68,7 +68,8 @@ def read_sp3(
     hold_to_size(len(data), name, "time")
     lines = decoded(data, name).split("\n")
     header = _Heading(lines, name)
-    satellites = _satellites(lines, header, name)
+    # Of a hundred satellites one is read; all of them where that is needed to say which there are.
+    satellites = (wanted and _satellites(lines, header, name, wanted)) or _satellites(lines, header, name)
     segments = [segment for one in satellites.values() for segment in _segments(one, header, name, tai(center))]
     return orbit_through(segments, name, wanted, center, orientation)
 
@@ -120,7 +121,11 @@ def _id(written: str) -> str:
     return (written[:1].strip() or "G") + written[1:].strip().rjust(2, "0")
 
 
-def _satellites(lines: Sequence[str], header: _Heading, name: str) -> dict[str, _Satellite]:
+def _satellites(
+    lines: Sequence[str], header: _Heading, name: str, wanted: str | None = None
+) -> dict[str, _Satellite]:
+    """Satellites of a file by their names, or the one that is wanted."""
+    key = None if wanted is None else object_key(wanted)
     found: dict[str, _Satellite] = {}
     time: Instant | None = None
     place: tuple[_Satellite, int] | None = None  # what the next line may give the velocity of
@@ -130,6 +135,8 @@ def _satellites(lines: Sequence[str], header: _Heading, name: str) -> dict[str, 
             before, time, place = time, _epoch(line, header.system, f"{name}:{at}"), None
             if before is not None and time.since(before) < APART:
                 raise PathFileError(f"{name}:{at}: the epoch is not after the one before it; epochs must rise")
+        elif kind in ("P", "V") and key not in (None, object_key(_satellite_of(line, f"{name}:{at}"))):
+            continue
         elif kind == "P" and time is not None:
             place = _place(line, time, at, found, header, name)
         elif kind == "V" and place is not None:

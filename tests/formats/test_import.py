@@ -300,7 +300,14 @@ class TestErrors:
 
     @pytest.mark.parametrize(
         ("wrong", "right", "at"),
-        [("<P3>3<", "<P3>-3<", "PosVelErr"), ("RIC_ECI", "NED", "Frame"), (">-0.9<", ">-1.9<", "P1V2")],
+        [
+            ("<P3>3<", "<P3>-3<", "PosVelErr"),
+            ("RIC_ECI", "NED", "Frame"),
+            (">-0.9<", ">-1.9<", "P1V2"),
+            ("<P3>3<", "<P3>1e308<", "PosVelErr"),  # its square is infinite, and had no eigenvalues
+            ("<P3>3<", "<P3>1.001e9<", "PosVelErr"),
+            ("<V1>0.01<", "<V1>1e154<", "PosVelErr"),
+        ],
     )
     def test_what_is_no_error(self, tmp_path, wrong, right, at) -> None:
         with pytest.raises(FormatError, match=f"ErrorParameters/Bistatic/TxPlatform/PosVelErr.*{at}|{at}"):
@@ -625,3 +632,13 @@ def test_a_place_beyond_the_moon_is_none(run, tmp_path, place) -> None:
     found = run("import", written(tmp_path / "a.cphd", tree, pulses))
     assert found.exit_code == 0
     assert "without a pulse, a time or a place, and not used: 1 of 201 vectors" in found.stderr
+
+
+@pytest.mark.parametrize("value", ["1e308", "1e200", "-1e308"])
+def test_a_covariance_that_is_no_errors_ends_in_2(run, tmp_path, value) -> None:
+    tree = sample(BISTATIC)
+    element(tree, ERRORS.replace("<V1>0.01<", f"<V1>{value}<"), before="ProductInfo")
+    found = run("import", written(tmp_path / "errors.cphd", tree))
+    assert found.exit_code == 2
+    assert "PosVelErr" in found.stderr
+    assert "Traceback" not in found.stderr
