@@ -1,3 +1,53 @@
-"""Motion-measurement error budgets for bistatic SAR, after Rigling & Moses."""
+"""Motion-measurement error budgets for bistatic SAR, after Rigling & Moses.
+
+    import bisar_budget as bb
+
+    result = bb.check(bb.load("mission.yaml"))
+
+Numbers are SI and radians. What is named here is read when it is asked for: the package alone imports nothing.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    from bisar_budget.faults import MissionError as MissionError
+    from bisar_budget.front.missions import geomspace as geomspace
+    from bisar_budget.front.missions import linspace as linspace
+    from bisar_budget.front.missions import load as load
+    from bisar_budget.front.missions import loads as loads
+    from bisar_budget.front.questions import allocate as allocate
+    from bisar_budget.front.questions import check as check
+    from bisar_budget.front.questions import monte_carlo as monte_carlo
+    from bisar_budget.front.questions import sensitivity as sensitivity
+    from bisar_budget.front.questions import simulate as simulate
+    from bisar_budget.front.questions import solve as solve
+    from bisar_budget.front.questions import sweep as sweep
+    from bisar_budget.front.questions import verify as verify
+    from bisar_budget.mission.model import Mission as Mission
+    from bisar_budget.mission.quantities import QuestionError as QuestionError
+
+# By the name that others use, the module that it lives in.
+_FROM = {
+    "Mission": "mission.model",
+    "MissionError": "faults",
+    "QuestionError": "mission.quantities",
+    **dict.fromkeys(("geomspace", "linspace", "load", "loads"), "front.missions"),
+    **dict.fromkeys(
+        ("allocate", "check", "monte_carlo", "sensitivity", "simulate", "solve", "sweep", "verify"), "front.questions"
+    ),
+}
+__all__ = ["__version__", *sorted(_FROM)]
+
+
+def __getattr__(name: str) -> Any:
+    """What is named in `__all__`, from where it lives."""
+    if name not in _FROM:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_FROM[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -117,6 +117,7 @@ class Outside(NamedTuple):
     options: tuple[Override, ...] = ()
     day_origin: str = "the caller"
     is_day_given: bool = False  # by the option --date, which is said even where no waiver stands
+    set_origin: str = "command line"  # of values in place of the file's
 
 
 NOTHING_OUTSIDE = Outside()
@@ -137,7 +138,7 @@ def overrides(mission: Mission, outside: Outside, today: date) -> tuple[Override
     found = list(outside.options)
     if mission.waivers or outside.is_day_given:
         found.append(Override("--date", today.isoformat(), outside.day_origin))
-    found += [Override("--set", f"{change.key}={change.text}", "command line") for change in mission.changes]
+    found += [Override("--set", f"{change.key}={change.text}", outside.set_origin) for change in mission.changes]
     return (*found, *_own_parts(mission))
 
 

@@ -6,6 +6,7 @@ __all__ = [
     "covariance",
     "curves",
     "edited",
+    "given",
     "instruments",
     "load",
     "model",

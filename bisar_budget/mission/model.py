@@ -421,6 +421,12 @@ class Mission(NamedTuple):
         """Whether it does not; a tuple has its own answer."""
         return not self == other
 
+    def replace(self, values: Mapping[str, Any]) -> "Mission":
+        """A mission with other values in place of the file's; arguments and faults are those of `given.changed`."""
+        from bisar_budget.mission.given import changed  # which reads a mission
+
+        return changed(self, values)
+
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
         """Hold it to a collection that forms an image, and to names that can be told apart."""

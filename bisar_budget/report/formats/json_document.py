@@ -145,7 +145,7 @@ def _mission(mission: MissionFindings) -> dict[str, Any]:
         "notes": mission.notes,
         "note_codes": [note.code for note in mission.notes],
         "errors": [],
-        "monte_carlo": None if mission.monte_carlo is None else _monte_carlo(mission.monte_carlo),
+        "monte_carlo": None if mission.monte_carlo is None else monte_carlo_item(mission.monte_carlo),
         "verification": None if mission.verdicts is None else [verdict_item(one) for one in mission.verdicts],
         **({} if mission.study is None else {"sweep": _study(mission.study)}),
     }
@@ -189,7 +189,8 @@ def _row(row: Row) -> dict[str, Any]:
     return found
 
 
-def _monte_carlo(drawn: MonteCarlo) -> dict[str, Any]:
+def monte_carlo_item(drawn: MonteCarlo) -> dict[str, Any]:
+    """How often requirements hold, as the contract has it."""
     return {**drawn._asdict(), "requirements": [requirement._asdict() for requirement in drawn.requirements]}
 
 

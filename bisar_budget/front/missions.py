@@ -1,0 +1,115 @@
+"""Missions from files and texts, and the values that a sweep gives them."""
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from bisar_budget.design.cases import Grid, grid, grid_of
+from bisar_budget.mission.given import is_quantity, magnitude, text_of
+from bisar_budget.mission.load import load_mission, parse_mission
+from bisar_budget.mission.model import Mission
+from bisar_budget.mission.quantities import number_of, tree_of
+
+
+def load(path: str | os.PathLike[str]) -> Mission:
+    """Read a mission file.
+
+    Parameters
+    ----------
+    path : path
+        Of a YAML file; files that it names are looked for beside it.
+
+    Raises
+    ------
+    MissionError
+        The file cannot be used; `faults` has what is wrong, and where.
+    """
+    return load_mission(os.fspath(path))
+
+
+def loads(text: str | bytes, file: str = "mission.yaml") -> Mission:
+    """Read a mission from a text.
+
+    Parameters
+    ----------
+    text : str or bytes
+        What a mission file would have.
+    file : str
+        What messages call it; files that it names are looked for beside it.
+
+    Raises
+    ------
+    MissionError
+        The text cannot be used; `faults` has what is wrong, and where.
+    """
+    return parse_mission(text, file)
+
+
+@dataclass(frozen=True)
+class Range:
+    """Values of a key from one to another, as `linspace` and `geomspace` give them, in the unit of the texts."""
+
+    start: str
+    stop: str
+    count: int
+
+    is_log: bool = False
+
+    def of(self, key: str) -> str:
+        """What `sweep --vary` would be given."""
+        return f"{key}={self.start}:{self.stop}:{self.count}" + (":log" if self.is_log else "")
+
+
+def linspace(start: Any, stop: Any, count: int) -> Range:
+    """So many values from one to another at even distances, both included, for `sweep`.
+
+    Parameters
+    ----------
+    start, stop : str, float or quantity
+        Texts with a unit, `"1 s"`, or numbers in SI.
+    count : int
+        At least 2.
+    """
+    return Range(text_of("", start), text_of("", stop), count)
+
+
+def geomspace(start: Any, stop: Any, count: int) -> Range:
+    """So many values from one to another in equal ratios; arguments are those of `linspace`, above zero."""
+    return Range(text_of("", start), text_of("", stop), count, is_log=True)
+
+
+def cases_of(mission: Mission, values: Mapping[str, Any]) -> Grid:
+    """The cases of a sweep: every combination of the values of each key; the last key is the fastest.
+
+    Parameters
+    ----------
+    mission : Mission
+        As loaded.
+    values : mapping
+        Of each key a range of `linspace`, an array of numbers in SI, a quantity that holds an array, or a list of
+        texts: values with units, or words.
+
+    Raises
+    ------
+    QuestionError
+        No such key, no number or word for it, no value.
+    """
+    tree = tree_of(mission)
+    each = [_axis(tree, key, given) for key, given in values.items()]
+    return Grid(tuple(one.varied[0] for one in each), tuple(one.axes[0] for one in each))
+
+
+def _axis(tree: dict[str, Any], key: str, given: Any) -> Grid:
+    """The values of one key."""
+    if isinstance(given, Range):
+        return grid(tree, [given.of(key)], "sweep")
+    if isinstance(given, str):
+        return grid(tree, [f"{key}={given}"], "sweep")
+    if isinstance(given, Sequence) and any(isinstance(one, str) or is_quantity(one) for one in given):
+        return grid(tree, [f"{key}={','.join(text_of('', one) for one in given)}"], "sweep")
+    if is_quantity(given):
+        given = np.atleast_1d(magnitude(given, number_of(tree, key).dimension.si))
+    return grid_of(tree, {key: given})
