@@ -49,7 +49,7 @@ def loads(text: str | bytes, file: str = "mission.yaml") -> Mission:
 
 
 @dataclass(frozen=True)
-class Range:
+class Spaced:
     """Values of a key from one to another, as `linspace` and `geomspace` give them, in the unit of the texts."""
 
     start: str
@@ -63,7 +63,7 @@ class Range:
         return f"{key}={self.start}:{self.stop}:{self.count}" + (":log" if self.is_log else "")
 
 
-def linspace(start: Any, stop: Any, count: int) -> Range:
+def linspace(start: Any, stop: Any, count: int) -> Spaced:
     """So many values from one to another at even distances, both included, for `sweep`.
 
     Parameters
@@ -73,12 +73,12 @@ def linspace(start: Any, stop: Any, count: int) -> Range:
     count : int
         At least 2.
     """
-    return Range(text_of("", start), text_of("", stop), count)
+    return Spaced(text_of("", start), text_of("", stop), count)
 
 
-def geomspace(start: Any, stop: Any, count: int) -> Range:
+def geomspace(start: Any, stop: Any, count: int) -> Spaced:
     """So many values from one to another in equal ratios; arguments are those of `linspace`, above zero."""
-    return Range(text_of("", start), text_of("", stop), count, is_log=True)
+    return Spaced(text_of("", start), text_of("", stop), count, is_log=True)
 
 
 def cases_of(mission: Mission, values: Mapping[str, Any]) -> Grid:
@@ -104,7 +104,7 @@ def cases_of(mission: Mission, values: Mapping[str, Any]) -> Grid:
 
 def _axis(tree: dict[str, Any], key: str, given: Any) -> Grid:
     """The values of one key."""
-    if isinstance(given, Range):
+    if isinstance(given, Spaced):
         return grid(tree, [given.of(key)], "sweep")
     if isinstance(given, str):
         return grid(tree, [f"{key}={given}"], "sweep")
