@@ -5,7 +5,7 @@ import math
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -194,24 +194,60 @@ def _with_radial(state: PlatformState, axes: earth.SceneAxes) -> PlatformState:
         return state
 
 
+class OrbitFile(NamedTuple):
+    """The file of an orbit: the form it has, its name, its content, and which object of it is wanted.
+
+    The name is None where an element set stands in the mission file itself.
+    """
+
+    form: str
+    name: str | None
+    data: bytes
+    object: str | None
+
+    @classmethod
+    def of(cls, route: OrbitSource, read: Beside) -> "OrbitFile":
+        """Read the file of an orbit; raises `PathFileError`."""
+        form = form_of(route)
+        named = getattr(route, form)
+        if isinstance(named, str):
+            return cls(form, named, read(named), route.object)
+        return cls(form, None, "\n".join(named).encode(), route.object)
+
+    def orbit(self, center: Instant) -> Orbit:
+        """The orbit that is flown at an instant: that of the elements, or of the segment, nearest to it.
+
+        Raises
+        ------
+        PathFileError
+            There is none.
+        """
+        orbit: Orbit = _ORBITS[self.form](self.data, self.name or "the element set", self.object, center)
+        return orbit
+
+
+def form_of(route: OrbitSource) -> str:
+    """Key under which the mission file has an orbit."""
+    return next(form for form in _ORBITS if getattr(route, form) is not None)
+
+
 def _of_orbit(mission: Mission, route: OrbitSource, axes: earth.SceneAxes, read: Beside) -> FlownPath:
     center = mission.collection.center_time
     if center is None:
         raise _UnusablePathError(("orbit",), Problem("needs an instant", "accepted: collection.center_time"))
-    form = next(form for form in _ORBITS if getattr(route, form) is not None)
-    named = getattr(route, form)
-    file = named if isinstance(named, str) else None
     try:
-        data = read(file) if file is not None else "\n".join(named).encode()
-        digest, T = hashlib.sha256(data).hexdigest(), mission.collection.aperture_time
-
-        def found() -> FlownPath:
-            orbit = _ORBITS[form](data, file or "the element set", route.object, center)
-            return _orbit_path(orbit, file, center, axes, T)
-
-        path: FlownPath = _kept(_paths, _PATHS_KEPT, (form, file, digest, route.object, center, axes, T), found)
+        given = OrbitFile.of(route, read)
+        digest, T = hashlib.sha256(given.data).hexdigest(), mission.collection.aperture_time
+        path: FlownPath = _kept(
+            _paths,
+            _PATHS_KEPT,
+            (*given._replace(data=digest.encode()), center, axes, T),
+            lambda: _orbit_path(given.orbit(center), given.name, center, axes, T),
+        )
     except PathFileError as error:
-        raise _UnusablePathError(("orbit", form), _of_file(file, error)) from None
+        named = getattr(route, form_of(route))
+        file = named if isinstance(named, str) else None
+        raise _UnusablePathError(("orbit", form_of(route)), _of_file(file, error)) from None
     return path._replace(sha256=digest)
 
 

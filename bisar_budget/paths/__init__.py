@@ -10,4 +10,5 @@ __all__ = [
     "instant",
     "messages",
     "sbet",
+    "visibility",
 ]
