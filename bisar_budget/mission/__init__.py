@@ -10,6 +10,7 @@ __all__ = [
     "load",
     "model",
     "parts",
+    "paths",
     "platforms",
     "propagation",
     "quantities",

@@ -3,7 +3,7 @@
 import hashlib
 import math
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -89,6 +89,16 @@ def reader_of(folder: str, files: Files = DISK) -> Beside:
         return data
 
     return read
+
+
+def path_files(mission: Mission) -> Iterator[tuple[str, str]]:
+    """Keys under which a mission names an orbit or a log, and the names."""
+    for name in Platforms._fields:
+        platform: Platform = getattr(mission.platforms, name)
+        for key, section in (("orbit", platform.orbit), ("trajectory", platform.trajectory)):
+            for form in _FILES:
+                if isinstance(file := getattr(section, form, None), str):
+                    yield f"platforms.{name}.{key}.{form}", file
 
 
 def report_files(root: Any, read: Beside, report: Report) -> None:
