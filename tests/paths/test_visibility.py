@@ -2,6 +2,8 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -61,11 +63,11 @@ def skyfield_events(text: str, days: float, place: Geodetic, start: Instant) -> 
 @pytest.mark.parametrize(
     ("text", "days", "place", "fewest"),
     [
-        (TLE, 4, BESANCON, 8),
-        (TLE, 2, Geodetic(math.radians(78.23), math.radians(15.4), 450.0), 18),  # Svalbard sees each turn
-        (TLE, 4, Geodetic(math.radians(-0.2), math.radians(-78.5), 2850.0), 3),
-        (MOLNIYA, 4, BESANCON, 4),
-        (LOW, 4, BESANCON, 4),
+        (TLE, 3, BESANCON, 7),
+        (TLE, 1, Geodetic(math.radians(78.23), math.radians(15.4), 450.0), 9),  # Svalbard sees two of three turns
+        (TLE, 3, Geodetic(math.radians(-0.2), math.radians(-78.5), 2850.0), 2),
+        (MOLNIYA, 3, BESANCON, 3),
+        (LOW, 3, BESANCON, 3),
     ],
     ids=["besancon", "svalbard", "quito", "molniya", "low"],
 )
@@ -92,9 +94,9 @@ def test_events_are_those_of_skyfield(text: str, days: float, place: Geodetic, f
 
 
 def test_a_satellite_that_does_not_set_has_one_stretch_and_where_it_never_rises_none() -> None:
-    """Seen from six places around the equator: as Skyfield, which has no rise and no set of it."""
+    """Seen from three places around the equator: as Skyfield, which has no rise and no set of it."""
     counts = []
-    for longitude in np.arange(0, 2 * math.pi, math.pi / 3):
+    for longitude in np.arange(0, 2 * math.pi, 2 * math.pi / 3):
         site = Geodetic(math.radians(10), longitude, 0.0)
         there = watched(GEOSTATIONARY, 2, site)
         is_above = there.sine_of_elevation(np.linspace(0, 2 * DAY, 500)) > math.sin(LEAST)
@@ -102,7 +104,7 @@ def test_a_satellite_that_does_not_set_has_one_stretch_and_where_it_never_rises_
         assert there.above(LEAST) == [Stretch(0.0, 2 * DAY, False, False)] * int(is_above.all())
         assert {kind for _, kind in skyfield_events(GEOSTATIONARY, 2, site, CENTER)} <= {1}
         counts.append(is_above.all())
-    assert 0 < sum(counts) < 6
+    assert 0 < sum(counts) < 3
 
 
 @pytest.mark.parametrize("text", [TLE, MOLNIYA, LOW], ids=["sentinel", "molniya", "low"])
@@ -124,6 +126,7 @@ def test_no_pass_is_missed_and_none_is_there_twice() -> None:
     """Over ten days and random places against the elevation each 10 s, down to passes of a minute."""
     rng = np.random.default_rng(11)
     orbit, days = of_elements(TLE)(CENTER), 10
+    orbit = replace(orbit, place=cache(orbit.place))
     times = np.arange(0.0, days * DAY, 10.0)
     greenwich = axes_at(Geodetic(0.0, 0.0, 0.0))
     over_it = Watched.over(lambda _: orbit, greenwich, CENTER, days * DAY)
@@ -183,10 +186,10 @@ class TestSeveral:
         assert "its useable time is 2026-06-01T06:20:31.250Z to 2026-06-01T11:20:31.250Z" in after.reason
 
     def test_an_ephemeris_sees_what_its_elements_see(self) -> None:
-        text = ephemeris(CENTER, DAY)
-        seen = Watched.over(lambda at: read_oem(text, "o.oem", None, at), axes_at(BESANCON), CENTER, DAY)
-        of_file, of_set = seen.above(LEAST), watched(TLE, 1).above(LEAST)
-        assert len(of_file) == len(of_set) >= 3
+        text = ephemeris(CENTER, DAY / 2)
+        seen = Watched.over(lambda at: read_oem(text, "o.oem", None, at), axes_at(BESANCON), CENTER, DAY / 2)
+        of_file, of_set = seen.above(LEAST), watched(TLE, 0.5).above(LEAST)
+        assert len(of_file) == len(of_set) >= 2
         for one, other in zip(of_file, of_set, strict=True):
             assert (one.start, one.stop) == pytest.approx((other.start, other.stop), abs=0.01)
 
