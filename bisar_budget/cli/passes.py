@@ -1,5 +1,6 @@
 """`bisar-budget passes`: when an orbit sees the scene, and how the mission stands in each pass."""
 
+import math
 import os
 import sys
 from collections.abc import Sequence
@@ -111,6 +112,8 @@ def passes(
     complies in some pass, 1 if in none, 2 for wrong usage, an unusable mission file or an orbit that is not known at
     any time that was asked for.
     """
+    if math.isnan(days):
+        raise click.UsageError("--days: nan is no number of days; accepted: more than 0, up to 366.")
     hold_to_suffixes(plot, (".svg", ".png", ".pdf"))
     is_folder = output is not None and (output.endswith(("/", os.sep)) or os.path.isdir(output))
     if format_name is None:
@@ -158,17 +161,15 @@ def passes(
 
 def _angle(option: str, text: str, least: float) -> float:
     """An angle of an option, from a least one to less than 90 deg. [rad]"""
-    import math
-
     from bisar_budget import units
-    from bisar_budget.faults import InvalidValueError, shown
+    from bisar_budget.faults import InvalidValueError, closed, shown
     from bisar_budget.mission.readers import Quantity
 
     bounds = {"ge": 0.0} if least == 0 else {"gt": math.radians(least)}
     try:
         return Quantity(units.ANGLE, lt=math.pi / 2, **bounds).leaf(text)
     except InvalidValueError as error:
-        raise click.UsageError(f"{option} {shown(text)}: {error.problem.words}.") from None
+        raise click.UsageError(f"{option} {shown(text)}: {closed(error.problem.words)}") from None
 
 
 def _written(found: "Passes", format_name: str, output: str | None, stamp: date) -> str:

@@ -227,7 +227,7 @@ def _degrees(angle: float | None, digits: int = 0) -> str:
 def _notes(passes: Passes) -> Iterator[str]:
     """What decides, once for all passes that share it; what was cut, and what is not known."""
     for text, numbers in _grouped(passes.found, _decided):
-        yield f"{numbers}: {text}."
+        yield f"{sentence(text)}: {numbers}."
     for text, numbers in _grouped(passes.found, lambda one: one.reason and _figureless(one)):
         first = next(one for one in passes.found if one.reason and _figureless(one) == text)
         of_first = f" (numbers of {first.number})" if first.reason != text and not numbers.isdecimal() else ""
@@ -235,11 +235,11 @@ def _notes(passes: Passes) -> Iterator[str]:
     if any(one.center is None for one in passes.found):
         yield "* of the culmination: there is no mid-time."
     for numbers, where in (
-        (_numbers(one.number for one in passes.found if not one.rises), "began before what was looked at"),
-        (_numbers(one.number for one in passes.found if not one.sets), "goes on after what was looked at"),
+        (_numbers(one.number for one in passes.found if not one.rises), "Began before what was looked at"),
+        (_numbers(one.number for one in passes.found if not one.sets), "Goes on after what was looked at"),
     ):
         if numbers:
-            yield f"{numbers}: {where}."
+            yield f"{where}: {numbers}."
     for gap in passes.unknown:
         yield (
             f"No orbit of the {gap.platform} {short_time(gap.start)} to {short_time(gap.stop)}: "
@@ -377,13 +377,18 @@ def _escaped(text: str) -> str:
 def _folded(line: str) -> Iterator[str]:
     """Lines of at most 75 octets, of which all but the first begin with a space; no character is cut.
 
-    A line goes on with no colon: at the start of a line of a log, two of them are a command.
+    None goes on with a colon, and two `#` stand on two lines: a log takes either for a command.
     """
     start, size = 0, 0
     for place, letter in enumerate(line):
         octets = len(letter.encode())
-        if size + octets > _OCTETS - 1 and letter != ":":
-            yield f"{' ' if start else ''}{line[start:place]}"
-            start, size = place, 0
+        is_command = letter == line[place - 1 : place] == "#"
+        if is_command or size + octets > _OCTETS - 1:
+            cut = place
+            while line[cut] == ":" and cut > start + 1:
+                cut -= 1
+            cut = cut if cut > start + 1 else place  # colons alone
+            yield f"{' ' if start else ''}{line[start:cut]}"
+            start, size = cut, len(line[cut:place].encode())
         size += octets
     yield f"{' ' if start else ''}{line[start:]}"
