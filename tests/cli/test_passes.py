@@ -386,7 +386,7 @@ def test_what_cannot_be_asked_says_why(run, arguments, said: str, tmp_path, monk
         (
             "tle: paths/sentinel1a_2021079.tle",
             "tle: paths/none.tle",
-            "m.yaml:32:19: platforms.transmitter.orbit.tle:",
+            "m.yaml:32:19: platforms.transmitter.orbit",
         ),
         ("tle: paths/sentinel1a_2021079.tle", "oem: paths/sentinel1a_2021079.tle", "m.yaml:32:19: platforms.transmi"),
         ("aperture_time: 0.5 s", "aperture_time: -1 s", "m.yaml:28:18: collection.aperture_time: must be"),
