@@ -28,6 +28,7 @@ from bisar_budget.mission.quantities import QuestionError
 from bisar_budget.paths.earth import SceneAxes
 from bisar_budget.paths.flight import PathFileError
 from bisar_budget.paths.instant import DAY, Instant, parse_instant
+from bisar_budget.paths.messages import EARLIEST, LATEST
 from bisar_budget.paths.visibility import Floats, Stretch, Watched, shared
 from bisar_budget.workers import Progress, unseen
 
@@ -128,9 +129,10 @@ def start_of(text: str) -> Instant:
         It is neither.
     """
     found = parse_instant(f"{text.strip()}T00:00:00Z") or parse_instant(text)
-    if found is None:
+    if found is None or not EARLIEST <= found.day < LATEST:
         raise QuestionError(
-            f"--from {shown(text)}: is no day and no instant of UTC; accepted: 2026-07-01, 2026-07-01T05:30:00Z"
+            f"--from {shown(text)}: is no day and no instant of UTC from 1957-10 to 2199; accepted: 2026-07-01, "
+            "2026-07-01T05:30:00Z"
         )
     return found
 

@@ -1,10 +1,10 @@
 """When a satellite is above an elevation at a place: rise, culmination and set, and where it has a squint.
 
-An orbit is sampled each minute in the axes of the scene, and read between by Lagrange's polynomials through eight
-places: they leave less than a millimetre. All that is looked for is then found on arrays. The rate of the elevation
-is looked at each half minute, and each extremum found where it changes its sign. From one extremum to the next a low
-orbit makes about half a turn. Between two of them the elevation only rises or only falls, so that no pass is missed,
-however short, and none is there twice.
+An orbit is sampled each two minutes in the axes of the scene, and read between by Lagrange's polynomials through
+eight places: they leave centimetres of a low orbit, and less than a metre at the perigee of a transfer orbit. All
+that is looked for is then found on arrays. The rate of the elevation is looked at each half minute, and each extremum
+found where it changes its sign. From one extremum to the next a low orbit makes about half a turn. Between two of
+them the elevation only rises or only falls, so that no pass is missed, however short, and none is there twice.
 """
 
 import math
@@ -24,10 +24,10 @@ from bisar_budget.paths.instant import Instant
 
 Floats = NDArray[np.float64]
 
-STEP = 60.0  # s between places
+STEP = 120.0  # s between places
 _NODES = 8
-_FINE = 2  # times as many places are looked at
-_HALVINGS = 50  # of a bracket, to 1e-13 s
+_FINE = 4  # times as many places are looked at
+_HALVINGS = 40  # of a bracket, to 1e-10 s
 _APART = 1e-3  # s to which it is found where one orbit ends and the next begins
 _TOUCHING = 5 * _APART
 _LOOKED_FOR = 16  # parts of a span without an orbit in which one is looked for
@@ -58,7 +58,7 @@ class Stretch(NamedTuple):
 
 
 class _Sampled:
-    """Places of one orbit in the axes of a scene, each minute from `start` to `stop` or a little closer. [s]"""
+    """Places of one orbit in the axes of a scene, each two minutes from `start` to `stop` or a little closer. [s]"""
 
     def __init__(self, orbit: Orbit, axes: SceneAxes, origin: Instant, start: float, stop: float) -> None:
         self.orbit, self.start, self.reason = orbit, start, ""
