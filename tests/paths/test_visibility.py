@@ -86,8 +86,8 @@ def skyfield_events(text: str, days: float, place: Geodetic, start: Instant) -> 
 def test_events_are_those_of_skyfield(text: str, days: float, place: Geodetic, fewest: int) -> None:
     """To a second of `find_events`, which looks for them to half a second, and by its altitudes.
 
-    Skyfield turns the Earth by UT1, which is up to 0.9 s from UTC, here it is UTC: that moves a place by 0.4 km, which
-    is 0.02 deg at the distance of the nearest orbit.
+    Skyfield turns the Earth by UT1, which is up to 0.9 s from UTC, here it is UTC: that moves a place by 0.4 km,
+    which is 0.02 deg at the distance of the nearest orbit.
     """
     seen = watched(text, days, place)
     found: list[tuple[float, int]] = []

@@ -20,7 +20,7 @@ _BESIDE = 34.0  # px for the names of directions
 _APART = 78.0  # px between the sky and the axes of the resolution
 _HEAD = 7.0  # px, of an arrow
 _MANY, _THIN, _BROAD = 20, 1.3, 2.0  # tracks, from which on they are thin; px
-_NUMBERED = 40  # passes whose numbers look for a free place
+_NUMBERED = 40  # passes, at most
 _HOUR = 3600.0
 _STEPS = (1, 2, 3, 6, 12, 24, 48, 120, 240, 480, 1200, 2400)  # h
 _ROOM = 58.0  # px for a date
@@ -134,12 +134,12 @@ def _arrow(track: Sequence[svg.Point]) -> list[svg.Point]:
 
 
 def _numbers(canvas: svg.Canvas, found: Sequence[SatellitePass], marks: Sequence[svg.Point], within: svg.Box) -> None:
-    """Numbers of passes beside their marks, where there is room; of very many simply there."""
-    if len(found) <= _NUMBERED:
-        canvas.labels([svg.DrawnLabel(at, (str(one.number),), within) for one, at in zip(found, marks, strict=True)])
-        return
-    for one, (x, y) in zip(found, marks, strict=True):
-        canvas.text((x + 6, y + 4), [str(one.number)], "small")
+    """Numbers of passes beside their marks; of very many those of the passes that comply, if they are few."""
+    numbered = list(zip(found, marks, strict=True))
+    if len(numbered) > _NUMBERED:
+        numbered = [(one, at) for one, at in numbered if one.complies]
+    if len(numbered) <= _NUMBERED:
+        canvas.labels([svg.DrawnLabel(at, (str(one.number),), within) for one, at in numbered])
 
 
 # ---------------------------------------------------------------- resolution over time

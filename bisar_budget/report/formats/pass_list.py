@@ -139,11 +139,12 @@ def verdict(passes: Passes) -> str:
     comply = len(passes.complying)
     if not count:
         said = "no pass"
+    elif count == 1:
+        said = f"one pass, which {'complies' if comply else 'does not comply'}"
     elif comply == count:
-        said = "the pass complies" if count == 1 else f"all {count} passes comply"
+        said = f"all {count} passes comply"
     else:
-        of_all = f"{count} pass{'es' if count != 1 else ''}"
-        said = f"{comply or 'none'} of {of_all} {'complies' if comply == 1 else 'comply'}"
+        said = f"{comply or 'none'} of {count} passes {'complies' if comply == 1 else 'comply'}"
     squint = f"squint {math.degrees(passes.squint):.4g} deg" if passes.squint else "broadside"
     return (
         f"{said}: {passes.platform} above {math.degrees(passes.min_elevation):.4g} deg and at {squint}, "
