@@ -23,7 +23,7 @@ from bisar_budget.findings.status import RANK, STATUS
 from bisar_budget.geometry import PlatformState, cross, dot
 from bisar_budget.mission.load import folder_of
 from bisar_budget.mission.model import Mission
-from bisar_budget.mission.paths import OrbitFile, reader_of
+from bisar_budget.mission.paths import orbits_of, reader_of
 from bisar_budget.mission.quantities import QuestionError
 from bisar_budget.paths.earth import SceneAxes
 from bisar_budget.paths.flight import PathFileError
@@ -234,7 +234,7 @@ def _watched(
         if route is None:
             continue
         try:
-            seen[name] = Watched.over(OrbitFile.of(route, read).orbit, axes, start, days * DAY)
+            seen[name] = Watched.over(orbits_of(mission, route, read), axes, start, days * DAY)
         except PathFileError as error:  # the file went away since the mission was loaded
             raise QuestionError(f"platforms.{name}.orbit: {error}") from None
         if not seen[name].pieces:

@@ -204,7 +204,7 @@ def _with_radial(state: PlatformState, axes: earth.SceneAxes) -> PlatformState:
         return state
 
 
-class OrbitFile(NamedTuple):
+class _OrbitFile(NamedTuple):
     """The file of an orbit: the form it has, its name, its content, and which object of it is wanted.
 
     The name is None where an element set stands in the mission file itself.
@@ -216,29 +216,31 @@ class OrbitFile(NamedTuple):
     object: str | None
 
     @classmethod
-    def of(cls, route: OrbitSource, read: Beside) -> "OrbitFile":
+    def of(cls, route: OrbitSource, read: Beside) -> "_OrbitFile":
         """Read the file of an orbit; raises `PathFileError`."""
-        form = form_of(route)
+        form = _form_of(route)
         named = getattr(route, form)
         if isinstance(named, str):
             return cls(form, named, read(named), route.object)
         return cls(form, None, "\n".join(named).encode(), route.object)
 
     def orbit(self, center: Instant) -> Orbit:
-        """The orbit that is flown at an instant: that of the elements, or of the segment, nearest to it.
-
-        Raises
-        ------
-        PathFileError
-            There is none.
-        """
+        """The orbit that is flown at an instant; raises `PathFileError` where there is none."""
         orbit: Orbit = _ORBITS[self.form](self.data, self.name or "the element set", self.object, center)
         return orbit
 
 
-def form_of(route: OrbitSource) -> str:
+def _form_of(route: OrbitSource) -> str:
     """Key under which the mission file has an orbit."""
     return next(form for form in _ORBITS if getattr(route, form) is not None)
+
+
+def orbits_of(mission: Mission, route: OrbitSource, read: Beside) -> Callable[[Instant], Orbit]:
+    """Return a function that gives the orbit which a mission flies in an aperture around an instant.
+
+    Of several element sets, or segments of an ephemeris, that is the nearest one. Both raise `PathFileError`.
+    """
+    return _OrbitFile.of(route, read).orbit
 
 
 def _of_orbit(mission: Mission, route: OrbitSource, axes: earth.SceneAxes, read: Beside) -> FlownPath:
@@ -246,7 +248,7 @@ def _of_orbit(mission: Mission, route: OrbitSource, axes: earth.SceneAxes, read:
     if center is None:
         raise _UnusablePathError(("orbit",), Problem("needs an instant", "accepted: collection.center_time"))
     try:
-        given = OrbitFile.of(route, read)
+        given = _OrbitFile.of(route, read)
         digest, T = hashlib.sha256(given.data).hexdigest(), mission.collection.aperture_time
         path: FlownPath = _kept(
             _paths,
@@ -255,9 +257,9 @@ def _of_orbit(mission: Mission, route: OrbitSource, axes: earth.SceneAxes, read:
             lambda: _orbit_path(given.orbit(center), given.name, center, axes, T),
         )
     except PathFileError as error:
-        named = getattr(route, form_of(route))
+        named = getattr(route, _form_of(route))
         file = named if isinstance(named, str) else None
-        raise _UnusablePathError(("orbit", form_of(route)), _of_file(file, error)) from None
+        raise _UnusablePathError(("orbit", _form_of(route)), _of_file(file, error)) from None
     return path._replace(sha256=digest)
 
 

@@ -30,7 +30,7 @@ _FINE = 4  # times as many places are looked at
 _HALVINGS = 40  # of a bracket, to 1e-10 s
 _APART = 1e-3  # s to which it is found where one orbit ends and the next begins
 _TOUCHING = 5 * _APART
-_LOOKED_FOR = 16  # parts of a span without an orbit in which one is looked for
+_LOOKED_FOR = 16  # parts of a span in which an orbit is looked for, where a file does not say when it has one
 _SHORTEST = 3600.0  # s; shorter parts are not looked into
 # Powers of a place between two nodes to the weights of the places around: the inverse of Vandermonde's matrix.
 _WEIGHTS = np.linalg.inv(np.vander(np.arange(_NODES, dtype=float), increasing=True))
@@ -91,7 +91,7 @@ class Watched:
     """A satellite as it is seen from the origin of a scene over a span of time, and the parts without an orbit.
 
     Times are seconds after `origin`. Where a file has several element sets, or segments, each is flown where it is
-    nearest, as `OrbitFile.orbit` has it.
+    nearest, as `orbits_of` a mission has it.
     """
 
     origin: Instant
@@ -263,15 +263,13 @@ def _orbits(
     def look(start: float, stop: float) -> None:
         """Find all that differ between two times."""
         a, b = at(start), at(stop)
-        if stop - start <= _APART or _are_one(a, b):
-            return
-        if isinstance(a, PathFileError) and isinstance(b, PathFileError):
-            if stop - start > max(_SHORTEST, duration_s / _LOOKED_FOR):
-                middle = (start + stop) / 2
-                look(start, middle)
-                look(middle, stop)
+        if stop - start <= _APART or (_are_one(a, b) and not _is_gap(a)):
             return
         inside = [time for time in _changes(a, b, origin) if start < time < stop]
+        if _is_gap(a) and _is_gap(b) and not inside:
+            is_known = str(a) == str(b) or any(isinstance(one, PathFileError) and one.spans for one in (a, b))
+            if is_known or stop - start < max(_SHORTEST, duration_s / _LOOKED_FOR):
+                return
         for c, d in pairwise([start, *(inside or [(start + stop) / 2]), stop]):
             look(c, d)
 
@@ -279,7 +277,7 @@ def _orbits(
     times = sorted(known)
     begin = times[0]
     for before, time in pairwise(times):
-        if not _are_one(known[before], known[time]) and not (_is_gap(known[before]) and _is_gap(known[time])):
+        if not _are_one(known[before], known[time]):
             yield begin, before, known[before]
             begin = time
     yield begin, times[-1], known[times[-1]]
@@ -290,19 +288,19 @@ def _is_gap(orbit: Orbit | PathFileError) -> bool:
 
 
 def _are_one(a: Orbit | PathFileError, b: Orbit | PathFileError) -> bool:
-    """Whether two orbits are one, or have one reason why there is none."""
+    """Whether two orbits are of one epoch or span, or neither is there."""
     if isinstance(a, PathFileError) or isinstance(b, PathFileError):
-        return _is_gap(a) and _is_gap(b) and str(a) == str(b)
-    return (a.words, a.span, a.epoch) == (b.words, b.span, b.epoch)
+        return _is_gap(a) and _is_gap(b)
+    return (a.epoch, a.span) == (b.epoch, b.span)
 
 
 def _changes(a: Orbit | PathFileError, b: Orbit | PathFileError, origin: Instant) -> list[float]:
-    """Times around which the one is likely to give way to the other: the ends of spans, the middle of epochs. [s]"""
-    ends = []
-    if isinstance(a, Orbit) and a.span is not None:
-        ends.append(a.span[1].since(origin))
-    if isinstance(b, Orbit) and b.span is not None:
-        ends.append(b.span[0].since(origin))
+    """Times around which one is likely to give way to another: ends of spans, the middle of two epochs. [s]"""
+    ends: list[Instant] = []
+    for one in (a, b):
+        spans = one.spans if isinstance(one, PathFileError) else [one.span] if one.span is not None else []
+        ends += [end for span in spans for end in span]
+    times = [end.since(origin) for end in ends]
     if isinstance(a, Orbit) and isinstance(b, Orbit) and a.epoch is not None and b.epoch is not None:
-        ends.append((a.epoch.since(origin) + b.epoch.since(origin)) / 2)
-    return sorted(time for end in ends for time in (end - _APART / 2, end + _APART / 2))
+        times.append((a.epoch.since(origin) + b.epoch.since(origin)) / 2)
+    return sorted({time + side for time in times for side in (-_APART / 2, _APART / 2)})

@@ -207,6 +207,16 @@ class TestSeveral:
         assert (after.start, after.stop) == (pytest.approx(6 * 3600, abs=0.01), DAY)
         assert "its useable time is 2026-06-01T06:20:31.250Z to 2026-06-01T11:20:31.250Z" in after.reason
 
+    def test_short_segments_of_a_long_span_are_found(self) -> None:
+        """Two of 40 and 30 minutes within 20 days, between which there is nothing."""
+        starts = (CENTER.after(7.2 * DAY), CENTER.after(12.7 * DAY))
+        one, other = (ephemeris(start, seconds) for start, seconds in zip(starts, (2400.0, 1800.0), strict=True))
+        text = one + other[other.index(b"META_START") :]
+        seen = Watched.over(lambda at: read_oem(text, "o.oem", None, at), axes_at(BESANCON), CENTER, 20 * DAY)
+        assert [piece.start for piece in seen.pieces] == pytest.approx([7.2 * DAY, 12.7 * DAY], abs=0.01)
+        assert [piece.stop - piece.start for piece in seen.pieces] == pytest.approx([2400, 1800], abs=0.01)
+        assert [gap.stop for gap in seen.gaps] == pytest.approx([7.2 * DAY, 12.7 * DAY, 20 * DAY], abs=0.01)
+
     def test_an_ephemeris_sees_what_its_elements_see(self) -> None:
         text = ephemeris(CENTER, DAY / 2)
         seen = Watched.over(lambda at: read_oem(text, "o.oem", None, at), axes_at(BESANCON), CENTER, DAY / 2)
