@@ -9,12 +9,14 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from bisar_budget.mission.load import parse_mission
+from bisar_budget.mission.paths import orbits_of
+from bisar_budget.mission.platforms import OrbitSource
 from bisar_budget.paths.earth import Geodetic, axes_at
-from bisar_budget.paths.elements import read_tle
-from bisar_budget.paths.ephemeris import read_oem
 from bisar_budget.paths.flight import Orbit, PathFileError
 from bisar_budget.paths.instant import Instant
 from bisar_budget.paths.visibility import OrbitGap, Stretch, Watched, shared
+from tests.conftest import mission_text
 from tests.paths.orbit_files import CENTER, LINE_1, LINE_2, TLE, checked, oem
 
 BESANCON = Geodetic(math.radians(47.2512), math.radians(5.9938), 360.0)
@@ -40,8 +42,16 @@ TRANSFER = elements(28, 0.725, 10, 5, 2.28)  # perigee 200 km high
 LOW = elements(51.6, 0.001, 20, 40, 16.3)  # 190 km high, without drag
 
 
+MISSION = parse_mission(mission_text(), "m.yaml")
+
+
+def of_file(form: str, data: bytes) -> Callable[[Instant], Orbit]:
+    """The orbit around an instant that a mission flies which names a file of a form."""
+    return orbits_of(MISSION, OrbitSource(**{form: f"an.{form}"}), lambda _: data)
+
+
 def of_elements(text: str) -> Callable[[Instant], Orbit]:
-    return lambda center: read_tle(text, "elements.tle", None, center)
+    return of_file("tle", text.encode())
 
 
 def watched(text: str, days: float, place: Geodetic = BESANCON, start: Instant = CENTER) -> Watched:
@@ -199,7 +209,7 @@ class TestSeveral:
 
     def test_an_ephemeris_that_ends_within_the_span_is_said(self) -> None:
         text = ephemeris(CENTER.after(3600.0), 5 * 3600.0)
-        seen = Watched.over(lambda at: read_oem(text, "o.oem", None, at), axes_at(BESANCON), CENTER, DAY)
+        seen = Watched.over(of_file("oem", text), axes_at(BESANCON), CENTER, DAY)
         (piece,) = seen.pieces
         assert (piece.start, piece.stop) == (pytest.approx(3600, abs=0.01), pytest.approx(6 * 3600, abs=0.01))
         before, after = seen.gaps
@@ -212,14 +222,14 @@ class TestSeveral:
         starts = (CENTER.after(7.2 * DAY), CENTER.after(12.7 * DAY))
         one, other = (ephemeris(start, seconds) for start, seconds in zip(starts, (2400.0, 1800.0), strict=True))
         text = one + other[other.index(b"META_START") :]
-        seen = Watched.over(lambda at: read_oem(text, "o.oem", None, at), axes_at(BESANCON), CENTER, 20 * DAY)
+        seen = Watched.over(of_file("oem", text), axes_at(BESANCON), CENTER, 20 * DAY)
         assert [piece.start for piece in seen.pieces] == pytest.approx([7.2 * DAY, 12.7 * DAY], abs=0.01)
         assert [piece.stop - piece.start for piece in seen.pieces] == pytest.approx([2400, 1800], abs=0.01)
         assert [gap.stop for gap in seen.gaps] == pytest.approx([7.2 * DAY, 12.7 * DAY, 20 * DAY], abs=0.01)
 
     def test_an_ephemeris_sees_what_its_elements_see(self) -> None:
         text = ephemeris(CENTER, DAY / 2)
-        seen = Watched.over(lambda at: read_oem(text, "o.oem", None, at), axes_at(BESANCON), CENTER, DAY / 2)
+        seen = Watched.over(of_file("oem", text), axes_at(BESANCON), CENTER, DAY / 2)
         of_file, of_set = seen.above(LEAST), watched(TLE, 0.5).above(LEAST)
         assert len(of_file) == len(of_set) >= 2
         for one, other in zip(of_file, of_set, strict=True):
