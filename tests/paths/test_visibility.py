@@ -230,9 +230,9 @@ class TestSeveral:
     def test_an_ephemeris_sees_what_its_elements_see(self) -> None:
         text = ephemeris(CENTER, DAY / 2)
         seen = Watched.over(of_file("oem", text), axes_at(BESANCON), CENTER, DAY / 2)
-        of_file, of_set = seen.above(LEAST), watched(TLE, 0.5).above(LEAST)
-        assert len(of_file) == len(of_set) >= 2
-        for one, other in zip(of_file, of_set, strict=True):
+        of_message, of_set = seen.above(LEAST), watched(TLE, 0.5).above(LEAST)
+        assert len(of_message) == len(of_set) >= 2
+        for one, other in zip(of_message, of_set, strict=True):
             assert (one.start, one.stop) == pytest.approx((other.start, other.stop), abs=0.01)
 
     def test_a_satellite_that_decays_is_followed_until_then(self) -> None:
