@@ -28,7 +28,6 @@ from bisar_budget.mission.quantities import QuestionError
 from bisar_budget.paths.earth import SceneAxes
 from bisar_budget.paths.flight import PathFileError
 from bisar_budget.paths.instant import DAY, Instant, parse_instant
-from bisar_budget.paths.messages import EARLIEST, LATEST
 from bisar_budget.paths.visibility import Floats, Stretch, Watched, shared
 from bisar_budget.workers import Progress, unseen
 
@@ -36,6 +35,7 @@ CENTER_TIME = "collection.center_time"
 MIN_ELEVATION = math.radians(20)
 MOST_DAYS = 366.0
 _TOGETHER = 64  # passes that are checked at once
+_YEARS = (1957, 2200)  # in which there are orbits
 _TRACK = 41  # places of a pass that a drawing shows
 
 
@@ -129,9 +129,9 @@ def start_of(text: str) -> Instant:
         It is neither.
     """
     found = parse_instant(f"{text.strip()}T00:00:00Z") or parse_instant(text)
-    if found is None or not EARLIEST <= found.day < LATEST:
+    if found is None or not _YEARS[0] <= found.as_datetime().year < _YEARS[1]:
         raise QuestionError(
-            f"--from {shown(text)}: is no day and no instant of UTC from 1957-10 to 2199; accepted: 2026-07-01, "
+            f"--from {shown(text)}: is no day and no instant of UTC from {_YEARS[0]} to {_YEARS[1] - 1}; accepted: 2026-07-01, "
             "2026-07-01T05:30:00Z"
         )
     return found

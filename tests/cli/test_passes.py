@@ -355,7 +355,7 @@ class TestPlot:
     [
         (
             ["--from", "tomorrow"],
-            "--from tomorrow: is no day and no instant of UTC from 1957-10 to 2199; accepted",
+            "--from tomorrow: is no day and no instant of UTC from 1957 to 2199; accepted",
         ),
         (["--days", "0"], "--days"),
         (["--days", "1000"], "--days"),

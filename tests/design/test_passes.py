@@ -283,7 +283,7 @@ class TestQuestions:
     )
     def test_what_is_no_day_is_refused(self, text: str) -> None:
         with pytest.raises(
-            QuestionError, match="is no day and no instant of UTC from 1957-10 to 2199; accepted: 2026-07-01"
+            QuestionError, match="is no day and no instant of UTC from 1957 to 2199; accepted: 2026-07-01"
         ):
             start_of(text)
 
