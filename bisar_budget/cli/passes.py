@@ -27,6 +27,7 @@ from bisar_budget.cli.streams import (
     wants_color,
     write_file,
 )
+from bisar_budget.constants import MAX_DAYS
 
 if TYPE_CHECKING:
     from bisar_budget.design.passes import Passes, SatellitePass
@@ -47,11 +48,11 @@ _MISSION = (".yaml", ".yml")
 )
 @click.option(
     "--days",
-    type=click.FloatRange(0, 366, min_open=True),
+    type=click.FloatRange(0, MAX_DAYS, min_open=True),
     default=3.0,
     show_default=True,
     metavar="N",
-    help="How many days to look at, up to 366.",
+    help=f"How many days to look at, up to {MAX_DAYS:g}.",
 )
 @click.option(
     "--min-elevation",
@@ -113,7 +114,7 @@ def passes(
     any time that was asked for.
     """
     if math.isnan(days):
-        raise click.UsageError("--days: nan is no number of days; accepted: more than 0, up to 366.")
+        raise click.UsageError(f"--days: nan is no number of days; accepted: more than 0, up to {MAX_DAYS:g}.")
     hold_to_suffixes(plot, (".svg", ".png", ".pdf"))
     is_folder = output is not None and (output.endswith(("/", os.sep)) or os.path.isdir(output))
     if format_name is None:

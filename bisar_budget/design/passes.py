@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bisar_budget.budget.check import check_missions
+from bisar_budget.constants import MAX_DAYS
 from bisar_budget.design.table import Variation
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.faults import MissionError, SetValue, printable, shown
@@ -33,7 +34,6 @@ from bisar_budget.workers import Progress, unseen
 
 CENTER_TIME = "collection.center_time"
 MIN_ELEVATION = math.radians(20)
-MOST_DAYS = 366.0
 _TOGETHER = 64  # passes that are checked at once
 _YEARS = (1957, 2200)  # in which there are orbits
 _TRACK = 41  # places of a pass that a drawing shows
@@ -131,8 +131,8 @@ def start_of(text: str) -> Instant:
     found = parse_instant(f"{text.strip()}T00:00:00Z") or parse_instant(text)
     if found is None or not _YEARS[0] <= found.as_datetime().year < _YEARS[1]:
         raise QuestionError(
-            f"--from {shown(text)}: is no day and no instant of UTC from {_YEARS[0]} to {_YEARS[1] - 1}; accepted: 2026-07-01, "
-            "2026-07-01T05:30:00Z"
+            f"--from {shown(text)}: is no day and no instant of UTC from {_YEARS[0]} to {_YEARS[1] - 1}; accepted: "
+            "2026-07-01, 2026-07-01T05:30:00Z"
         )
     return found
 
@@ -175,10 +175,12 @@ def passes(
     Raises
     ------
     QuestionError
-        No platform has an orbit, or the scene has no place on the Earth.
+        No platform has an orbit, the scene has no place on the Earth, or there are too many days.
     MissionError
         The orbit cannot be used at any time of the span; with the place of its key.
     """
+    if not 0 < days <= MAX_DAYS:
+        raise QuestionError(f"--days {days:g}: accepted: more than 0, up to {MAX_DAYS:g}")
     axes = mission.scene.axes
     if axes is None:
         raise QuestionError("scene: passes are over a place on the Earth; accepted: latitude, longitude and height")

@@ -256,8 +256,9 @@ class TestQuestions:
                 "scene: passes are over a place on the Earth; accepted: latitude, longitude and height",
             ),
             (tree(lines(LINE_1, LINE_2), ROOF), {"platform": "receiver"}, "--platform receiver: has no orbit"),
+            (tree(lines(LINE_1, LINE_2), ROOF), {"days": 400}, "--days 400: accepted: more than 0, up to 366"),
         ],
-        ids=["no orbit", "no place", "platform without one"],
+        ids=["no orbit", "no place", "platform without one", "days"],
     )
     def test_what_cannot_be_asked_says_why(self, text: str, asked: dict[str, Any], said: str) -> None:
         with pytest.raises(QuestionError, match=said):
