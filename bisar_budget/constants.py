@@ -23,3 +23,4 @@ MAX_DRAWS = 10**12  # shared out between many
 
 EARTH_GRAVITATIONAL_PARAMETER = 3.986004418e14  # m³/s², GM of WGS-84, atmosphere included
 EARTH_RADIUS = 6.371e6  # m, mean radius; how far the Earth's centre is below the scene
+MAX_DAYS = 366.0  # in which passes of a satellite are looked for

@@ -26,7 +26,7 @@ from tests.conftest import APART, ROOT, TODAY
 from tests.fuzz import RAW, RUN
 from tests.fuzz_commands import MISSION, Question, break_parts, flown, radar_file, small_mission, targets
 
-CODES = {"solve": {0, 1, 2}, "check": {0, 1, 2}, "allocate": {0, 1, 2}}
+CODES = {name: {0, 1, 2} for name in ("solve", "check", "allocate", "passes")}
 SECTION_V = str(ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml")
 # Three parts, which arrays hold.
 SWEEP = ("sweep", SECTION_V, "--vary", "collection.aperture_time=1:2s:17000", "--date", TODAY.isoformat())
@@ -116,7 +116,7 @@ def _read_csv(text: str) -> None:
 
 
 def on_paths(seed: int, folder: Path, tried: Counter[str]) -> Iterator[str]:
-    """Check a mission that names an orbit or a log; one in ten is also swept."""
+    """Check a mission that names an orbit or a log; of ten one is also swept, and the passes of two are listed."""
     for name, data in flown(seed).items():
         folder.joinpath(name).write_bytes(data)
     arguments: tuple[str, ...] = ("check", MISSION, "--format", ("json", "html", "text")[seed % 3])
@@ -125,6 +125,10 @@ def on_paths(seed: int, folder: Path, tried: Counter[str]) -> Iterator[str]:
     yield from wrong(done, arguments)
     if seed % 10 == 0:
         arguments = ("sweep", MISSION, "--vary", "collection.aperture_time=1:2s:3", "--jobs", "1")
+        yield from wrong(told(arguments, folder), arguments)
+    if seed % 5 == 1:
+        form = ("json", "text", "csv", "ics")[seed // 5 % 4]
+        arguments = ("passes", MISSION, "--from", "2026-06-01", "--days", "0.3", "--format", form)
         yield from wrong(told(arguments, folder), arguments)
 
 

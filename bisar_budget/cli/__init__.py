@@ -26,6 +26,7 @@ _MODULES = {
     "diff": "diff",
     "import": "mission_files",
     "init": "mission_files",
+    "passes": "passes",
     "schema": "mission_files",
     "sensitivity": "solve",
     "sensors": "sensors",

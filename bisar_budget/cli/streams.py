@@ -145,6 +145,8 @@ _COMMAND_WITHIN = re.compile(r"(?<=#)#(?=[\w.]*\[)")
 # How a format writes a character so that its readers read that character; the others show an escape.
 _ESCAPES = dict.fromkeys(("json", "sarif", "needs", "yaml"), "\\u{:04x}")
 _ESCAPES |= dict.fromkeys(("html", "markdown", "junit", "mathml"), "&#{};")
+_ESCAPES["ics"] = "\\\\x{:02x}"
+_LINE_ENDS = {"ics": "\r\n"}  # RFC 5545; others end a line with a line feed
 
 
 def harmless(text: str, format_name: str = "") -> str:
@@ -177,7 +179,8 @@ def deliver_parts(texts: Iterable[str], format_name: str) -> None:
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")
         if format_name != "text":
-            sys.stdout.reconfigure(encoding="utf-8", errors="backslashreplace", newline="\n")
+            newline = _LINE_ENDS.get(format_name, "\n")
+            sys.stdout.reconfigure(encoding="utf-8", errors="backslashreplace", newline=newline)
     for text in texts:
         try:
             sys.stdout.write(harmless(text, format_name))
@@ -212,7 +215,7 @@ def deliver(text: str, output: str | None = None, format_name: str = "text") -> 
     if output is None or output == "-":
         deliver_parts([text], format_name)
     else:
-        write_file(output, harmless(text, format_name))
+        write_file(output, harmless(text, format_name).replace("\n", _LINE_ENDS.get(format_name, "\n")))
 
 
 def deliver_found(form: "ModuleType", found: Sequence[Any], format_name: str, output: str | None) -> None:

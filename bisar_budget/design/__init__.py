@@ -7,6 +7,7 @@ __all__ = [
     "compare",
     "imaged",
     "offers",
+    "passes",
     "sensitivity",
     "solve",
     "sweep",

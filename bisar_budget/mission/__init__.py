@@ -11,6 +11,7 @@ __all__ = [
     "load",
     "model",
     "parts",
+    "paths",
     "platforms",
     "propagation",
     "quantities",

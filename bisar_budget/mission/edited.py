@@ -1,12 +1,18 @@
 """A mission file with other values in place, and all else of it as it was written, comments included."""
 
-from collections.abc import Mapping, Sequence
+import json
+import os
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import yaml
 
 from bisar_budget.faults import SetValue
 from bisar_budget.mission.changes import next_name, parts_of
+from bisar_budget.mission.load import folder_of
+from bisar_budget.mission.model import Mission
+from bisar_budget.mission.parts import is_file
+from bisar_budget.mission.paths import path_files
 
 _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
@@ -52,6 +58,30 @@ def with_section(text: str, name: str, values: Mapping[str, str]) -> str:
         whole = text[start:end] if value.flow_style else _without_comments(text[start:end])
         text = f"{text[:start]}{inline if value.flow_style else lines}{text[start + len(whole) :]}"
     return text.replace("\n", "\r\n") if is_of_dos else text
+
+
+def in_folder(mission: Mission, folder: str) -> Iterator[SetValue]:
+    """Values with which the file of a mission, put into another folder, names the same files from there."""
+    for key, name in (*path_files(mission), *_parts_beside(mission)):
+        if os.path.isabs(name):
+            continue
+        file = os.path.realpath(os.path.join(folder_of(mission.file), name))
+        try:
+            name = os.path.relpath(file, os.path.realpath(folder))
+        except ValueError:  # on another drive
+            name = file
+        yield SetValue(key, json.dumps(name.replace(os.sep, "/"), ensure_ascii=False))
+
+
+def _parts_beside(mission: Mission) -> Iterator[tuple[str, str]]:
+    """Keys under which a mission names files of parts, not parts of a catalogue, and the names."""
+    for owner, platform in zip(mission.platforms._fields, mission.platforms, strict=True):
+        sensor = platform.motion_error.sensor
+        key = f"platforms.{owner}.motion_error.sensor"
+        each = {key: sensor} if isinstance(sensor, str) else {f"{key}.{n}": one for n, one in enumerate(sensor or ())}
+        if platform.oscillator is not None and platform.oscillator.sensor is not None:
+            each[f"platforms.{owner}.oscillator.sensor"] = platform.oscillator.sensor
+        yield from ((key, name) for key, name in each.items() if is_file(name))
 
 
 def _with_value(text: str, parts: tuple[str, ...], value: str) -> str:

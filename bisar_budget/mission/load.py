@@ -20,10 +20,12 @@ from bisar_budget.resources import UnreadableError, held, standard_input
 _Find = Callable[[str], tuple[str, bytes]]
 
 
-def load_mission(path: str, model: str | None = None, changes: Sequence[SetValue] = ()) -> Mission:
+def load_mission(
+    path: str, model: str | None = None, changes: Sequence[SetValue] = (), *, is_placed: bool = True
+) -> Mission:
     """Read the mission file at `path`; `-` is standard input.
 
-    `model` stands in for the file's own, `changes` for values.
+    `model` stands in for the file's own, `changes` for values. Without `is_placed` as `parse_mission`.
 
     Raises
     ------
@@ -38,7 +40,7 @@ def load_mission(path: str, model: str | None = None, changes: Sequence[SetValue
         problem = "not found, and no file matches the pattern" if is_pattern else f"cannot be read: {reason}"
         raise MissionError(path, (file_fault(problem),)) from None
     try:
-        return parse_mission(data, path, model, changes=changes)
+        return parse_mission(data, path, model, changes=changes, is_placed=is_placed)
     except MissionError as error:
         error.data = data if len(data) <= MAX_BYTES else None
         raise
@@ -64,6 +66,8 @@ def parse_mission(
     beside: Callable[[str], bytes] | None = None,
     changes: Sequence[SetValue] = (),
     find: _Find | None = None,
+    *,
+    is_placed: bool = True,
 ) -> Mission:
     """Turn the content of a mission file into a `Mission`.
 
@@ -81,13 +85,16 @@ def parse_mission(
         Values in place of the file's, and beside them, in this order.
     find : callable, optional
         Gives file and content of a part that the mission names, and raises `PartError`; omitted: where parts are.
+    is_placed : bool
+        Whether platforms on the Earth get their paths. Without them the mission may be asked at any
+        `collection.center_time`, and has no geometry.
 
     Raises
     ------
     MissionError
         Not a usable mission; carries every fault.
     """
-    return mission_of(read_tree(data, file), data, file, model, beside, changes, find)
+    return mission_of(read_tree(data, file), data, file, model, beside, changes, find, is_placed=is_placed)
 
 
 def mission_of(
@@ -98,6 +105,8 @@ def mission_of(
     beside: Callable[[str], bytes] | None = None,
     changes: Sequence[SetValue] = (),
     find: _Find | None = None,
+    *,
+    is_placed: bool = True,
 ) -> Mission:
     """Turn the tree of a mission file into a `Mission`, and change the tree; all else as `parse_mission`."""
     if changes:
@@ -120,11 +129,11 @@ def mission_of(
             from bisar_budget.mission.quantities import with_specifications
 
             mission = with_specifications(mission, tree)
-        if mission is INVALID and names_files(tree.root):
+        if (mission is INVALID or not is_placed) and names_files(tree.root):
             from bisar_budget.mission.paths import reader_of, report_files
 
             report_files(tree.root, beside or reader_of(folder), tree.report)
-        elif mission is not INVALID and flies_on_earth(mission):
+        elif mission is not INVALID and is_placed and flies_on_earth(mission):
             from bisar_budget.mission.paths import reader_of, with_paths
 
             mission = with_paths(mission, beside or reader_of(folder), tree.report)

@@ -404,8 +404,13 @@ def find_part(name: str, beside: str) -> Part:
     return _entry(*finder_of(beside)(name)).part
 
 
+def is_file(name: str) -> bool:
+    """Whether what a mission names as a part is a file beside it, and none of a catalogue."""
+    return name.endswith(_SUFFIXES)
+
+
 def _file_of(name: str, beside: str, files: Files) -> str:
-    if name.endswith(_SUFFIXES):
+    if is_file(name):
         return os.path.join(beside, name)
     places = folders(beside, files)
     for folder in places:

@@ -3,9 +3,10 @@
 import hashlib
 import math
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import Any
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -39,7 +40,7 @@ from bisar_budget.paths.flight import (
     stretch_around,
 )
 from bisar_budget.paths.flight_log import hold_to_motion, read_csv
-from bisar_budget.paths.instant import Instant
+from bisar_budget.paths.instant import DAY, Instant
 from bisar_budget.paths.orbit_formats import ORBIT_FORMATS, hold_to_format
 from bisar_budget.paths.orientation import UNKNOWN, Orientation, read_finals
 from bisar_budget.paths.sbet import read_accuracy, read_sbet
@@ -84,6 +85,16 @@ def reader_of(folder: str, files: Files = DISK) -> Beside:
         return data
 
     return read
+
+
+def path_files(mission: Mission) -> Iterator[tuple[str, str]]:
+    """Keys under which a mission names an orbit or a log, and the names."""
+    for name in Platforms._fields:
+        platform: Platform = getattr(mission.platforms, name)
+        for key, section in (("orbit", platform.orbit), ("trajectory", platform.trajectory)):
+            for form in _FILES:
+                if isinstance(file := getattr(section, form, None), str):
+                    yield f"platforms.{name}.{key}.{form}", file
 
 
 def report_files(root: Any, read: Beside, report: Report) -> None:
@@ -213,29 +224,73 @@ def _with_radial(state: PlatformState, axes: earth.SceneAxes) -> PlatformState:
         return state
 
 
+class _OrbitFile(NamedTuple):
+    """The file of an orbit: the form it has, its name, its content, and which object of it is wanted.
+
+    The name is None where an element set stands in the mission file itself.
+    """
+
+    form: str
+    name: str | None
+    data: bytes
+    object: str | None
+
+    @classmethod
+    def of(cls, route: OrbitSource, read: Beside) -> "_OrbitFile":
+        """Read the file of an orbit; raises `PathFileError`."""
+        form = _form_of(route)
+        named = getattr(route, form)
+        if isinstance(named, str):
+            return cls(form, named, read(named), route.object)
+        return cls(form, None, "\n".join(named).encode(), route.object)
+
+    def orbit(self, center: Instant, orientation: Orientation) -> Orbit:
+        """The orbit that is flown at an instant; raises `PathFileError` where there is none."""
+        name = self.name or "the element set"
+        hold_to_format(self.data, name, self.form)
+        return ORBIT_FORMATS[self.form].read(self.data, name, self.object, center, orientation)
+
+
+def _form_of(route: OrbitSource) -> str:
+    """Key under which the mission file has an orbit."""
+    return next(form for form in ORBIT_FORMATS if getattr(route, form) is not None)
+
+
+def orbits_of(mission: Mission, route: OrbitSource, read: Beside) -> Callable[[Instant], Orbit]:
+    """Return a function that gives the orbit which a mission flies in an aperture around an instant.
+
+    Of several element sets, or segments of an ephemeris, that is the nearest one. Both raise `PathFileError`. The
+    Earth is turned as at noon of the day: UT1 - UTC changes by a millisecond a day.
+    """
+    given = _OrbitFile.of(route, read)
+
+    @lru_cache(maxsize=64)
+    def orientation(day: int) -> Orientation:
+        return _orientation(mission, Instant(day, DAY / 2), read)[0]
+
+    return lambda center: given.orbit(center, orientation(center.day))
+
+
 def _of_orbit(mission: Mission, route: OrbitSource, axes: earth.SceneAxes, read: Beside) -> FlownPath:
     center = mission.collection.center_time
     if center is None:
         raise _UnusablePathError(("orbit",), Problem("needs an instant", "accepted: collection.center_time"))
-    form = next(form for form in ORBIT_FORMATS if getattr(route, form) is not None)
-    named = getattr(route, form)
-    file = named if isinstance(named, str) else None
     orientation, table = _orientation(mission, center, read)
     try:
-        data = read(file) if file is not None else "\n".join(named).encode()
-        digest, T = hashlib.sha256(data).hexdigest(), mission.collection.aperture_time
+        given = _OrbitFile.of(route, read)
+        digest, T = hashlib.sha256(given.data).hexdigest(), mission.collection.aperture_time
 
         def found() -> FlownPath:
-            name = file or "the element set"
-            hold_to_format(data, name, form)
-            orbit = ORBIT_FORMATS[form].read(data, name, route.object, center, orientation)
-            path = _orbit_path(orbit, file, center, axes, T)
+            orbit = given.orbit(center, orientation)
+            path = _orbit_path(orbit, given.name, center, axes, T)
             return path._replace(orientation=table) if orbit.is_turned else path
 
-        key = (form, file, digest, route.object, center, axes, T, orientation, table)
+        key = (*given._replace(data=digest.encode()), center, axes, T, orientation, table)
         path: FlownPath = _kept(_paths, _PATHS_KEPT, key, found)
     except PathFileError as error:
-        raise _UnusablePathError(("orbit", form), _of_file(file, error)) from None
+        named = getattr(route, _form_of(route))
+        file = named if isinstance(named, str) else None
+        raise _UnusablePathError(("orbit", _form_of(route)), _of_file(file, error)) from None
     return path._replace(sha256=digest)
 
 

@@ -9,4 +9,5 @@ __all__ = [
     "orbit_formats",
     "orientation",
     "sbet",
+    "visibility",
 ]

@@ -234,9 +234,10 @@ def _at(segments: Sequence[Segment], name: str, center: Instant) -> Segment:
     time = tai(center)
     holding = [one for one in segments if one.holds(time)]
     if not holding:
-        spans = [f"{utc(one.first).as_text()} to {utc(one.last).as_text()}" for one in segments]
+        spans = [(utc(one.first), utc(one.last)) for one in segments]
+        said = ", ".join(f"{first.as_text()} to {last.as_text()}" for first, last in spans)
         raise PathFileError(
-            f"{name}: has no place at {center.as_text()}; its useable time is {cut(', '.join(spans))}"
+            f"{name}: has no place at {center.as_text()}; its useable time is {cut(said)}", spans=spans
         )
     return max(holding, key=lambda one: min(time.since(one.first), one.last.since(time)))
 

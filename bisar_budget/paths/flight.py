@@ -37,12 +37,15 @@ _ROUNDED = 1 + 1e-6  # of an interval whose ends are rounded
 class PathFileError(Exception):
     """A file that gives no path. The message names the file, and its line, byte or record.
 
-    `accepted` says what a file would have instead, `hint` what may be done.
+    `accepted` says what a file would have instead, `hint` what may be done. `spans` are the times for which the file
+    has places, where it has none for those that were asked for.
     """
 
-    def __init__(self, message: str, accepted: str = "", hint: str = "") -> None:
+    def __init__(
+        self, message: str, accepted: str = "", hint: str = "", spans: Sequence[tuple[Instant, Instant]] = ()
+    ) -> None:
         super().__init__(message)
-        self.accepted, self.hint = accepted, hint
+        self.accepted, self.hint, self.spans = accepted, hint, spans
 
 
 class PathDoubt(NamedTuple):

@@ -1,0 +1,262 @@
+"""`bisar-budget passes`: when an orbit sees the scene, and how the mission stands in each pass."""
+
+import math
+import os
+import sys
+from collections.abc import Sequence
+from contextlib import suppress
+from datetime import date, datetime
+from functools import partial
+from typing import TYPE_CHECKING
+
+import click
+
+from bisar_budget import __version__
+from bisar_budget.cli.long_work import watched
+from bisar_budget.cli.options import DATE, FILE, MODEL, SET, day, outside
+from bisar_budget.cli.streams import (
+    EXIT_BROKEN,
+    EXIT_USAGE,
+    complain,
+    deliver,
+    fail,
+    hold_to_suffixes,
+    read_all,
+    say_faults,
+    spare,
+    wants_color,
+    write_file,
+)
+from bisar_budget.constants import MAX_DAYS
+
+if TYPE_CHECKING:
+    from bisar_budget.design.passes import Passes, SatellitePass
+    from bisar_budget.faults import SetValue
+    from bisar_budget.mission.model import Mission
+
+_FORMATS = {".txt": "text", ".json": "json", ".csv": "csv", ".ics": "ics"}  # by the suffix of -o
+_MISSION = (".yaml", ".yml")
+
+
+@click.command()
+@click.argument("mission", type=FILE)
+@click.option(
+    "--from",
+    "start",
+    metavar="DATE",
+    help="Day of UTC to begin with, or an instant such as 2026-07-01T05:30:00Z (default: the day of --date).",
+)
+@click.option(
+    "--days",
+    type=click.FloatRange(0, MAX_DAYS, min_open=True),
+    default=3.0,
+    show_default=True,
+    metavar="N",
+    help=f"How many days to look at, up to {MAX_DAYS:g}.",
+)
+@click.option(
+    "--min-elevation",
+    "min_elevation",
+    default="20 deg",
+    show_default=True,
+    metavar="ANGLE",
+    help="Least elevation of the satellite, seen from the scene; of each, where both platforms have orbits.",
+)
+@click.option(
+    "--squint",
+    default="0 deg",
+    show_default=True,
+    metavar="ANGLE",
+    help="Squint of the mid-time, at which the mission is checked: 0 at broadside, positive looking forward.",
+)
+@click.option(
+    "--platform",
+    type=click.Choice(["transmitter", "receiver"]),
+    help="Whose passes are listed (default: the platform that has an orbit, of two the transmitter).",
+)
+@MODEL
+@SET
+@DATE
+@click.option(
+    "--format",
+    "format_name",
+    type=click.Choice(list(_FORMATS.values())),
+    help="Format of the list; ics is a calendar (default: that of -o's suffix, else text).",
+)
+@click.option(
+    "-o",
+    "--output",
+    type=FILE,
+    metavar="FILE|DIR",
+    help="Write to FILE: .txt, .json, .csv or .ics. Into a folder DIR, or a name that ends in /, go mission files, "
+    "one for each pass that complies.",
+)
+@click.option("--plot", type=FILE, metavar="FILE", help="Draw tracks in the sky and resolutions: .svg, .png or .pdf.")
+def passes(
+    mission: str,
+    start: str | None,
+    days: float,
+    min_elevation: str,
+    squint: str,
+    platform: str | None,
+    model: str | None,
+    changes: "tuple[SetValue, ...]",
+    today: datetime | None,
+    format_name: str | None,
+    output: str | None,
+    plot: str | None,
+) -> None:
+    """List the passes of a satellite over the scene, with the verdict of the mission in each.
+
+    The mission names an orbit (tle, omm or oem) and the scene's place on the Earth; its collection.center_time is
+    that of each pass in turn. A pass that cannot be checked is listed with the reason. Exit code: 0 if the mission
+    complies in some pass, 1 if in none, 2 for wrong usage, an unusable mission file or an orbit that is not known at
+    any time that was asked for.
+    """
+    if math.isnan(days):
+        raise click.UsageError(f"--days: nan is no number of days; accepted: more than 0, up to {MAX_DAYS:g}.")
+    hold_to_suffixes(plot, (".svg", ".png", ".pdf"))
+    is_folder = output is not None and (output.endswith(("/", os.sep)) or os.path.isdir(output))
+    if format_name is None:
+        if output not in (None, "-") and not is_folder:
+            hold_to_suffixes(output, tuple(_FORMATS))
+        format_name = _FORMATS.get(os.path.splitext(output or "")[1].lower() if not is_folder else "", "text")
+    spare([mission], [None if is_folder else output, plot])
+    from bisar_budget.budget.waivers import overrides
+    from bisar_budget.design.passes import passes as passes_of
+    from bisar_budget.design.passes import start_of
+    from bisar_budget.faults import MissionError
+    from bisar_budget.mission.load import load_mission
+    from bisar_budget.mission.quantities import QuestionError
+
+    judged_on, from_outside = day(today), outside(today)
+    least, wanted = _angle("--min-elevation", min_elevation, 0.0), _angle("--squint", squint, -90.0)
+    (loaded,) = read_all([partial(load_mission, mission, model, changes, is_placed=False)])
+    try:
+        with watched("Checking passes") as progress:
+            found = passes_of(
+                loaded,
+                start_of(start or judged_on.isoformat()),
+                days=days,
+                platform=platform,
+                min_elevation=least,
+                squint=wanted,
+                model=model,
+                today=judged_on,
+                progress=progress,
+            )
+    except QuestionError as error:
+        fail(f"{mission}: {error}")
+    except MissionError as error:
+        say_faults(error.file, error.faults)
+        sys.exit(EXIT_USAGE)
+    found = found._replace(overrides=overrides(loaded, from_outside, judged_on))
+    if is_folder and output is not None:
+        _write_missions(found, loaded, output, model, judged_on)
+        output = None
+    if plot is not None:
+        _draw(found, plot)
+    deliver(_written(found, format_name, output, judged_on), output, format_name)
+    sys.exit(0 if found.complying else EXIT_BROKEN)
+
+
+def _angle(option: str, text: str, least: float) -> float:
+    """An angle of an option, from a least one to less than 90 deg. [rad]"""
+    from bisar_budget import units
+    from bisar_budget.faults import InvalidValueError, closed, shown
+    from bisar_budget.mission.readers import Quantity
+
+    bounds = {"ge": 0.0} if least == 0 else {"gt": math.radians(least)}
+    try:
+        return Quantity(units.ANGLE, lt=math.pi / 2, **bounds).leaf(text)
+    except InvalidValueError as error:
+        raise click.UsageError(f"{option} {shown(text)}: {closed(error.problem.words)}") from None
+
+
+def _written(found: "Passes", format_name: str, output: str | None, stamp: date) -> str:
+    from bisar_budget.report import Style
+    from bisar_budget.report.formats import pass_list
+
+    if format_name == "ics":
+        return pass_list.as_ics(__version__, found, stamp)
+    if format_name == "text":
+        return pass_list.as_text(found, Style(color=output is None and wants_color()))
+    return pass_list.as_json(__version__, found) if format_name == "json" else pass_list.as_csv(found)
+
+
+def _draw(found: "Passes", plot: str) -> None:
+    from bisar_budget.report.drawing.figure import drawing_file
+    from bisar_budget.report.drawing.sky_plot import sky_plot
+    from bisar_budget.report.formats.pass_list import verdict
+
+    drawing = sky_plot(found, f"Passes over the scene of {found.name}", verdict(found))
+    write_file(plot, drawing_file(drawing, os.path.splitext(plot)[1][1:].lower()))
+
+
+# ---------------------------------------------------------------- a mission file for each pass
+def _write_missions(found: "Passes", mission: "Mission", folder: str, model: str | None, today: date) -> None:
+    """Write the mission of each pass that complies, none of them where one would not be checked to the same status.
+
+    They are read first as they will lie there: files that they name are looked for from the folder.
+    """
+    texts = {
+        os.path.join(folder, _name(one, mission.file)): _mission_text(one, mission, folder, model)
+        for one in found.complying
+    }
+    spare([mission.file], texts)
+    if not texts:
+        complain(f"no mission file is written to {folder}: no pass complies")
+        return
+    is_new = not os.path.isdir(folder)
+    try:
+        os.makedirs(folder, exist_ok=True)
+        _hold_to_statuses(found.complying, texts, today)
+    except OSError as error:
+        fail(f"cannot write {folder}: {error.strerror}")
+    except SystemExit:
+        if is_new:
+            with suppress(OSError):
+                os.rmdir(folder)
+        raise
+    for path, text in texts.items():
+        write_file(path, text)
+    complain(f"{len(texts)} mission file{'s' if len(texts) != 1 else ''} in {folder}")
+
+
+def _name(one: "SatellitePass", file: str) -> str:
+    """Name of the file of a pass: that of the mission, and the mid-time."""
+    stem, suffix = os.path.splitext(os.path.basename(file) if file != "-" else "mission.yaml")
+    stem, suffix = (stem, suffix) if suffix.lower() in _MISSION else (stem + suffix, _MISSION[0])
+    time = "" if one.center is None else one.center.as_text()[:19].replace("-", "").replace(":", "")
+    return f"{stem}_{time}Z{suffix}"
+
+
+def _mission_text(one: "SatellitePass", mission: "Mission", folder: str, model: str | None) -> str:
+    from bisar_budget.design.passes import center_time
+    from bisar_budget.faults import SetValue
+    from bisar_budget.mission.edited import in_folder, with_values
+
+    text = mission.data.decode("utf-8-sig")
+    of_model = [SetValue("allocation.model", model)] if model else []
+    at_mid_time = [] if one.center is None else center_time(one.center)
+    return with_values(text, [*mission.changes, *of_model, *in_folder(mission, folder), *at_mid_time])
+
+
+def _hold_to_statuses(passes: "Sequence[SatellitePass]", texts: dict[str, str], today: date) -> None:
+    """Exit where a file cannot be read in its folder, or is checked to another status than its pass."""
+    from bisar_budget.budget.check import check_missions
+    from bisar_budget.faults import MissionError
+    from bisar_budget.mission.load import parse_mission
+
+    missions = []
+    for path, text in texts.items():
+        try:
+            missions.append(parse_mission(text, path))
+        except MissionError as error:
+            fail(f"{path} is not written: {error.faults[0]}")
+    for place, findings in check_missions(missions, today):
+        if findings.status != passes[place].status:
+            path = missions[place].file
+            fail(
+                f"{path} is not written: in its folder it is checked to {findings.status}; does it name a part there?"
+            )

@@ -1,0 +1,353 @@
+"""Passes of a satellite over the scene of a mission, and what the mission is in each of them.
+
+A pass lasts as long as the satellite is above an elevation; where both platforms have orbits, both are. Its mid-time
+is where the satellite looks at the scene with a given squint, at broadside without one: there the aperture is taken,
+and the mission is checked as a file with that `collection.center_time` is.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from datetime import date
+from typing import NamedTuple
+
+import numpy as np
+
+from bisar_budget.budget.check import check_missions
+from bisar_budget.constants import MAX_DAYS
+from bisar_budget.design.table import Variation
+from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.faults import MissionError, SetValue, printable, shown
+from bisar_budget.findings.mission import MissionFindings
+from bisar_budget.findings.requirement import Override
+from bisar_budget.findings.row import worst_first
+from bisar_budget.findings.status import RANK, STATUS
+from bisar_budget.geometry import PlatformState, cross, dot
+from bisar_budget.mission.load import folder_of
+from bisar_budget.mission.model import Mission
+from bisar_budget.mission.paths import orbits_of, reader_of
+from bisar_budget.mission.quantities import QuestionError
+from bisar_budget.paths.earth import SceneAxes
+from bisar_budget.paths.flight import PathFileError
+from bisar_budget.paths.instant import DAY, Instant, parse_instant
+from bisar_budget.paths.visibility import Floats, Stretch, Watched, shared
+from bisar_budget.workers import Progress, unseen
+
+CENTER_TIME = "collection.center_time"
+MIN_ELEVATION = math.radians(20)
+_TOGETHER = 64  # passes that are checked at once
+_YEARS = (1957, 2200)  # in which there are orbits
+_TRACK = 41  # places of a pass that a drawing shows
+
+
+class SatellitePass(NamedTuple):
+    """One pass: when it is, where the satellite then stands, and how the mission stands at its mid-time.
+
+    `rises` and `sets` are false where the satellite is above at the beginning, or the end, of what was looked at.
+    `track` is azimuth and elevation (n, 2) along it [rad]. `center` is the mid-time, to a millisecond; None where it
+    never has the squint. `state` is the path at the mid-time in the axes of the scene, `side` that of the track on
+    which the scene lies. `status` is that of `check`; `error` where there is no mission then, `not_evaluated` where
+    there is no mid-time; `reason` says why. `row`, `requirement` and `utilization` are of the requirement that
+    decides. `doubt` is how far the satellite may be from its path [m].
+    """
+
+    number: int
+    start: Instant
+    stop: Instant
+    rises: bool
+    sets: bool
+    culmination: Instant
+    max_elevation: float
+    track: Floats
+    center: Instant | None = None
+    state: PlatformState | None = None
+    side: str = ""
+    is_ascending: bool = False
+    doubt: float | None = None
+    status: str = "not_evaluated"
+    reason: str = ""
+    bistatic_angle: float | None = None
+    gradient_angle: float | None = None
+    range_resolution: float | None = None
+    cross_range_resolution: float | None = None
+    row: str | None = None
+    requirement: str | None = None
+    utilization: float | None = None
+
+    @property
+    def complies(self) -> bool:
+        """Whether the mission breaks nothing at the mid-time."""
+        return self.status != "error" and not STATUS[self.status].fails
+
+    @property
+    def bearing(self) -> float | None:
+        """Direction to the satellite at the mid-time, from north, clockwise. [rad]"""
+        return None if self.state is None else bearing(self.state.azimuth)
+
+
+def bearing(azimuth: float) -> float:
+    """Direction from north, clockwise, 0 to 2π, of an azimuth from east, counter-clockwise. [rad]"""
+    return (math.pi / 2 - azimuth) % (2 * math.pi)
+
+
+class UnknownTime(NamedTuple):
+    """A part of the span in which the orbit of a platform is not known, and why."""
+
+    platform: str
+    start: Instant
+    stop: Instant
+    reason: str
+
+
+class Passes(NamedTuple):
+    """The passes of the orbit of one platform over the scene of a mission, in their order."""
+
+    file: str
+    name: str
+    model: str
+    platform: str
+    start: Instant
+    stop: Instant
+    min_elevation: float
+    squint: float
+    found: tuple[SatellitePass, ...]
+    unknown: tuple[UnknownTime, ...] = ()
+    changes: tuple[SetValue, ...] = ()
+    overrides: tuple[Override, ...] = ()
+
+    @property
+    def complying(self) -> list[SatellitePass]:
+        """Passes in which the mission breaks nothing."""
+        return [one for one in self.found if one.complies]
+
+
+def start_of(text: str) -> Instant:
+    """The instant that a day of UTC, or an instant of it, says.
+
+    Raises
+    ------
+    QuestionError
+        It is neither.
+    """
+    found = parse_instant(f"{text.strip()}T00:00:00Z") or parse_instant(text)
+    if found is None or not _YEARS[0] <= found.as_datetime().year < _YEARS[1]:
+        raise QuestionError(
+            f"--from {shown(text)}: is no day and no instant of UTC from {_YEARS[0]} to {_YEARS[1] - 1}; accepted: "
+            "2026-07-01, 2026-07-01T05:30:00Z"
+        )
+    return found
+
+
+def passes(
+    mission: Mission,
+    start: Instant,
+    *,
+    days: float,
+    platform: str | None = None,
+    min_elevation: float = MIN_ELEVATION,
+    squint: float = 0.0,
+    model: str | None = None,
+    today: date,
+    progress: Progress = unseen,
+) -> Passes:
+    """Find the passes of a satellite over the scene, and check the mission in each.
+
+    Parameters
+    ----------
+    mission : Mission
+        As loaded, with its paths or without; its `collection.center_time` does not count.
+    start : Instant
+        Beginning of the span.
+    days : float
+        Its length.
+    platform : str, optional
+        The platform whose passes are listed; omitted: the one that has an orbit, of two the transmitter.
+    min_elevation : float
+        Least elevation of every satellite, seen from the scene. [rad]
+    squint : float
+        Of the mid-time, positive looking forward. [rad]
+    model : str, optional
+        Gating model in place of the mission's own.
+    today : date
+        Day on which waivers are judged, UTC.
+    progress : callable, optional
+        Is told how many passes are checked, and how many there are.
+
+    Raises
+    ------
+    QuestionError
+        No platform has an orbit, the scene has no place on the Earth, or there are too many days.
+    MissionError
+        The orbit cannot be used at any time of the span; with the place of its key.
+    """
+    if not 0 < days <= MAX_DAYS:
+        raise QuestionError(f"--days {days:g}: accepted: more than 0, up to {MAX_DAYS:g}")
+    axes = mission.scene.axes
+    if axes is None:
+        raise QuestionError("scene: passes are over a place on the Earth; accepted: latitude, longitude and height")
+    listed = _listed(mission, platform)
+    variation = Variation(mission, model)
+    seen = _watched(mission, axes, start, days, variation)
+    stretches = seen[listed].above(min_elevation)
+    for name, other in seen.items():
+        if name != listed:
+            stretches = shared(stretches, other.above(min_elevation))
+    found = [_at_mid_time(number, stretch, seen[listed], axes, squint) for number, stretch in enumerate(stretches, 1)]
+    return Passes(
+        file=mission.file,
+        name=mission.name,
+        model=model if model is not None and not mission.has_direct_path else mission.gating_model,
+        platform=listed,
+        start=start,
+        stop=start.after(days * DAY),
+        min_elevation=min_elevation,
+        squint=squint,
+        found=tuple(_checked(found, listed, variation, today, progress)),
+        unknown=tuple(
+            UnknownTime(name, start.after(gap.start), start.after(gap.stop), gap.reason)
+            for name, one in seen.items()
+            for gap in one.gaps
+        ),
+        changes=mission.changes,
+    )
+
+
+def _listed(mission: Mission, platform: str | None) -> str:
+    """The platform whose passes are asked for."""
+    flying = [name for name in PLATFORMS if getattr(mission.platforms, name).orbit is not None]
+    if not flying:
+        accepted = "accepted: platforms.transmitter.orbit or platforms.receiver.orbit"
+        raise QuestionError(f"platforms: neither has an orbit, so that nothing passes; {accepted}")
+    if platform is not None and platform not in flying:
+        raise QuestionError(f"--platform {platform}: has no orbit; accepted: {flying[0]}")
+    return platform or flying[0]
+
+
+def _watched(
+    mission: Mission, axes: SceneAxes, start: Instant, days: float, variation: Variation
+) -> dict[str, Watched]:
+    """Each satellite as it is seen from the scene.
+
+    An orbit that cannot be used at all is what a check at the beginning of the span would say.
+    """
+    read = reader_of(folder_of(mission.file))
+    seen = {}
+    for name in PLATFORMS:
+        route = getattr(mission.platforms, name).orbit
+        if route is None:
+            continue
+        try:
+            seen[name] = Watched.over(orbits_of(mission, route, read), axes, start, days * DAY)
+        except PathFileError as error:  # the file went away since the mission was loaded
+            raise QuestionError(f"platforms.{name}.orbit: {error}") from None
+        if not seen[name].pieces:
+            variation.read([SetValue(CENTER_TIME, start.as_text())])
+            raise QuestionError(f"platforms.{name}.orbit: {seen[name].gaps[0].reason}")
+    return seen
+
+
+def _at_mid_time(number: int, stretch: Stretch, satellite: Watched, axes: SceneAxes, squint: float) -> SatellitePass:
+    """A pass as the orbit alone says it, not yet checked."""
+    culmination = satellite.culmination(stretch)
+    times = np.linspace(stretch.start, stretch.stop, _TRACK)
+    x, y, z = satellite.at(times)[0].T
+    found = SatellitePass(
+        number=number,
+        start=satellite.origin.after(stretch.start),
+        stop=satellite.origin.after(stretch.stop),
+        rises=stretch.rises,
+        sets=stretch.sets,
+        culmination=satellite.origin.after(culmination),
+        max_elevation=satellite.state(culmination).elevation,
+        track=np.stack([np.arctan2(y, x), np.arctan2(z, np.hypot(x, y))], axis=1),
+    )
+    time = satellite.with_squint(stretch, squint)
+    if time is None:
+        seen = np.degrees(satellite.squint(times))
+        return found._replace(
+            reason=f"its squint is {seen.min():.1f} deg to {seen.max():.1f} deg, never {math.degrees(squint):.4g} deg"
+        )
+    center = _to_a_millisecond(satellite.origin.after(time))
+    time = center.since(satellite.origin)
+    state = satellite.state(time)
+    return found._replace(
+        center=center,
+        state=state,
+        side=_side(state, axes),
+        is_ascending=axes.turned_back(state.velocity)[2] > 0,
+        doubt=satellite.orbit(time).doubt(center).size,
+    )
+
+
+def _to_a_millisecond(instant: Instant) -> Instant:
+    """The instant that `Instant.as_text` writes: a file that has it is checked as the pass is."""
+    return parse_instant(instant.as_text()) or instant
+
+
+def _side(state: PlatformState, axes: SceneAxes) -> str:
+    """Side of the track over ground on which the scene lies, looking ahead: right is along v × r from the Earth."""
+    right = cross(state.velocity, axes.turned(axes.earth_fixed(state.position)))
+    return "left" if dot(state.look, right) > 0 else "right"
+
+
+# ---------------------------------------------------------------------- the mission in a pass
+def _checked(
+    found: Sequence[SatellitePass], platform: str, variation: Variation, today: date, progress: Progress
+) -> Iterator[SatellitePass]:
+    """Check the mission at the mid-time of each pass."""
+    for first in range(0, len(found), _TOGETHER):
+        some = list(found[first : first + _TOGETHER])
+        missions, places = [], []
+        for place, one in enumerate(some):
+            if one.center is None:
+                continue
+            try:
+                missions.append(variation.read(center_time(one.center)))
+                places.append(place)
+            except MissionError as error:
+                fault = error.faults[0]
+                some[place] = one._replace(status="error", reason=f"{fault.key}: {fault.problem}")
+        for index, findings in check_missions(missions, today):
+            some[places[index]] = _judged(some[places[index]], findings, missions[index], platform)
+        yield from some
+        progress(first + len(some), len(found))
+
+
+def center_time(instant: Instant) -> list[SetValue]:
+    """The value of a mission file that takes the aperture at an instant."""
+    return [SetValue(CENTER_TIME, instant.as_text())]
+
+
+def _judged(one: SatellitePass, findings: MissionFindings, mission: Mission, platform: str) -> SatellitePass:
+    """A pass with what a check of it finds."""
+    path = getattr(mission.platforms, platform).path
+    row, requirement, utilization, reason = _deciding(findings)
+    return one._replace(
+        state=path.state,
+        doubt=path.doubt_m,
+        status=findings.status,
+        reason=reason,
+        bistatic_angle=findings.geometry.bistatic_angle,
+        gradient_angle=findings.geometry.gradient_angle,
+        range_resolution=findings.resolution.range,
+        cross_range_resolution=findings.resolution.cross_range,
+        row=row,
+        requirement=requirement,
+        utilization=utilization,
+    )
+
+
+def _deciding(found: MissionFindings) -> tuple[str | None, str | None, float | None, str]:
+    """Row, requirement and utilization of the requirement that decides, and why the status is what it is.
+
+    Of requirements of one status the one decides that is used most. Where none has the status of the mission, a row
+    has it, or a warning that doubts the whole.
+    """
+    worst = min(found.requirements, key=lambda one: (RANK[one.status], -(one.utilization or 0.0)))
+    if worst.status == found.status:
+        return worst.row, worst.key, worst.utilization, str(worst.reason or "")
+    for row in worst_first(found.rows):
+        if row.status == found.status:
+            return row.id, row.binding_requirement or row.metric, row.utilization, str(row.reason or "")
+    doubts = [str(warning.message) for warning in found.warnings if warning.is_doubt]
+    reason = doubts[0] if doubts else "nothing is declared" if found.is_empty else ""
+    return worst.row, worst.key, worst.utilization, printable(reason)
