@@ -601,9 +601,5 @@ _LEAVE = "accepted: leave it out"
 # By the name of the section, as its class has it, and the key: what is accepted instead.
 LATER: Mapping[str, Mapping[str, str]] = {
     "OrbitSource": dict.fromkeys(("eof", "sp3"), "accepted: the same orbit as tle, omm or oem"),
-    "TrajectorySource": dict.fromkeys(
-        ("time_scale", "geoid_separation"), f"{_LEAVE}; a log in CSV has UTC, and heights above the ellipsoid"
-    ),
     "Mission": {"earth_orientation": f"{_LEAVE}; UT1 is taken to be UTC"},
 }
-LATER_FORMATS: Mapping[str, str] = dict.fromkeys(("pos", "nmea", "gpx", "ulog"), NOT_COMPUTED)

@@ -8,6 +8,8 @@ __all__ = [
     "flight",
     "flight_log",
     "instant",
+    "log_places",
     "messages",
+    "recognised",
     "sbet",
 ]

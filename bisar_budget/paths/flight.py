@@ -34,12 +34,13 @@ _ROUNDED = 1 + 1e-6  # of an interval whose ends are rounded
 class PathFileError(Exception):
     """A file that gives no path. The message names the file, and its line, byte or record.
 
-    `accepted` says what a file would have instead, `hint` what may be done.
+    `accepted` says what a file would have instead, `hint` what may be done. `key` is the one beside that of the file
+    which the file contradicts; empty: the file itself is wrong.
     """
 
-    def __init__(self, message: str, accepted: str = "", hint: str = "") -> None:
+    def __init__(self, message: str, accepted: str = "", hint: str = "", key: str = "") -> None:
         super().__init__(message)
-        self.accepted, self.hint = accepted, hint
+        self.accepted, self.hint, self.key = accepted, hint, key
 
 
 class PathDoubt(NamedTuple):
@@ -75,6 +76,7 @@ class Log:
     """Measured places (n, 3) [m] at rising times (n,) [s], Earth-fixed or in the scene's axes.
 
     Times count from `start`; without one they are those of the log itself. `words` says what it is, for reports.
+    `sigmas` (n, 3) are one-sigma errors east, north, up, where the log states them [m].
     """
 
     times: Floats
@@ -82,6 +84,7 @@ class Log:
     is_earth_fixed: bool
     words: str
     start: Instant | None = None
+    sigmas: Floats | None = None
 
 
 @dataclass(frozen=True)

@@ -36,14 +36,6 @@ def faults(**changes: object) -> tuple[Fault, ...]:
     [
         ({"platforms__receiver": {"orbit": {"eof": "a.EOF"}}}, "platforms.receiver.orbit.eof"),
         ({"platforms__receiver": {"orbit": {"sp3": "a.sp3", "object": "G05"}}}, "platforms.receiver.orbit.sp3"),
-        *(
-            ({"platforms__receiver": {"trajectory": {"file": "a.csv", key: "1"}}}, f"{OF_RECEIVER}trajectory.{key}")
-            for key in ("time_scale", "geoid_separation")
-        ),
-        *(
-            ({"platforms__receiver": {"trajectory": {"file": "a", "format": one}}}, f"{OF_RECEIVER}trajectory.format")
-            for one in ("pos", "nmea", "gpx", "ulog")
-        ),
         ({"earth_orientation": {"ut1_minus_utc": "-0.1 s"}}, "earth_orientation"),
     ],
 )  # fmt: skip

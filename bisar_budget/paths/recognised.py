@@ -1,0 +1,90 @@
+"""Formats of logs of flights: how each is told by its content, what messages call it, and who reads it."""
+
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+
+from bisar_budget.paths.flight import Log, PathFileError
+from bisar_budget.paths.flight_log import is_csv, read_csv
+from bisar_budget.paths.log_places import LogKeys, hold_to_ellipsoid, hold_to_scale
+from bisar_budget.paths.rtklib import is_solution, read_solution
+from bisar_budget.paths.sbet import is_sbet, read_sbet
+
+
+class LogFormat(NamedTuple):
+    """A format: its words, endings of names of its files, whether bytes are one, and its reader.
+
+    The reader takes the bytes, what messages call the file, and what the mission file says of it.
+    """
+
+    words: str
+    endings: tuple[str, ...]
+    is_one: Callable[[bytes], bool]
+    read: Callable[[bytes, str, LogKeys], Log]
+
+
+def _sbet(data: bytes, name: str, keys: LogKeys) -> Log:
+    hold_to_scale("gps", keys, name)
+    hold_to_ellipsoid(keys, name)
+    return read_sbet(data, name, keys.week)
+
+
+# By the word of the mission file, in the order of the schema.
+LOG_FORMATS: Mapping[str, LogFormat] = {
+    "csv": LogFormat("CSV with a header", (".csv",), is_csv, read_csv),
+    "sbet": LogFormat("an SBET of records of 136 bytes", (".out", ".sbet"), is_sbet, _sbet),
+    "pos": LogFormat("a solution of RTKLIB", (".pos",), is_solution, read_solution),
+}
+_WITH_WEEK = ("sbet",)
+# What is told by less is looked for behind what is told by more.
+_BY_CONTENT = sorted(LOG_FORMATS, key=("csv", "sbet").__contains__)
+
+
+def log_format(data: bytes) -> str | None:
+    """Format of a log by its content; None where it is none of `LOG_FORMATS`."""
+    return next((name for name in _BY_CONTENT if LOG_FORMATS[name].is_one(data)), None)
+
+
+def read_log(data: bytes, name: str, stated: str | None, keys: LogKeys) -> Log:
+    """Read a log.
+
+    Parameters
+    ----------
+    data : bytes
+        The file.
+    name : str
+        What messages call it.
+    stated : str or None
+        Its format by the mission file; None: by its content, or else by the ending of its name.
+    keys : LogKeys
+        What else the mission file says of it.
+
+    Raises
+    ------
+    PathFileError
+        The content is that of another format, or of none; or what its reader says.
+    """
+    found = log_format(data)
+    if stated is not None and found not in (None, stated):
+        raise PathFileError(
+            f"{name}: is {LOG_FORMATS[found].words}",
+            f"accepted: {LOG_FORMATS[stated].words}",
+            f"trajectory.format: {found} reads it",
+            key="format",
+        )
+    by_ending = (one for one, format in LOG_FORMATS.items() if name.lower().endswith(format.endings))
+    chosen = stated or found or next(by_ending, None) or ("csv" if _is_text(data) else None)
+    if chosen is None:
+        known = ", ".join(f"{format.words} ({one})" for one, format in LOG_FORMATS.items())
+        raise PathFileError(f"{name}: is no log that is known by its content", f"accepted: {known}")
+    if keys.week is not None and chosen not in _WITH_WEEK:
+        raise PathFileError(
+            f"is for an SBET; {name} is {LOG_FORMATS[chosen].words}",
+            hint="Leave trajectory.week out",
+            key="week",
+        )
+    return LOG_FORMATS[chosen].read(data, name, keys)
+
+
+def _is_text(data: bytes) -> bool:
+    """Whether somebody may have written it by hand."""
+    return b"\0" not in data[:10_000]

@@ -1,0 +1,98 @@
+"""Files of the flight of `flown` in formats of receivers and autopilots, written without the package.
+
+Each writer has as many digits as such a file has.
+"""
+
+import math
+from collections.abc import Callable, Iterable
+from datetime import datetime, timedelta
+from typing import Any
+
+import numpy as np
+
+from tests.paths.flown import SECOND, SEMI_MAJOR, START, WEEK, Flight
+
+GPS_AHEAD = timedelta(seconds=18)
+SEPARATION = 46.9  # m, of the geoid above the ellipsoid
+SIGMAS = (0.008, 0.010, 0.020)  # m, east, north, up
+Stamp = Callable[[float], str]
+
+
+def at(seconds: float, ahead: timedelta = timedelta(0), start: datetime = START) -> datetime:
+    """Date and time of a time of the flight, on a clock that is ahead of UTC."""
+    return start + timedelta(seconds=float(seconds)) + ahead
+
+
+def _places(flown: Flight) -> Iterable[tuple[float, float, float, float]]:
+    """Time, latitude and longitude in degrees, height above the ellipsoid."""
+    return zip(flown.times, np.degrees(flown.latitude), np.degrees(flown.longitude), flown.height, strict=True)
+
+
+# ---------------------------------------------------------------------- RTKLIB
+_QUALITIES = ",Q=1:fix,2:float,3:sbas,4:dgps,5:single,6:ppp,ns=# of satellites)"
+_SPREAD = ("sdn(m)", "sde(m)", "sdu(m)", "sdne(m)", "sdeu(m)", "sdun(m)", "age(s)", "ratio")
+_AHEAD = {"GPST": timedelta(seconds=18), "UTC": timedelta(0), "JST": timedelta(hours=9)}
+
+
+def calendar(system: str = "GPST", start: datetime = START) -> Stamp:
+    """Times as dates."""
+    return lambda seconds: f"{at(seconds, _AHEAD[system], start):%Y/%m/%d %H:%M:%S.%f}"[:-3]
+
+
+def week_and_second(seconds: float) -> str:
+    """GPS week and its second."""
+    return f"{WEEK:4d} {SECOND + seconds:10.3f}"
+
+
+def sexagesimal(degrees: float) -> str:
+    """Degrees, minutes and seconds, the sign before the degrees."""
+    whole = round(abs(degrees) * 3600e5)
+    minutes, seconds = divmod(whole, 6000000)
+    return f"{math.copysign(minutes // 60, degrees):4.0f} {minutes % 60:02d} {seconds / 1e5:08.5f}"
+
+
+def solution(
+    flown: Flight,
+    stamp: Stamp | None = None,
+    *,
+    system: str = "GPST",
+    height: str = "ellipsoidal",
+    is_in_minutes: bool = False,
+    separator: str = " ",
+    sigmas: tuple[float, float, float] = SIGMAS,
+) -> bytes:
+    """Solution of latitude, longitude and height; `height` says what heights count from."""
+    stamp = stamp or calendar(system)
+    unit = "d'\"" if is_in_minutes else "deg"
+    names = [f"latitude({unit})", f"longitude({unit})", "height(m)", "Q", "ns", *_SPREAD]
+    lines = [
+        "% program   : RTKPOST ver.2.4.3",
+        f"% (lat/lon/height=WGS84/{height}{_QUALITIES}",
+        f"%  {system:<22}{separator}" + separator.join(f"{name:>14}" for name in names),
+    ]
+    east, north, up = sigmas
+    below = SEPARATION if height == "geodetic" else 0.0
+    for number, (time, latitude, longitude, above) in enumerate(_places(flown)):
+        angles = [sexagesimal(one) if is_in_minutes else f"{one:14.9f}" for one in (latitude, longitude)]
+        cells = [*angles, f"{above - below:10.4f}", "  1" if number % 50 else "  2", " 12"]
+        cells += [f"{one:8.4f}" for one in (north, east, up, 0.001, -0.002, 0.003)] + ["  0.00", "   3.1"]
+        lines.append(separator.join([stamp(time), *(part for cell in cells for part in cell.split())]))
+    return "\n".join([*lines, ""]).encode()
+
+
+def solution_in_x_y_z(flown: Flight, covariance: Any) -> bytes:
+    """Solution of Earth-fixed places, whose errors have a covariance matrix along x, y, z [m²]."""
+    names = ["x-ecef(m)", "y-ecef(m)", "z-ecef(m)", "Q", "ns", "sdx(m)", "sdy(m)", "sdz(m)"]
+    names += ["sdxy(m)", "sdyz(m)", "sdzx(m)", "age(s)", "ratio"]
+    lines = [f"% (x/y/z-ecef=WGS84{_QUALITIES}", f"%  {'GPST':<22} " + " ".join(f"{name:>14}" for name in names)]
+    pairs = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))
+    roots = [math.copysign(math.sqrt(abs(covariance[i][j])), covariance[i][j]) for i, j in pairs]
+    for time, place in zip(flown.times, flown.places, strict=True):
+        cells = (
+            [f"{one:14.4f}" for one in place] + ["  5", "  7"] + [f"{one:12.8f}" for one in roots] + ["0.00", "0.0"]
+        )
+        lines.append(" ".join([calendar()(time), *cells]))
+    return "\r\n".join([*lines, ""]).encode()
+
+
+METRES_A_DEGREE = math.radians(SEMI_MAJOR)
