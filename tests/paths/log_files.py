@@ -96,3 +96,61 @@ def solution_in_x_y_z(flown: Flight, covariance: Any) -> bytes:
 
 
 METRES_A_DEGREE = math.radians(SEMI_MAJOR)
+
+
+# ---------------------------------------------------------------------- NMEA 0183
+def sentence(body: str) -> str:
+    """A sentence with its checksum, the exclusive or of its characters."""
+    checksum = 0
+    for character in body:
+        checksum ^= ord(character)
+    return f"${body}*{checksum:02X}"
+
+
+def minutes(degrees: float, width: int, sides: str) -> str:
+    """Degrees and minutes to 1e-7 minutes, and the side."""
+    whole = round(abs(degrees) * 60e7)
+    return f"{whole // (60 * 10**7):0{width}d}{whole % (60 * 10**7) / 1e7:010.7f},{sides[int(degrees < 0)]}"
+
+
+def rmc(time: float, talker: str = "GN", start: datetime = START) -> str:
+    """Recommended minimum: time and date."""
+    moment = at(time, start=start)
+    return sentence(f"{talker}RMC,{moment:%H%M%S.%f},A,4805.0,N,01116.0,E,116.6,045.0,{moment:%d%m%y},,,R")
+
+
+def zda(time: float, start: datetime = START) -> str:
+    """Time and date, and a local zone that changes nothing."""
+    return sentence(f"GPZDA,{at(time, start=start):%H%M%S.%f,%d,%m,%Y},-05,30")
+
+
+def gga(
+    time: float,
+    latitude: float,
+    longitude: float,
+    above: float,
+    talker: str = "GN",
+    start: datetime = START,
+    separation: str = f"{SEPARATION:.4f}",
+    quality: int = 4,
+) -> str:
+    """Fix; its height is above the sea."""
+    clock, height = f"{at(time, start=start):%H%M%S.%f}", f"{above - SEPARATION:.4f}"
+    place = f"{minutes(latitude, 2, 'NS')},{minutes(longitude, 3, 'EW')}"
+    return sentence(f"{talker}GGA,{clock},{place},{quality},12,0.7,{height},M,{separation},M,1.0,0000")
+
+
+def gns(time: float, latitude: float, longitude: float, above: float, modes: str = "RR") -> str:
+    """Fix of several systems."""
+    place = f"{minutes(latitude, 2, 'NS')},{minutes(longitude, 3, 'EW')}"
+    clock, height = f"{at(time):%H%M%S.%f}", f"{above - SEPARATION:.4f}"
+    return sentence(f"GNGNS,{clock},{place},{modes},12,0.7,{height},{SEPARATION:.4f},1.0,0000")
+
+
+def nmea(flown: Flight, place: Callable[..., str] = gga, date: Callable[..., str] = rmc, **more: Any) -> bytes:
+    """Log of sentences, with dates behind places and with sentences that say nothing of either."""
+    dated = {"start": more["start"]} if "start" in more else {}
+    lines = []
+    for one in _places(flown):
+        lines += [place(*one, **more), sentence("GNGST,052001.25,,,,,0.01,0.01,0.02"), date(one[0], **dated)]
+    return "\r\n".join([*lines, ""]).encode()
