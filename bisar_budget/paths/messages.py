@@ -1,11 +1,11 @@
-"""Files of orbits: texts, times and numbers, and XML as a tree whose elements know their lines.
+"""Files of orbits and logs: texts, times and numbers, and XML as a tree whose elements know their lines.
 
 XML is that of others: no reference is followed, no entity is expanded.
 """
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from sys import intern
 from xml.parsers import expat
@@ -61,6 +61,7 @@ def number_in(text: object) -> float | None:
 
 
 # ---------------------------------------------------------------------- XML
+_NONE: Mapping[str, str] = {}
 _MOST = 2_000_000  # elements; a day of an ephemeris at 1 Hz has 0.7 million
 _DEEPEST = 32
 _LONGEST = 10_000  # characters of an element's own text
@@ -68,13 +69,14 @@ _LONGEST = 10_000  # characters of an element's own text
 
 @dataclass(eq=False, slots=True)
 class MessageElement:
-    """An element of a message: its name without namespace, the line where it begins, its units, text and children."""
+    """An element: its name without namespace, the line where it begins, its units, text, children and attributes."""
 
     name: str
     line: int
     units: str = ""
     text: str = ""
     children: list["MessageElement"] = field(default_factory=list)
+    attributes: Mapping[str, str] = field(default_factory=lambda: _NONE)
 
     def all(self, name: str) -> Iterator["MessageElement"]:
         """Elements of a name anywhere below, in the order of the file."""
@@ -110,6 +112,8 @@ def parse_markup(data: bytes, name: str) -> MessageElement:
         one = MessageElement(
             intern(tag.rpartition(":")[2]), parser.CurrentLineNumber, intern(attributes.get("units", ""))
         )
+        if attributes:
+            one.attributes = attributes
         open_ones[-1].children.append(one)
         open_ones.append(one)
 

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 from bisar_budget.paths.flight import Log, PathFileError
 from bisar_budget.paths.flight_log import is_csv, read_csv
+from bisar_budget.paths.gpx import is_gpx, read_gpx
 from bisar_budget.paths.log_places import LogKeys, hold_to_ellipsoid, hold_to_scale
 from bisar_budget.paths.nmea import is_nmea, read_nmea
 from bisar_budget.paths.rtklib import is_solution, read_solution
@@ -35,6 +36,7 @@ LOG_FORMATS: Mapping[str, LogFormat] = {
     "sbet": LogFormat("an SBET of records of 136 bytes", (".out", ".sbet"), is_sbet, _sbet),
     "pos": LogFormat("a solution of RTKLIB", (".pos",), is_solution, read_solution),
     "nmea": LogFormat("sentences of NMEA 0183", (".nmea",), is_nmea, read_nmea),
+    "gpx": LogFormat("a GPX track", (".gpx",), is_gpx, read_gpx),
 }
 _WITH_WEEK = ("sbet",)
 # What is told by less is looked for behind what is told by more.

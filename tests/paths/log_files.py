@@ -154,3 +154,36 @@ def nmea(flown: Flight, place: Callable[..., str] = gga, date: Callable[..., str
     for one in _places(flown):
         lines += [place(*one, **more), sentence("GNGST,052001.25,,,,,0.01,0.01,0.02"), date(one[0], **dated)]
     return "\r\n".join([*lines, ""]).encode()
+
+
+# ---------------------------------------------------------------------- GPX
+def point(
+    time: float,
+    latitude: float,
+    longitude: float,
+    above: float,
+    zone: str = "Z",
+    start: datetime = START,
+    has_separation: bool = True,
+) -> str:
+    """Point of a track; its elevation is above the sea."""
+    moment = f"{at(time, start=start):%Y-%m-%dT%H:%M:%S.%f}{zone}"
+    geoid = f"<geoidheight>{SEPARATION:.4f}</geoidheight>" if has_separation else ""
+    place = f'lat="{latitude:.9f}" lon="{longitude:.9f}"'
+    return f"<trkpt {place}><ele>{above - SEPARATION:.4f}</ele><time>{moment}</time>{geoid}</trkpt>"
+
+
+def gpx(flown: Flight, segments: int = 1, prefix: str = "", **more: Any) -> bytes:
+    """Track of some segments of the same length, in one namespace with or without a prefix."""
+    points = [point(*one, **more) for one in _places(flown)]
+    size = math.ceil(len(points) / segments)
+    parts = ["\n".join(points[n : n + size]) for n in range(0, len(points), size)]
+    body = "".join(f"<trkseg>\n{part}\n</trkseg>\n" for part in parts)
+    name = f"xmlns{':' if prefix else ''}{prefix}"
+    text = (
+        f'<gpx version="1.1" {name}="http://www.topografix.com/GPX/1/1">\n<trk><name>a</name>\n{body}</trk></gpx>\n'
+    )
+    for tag in ("gpx", "trkseg", "trkpt", "trk", "name", "ele", "time", "geoidheight") if prefix else ():
+        text = text.replace(f"<{tag}>", f"<{prefix}:{tag}>").replace(f"<{tag} ", f"<{prefix}:{tag} ")
+        text = text.replace(f"</{tag}>", f"</{prefix}:{tag}>")
+    return b'<?xml version="1.0" encoding="UTF-8"?>\n' + text.encode()
