@@ -26,7 +26,7 @@ from bisar_budget import units
 from bisar_budget.faults import InvalidValueError, fault_words, shown
 from bisar_budget.paths.earth import Floats, earth_fixed_places
 from bisar_budget.paths.flight import Log, PathFileError
-from bisar_budget.paths.instant import DAY, GPS_EPOCH, UNIX_EPOCH, WEEK, Instant, parse_instant
+from bisar_budget.paths.instant import DAY, GPS_EPOCH, WEEK, Instant, parse_instant
 from bisar_budget.paths.log_places import (
     NOTHING_SAID,
     SCALES,
@@ -39,6 +39,7 @@ from bisar_budget.paths.log_places import (
     hold_to_scale,
     needs_separation,
     scale_words,
+    unix_instant,
     utc_of,
 )
 from bisar_budget.paths.vendor_logs import Vendor, dataflash_as_csv, vendor_of
@@ -205,7 +206,7 @@ def _times(table: _Table, header: _Header, rows: LogRows) -> tuple[Floats, Insta
         raw = table.numbers[:, unix]
         scale = header.numbers[unix].scale
         rows.refuse(raw * scale > _LATEST_S, lambda i: f"time {raw[i]:.10g} us is beyond {_LATEST_S:g} s")
-        return (raw - raw[0]) * scale, Instant(UNIX_EPOCH, 0.0).after(float(raw[0]) * scale), ""
+        return (raw - raw[0]) * scale, unix_instant(int(raw[0])), ""
     if week is not None:
         weeks = table.numbers[:, week]
         rows.refuse(

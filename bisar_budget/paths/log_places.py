@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from bisar_budget.paths.earth import Floats, earth_fixed_places
 from bisar_budget.paths.flight import Log, PathFileError
-from bisar_budget.paths.instant import TAI_LESS, Instant, tai_less_utc, utc
+from bisar_budget.paths.instant import TAI_LESS, UNIX_EPOCH, Instant, tai_less_utc, utc
 
 SCALES = {"utc": "UTC", "gps": "GPST", "tai": "TAI"}  # as the mission file has them, and as logs do
 _LEAPS_KNOWN = 61587  # MJD, 2027-07-01: Bulletin C 72 has no leap second before
@@ -70,6 +70,12 @@ def utc_of(instant: Instant, scale: str) -> Instant:
     return instant if scale == "utc" else utc(instant.after(TAI_LESS["GPS" if scale == "gps" else "TAI"]))
 
 
+def unix_instant(micro: int) -> Instant:
+    """Instant of UTC so many microseconds after 1970-01-01."""
+    days, rest = divmod(micro, 86_400_000_000)
+    return Instant(UNIX_EPOCH + days, rest * 1e-6)
+
+
 def scale_words(start: Instant, scale: str) -> str:
     """How UTC follows from the scale of a log that starts then; empty of one in UTC."""
     if scale == "utc":
@@ -122,7 +128,8 @@ def from_sea_level(heights: Floats, separations: Floats | None, keys: LogKeys, n
     """
     if separations is not None:
         hold_to_ellipsoid(keys, name, "gives the geoid separation itself")
-        return heights + separations
+        with np.errstate(over="ignore", invalid="ignore"):  # a height that cannot be is refused later
+            return heights + separations
     if keys.geoid_separation is None:
         raise needs_separation(f"{name}: has heights above mean sea level, and no geoid separation")
     return heights + keys.geoid_separation

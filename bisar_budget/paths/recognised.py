@@ -10,6 +10,7 @@ from bisar_budget.paths.log_places import LogKeys, hold_to_ellipsoid, hold_to_sc
 from bisar_budget.paths.nmea import is_nmea, read_nmea
 from bisar_budget.paths.rtklib import is_solution, read_solution
 from bisar_budget.paths.sbet import is_sbet, read_sbet
+from bisar_budget.paths.ulog import is_ulog, read_ulog
 
 
 class LogFormat(NamedTuple):
@@ -37,6 +38,7 @@ LOG_FORMATS: Mapping[str, LogFormat] = {
     "pos": LogFormat("a solution of RTKLIB", (".pos",), is_solution, read_solution),
     "nmea": LogFormat("sentences of NMEA 0183", (".nmea",), is_nmea, read_nmea),
     "gpx": LogFormat("a GPX track", (".gpx",), is_gpx, read_gpx),
+    "ulog": LogFormat("a PX4 ULog", (".ulg",), is_ulog, read_ulog),
 }
 _WITH_WEEK = ("sbet",)
 # What is told by less is looked for behind what is told by more.

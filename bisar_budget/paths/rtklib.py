@@ -121,7 +121,8 @@ def read_solution(data: bytes, name: str, keys: LogKeys) -> Log:
     if "x-ecef(m)" in header.columns:
         hold_to_ellipsoid(keys, name, "has x, y, z")
         at = header.columns["x-ecef(m)"]
-        latitude, longitude, height = geodetic_places(table[:, at : at + 3])
+        with np.errstate(all="ignore"):  # a place that cannot be is refused later
+            latitude, longitude, height = geodetic_places(table[:, at : at + 3])
     else:
         latitude, longitude = (_radians(table, header, axis, rows) for axis in ("latitude", "longitude"))
         height = _heights(table[:, header.columns["height(m)"]], height_said, keys, name)

@@ -91,6 +91,8 @@ VENDORS = (
     _vendor(
         "CSV of PX4's global position",
         "timestamp lat lon alt terrain_alt",
+        1,
+        lat_lon_valid=_FIX,
         timestamp=VendorColumn("time", "us", 1e-6),
         lat=_LATITUDE,
         lon=_LONGITUDE,

@@ -4,6 +4,7 @@ Each writer has as many digits as such a file has.
 """
 
 import math
+import struct
 from collections.abc import Callable, Iterable
 from datetime import datetime, timedelta
 from typing import Any
@@ -187,3 +188,111 @@ def gpx(flown: Flight, segments: int = 1, prefix: str = "", **more: Any) -> byte
         text = text.replace(f"<{tag}>", f"<{prefix}:{tag}>").replace(f"<{tag} ", f"<{prefix}:{tag} ")
         text = text.replace(f"</{tag}>", f"</{prefix}:{tag}>")
     return b'<?xml version="1.0" encoding="UTF-8"?>\n' + text.encode()
+
+
+# ---------------------------------------------------------------------- ULog of PX4
+_STRUCT = {
+    "uint64_t": "Q",
+    "int32_t": "i",
+    "uint32_t": "I",
+    "uint8_t": "B",
+    "bool": "?",
+    "float": "f",
+    "double": "d",
+    "char[4]": "4s",
+}
+GPS_OF_OLD = (
+    ("uint64_t", "timestamp"),
+    ("uint64_t", "time_utc_usec"),
+    ("int32_t", "lat"),
+    ("int32_t", "lon"),
+    ("int32_t", "alt"),
+    ("int32_t", "alt_ellipsoid"),
+    ("float", "eph"),
+    ("char[4]", "made_up"),
+    ("uint8_t", "fix_type"),
+    ("uint8_t", "_padding0"),
+)
+GPS_OF_NOW = (
+    ("uint64_t", "timestamp"),
+    ("uint64_t", "timestamp_sample"),
+    ("double", "latitude_deg"),
+    ("double", "longitude_deg"),
+    ("double", "altitude_msl_m"),
+    ("double", "altitude_ellipsoid_m"),
+    ("uint64_t", "time_utc_usec"),
+    ("uint32_t", "device_id"),
+    ("uint8_t", "fix_type"),
+)
+GLOBAL = (
+    ("uint64_t", "timestamp"),
+    ("uint64_t", "timestamp_sample"),
+    ("double", "lat"),
+    ("double", "lon"),
+    ("float", "alt"),
+    ("float", "alt_ellipsoid"),
+    ("float", "terrain_alt"),
+    ("bool", "dead_reckoning"),
+)
+BOOT = 20_000_000  # µs of the autopilot's clock at `START`
+
+
+def message(kind: str, payload: bytes) -> bytes:
+    """Message of a ULog."""
+    return struct.pack("<HB", len(payload), ord(kind)) + payload
+
+
+def topic(
+    name: str, fields: tuple[tuple[str, str], ...], number: int, records: Iterable[dict[str, Any]]
+) -> tuple[bytes, bytes]:
+    """Format of a topic; its number and its records. Fields that a record does not name are 0."""
+    text = f"{name}:" + "".join(f"{kind} {field};" for kind, field in fields)
+    form = "<" + "".join(_STRUCT[kind] for kind, _ in fields)
+    found = message("A", struct.pack("<BH", 0, number) + name.encode())
+    for record in records:
+        values = [record.get(field, b"" if kind.startswith("char") else 0) for kind, field in fields]
+        found += message("D", struct.pack("<H", number) + struct.pack(form, *values))
+    return message("F", text.encode()), found
+
+
+def gps_records(flown: Flight, late: float = 0.0, fix: int = 3, start: datetime = START) -> Iterable[dict[str, Any]]:
+    """Records of a GPS topic with the names of both releases; they come `late` at the autopilot [s]."""
+    epoch = round(start.timestamp() * 1e6)
+    for time, latitude, longitude, above in _places(flown):
+        micro = round(time * 1e6)
+        yield {
+            "timestamp": BOOT + micro + round(late * 1e6),
+            "time_utc_usec": epoch + micro,
+            "lat": round(latitude * 1e7),
+            "lon": round(longitude * 1e7),
+            "alt": round((above - SEPARATION) * 1e3),
+            "alt_ellipsoid": round(above * 1e3),
+            "latitude_deg": latitude,
+            "longitude_deg": longitude,
+            "altitude_msl_m": above - SEPARATION,
+            "altitude_ellipsoid_m": above,
+            "fix_type": fix,
+        }
+
+
+def global_records(flown: Flight) -> Iterable[dict[str, Any]]:
+    """Records of the autopilot's own estimate, on its own clock."""
+    for time, latitude, longitude, above in _places(flown):
+        yield {
+            "timestamp": BOOT + round(time * 1e6),
+            "lat": latitude,
+            "lon": longitude,
+            "alt": above - SEPARATION,
+            "alt_ellipsoid": above,
+        }
+
+
+def ulog(*topics: tuple[bytes, bytes]) -> bytes:
+    """A ULog with flags, an information and topics among messages that are not read."""
+    flags = message("B", bytes(40))
+    begin = b"ULog\x01\x12\x35\x01" + struct.pack("<Q", BOOT)
+    information = message("I", bytes([len(b"char[3] sys")]) + b"char[3] sysPX4")
+    text = message("L", b"6" + struct.pack("<Q", BOOT) + b"[commander] Takeoff")
+    sync = message("S", bytes.fromhex("2F731320250CBB12"))
+    formats = b"".join(one for one, _ in topics)
+    return begin + flags + information + formats + text + sync.join(records for _, records in topics)
