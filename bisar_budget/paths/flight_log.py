@@ -413,8 +413,9 @@ def _vendor_header(
         if known is not None:
             columns.setdefault(known.name, _Column(known.name, index, known.unit, known.scale))
     if "height" not in columns and "altitude" not in columns:
-        wanted = next(name for name, column in vendor.columns.items() if column.name == "altitude")
-        raise PathFileError(f"{where}: {vendor.words} has no column {wanted}; a height above take-off is no place")
+        raise PathFileError(
+            f"{where}: {vendor.words} has no height above the sea or the ellipsoid; one above take-off is no place"
+        )
     if "height" in columns:
         columns.pop("altitude", None)
     stamp = columns.pop("utc", None)

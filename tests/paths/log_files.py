@@ -245,8 +245,9 @@ def message(kind: str, payload: bytes) -> bytes:
 def topic(
     name: str, fields: tuple[tuple[str, str], ...], number: int, records: Iterable[dict[str, Any]]
 ) -> tuple[bytes, bytes]:
-    """Format of a topic; its number and its records. Fields that a record does not name are 0."""
+    """Format of a topic; its number and its records. Fields that a record does not name are 0, no padding follows."""
     text = f"{name}:" + "".join(f"{kind} {field};" for kind, field in fields)
+    fields = tuple(one for one in fields if not one[1].startswith("_padding"))
     form = "<" + "".join(_STRUCT[kind] for kind, _ in fields)
     found = message("A", struct.pack("<BH", 0, number) + name.encode())
     for record in records:
@@ -296,3 +297,68 @@ def ulog(*topics: tuple[bytes, bytes]) -> bytes:
     sync = message("S", bytes.fromhex("2F731320250CBB12"))
     formats = b"".join(one for one, _ in topics)
     return begin + flags + information + formats + text + sync.join(records for _, records in topics)
+
+
+# ---------------------------------------------------------------------- CSV of exporters
+AIRDATA = (
+    "time(millisecond),datetime(utc),latitude,longitude,height_above_takeoff({0}),"
+    "height_above_ground_at_drone_location({0}),ground_elevation_at_drone_location({0}),altitude_above_seaLevel({0}),"
+    "height_sonar({0}),speed(m/s),satellites, xSpeed(m/s), pitch(degrees),isPhoto,flycState,message"
+)
+
+
+def airdata(flown: Flight, unit: str = "meters", start: datetime = START) -> bytes:
+    """Export of Airdata, whose instants are cut to seconds; a message has a comma."""
+    lines = [AIRDATA.format(unit), f"0,,0,0,0,0,0,0,0,0,0,0,0,0,{'Motors_Started'},"]
+    size = {"meters": 1.0, "feet": 0.3048}[unit]
+    for number, (time, latitude, longitude, above) in enumerate(_places(flown)):
+        moment = f"{at(time, start=start):%Y-%m-%d %H:%M:%S}"
+        heights = [f"{one / size:.4f}" for one in (100.0, 100.0, 2800.0, above - SEPARATION)]
+        said = '"Low battery, returning"' if number == 7 else ""
+        cells = [str(5000 + round(time * 1e3)), moment, f"{latitude:.13f}", f"{longitude:.13f}", *heights]
+        lines.append(",".join([*cells, "0", "60.1", "18", "42.5", "-1.2", "0", "P-GPS", said]))
+    return "\n".join([*lines, ""]).encode()
+
+
+def px4_csv(flown: Flight, fields: tuple[tuple[str, str], ...], records: Iterable[dict[str, Any]]) -> bytes:
+    """What ulog2csv writes of a topic: names of fields, the numbers as Python has them."""
+    names = [field for _, field in fields if not field.startswith("_padding")]
+    lines = [",".join(names)]
+    for record in records:
+        lines.append(",".join(str(record.get(name, 0)) for name in names))
+    return "\n".join([*lines, ""]).encode()
+
+
+DATAFLASH = "TimeUS,I,Status,GMS,GWk,NSats,HDop,Lat,Lng,Alt,Spd,GCrs,VZ,Yaw,U"
+
+
+def _gps_rows(flown: Flight, week_second: float = SECOND) -> Iterable[list[str]]:
+    for time, latitude, longitude, above in _places(flown):
+        moment = week_second + time
+        week, second = WEEK + int(moment // 604800), moment % 604800
+        yield [
+            *(str(BOOT + round(time * 1e6)), "0", "6", str(round(second * 1e3)), str(week), "18", "0.62"),
+            *(f"{latitude:.7f}", f"{longitude:.7f}", f"{above - SEPARATION:.2f}", "60.1", "45.0", "0.1", "0", "1"),
+        ]
+
+
+def dataflash(flown: Flight, week_second: float = SECOND) -> bytes:
+    """Text of a dataflash log: formats, then rows of several kinds, of two receivers."""
+    lines = [
+        "FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns",
+        "FMT, 131, 67, GPA, QBCCCCfBIHeHH, TimeUS,I,VDop,HAcc,VAcc,SAcc,YAcc,VV,SMS,Delta,AEl,RTCMFU,RTCMFD",
+        f"FMT, 130, 50, GPS, QBBIHBcLLeffffB, {DATAFLASH}",
+        "PARM, 1000, GPS_TYPE, 1",
+        "GPS, 19000000, 0, 1, 0, 0, 0, 99.99, 0, 0, 0, 0, 0, 0, 0, 1",
+    ]
+    for number, row in enumerate(_gps_rows(flown, week_second)):
+        lines += [f"GPS, {', '.join(row)}", f"ATT, {row[0]}, 0, 0, 0, 0, 0, 0"]
+        if number % 5 == 0:
+            lines.append(f"GPS, {', '.join([row[0], '1', '3', *row[3:7], '-35.0', '149.0', '600.00', *row[10:]])}")
+    return "\r\n".join([*lines, ""]).encode()
+
+
+def mavlogdump(flown: Flight) -> bytes:
+    """What `mavlogdump.py --format csv --types GPS` writes."""
+    rows = [f"{START.timestamp():.8f},{','.join(row)}" for row in _gps_rows(flown)]
+    return "\n".join([f"timestamp,{DATAFLASH}", *rows, ""]).encode()
