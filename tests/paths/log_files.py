@@ -362,3 +362,33 @@ def mavlogdump(flown: Flight) -> bytes:
     """What `mavlogdump.py --format csv --types GPS` writes."""
     rows = [f"{START.timestamp():.8f},{','.join(row)}" for row in _gps_rows(flown)]
     return "\n".join([f"timestamp,{DATAFLASH}", *rows, ""]).encode()
+
+
+# ---------------------------------------------------------------------- of each format one
+def every_format(flown: Flight) -> dict[str, tuple[str, bytes, dict[str, Any]]]:
+    """Format, file and keys of the mission that it needs, by the name of the file."""
+    above_sea = {"geoid_separation": f"{SEPARATION} m"}
+    gps, own = gps_records(flown), global_records(flown)
+    return {
+        "a.pos": ("pos", solution(flown), {}),
+        "seconds.pos": ("pos", solution(flown, week_and_second, is_in_minutes=True), {}),
+        "ecef.pos": ("pos", solution_in_x_y_z(flown, np.diag([1e-4, 1e-4, 4e-4])), {}),
+        "a.nmea": ("nmea", nmea(flown), {}),
+        "gns.log": ("nmea", nmea(flown, gns, zda), {}),
+        "a.gpx": ("gpx", gpx(flown), {}),
+        "a.ulg": ("ulog", ulog(topic("vehicle_gps_position", GPS_OF_OLD, 1, gps)), {}),
+        "now.ulg": ("ulog", ulog(topic("sensor_gps", GPS_OF_NOW, 1, gps_records(flown))), {}),
+        "own.ulg": (
+            "ulog",
+            ulog(
+                topic("vehicle_gps_position", GPS_OF_OLD, 1, [*gps_records(flown)][::10]),
+                topic("vehicle_global_position", GLOBAL, 2, own),
+            ),
+            {},
+        ),
+        "px4.csv": ("csv", px4_csv(flown, GPS_OF_OLD, gps_records(flown)), {}),
+        "px4_now.csv": ("csv", px4_csv(flown, GPS_OF_NOW, gps_records(flown)), {}),
+        "dataflash.log": ("csv", dataflash(flown), above_sea),
+        "mavlogdump.csv": ("csv", mavlogdump(flown), above_sea),
+        "airdata.csv": ("csv", airdata(flown), above_sea),
+    }
