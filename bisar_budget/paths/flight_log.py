@@ -56,7 +56,7 @@ _KINDS = (_GEODETIC, ("x", "y", "z"), ("east", "north", "up"))
 _STAMPS = {"utc": "utc", "gpst": "gps", "gps": "gps", "tai": "tai"}  # names of columns, or units of a time
 _SPARE = ("altitude", "geoid_separation")
 _DIMENSIONS = {"latitude": units.ANGLE, "longitude": units.ANGLE, "time": units.TIME}
-_HEADER = re.compile(r"([^\[\]()]*)(?:\[([^\[\]]*)\])?\s*")
+_HEADER = re.compile(r"([^\[\]()]*)(?:\[([^\[\]]*)\])?")
 _QUOTED = re.compile('"').search
 _IN_NUMBERS = b"0123456789+-.eE \t"
 _SECOND = r"[0-5]\d(?:[.,]\d{1,12})?"
@@ -327,6 +327,7 @@ def _is_said(line: str) -> bool:
 
 def _name_of(cell: str) -> tuple[str, str | None]:
     """Name of a column in small letters, as far as a bracket, and the unit in square ones."""
+    cell = cell.strip()
     match = _HEADER.fullmatch(cell)
     name = (match[1] if match else re.split(r"[\[(]", cell)[0]).strip().strip('"').lower()
     return name.replace(" ", "_"), match[2].strip() if match and match[2] is not None else None

@@ -21,7 +21,7 @@ from bisar_budget.paths.log_places import LogKeys, LogRows, from_sea_level, geod
 from bisar_budget.paths.messages import MessageElement, hold_to_size, number_in, parse_markup
 
 _ROOT = re.compile(rb"<(?:[\w.-]+:)?gpx[\s>]")
-_OFFSET = re.compile(r"(.*T.*)([+-])(\d\d):([0-5]\d)", re.ASCII)
+_OFFSET = re.compile(r"([\d-]{10}T[\d:.]{8,21})([+-])(\d\d):([0-5]\d)", re.ASCII)
 
 
 def is_gpx(data: bytes) -> bool:

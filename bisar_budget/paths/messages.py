@@ -16,7 +16,7 @@ from bisar_budget.paths.instant import Instant, day_of_year, parse_instant
 
 LARGEST_BYTES = 32_000_000  # a day of an ephemeris at 1 Hz has 26 MB as XML
 EARLIEST, LATEST = 36112, 124593  # modified Julian days of 1957-10-01 and 2200-01-01, for which there are orbits
-_NUMBER = re.compile(r"\s*[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?\s*", re.ASCII)
+_NUMBER = re.compile(r"\s*[+-]?(\d+(?:\.\d*)?|\.\d+)([eEdD][+-]?\d+)?\s*", re.ASCII)
 
 
 def hold_to_size(size: int, name: str, part: str = "objects") -> None:

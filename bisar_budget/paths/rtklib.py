@@ -38,8 +38,8 @@ from bisar_budget.paths.messages import decoded, number_in
 
 LARGEST = 200_000_000  # bytes; a million places
 _COLUMNS = re.compile(rb"(?m)^%[ \t]*(GPST|UTC|JST)\b[^\r\n]*(latitude\(|x-ecef\(m\)|e-baseline\(m\))")
-_HEADER = re.compile(r"%\s*(GPST|UTC|JST)\s*(\W?)\s*((?:latitude|x-ecef|e-baseline)\(.*)")
-_NAME = re.compile(r"[a-z-]+\([^)]*\)|[A-Za-z]+")
+_HEADER = re.compile(r"% ?(GPST|UTC|JST) ?([,;]?) ?((?:latitude|x-ecef|e-baseline)\(.*)")
+_NAME = re.compile(r"[a-z-]+\([^)]{0,9}\)|[A-Za-z]+")
 _DATE = re.compile(r"(\d{4})/(\d\d)/(\d\d)", re.ASCII)
 _CLOCK = re.compile(r"([01]\d|2[0-3]):([0-5]\d):([0-5]\d(?:\.\d{1,12})?)", re.ASCII)
 _JST = 9 * 3600.0  # s ahead of UTC
@@ -132,7 +132,7 @@ def read_solution(data: bytes, name: str, keys: LogKeys) -> Log:
 
 def _header(text: str, where: str) -> _Columns | None:
     """Columns that a line of % names; None where it says something else."""
-    match = _HEADER.match(text)
+    match = _HEADER.match(" ".join(text.split()))
     if match is None:
         return None
     if match[3].startswith("e-baseline"):

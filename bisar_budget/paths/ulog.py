@@ -208,6 +208,7 @@ def _log(
 def _topics(data: bytes, name: str) -> list[_Topic]:
     """Topics of places, each of one instance, with their records."""
     formats: dict[str, str] = {}
+    layouts: dict[str, tuple[np.dtype[np.void], _Units]] = {}
     wanted: dict[int, tuple[str, np.dtype[np.void], _Units]] = {}
     payloads: dict[int, list[bytes]] = {}
     for kind, at, payload in _messages(data, name):
@@ -224,8 +225,9 @@ def _topics(data: bytes, name: str) -> list[_Topic]:
         elif kind == ord("A"):
             number, topic = int.from_bytes(payload[1:3], "little"), payload[3:].decode("latin-1")
             if topic in (*_GPS, _GLOBAL) and number not in wanted:
-                layout = _layout(topic, formats.get(topic, ""), f"{name}: byte {at}")
-                wanted[number], payloads[number] = (topic, *layout), []
+                if topic not in layouts:
+                    layouts[topic] = _layout(topic, formats.get(topic, ""), f"{name}: byte {at}")
+                wanted[number], payloads[number] = (topic, *layouts[topic]), []
         elif kind == ord("B"):
             _hold_to_flags(payload, f"{name}: byte {at}")
     return [

@@ -20,8 +20,8 @@ pytest.importorskip("pynmea2")
 FLOWN = flight()
 FILES = every_format(FLOWN)
 # Last digits of places [m]. White rounding by q moves the acceleration of a parabola through N = 101 places over
-# T = 2 s by q/√12·√720/(T²√N) = 0.2 q/s² (one sigma). It is 0.4 m/s² here, and decides on the velocities: 1 q/m covers them.
-# What is not written coarsely is rounded as allowables are, at 1e-11.
+# T = 2 s by q/√12·√720/(T²√N) = 0.2 q/s² (one sigma). It is 0.4 m/s² here, and decides on the velocities: 1 q/m
+# covers them. What is not written coarsely is rounded as allowables are, at 1e-11.
 DIGITS = {
     "a.pos": 1.1e-4,
     "seconds.pos": 3.1e-4,
