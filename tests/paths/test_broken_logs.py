@@ -13,8 +13,6 @@ from bisar_budget.paths.recognised import log_format, read_log
 from tests.hostile_commands import log_read
 from tests.paths.log_files import message
 
-pytest.importorskip("pynmea2")
-
 
 @pytest.mark.parametrize("first", range(0, 600, 100))
 def test_nothing_else_comes_out(first: int, tmp_path: Path) -> None:
