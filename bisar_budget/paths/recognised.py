@@ -78,10 +78,14 @@ def read_log(data: bytes, name: str, stated: str | None, keys: LogKeys) -> Log:
             key="format",
         )
     by_ending = (one for one, format in LOG_FORMATS.items() if name.lower().endswith(format.endings))
-    chosen = stated or found or next(by_ending, None) or ("csv" if _is_text(data) else None)
+    chosen = stated or found or next(by_ending, None)
     if chosen is None:
         known = ", ".join(f"{format.words} ({one})" for one, format in LOG_FORMATS.items())
-        raise PathFileError(f"{name}: is no log that is known by its content", f"accepted: {known}")
+        raise PathFileError(
+            f"{name}: is no log that is known by its content",
+            f"accepted: {known}",
+            "trajectory.format: csv says what is wrong with a header" if b"\0" not in data[:10_000] else "",
+        )
     if keys.week is not None and chosen not in _WITH_WEEK:
         raise PathFileError(
             f"is for an SBET; {name} is {LOG_FORMATS[chosen].words}",
@@ -89,8 +93,3 @@ def read_log(data: bytes, name: str, stated: str | None, keys: LogKeys) -> Log:
             key="week",
         )
     return LOG_FORMATS[chosen].read(data, name, keys)
-
-
-def _is_text(data: bytes) -> bool:
-    """Whether somebody may have written it by hand."""
-    return b"\0" not in data[:10_000]

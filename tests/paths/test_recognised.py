@@ -59,15 +59,17 @@ def test_what_is_no_log_is_none(data: bytes) -> None:
         (sbet(SHORT)[:-1], "b.out", "b.out: ends at byte 4623, 135 into record 34"),
         (b"ULog", "a.ulg", "a.ulg: is no ULog"),
         (b"<kml/>", "a.gpx", "a.gpx:1: is no GPX"),
-        (b"hello\n", "a.txt", "a.txt:1: names no place"),
+        (b"hello\n", "a.csv", "a.csv:1: names no place"),
+        (b"hello\n", "a.txt", "a.txt: is no log that is known by its content"),
     ],
 )
 def test_what_is_not_known_is_read_by_its_name_or_refused(data: bytes, name: str, says: str) -> None:
     with pytest.raises(PathFileError) as error:
         read_log(data, name, None, LogKeys())
     assert str(error.value).startswith(says)
-    if name == "a.zip":
+    if "known by its content" in says:
         assert all(f"({one})" in error.value.accepted for one in LOG_FORMATS)
+        assert ("trajectory.format: csv says" in error.value.hint) == (name == "a.txt")
 
 
 @pytest.mark.parametrize("name", [name for name in FILES if name != "sbet.out"])
