@@ -127,8 +127,13 @@ def is_csv(data: bytes) -> bool:
     """Whether the first line that says something names columns of places."""
     head = data[:100_000].decode("utf-8-sig", "replace").replace("\r\n", "\n").replace("\r", "\n").split("\n")
     line = next(filter(_is_said, dataflash_as_csv(head)), "")
-    names = {_name_of(cell)[0] for cell in line.split(max(",;\t", key=line.count))}
-    return vendor_of(tuple(names)) is not None or any(names.issuperset(kind[:2]) for kind in _KINDS)
+    cells = line.split(max(",;\t", key=line.count))
+    names = {_name_of(cell)[0] for cell in cells}
+    return _vendor(cells) is not None or any(names.issuperset(kind[:2]) for kind in _KINDS)
+
+
+def _vendor(cells: Sequence[str]) -> Vendor | None:
+    return vendor_of([cell.strip().lower() for cell in cells])
 
 
 def read_csv(data: bytes, name: str, keys: LogKeys = NOTHING_SAID) -> Log:
@@ -346,7 +351,7 @@ def _header(lines: Sequence[str], name: str, keys: LogKeys) -> _Header:
     cells = _cells(lines[at], delimiter)
     if isinstance(cells, str):
         refuse(cells)
-    vendor = vendor_of([cell.strip().lower() for cell in cells])
+    vendor = _vendor(cells)
     if vendor is not None:
         return _vendor_header(vendor, cells, delimiter, at + 1, f"{name}:{at + 1}", keys)
     found: dict[str, tuple[int, str | None]] = {}

@@ -1,6 +1,6 @@
 """Formats of logs of flights: how each is told by its content, what messages call it, and who reads it."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import NamedTuple
 
 from bisar_budget.paths.flight import Log, PathFileError
@@ -31,8 +31,8 @@ def _sbet(data: bytes, name: str, keys: LogKeys) -> Log:
     return read_sbet(data, name, keys.week)
 
 
-# By the word of the mission file, in the order of the schema.
-LOG_FORMATS: Mapping[str, LogFormat] = {
+# By the word of the mission file, in the order of the schema. What is told by more stands behind.
+LOG_FORMATS: dict[str, LogFormat] = {
     "csv": LogFormat("CSV with a header", (".csv",), is_csv, read_csv),
     "sbet": LogFormat("an SBET of records of 136 bytes", (".out", ".sbet"), is_sbet, _sbet),
     "pos": LogFormat("a solution of RTKLIB", (".pos",), is_solution, read_solution),
@@ -41,13 +41,11 @@ LOG_FORMATS: Mapping[str, LogFormat] = {
     "ulog": LogFormat("a PX4 ULog", (".ulg",), is_ulog, read_ulog),
 }
 _WITH_WEEK = ("sbet",)
-# What is told by less is looked for behind what is told by more.
-_BY_CONTENT = sorted(LOG_FORMATS, key=("csv", "sbet").__contains__)
 
 
 def log_format(data: bytes) -> str | None:
     """Format of a log by its content; None where it is none of `LOG_FORMATS`."""
-    return next((name for name in _BY_CONTENT if LOG_FORMATS[name].is_one(data)), None)
+    return next((name for name in reversed(LOG_FORMATS) if LOG_FORMATS[name].is_one(data)), None)
 
 
 def read_log(data: bytes, name: str, stated: str | None, keys: LogKeys) -> Log:
