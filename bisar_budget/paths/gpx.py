@@ -109,7 +109,9 @@ def _instant(point: MessageElement, name: str, keys: LogKeys) -> Instant:
     else:
         found = parse_instant(given, needs_zone=keys.time_scale is None)
     if found is None:
+        is_zone_missing = parse_instant(given, needs_zone=False) is not None
         raise PathFileError(
-            f"{name}:{point.line}: time must be an instant like 2026-06-01T05:20:01.250Z (got {shown(given)!r})"
+            f"{name}:{point.line}: time must be an instant like 2026-06-01T05:20:01.250Z (got {shown(given)!r})",
+            hint="trajectory.time_scale: utc reads times without a zone" if is_zone_missing else "",
         )
     return found

@@ -115,5 +115,8 @@ def test_elevations_need_the_separation_of_the_geoid() -> None:
         read(gpx(SHORT, has_separation=False))
     with pytest.raises(PathFileError, match=r"gives the geoid separation itself"):
         read(gpx(SHORT), geoid_separation=SEPARATION)
+    with pytest.raises(PathFileError) as error:
+        read(gpx(SHORT, zone=""))
+    assert error.value.hint == "trajectory.time_scale: utc reads times without a zone"
     with pytest.raises(PathFileError, match=r"counts in UTC, and trajectory.time_scale says GPST"):
         read(gpx(SHORT), time_scale="gps")

@@ -7,6 +7,7 @@ from datetime import UTC, datetime
 import numpy as np
 import pytest
 
+from bisar_budget.paths.earth import Geodetic, earth_fixed
 from bisar_budget.paths.flight import Log, PathFileError
 from bisar_budget.paths.instant import parse_instant
 from bisar_budget.paths.log_places import LogKeys
@@ -58,6 +59,22 @@ def test_sentences_are_those_of_another_reader() -> None:
         assert found.latitude == pytest.approx(math.degrees(SHORT.latitude[0]), abs=1e-4)
         assert found.altitude + float(found.geo_sep) == pytest.approx(3000)
         assert at == 1
+
+
+REAL = """gnss_cnav  2014-12-11T00:00:01.0020Z  $GNZDA,000001.00,11,12,2014,00,00*7D
+gnss_cnav  2014-12-11T00:00:01.0811Z  $GNRMC,000001.00,A,2304.167961,N,16553.836924,W,7.87,100.6,111214,0,E,D*17
+gnss_cnav  2014-12-11T00:00:01.1630Z  $PNCTR,NAVQ,000001.00,3D,SBAS,DUAL*38
+gnss_cnav  2014-12-11T00:00:01.2517Z  $GNGGA,000001.00,2304.167961,N,16553.836924,W,2,11,1.0,44.542,M,0.000,M,2.0,0103*43
+"""  # noqa: E501
+
+
+def test_sentences_of_a_real_receiver() -> None:
+    """A C-Nav3050 aboard a ship, as the read-me of its data shows them, behind a stamp of the logger."""
+    log = read(REAL)
+    place = Geodetic(math.radians(23 + 4.167961 / 60), -math.radians(165 + 53.836924 / 60), 44.542)
+    assert log.places[0] == pytest.approx(earth_fixed(place), abs=1e-8)
+    assert log.start is not None
+    assert log.start.as_text() == "2014-12-11T00:00:01.000Z"
 
 
 @pytest.mark.parametrize("date", [rmc, zda])
