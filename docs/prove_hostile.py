@@ -56,7 +56,7 @@ from tests.conftest import ROOT, TODAY
 from tests.formats.flown import SAMPLES
 from tests.fuzz import RAW, RUN, case, original, strict_settings
 from tests.fuzz_commands import MISSION, questions
-from tests.hostile_commands import answered, imported, kept, on_paths
+from tests.hostile_commands import answered, imported, kept, log_read, on_paths
 from tests.recorded import record
 
 PAGE = Path(__file__).with_name("hostile.md")
@@ -270,6 +270,11 @@ def paths(seeds: range) -> Outcome:
     return _each(seeds, "paths", on_paths)
 
 
+def logs(seeds: range) -> Outcome:
+    """Read damaged logs of every format."""
+    return _each(seeds, "logs", log_read)
+
+
 def radar_files(seeds: range) -> Outcome:
     """Feed damaged CPHD, CRSD and SICD files to `import`, and targets to what writes CPHD."""
     return _each(seeds, "radar files", imported)
@@ -441,8 +446,8 @@ def limits(seeds: range) -> Outcome:
 
 
 Part = Callable[[range], Outcome]
-SHARES: dict[Part, int] = {settings: 10, paths: 20, radar_files: 50, parts: 200, signals: 500, limits: 500}
-SIZES: dict[Part, int] = {files: 100, settings: 500, paths: 50, radar_files: 50}
+SHARES: dict[Part, int] = {settings: 10, logs: 10, paths: 20, radar_files: 50, parts: 200, signals: 500, limits: 500}
+SIZES: dict[Part, int] = {files: 100, settings: 500, logs: 500, paths: 50, radar_files: 50}
 Slices = dict[str, tuple[dict[str, int], list[str]]]  # outcomes by `part first..last`
 
 

@@ -16,11 +16,13 @@ from random import Random
 from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
+from bisar_budget.paths.log_places import LogKeys
 from tests.conftest import TODAY, mission_text
 from tests.formats.flown import SAMPLES, sample, written
 from tests.fuzz import TEXTS, UNITS, damaged, original, places, tree_of
 from tests.mission.test_path_files import aircraft, satellite
 from tests.paths.flown import earth_fixed_csv, flight, geodetic_csv, sbet, smrmsg
+from tests.paths.log_files import every_format, sentence
 from tests.paths.orbit_files import TLE, oem, oem_xml, omm_csv, omm_json, omm_text, omm_xml
 
 MISSION = "m.yaml"  # the file that a question is about
@@ -292,7 +294,59 @@ def _flights() -> tuple[Callable[[], tuple[str, dict[str, bytes]]], ...]:
         route({"earth.csv": earth_fixed_csv(log)}),
         route({"sbet.out": sbet(log)}, week=2421),
         route({"sbet.out": sbet(log), "smrmsg.out": smrmsg(log.times)}, week=2421, accuracy="smrmsg.out"),
+        *(route({name: data}, **keys) for name, (_, data, keys) in every_format(log).items()),
     )
+
+
+class BrokenLog(NamedTuple):
+    """A damaged log: the name of its file, its bytes, the format that a mission states and what else it says."""
+
+    name: str
+    data: bytes
+    stated: str | None
+    keys: LogKeys
+
+
+def broken_log(seed: int) -> BrokenLog:
+    """A log of a short flight, with other bytes and numbers, or cut off; some are said to be of another format."""
+    random = Random(f"log {seed}")
+    files = _logs()
+    name = random.choice(sorted(files))
+    kind, data, _ = files[name]
+    for _ in range(random.choice((0, 1, 1, 2, 8))):
+        data = random.choice((damaged, _cut, _flipped, _with_number, _with_number))(data or b"\n", random)
+    if kind == "nmea" and random.random() < 0.7:  # so that what is wrong is looked at
+        data = re.sub(rb"\$([^$*\r\n]*)\*[0-9A-F]{2}", lambda one: sentence(one[1].decode("latin-1")).encode(), data)
+    stated = random.choice((None, None, kind, random.choice(("csv", "sbet", "pos", "nmea", "gpx", "ulog"))))
+    scale = random.choice((*[None] * 8, "utc", "gps", "tai"))
+    week = random.choice((*[None] * 8, 2421)) if kind != "sbet" else 2421
+    return BrokenLog(name, data, stated, LogKeys(week, scale, random.choice((None, None, 47.0))))
+
+
+@cache
+def _logs() -> Mapping[str, tuple[str, bytes, Any]]:
+    log = flight(34)
+    return {
+        **every_format(log),
+        "flight.csv": ("csv", geodetic_csv(log), {}),
+        "earth.csv": ("csv", earth_fixed_csv(log), {}),
+        "sbet.out": ("sbet", sbet(log), {}),
+    }
+
+
+def _cut(data: bytes, random: Random) -> bytes:
+    """Leave out the end, or the begin."""
+    at = random.randrange(len(data) + 1)
+    return data[:at] if random.random() < 0.7 else data[at:]
+
+
+def _with_number(data: bytes, random: Random) -> bytes:
+    """Another number in the place of one."""
+    found = list(re.finditer(rb"[-+]?\d+\.?\d*", data))
+    if not found:
+        return damaged(data, random)
+    chosen = random.choice(found)
+    return data[: chosen.start()] + random.choice(_NUMBERS) + data[chosen.end() :]
 
 
 def radar_file(seed: int) -> bytes:

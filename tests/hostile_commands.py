@@ -14,22 +14,27 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 from tempfile import mkdtemp
+from time import process_time
 from unittest.mock import patch
 from xml.etree import ElementTree
 
+import numpy as np
 from click.testing import CliRunner, Result
 
 from bisar_budget.cli import cli
 from bisar_budget.design.sweep import Asked
 from bisar_budget.mission.load import parse_mission
+from bisar_budget.paths.flight import PathFileError
+from bisar_budget.paths.recognised import read_log
 from tests.conftest import APART, ROOT, TODAY
 from tests.fuzz import RAW, RUN
-from tests.fuzz_commands import MISSION, Question, break_parts, flown, radar_file, small_mission, targets
+from tests.fuzz_commands import MISSION, Question, break_parts, broken_log, flown, radar_file, small_mission, targets
 
 CODES = {name: {0, 1, 2} for name in ("solve", "check", "allocate", "passes")}
 SECTION_V = str(ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml")
 # Three parts, which arrays hold.
 SWEEP = ("sweep", SECTION_V, "--vary", "collection.aperture_time=1:2s:17000", "--date", TODAY.isoformat())
+SLOWEST_LOG_S = 1.0  # of a file of some kilobytes
 _COLOR = re.compile(r"\x1b\[[0-9;]*m")
 
 
@@ -130,6 +135,26 @@ def on_paths(seed: int, folder: Path, tried: Counter[str]) -> Iterator[str]:
         form = ("json", "text", "csv", "ics")[seed // 5 % 4]
         arguments = ("passes", MISSION, "--from", "2026-06-01", "--days", "0.3", "--format", form)
         yield from wrong(told(arguments, folder), arguments)
+
+
+def log_read(seed: int, folder: Path, tried: Counter[str]) -> Iterator[str]:
+    """Read a damaged log: places that there can be, or one line that says why not, within a second."""
+    name, data, stated, keys = broken_log(seed)
+    begin = process_time()
+    try:
+        log = read_log(data, name, stated, keys)
+    except PathFileError as error:
+        said = " ".join((str(error), error.accepted, error.hint))
+        if found := RAW.search(said):
+            yield f"says a raw {found[0]!r}"
+    else:
+        tried["usable logs"] += 1
+        if not (np.isfinite(log.places).all() and np.isfinite(log.times).all() and (np.diff(log.times) > 0).all()):
+            yield "has places or times that there cannot be"
+        if RAW.search(log.words):
+            yield "has raw words"
+    if process_time() - begin > SLOWEST_LOG_S:
+        yield f"takes {process_time() - begin:.1f} s"
 
 
 def imported(seed: int, folder: Path, tried: Counter[str]) -> Iterator[str]:

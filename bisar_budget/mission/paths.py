@@ -3,7 +3,7 @@
 import hashlib
 import math
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bisar_budget.faults import Problem
-from bisar_budget.geometry import STRAIGHT, PlatformState
+from bisar_budget.geometry import STRAIGHT, PlatformState, Vector
 from bisar_budget.mission.instruments import Overridden
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import (
@@ -39,11 +39,13 @@ from bisar_budget.paths.flight import (
     smoothed,
     stretch_around,
 )
-from bisar_budget.paths.flight_log import hold_to_motion, read_csv
+from bisar_budget.paths.flight_log import hold_to_motion
 from bisar_budget.paths.instant import DAY, Instant
+from bisar_budget.paths.log_places import LogKeys, around_aperture
 from bisar_budget.paths.orbit_formats import ORBIT_FORMATS, hold_to_format
 from bisar_budget.paths.orientation import UNKNOWN, Orientation, read_finals
-from bisar_budget.paths.sbet import read_accuracy, read_sbet
+from bisar_budget.paths.recognised import read_log
+from bisar_budget.paths.sbet import read_accuracy
 from bisar_budget.resources import DISK, Files, UnreadableError
 from bisar_budget.units import format_quantity
 
@@ -196,11 +198,14 @@ def _with_path(mission: Mission, platform: Platform, axes: earth.SceneAxes | Non
     if axes is not None:
         path = path._replace(state=_with_radial(path.state, axes))
     found = platform._replace(path=path)
-    trajectory = platform.trajectory
+    trajectory, error = platform.trajectory, platform.motion_error
     if trajectory is not None and trajectory.accuracy is not None:
-        stated, digest = _by_accuracy(mission, trajectory, platform.motion_error, read)
+        stated, digest = _by_accuracy(mission, trajectory, error, read)
         path = path._replace(accuracy=(trajectory.accuracy, digest))
         found = found._replace(motion_error=stated, path=path)
+    elif trajectory is not None and path.sigmas is not None and _takes_sigmas(error):
+        stated = _filled(error, {"position": path.sigmas}, f"solution {trajectory.file}")
+        found = found._replace(motion_error=stated)
     return found
 
 
@@ -367,7 +372,8 @@ def _of_log(mission: Mission, route: TrajectorySource, axes: earth.SceneAxes | N
         key = (route, digest, mission.collection.center_time, axes, aperture_time)
         path: FlownPath = _kept(_paths, _PATHS_KEPT, key, lambda: _log_path(mission, route, axes, data, digest))
     except PathFileError as error:
-        raise _UnusablePathError(("trajectory", "file"), _of_file(route.file, error)) from None
+        problem = _of_file(None if error.key else route.file, error)
+        raise _UnusablePathError(("trajectory", error.key or "file"), problem) from None
     return path
 
 
@@ -385,6 +391,9 @@ def _log_path(
     if log.start is None:
         words += f", {route.center or 0.0:.12g} s of it at mid-aperture"
     path = _flown(fitted, words, route.file, digest)
+    if log.sigmas is not None:
+        east, north, up = log.sigmas[around_aperture(times, aperture_time)].max(axis=0).tolist()
+        path = path._replace(sigmas=(east, north, up) if east and north and up else None)  # 0 is not known
     # The root mean square is what a sigma is compared with: the largest of thousands of places is four of them.
     words = "residual of the smoothed log at places left out, root mean square"
     return path._replace(doubt_m=fitted.missed, doubt_of=words, is_doubted=fitted.missed > _NOISE_M)
@@ -392,19 +401,10 @@ def _log_path(
 
 def _log(route: TrajectorySource, data: bytes, digest: str) -> Log:
     """Read a log, or take it as it was read before."""
-    key = (route.file, route.format, route.week, digest)
-    log: Log = _kept(_logs, _LOGS_KEPT, key, lambda: _read_log(route, data))
+    keys = LogKeys(route.week, route.time_scale, route.geoid_separation)
+    key = (route.file, route.format, keys, digest)
+    log: Log = _kept(_logs, _LOGS_KEPT, key, lambda: read_log(data, route.file, route.format, keys))
     return log
-
-
-def _read_log(route: TrajectorySource, data: bytes) -> Log:
-    """Read a log; its format is stated, or that of its name."""
-    is_sbet = route.format == "sbet" or (route.format is None and route.file.lower().endswith((".out", ".sbet")))
-    if is_sbet:
-        return read_sbet(data, route.file, route.week)
-    if route.week is not None:
-        raise _UnusablePathError(("trajectory", "week"), Problem("is for an SBET; this log is read as CSV"))
-    return read_csv(data, route.file)
 
 
 def _by_accuracy(
@@ -423,17 +423,29 @@ def _by_accuracy(
         raise _UnusablePathError(key, _of_file(file, unusable)) from None
     if error.distribution != "normal" and error.covariance is None and None in (error.position, error.velocity):
         raise _UnusablePathError(key, Problem("states one sigma", "accepted: motion_error.distribution: normal"))
-    source = f"accuracy file {file}"
-    for kind, unit in (("position", "m"), ("velocity", "m/s")):
-        figure = getattr(stated, kind)
+    figures = {"position": stated.position, "velocity": stated.velocity}
+    return _filled(error, figures, f"accuracy file {file}"), hashlib.sha256(data).hexdigest()
+
+
+def _takes_sigmas(error: MotionError) -> bool:
+    """Whether one-sigma errors east, north, up of a log can stand in, or have to be noted beside what is stated."""
+    is_stated = error.position is not None or error.covariance is not None
+    return is_stated or (error.frame == "scene" and error.distribution == "normal")
+
+
+def _filled(error: MotionError, figures: Mapping[str, Vector], source: str) -> MotionError:
+    """Errors with those of a file where the mission file states none; what it states is noted beside them."""
+    for kind, figure in figures.items():
+        unit = {"position": "m", "velocity": "m/s"}[kind]
         if error.covariance is None and getattr(error, kind) is None:
-            error = error._replace(**{kind: figure}, of_parts=(*error.of_parts, (kind, source)))
+            stated: Any = {kind: figure}
+            error = error._replace(**stated, of_parts=(*error.of_parts, (kind, source)))
         else:
             own = "covariance" if error.covariance is not None else kind
             text = f"[{', '.join(format_quantity(sigma, unit) for sigma in figure)}]"
             replaced = Overridden(kind, f"motion_error.{own}", source, text)
             error = error._replace(overridden=(*error.overridden, replaced))
-    return error, hashlib.sha256(data).hexdigest()
+    return error
 
 
 def _of_place(platform: Platform, axes: earth.SceneAxes, aperture_time_s: float) -> FlownPath:

@@ -40,7 +40,6 @@ from bisar_budget.mission.readers import (
     HEIGHT,
     INVALID,
     JERK,
-    LATER_FORMATS,
     LATITUDE,
     RANGE,
     SNAP,
@@ -61,6 +60,8 @@ from bisar_budget.mission.readers import (
 )
 from bisar_budget.mission.vibrations import Vibration
 from bisar_budget.paths.instant import parse_instant
+from bisar_budget.paths.log_places import SCALES
+from bisar_budget.paths.recognised import LOG_FORMATS
 
 LEAST_BASELINE = 1.0  # m, between platforms of which one hears the other
 FARTHEST_BY = 3  # times the least baseline, that they move by in half an aperture: so far a fit of 16 nodes is true
@@ -263,17 +264,24 @@ class _Instant(Reader):
         return {"type": "string", "format": "date-time"}
 
 
-FORMATS = ("csv", "sbet")
-
-
 class TrajectorySource(NamedTuple):
     """A log of a flight."""
 
     file: Annotated[str, Key(_FILE, "Beside the mission file.")]
     format: Annotated[
-        str | None, Key(Choice(*FORMATS, refused=LATER_FORMATS), "Omitted: by the name's ending; .out is sbet.")
+        str | None, Key(Choice(*LOG_FORMATS), "Omitted: by the content, or else the ending of the name.")
     ] = None
     week: Annotated[int | None, Key(Whole(0, 9999), "GPS week in which an SBET begins, not rolled over.")] = None
+    time_scale: Annotated[
+        str | None, Key(Choice(*SCALES), "Of stamps in CSV, where the header does not say it; other logs say it.")
+    ] = None
+    geoid_separation: Annotated[
+        float | None,
+        Key(
+            Quantity(units.LENGTH, ge=-200, le=200),
+            "Height of the geoid above the ellipsoid, of a log whose heights are above mean sea level.",
+        ),
+    ] = None
     center: Annotated[
         float | None,
         Key(
@@ -350,6 +358,7 @@ class FlownPath(NamedTuple):
     is_doubted: bool = False
     accuracy: tuple[str, str] | None = None  # file that states its errors, and its SHA-256
     orientation: tuple[str, str] | None = None  # table by which it is turned to the Earth, and its SHA-256
+    sigmas: Vector | None = None  # east, north, up, that its log states in the aperture, at most [m]
 
     @property
     def beside(self) -> Mapping[str, tuple[str, str] | None]:

@@ -599,9 +599,4 @@ NOT_COMPUTED = "is not computed by this version yet"
 _LEAVE = "accepted: leave it out"
 
 # By the name of the section, as its class has it, and the key: what is accepted instead.
-LATER: Mapping[str, Mapping[str, str]] = {
-    "TrajectorySource": dict.fromkeys(
-        ("time_scale", "geoid_separation"), f"{_LEAVE}; a log in CSV has UTC, and heights above the ellipsoid"
-    ),
-}
-LATER_FORMATS: Mapping[str, str] = dict.fromkeys(("pos", "nmea", "gpx", "ulog"), NOT_COMPUTED)
+LATER: Mapping[str, Mapping[str, str]] = {}

@@ -6,8 +6,10 @@ __all__ = [
     "flight",
     "flight_log",
     "instant",
+    "log_places",
     "orbit_formats",
     "orientation",
+    "recognised",
     "sbet",
     "visibility",
 ]

@@ -37,15 +37,21 @@ _ROUNDED = 1 + 1e-6  # of an interval whose ends are rounded
 class PathFileError(Exception):
     """A file that gives no path. The message names the file, and its line, byte or record.
 
-    `accepted` says what a file would have instead, `hint` what may be done. `spans` are the times for which the file
-    has places, where it has none for those that were asked for.
+    `accepted` says what a file would have instead, `hint` what may be done. `key` is the one beside that of the file
+    which the file contradicts; empty: the file itself is wrong. `spans` are the times for which the file has places,
+    where it has none for those that were asked for.
     """
 
     def __init__(
-        self, message: str, accepted: str = "", hint: str = "", spans: Sequence[tuple[Instant, Instant]] = ()
+        self,
+        message: str,
+        accepted: str = "",
+        hint: str = "",
+        key: str = "",
+        spans: Sequence[tuple[Instant, Instant]] = (),
     ) -> None:
         super().__init__(message)
-        self.accepted, self.hint, self.spans = accepted, hint, spans
+        self.accepted, self.hint, self.key, self.spans = accepted, hint, key, spans
 
 
 class PathDoubt(NamedTuple):
@@ -82,6 +88,7 @@ class Log:
     """Measured places (n, 3) [m] at rising times (n,) [s], Earth-fixed or in the scene's axes.
 
     Times count from `start`; without one they are those of the log itself. `words` says what it is, for reports.
+    `sigmas` (n, 3) are one-sigma errors east, north, up, where the log states them [m].
     """
 
     times: Floats
@@ -89,6 +96,7 @@ class Log:
     is_earth_fixed: bool
     words: str
     start: Instant | None = None
+    sigmas: Floats | None = None
 
 
 @dataclass(frozen=True)

@@ -4,9 +4,11 @@
     time [s], latitude [deg], longitude [deg], height [m]
     0.00, 48.086600, 11.279700, 3000.0
 
-Time is `time [s]`, counted from anywhere, or `utc` with stamps of ISO 8601 that end in Z. Places are `latitude`,
-`longitude` and `height` above the ellipsoid of WGS-84, or Earth-fixed `x`, `y`, `z`, or `east`, `north`, `up` of the
-scene's centre. Other columns are not read. Cells are parted by commas, semicolons or tabs.
+Time is `time [s]`, counted from anywhere, or stamps of ISO 8601: `utc` with a Z at the end, `gpst` or `tai` without.
+`time [UTC]` is the same as `utc`, and a `time` without a unit is in the scale that the mission file says. Places are
+`latitude`, `longitude` and `height` above the ellipsoid of WGS-84 or `altitude` above mean sea level, or Earth-fixed
+`x`, `y`, `z`, or `east`, `north`, `up` of the scene's centre. `geoid_separation` makes a height of an altitude. Other
+columns are not read. Cells are parted by commas, semicolons or tabs. Headers of exporters are those of `vendor_logs`.
 """
 
 import csv
@@ -24,7 +26,23 @@ from bisar_budget import units
 from bisar_budget.faults import InvalidValueError, fault_words, shown
 from bisar_budget.paths.earth import Floats, earth_fixed_places
 from bisar_budget.paths.flight import Log, PathFileError
-from bisar_budget.paths.instant import DAY, Instant, parse_instant
+from bisar_budget.paths.instant import DAY, GPS_EPOCH, WEEK, Instant, parse_instant
+from bisar_budget.paths.log_places import (
+    NOTHING_SAID,
+    SCALES,
+    LogKeys,
+    LogRows,
+    counted,
+    from_sea_level,
+    hold_to_ellipsoid,
+    hold_to_rise,
+    hold_to_scale,
+    needs_separation,
+    scale_words,
+    unix_instant,
+    utc_of,
+)
+from bisar_budget.paths.vendor_logs import Vendor, dataflash_as_csv, vendor_of
 from bisar_budget.units import format_quantity
 
 LARGEST = 200_000_000  # bytes; four hours at 200 Hz
@@ -33,18 +51,25 @@ _FARTHEST_M = 1e9  # of a place; beyond the Moon
 _LATEST_S = 1e11  # of a time; 3000 years, so that Unix time is one
 _DEEPEST_M = 6.2e6  # m from the Earth's centre; the poles are at 6.357e6
 _RIGHT_ANGLE = math.pi / 2 * (1 + 1e-12)  # 90 deg, rounded
-_KINDS = (("latitude", "longitude", "height"), ("x", "y", "z"), ("east", "north", "up"))
+_GEODETIC = ("latitude", "longitude", "height")
+_KINDS = (_GEODETIC, ("x", "y", "z"), ("east", "north", "up"))
+_STAMPS = {"utc": "utc", "gpst": "gps", "gps": "gps", "tai": "tai"}  # names of columns, or units of a time
+_SPARE = ("altitude", "geoid_separation")
 _DIMENSIONS = {"latitude": units.ANGLE, "longitude": units.ANGLE, "time": units.TIME}
-_HEADER = re.compile(r"([^\[\]()]*)(?:\[([^\[\]]*)\])?\s*")
+_HEADER = re.compile(r"([^\[\]()]*)(?:\[([^\[\]]*)\])?")
 _QUOTED = re.compile('"').search
 _IN_NUMBERS = b"0123456789+-.eE \t"
-_SECONDS = re.compile(r"[0-5]\d(?:[.,]\d{1,12})?(?:Z|\+00:00)", re.ASCII).fullmatch
+_SECOND = r"[0-5]\d(?:[.,]\d{1,12})?"
+_ZONED = re.compile(_SECOND + r"(?:Z|\+00:00)", re.ASCII).fullmatch
+_BARE = re.compile(_SECOND, re.ASCII).fullmatch
+_EITHER = re.compile(_SECOND + r"(?:Z|\+00:00)?", re.ASCII).fullmatch
 _EXAMPLE = "2026-06-01T05:20:31.250Z"
+_CLOCKS_APART_S = 1.0  # of an exporter's two clocks, beyond the second to which one is written
 
 
 @dataclass(frozen=True)
 class _Column:
-    """A column that is read: its name, place in a row, unit as written and factor to SI. UTC has no unit."""
+    """A column that is read: its name, place in a row, unit as written and factor to SI. An instant has no unit."""
 
     name: str
     place: int
@@ -54,36 +79,64 @@ class _Column:
 
 @dataclass(frozen=True)
 class _Header:
-    """Line of the header, what parts its cells and how many there are, and the columns of time and place."""
+    """Line of the header, what parts its cells and how many there are, and the columns that are read.
+
+    `numbers` are columns of numbers, `stamp` is one of instants of a `scale`, which need a zone, have none or either.
+    """
 
     line: int
     delimiter: str
     width: int
-    time: _Column
-    axes: tuple[_Column, _Column, _Column]
+    numbers: tuple[_Column, ...]
+    stamp: _Column | None = None
+    scale: str = "utc"
+    zone: Callable[[str], object] = _ZONED
+    vendor: Vendor | None = None
 
     @property
-    def is_utc(self) -> bool:
-        return self.time.name == "utc"
+    def names(self) -> tuple[str, ...]:
+        return tuple(column.name for column in self.numbers)
 
     @property
-    def numbers(self) -> tuple[_Column, ...]:
-        return self.axes if self.is_utc else (self.time, *self.axes)
+    def axes(self) -> tuple[str, ...]:
+        """Names of the three coordinates."""
+        return next((kind for kind in _KINDS if kind[1] in self.names), _GEODETIC)
+
+    @property
+    def kind_words(self) -> str:
+        return self.vendor.words if self.vendor else f"CSV of {', '.join(self.axes)}"
+
+    def place(self, name: str) -> int | None:
+        """Place of a column among those of numbers; None where there is none."""
+        return self.names.index(name) if name in self.names else None
 
 
-class _Rows(NamedTuple):
-    """Lines (n,) of rows, their three coordinates (n, 3) in units of the file, and their times.
+class _Table(NamedTuple):
+    """Lines (n,) of rows, their numbers (n, columns) in units of the file, and their instants.
 
-    A time is a number in the unit of the file, or whole minutes of UTC since MJD 0 and the seconds after, [s].
+    An instant is whole minutes since MJD 0 and the seconds after, [s]; NaN where an exporter leaves it out.
     """
 
     lines: NDArray[np.int64]
-    coordinates: Floats
-    times: Floats
+    numbers: Floats
     minutes: Floats
+    seconds: Floats
 
 
-def read_csv(data: bytes, name: str) -> Log:
+def is_csv(data: bytes) -> bool:
+    """Whether the first line that says something names columns of places."""
+    head = data[:100_000].decode("utf-8-sig", "replace").replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    line = next(filter(_is_said, dataflash_as_csv(head)), "")
+    cells = line.split(max(",;\t", key=line.count))
+    names = {_name_of(cell)[0] for cell in cells}
+    return _vendor(cells) is not None or any(names.issuperset(kind[:2]) for kind in _KINDS)
+
+
+def _vendor(cells: Sequence[str]) -> Vendor | None:
+    return vendor_of([cell.strip().lower() for cell in cells])
+
+
+def read_csv(data: bytes, name: str, keys: LogKeys = NOTHING_SAID) -> Log:
     """Read a log of a flight.
 
     Parameters
@@ -92,69 +145,158 @@ def read_csv(data: bytes, name: str) -> Log:
         The file: UTF-8, at most `LARGEST` bytes.
     name : str
         What messages call it.
+    keys : LogKeys
+        What the mission file says of it.
 
     Returns
     -------
     Log
-        Geodetic places become Earth-fixed ones. Stamps of UTC become seconds after the first of them.
+        Geodetic places become Earth-fixed ones. Instants become seconds after the first of them.
 
     Raises
     ------
     PathFileError
         Names the file and the line of the fault: `flight.csv:17: ...`.
     """
-    lines = _text(data, name).split("\n")
-    header = _header(lines, name)
-    rows = _all_rows(lines, header, name)
+    lines = dataflash_as_csv(_text(data, name).split("\n"))
+    header = _header(lines, name, keys)
+    table, left_out = _with_fix(_all_rows(lines, header, name), header, name)
+    rows = LogRows(name, table.lines)
+    times, start, clock_words = _times(table, header, rows)
+    in_utc = None if start is None else utc_of(start, header.scale)
+    hold_to_rise(times, rows, in_utc)
+    places = _places(table, header, rows, keys)
+    span = times[-1] - times[0]
+    words = f"{header.kind_words}, {counted(len(times))} over {span:.6g} s{clock_words}"
+    words += "" if in_utc is None else scale_words(in_utc, header.scale)
+    words += f", {counted(left_out, 'row')} without a fix left out" if left_out else ""
+    return Log(times, places, header.axes != _KINDS[2], words, in_utc)
 
-    def refuse(bad: NDArray[np.bool_], says: Callable[[int], str]) -> None:
-        if bad.any():
-            index = int(bad.argmax())
-            raise PathFileError(f"{name}:{rows.lines[index]}: {says(index)}")
 
-    start = None
-    if header.is_utc:
-        start = Instant(0, 0.0).after(float(rows.minutes[0])).after(float(rows.times[0]))
-        times = (rows.minutes - rows.minutes[0]) + (rows.times - rows.times[0])
-    else:
+def _with_fix(table: _Table, header: _Header, name: str) -> tuple[_Table, int]:
+    """The rows of an exporter that have a place, of the receiver with most of them; and how many have none."""
+    if header.vendor is None:
+        return table, 0
+    numbers = table.numbers
+    fix, unix = header.place("fix"), header.place("unix")
+    latitude, longitude = (header.names.index(axis) for axis in _GEODETIC[:2])
+    has_place = (numbers[:, latitude] != 0) | (numbers[:, longitude] != 0)
+    if fix is not None:
+        has_place &= numbers[:, fix] >= header.vendor.least_fix
+    if unix is not None:
+        has_place &= numbers[:, unix] > 0
+    if not has_place.any():
+        raise PathFileError(f"{name}: has no row with a fix")
+    is_kept = has_place
+    receiver = header.place("receiver")
+    if receiver is not None:
+        found, counts = np.unique(numbers[has_place, receiver], return_counts=True)
+        is_kept = has_place & (numbers[:, receiver] == found[counts.argmax()])
+    return _Table(*(column[is_kept] for column in table)), int((~has_place).sum())
+
+
+def _times(table: _Table, header: _Header, rows: LogRows) -> tuple[Floats, Instant | None, str]:
+    """Times [s], day and seconds of the scale from which they count, and how well that is known."""
+    own = header.place("time")
+    counted_s = np.zeros(len(table.lines))
+    if own is not None:
+        column, raw = header.numbers[own], table.numbers[:, own]
         with np.errstate(over="ignore"):
-            times = rows.times * header.time.scale
-        written = header.time.unit
-        refuse(np.abs(times) > _LATEST_S, lambda i: f"time {rows.times[i]:.10g} {written} is beyond {_LATEST_S:g} s")
-    late = np.concatenate([[False], np.diff(times) <= 0])
-    refuse(
-        late,
-        lambda i: (
-            f"time {_time(times[i], start)} is not after {_time(times[i - 1], start)} of line {rows.lines[i - 1]}; "
-            "times must rise"
-        ),
-    )
-    with np.errstate(over="ignore"):
-        places = rows.coordinates * [axis.scale for axis in header.axes]
-    for column, axis in enumerate(header.axes):
-        limit = {"latitude": _RIGHT_ANGLE, "longitude": 2 * math.pi * (1 + 1e-12)}.get(axis.name, _FARTHEST_M)
-        at_most = {"latitude": "90 deg", "longitude": "360 deg"}.get(axis.name, f"{_FARTHEST_M:g} m")
-        refuse(
-            np.abs(places[:, column]) > limit,
-            lambda i, axis=axis, column=column, at_most=at_most: (  # type: ignore[misc]
-                f"{axis.name} {rows.coordinates[i, column]:.10g} {axis.unit} is beyond {at_most}"
+            counted_s = raw * column.scale
+        rows.refuse(
+            np.abs(counted_s) > _LATEST_S, lambda i: f"time {raw[i]:.10g} {column.unit} is beyond {_LATEST_S:g} s"
+        )
+    unix, week = header.place("unix"), header.place("week")
+    if unix is not None:
+        raw = table.numbers[:, unix]
+        scale = header.numbers[unix].scale
+        rows.refuse(raw * scale > _LATEST_S, lambda i: f"time {raw[i]:.10g} us is beyond {_LATEST_S:g} s")
+        return (raw - raw[0]) * scale, unix_instant(int(raw[0])), ""
+    if week is not None:
+        weeks = table.numbers[:, week]
+        rows.refuse(
+            (weeks % 1 != 0) | (weeks < 0) | (weeks > 9999),
+            lambda i: f"GPS week must be a whole number from 0 to 9999 (got {weeks[i]:g})",
+        )
+        start = Instant(GPS_EPOCH + 7 * int(weeks[0]), 0.0).after(float(counted_s[0]))
+        return (weeks - weeks[0]) * WEEK + (counted_s - counted_s[0]), start, ""
+    if header.stamp is None:
+        return counted_s, None, ""
+    minutes, seconds = table.minutes, table.seconds
+    if own is not None:
+        return _by_two_clocks(counted_s, minutes + seconds, rows)
+    start = Instant(0, 0.0).after(float(minutes[0])).after(float(seconds[0]))
+    return (minutes - minutes[0]) + (seconds - seconds[0]), start, ""
+
+
+def _by_two_clocks(counted_s: Floats, instants: Floats, rows: LogRows) -> tuple[Floats, Instant, str]:
+    """Times of a clock that counts fractions, in UTC by another that writes whole seconds.
+
+    An instant is cut to its second: the start is at or behind every instant less its time, and less than a second
+    behind. Between the latest and the earliest such bound it is taken in the middle.
+    """
+    is_said = np.isfinite(instants)
+    if not is_said.any():
+        raise PathFileError(f"{rows.name}: has no instant of UTC")
+    behind = (instants - counted_s)[is_said]
+    earliest, latest = float(behind.max()), float(behind.min()) + 1.0
+    if earliest - latest > _CLOCKS_APART_S:
+        raise PathFileError(
+            f"{rows.name}: its clocks, time(millisecond) and datetime(utc), drift apart by {earliest - latest:.3g} s",
+            "accepted: the log of one flight",
+        )
+    start = Instant(0, 0.0).after((earliest + latest) / 2 + float(counted_s[0]))
+    return counted_s - counted_s[0], start, f", UTC to {abs(latest - earliest) / 2:.2g} s by whole seconds"
+
+
+def _places(table: _Table, header: _Header, rows: LogRows, keys: LogKeys) -> Floats:
+    """Places (n, 3), Earth-fixed or of the scene. [m]"""
+    kind = header.axes
+    is_geodetic = kind == _GEODETIC
+    is_above_sea = is_geodetic and "height" not in header.names
+    own = kind if not is_above_sea else (*_GEODETIC[:2], "altitude")
+    found = []
+    for axis in own:
+        at = header.names.index(axis)
+        column, raw = header.numbers[at], table.numbers[:, at]
+        with np.errstate(over="ignore"):
+            values = raw * column.scale
+        limit = {"latitude": _RIGHT_ANGLE, "longitude": 2 * math.pi * (1 + 1e-12)}.get(axis, _FARTHEST_M)
+        at_most = {"latitude": "90 deg", "longitude": "360 deg"}.get(axis, f"{_FARTHEST_M:g} m")
+        rows.refuse(
+            np.abs(values) > limit,
+            lambda i, raw=raw, column=column, at_most=at_most: (  # type: ignore[misc]
+                f"{column.name} {raw[i]:.10g} {column.unit} is beyond {at_most}"
             ),
         )
-    kind = tuple(axis.name for axis in header.axes)
-    if kind == _KINDS[0]:
-        places = earth_fixed_places(*places.T)
-    elif kind == _KINDS[1]:
+        found.append(values)
+    if not is_above_sea:
+        hold_to_ellipsoid(
+            keys, rows.name, "has heights above the ellipsoid" if is_geodetic else f"has {', '.join(kind)}"
+        )
+    else:
+        at_separation = header.place("geoid_separation")
+        separations = None
+        if at_separation is not None:
+            column, raw = header.numbers[at_separation], table.numbers[:, at_separation]
+            separations = raw * column.scale
+            rows.refuse(
+                np.abs(separations) > 200, lambda i: f"geoid_separation {raw[i]:.10g} {column.unit} is beyond 200 m"
+            )
+        found[2] = from_sea_level(found[2], separations, keys, rows.name)
+    if is_geodetic:
+        return earth_fixed_places(*found)
+    places: Floats = np.stack(found, axis=1)
+    if kind == _KINDS[1]:
         radius = np.sqrt((places**2).sum(axis=1))
-        refuse(
+        rows.refuse(
             radius < _DEEPEST_M,
             lambda i: (
                 f"x, y, z are {radius[i] / 1e3:.4g} km from the Earth's centre; Earth-fixed coordinates are wanted, "
                 "places of the scene are named east, north, up"
             ),
         )
-    span = times[-1] - times[0]
-    words = f"CSV of {', '.join(kind)}, {_counted(len(times))} over {span:.6g} s"
-    return Log(times, places, kind != _KINDS[2], words, start)
+    return places
 
 
 def _text(data: bytes, name: str) -> str:
@@ -188,7 +330,15 @@ def _is_said(line: str) -> bool:
     return bool(text) and text[0] != "#"
 
 
-def _header(lines: Sequence[str], name: str) -> _Header:
+def _name_of(cell: str) -> tuple[str, str | None]:
+    """Name of a column in small letters, as far as a bracket, and the unit in square ones."""
+    cell = cell.strip()
+    match = _HEADER.fullmatch(cell)
+    name = (match[1] if match else re.split(r"[\[(]", cell)[0]).strip().strip('"').lower()
+    return name.replace(" ", "_"), match[2].strip() if match and match[2] is not None else None
+
+
+def _header(lines: Sequence[str], name: str, keys: LogKeys) -> _Header:
     """Columns that the first line names."""
     at = next((n for n, line in enumerate(lines) if _is_said(line)), None)
     if at is None:
@@ -201,67 +351,108 @@ def _header(lines: Sequence[str], name: str) -> _Header:
     cells = _cells(lines[at], delimiter)
     if isinstance(cells, str):
         refuse(cells)
+    vendor = _vendor(cells)
+    if vendor is not None:
+        return _vendor_header(vendor, cells, delimiter, at + 1, f"{name}:{at + 1}", keys)
     found: dict[str, tuple[int, str | None]] = {}
-    others = []
     for index, cell in enumerate(cells):
-        match = _HEADER.fullmatch(cell)
-        column = (match[1] if match else re.split(r"[\[(]", cell)[0]).strip().lower()
-        if column not in ("time", "utc", *(axis for kind in _KINDS for axis in kind)):
-            others.append(column)
-        elif column in found:
+        column, unit = _name_of(cell)
+        if column not in ("time", *_STAMPS, *_SPARE, *(axis for kind in _KINDS for axis in kind)):
+            continue
+        if column in found:
             refuse(f"has two columns {column}")
-        else:
-            found[column] = (index, match[2].strip() if match and match[2] is not None else None)
+        found[column] = (index, unit)
     kinds = [kind for kind in _KINDS if any(axis in found for axis in kind)]
     if not kinds:
         refuse("names no place; the first line names columns, like 'latitude [deg]', 'x [m]' or 'east [m]'")
     if len(kinds) > 1:
         one, other = (next(axis for axis in kind if axis in found) for kind in kinds[:2])
         refuse(f"mixes {one} with {other}; places are {', or '.join(', '.join(kind) for kind in _KINDS)}")
-    missing = [axis for axis in kinds[0] if axis not in found]
+    kind = kinds[0]
+    if kind == _GEODETIC and "altitude" in found:
+        if "height" in found:
+            refuse("has both height and altitude; keep one")
+        kind = (*_GEODETIC[:2], "altitude")
+    missing = [axis for axis in kind if axis not in found]
     if missing:
-        hint = ""
-        if missing == ["height"] and any(other.startswith(("altitude", "alt", "elevation")) for other in others):
-            hint = "; a height counts from the ellipsoid of WGS-84, an altitude often from the sea"
-        refuse(f"has no column {missing[0]}{hint}")
-    if "time" in found and "utc" in found:
-        refuse("has both time and utc; keep one")
-    if "time" not in found and "utc" not in found:
+        refuse(f"has no column {missing[0]}")
+    times = [column for column in ("time", *_STAMPS) if column in found]
+    if len(times) > 1:
+        refuse(f"has both {times[0]} and {times[1]}; keep one")
+    if not times:
         refuse("has no column of time; write 'time [s]' or 'utc'")
-    time = _time_column(found, refuse)
-    axes = [_measured(axis, *found[axis], refuse) for axis in kinds[0]]
-    alike = axes[:2] if kinds[0] == _KINDS[0] else axes
+    axes = [_measured(axis, *found[axis], refuse) for axis in kind]
+    alike = axes[:2] if kind[0] == "latitude" else axes
     other_unit = next((axis for axis in alike if axis.scale != alike[0].scale), None)
     if other_unit:
         refuse(f"mixes units: {alike[0].name} [{alike[0].unit}] and {other_unit.name} [{other_unit.unit}]")
-    return _Header(at + 1, delimiter, len(cells), time, (axes[0], axes[1], axes[2]))
+    if kind[-1] == "altitude" and "geoid_separation" in found:
+        axes.append(_measured("geoid_separation", *found["geoid_separation"], refuse))
+    elif kind[-1] == "altitude" and keys.geoid_separation is None:
+        raise needs_separation(
+            f"{name}:{at + 1}: altitude counts from mean sea level, and there is no column geoid_separation; "
+            "a height counts from the ellipsoid of WGS-84"
+        )
+    index, unit = found[times[0]]
+    scale = _STAMPS.get(times[0]) or _STAMPS.get((unit or "").lower())
+    if times[0] in _STAMPS and unit and _STAMPS.get(unit.lower()) != scale:
+        refuse(f"{times[0]} has the unit {shown(unit)!r}; stamps like {_example(str(scale))} need none")
+    zone = _ZONED if scale == "utc" else _BARE
+    if scale is None and not unit and keys.time_scale is not None:
+        scale, zone = keys.time_scale, _EITHER if keys.time_scale == "utc" else _BARE
+    if scale is None:
+        time = _measured("time", index, unit, refuse)
+        if keys.time_scale is not None:
+            refuse(f"time counts in {time.unit}; trajectory.time_scale says of instants in which scale they are")
+        return _Header(at + 1, delimiter, len(cells), (time, *axes))
+    hold_to_scale(scale, keys, f"{name}:{at + 1}")
+    return _Header(at + 1, delimiter, len(cells), tuple(axes), _Column(times[0], index), scale, zone)
 
 
-def _time_column(found: dict[str, tuple[int, str | None]], refuse: Callable[[str], NoReturn]) -> _Column:
-    if "utc" in found:
-        index, unit = found["utc"]
-        if unit and unit.lower() != "utc":
-            refuse(f"utc has the unit {shown(unit)!r}; stamps like {_EXAMPLE} need none")
-        return _Column("utc", index)
-    index, unit = found["time"]
-    if unit is not None and unit.lower() == "utc":
-        return _Column("utc", index)
-    return _measured("time", index, unit, refuse)
+def _vendor_header(
+    vendor: Vendor, cells: Sequence[str], delimiter: str, line: int, where: str, keys: LogKeys
+) -> _Header:
+    """Columns that an exporter names."""
+    columns: dict[str, _Column] = {}
+    for index, cell in enumerate(cells):
+        known = vendor.columns.get(cell.strip().lower())
+        if known is not None:
+            columns.setdefault(known.name, _Column(known.name, index, known.unit, known.scale))
+    if "height" not in columns and "altitude" not in columns:
+        raise PathFileError(
+            f"{where}: {vendor.words} has no height above the sea or the ellipsoid; one above take-off is no place"
+        )
+    if "height" in columns:
+        columns.pop("altitude", None)
+    stamp = columns.pop("utc", None)
+    scale = "gps" if "week" in columns else "utc"
+    if stamp is not None or not columns.keys().isdisjoint(("unix", "week")):
+        hold_to_scale(scale, keys, where)
+    elif keys.time_scale is not None:
+        raise PathFileError(f"{where}: time counts since the start of the autopilot, and is in no scale")
+    return _Header(line, delimiter, len(cells), tuple(columns.values()), stamp, scale, _EITHER, vendor)
+
+
+def _example(scale: str) -> str:
+    return _EXAMPLE if scale == "utc" else _EXAMPLE[:-1]
 
 
 def _measured(name: str, index: int, unit: str | None, refuse: Callable[[str], NoReturn]) -> _Column:
     """A column of numbers, whose unit is known and of the right dimension."""
     dimension = _DIMENSIONS.get(name, units.LENGTH)
-    example = {units.ANGLE: f"{name} [deg]", units.TIME: "time [s]' or 'time [UTC]"}.get(dimension, f"{name} [m]")
+    example = {units.ANGLE: f"{name} [deg]", units.TIME: "time [s]', 'time [UTC]' or 'time [GPST]"}.get(
+        dimension, f"{name} [m]"
+    )
     if not unit:
-        refuse(f"{name} has no unit; write '{example}'")
+        more = ", or say trajectory.time_scale" if name == "time" else ""
+        refuse(f"{name} has no unit; write '{example}'{more}")
     try:
         return _Column(name, index, shown(unit), units.parse_quantity(f"1 {unit}", dimension))
     except InvalidValueError as error:
         refuse(fault_words(f"{name} {error.problem.problem}", "", f"write '{example}'", error.problem.hint))
 
 
-def _all_rows(lines: list[str], header: _Header, name: str) -> _Rows:
+def _all_rows(lines: list[str], header: _Header, name: str) -> _Table:
     """Every row behind the header; a chunk of lines at a time, which is fast and needs little memory."""
     parts = []
     for first in range(header.line, len(lines), _CHUNK):
@@ -271,24 +462,41 @@ def _all_rows(lines: list[str], header: _Header, name: str) -> _Rows:
             parts.append(_rows([chunk[n] for n in kept], np.array(kept) + first + 1, header, name))
     if not parts:
         raise PathFileError(f"{name}:{header.line}: has a header and no places")
-    return _Rows(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+    return _Table(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
 
 
-def _rows(texts: list[str], lines: NDArray[np.int64], header: _Header, name: str) -> _Rows:
+def _rows(texts: list[str], lines: NDArray[np.int64], header: _Header, name: str) -> _Table:
     """Numbers of some rows at once; where that fails, look for the cell that is none."""
     read = _plain_cells(texts, header) or _quoted_cells(texts, header)
     if read is not None and np.isfinite(read[0]).all():
         numbers, stamps = read
         if stamps is None:
-            return _Rows(lines, numbers[:, 1:], numbers[:, 0], np.zeros(len(lines)))
-        times = _times(stamps)
-        if times is not None:
-            return _Rows(lines, numbers, times[1], times[0])
+            nothing = np.zeros(len(lines))
+            return _Table(lines, numbers, nothing, nothing)
+        instants = _instants(stamps, header)
+        if instants is not None:
+            return _Table(lines, numbers, *instants)
+    if header.vendor is not None:  # rows before the first fix have empty cells
+        is_whole = [_is_whole(text, header) for text in texts]
+        if not all(is_whole):
+            kept = [n for n, whole in enumerate(is_whole) if whole]
+            if not kept:
+                nothing = np.zeros(0)
+                return _Table(lines[:0], np.zeros((0, len(header.numbers))), nothing, nothing)
+            return _rows([texts[n] for n in kept], lines[kept], header, name)
     for text, line in zip(texts, lines, strict=True):
         says = _row_fault(text, header)
         if says:
             raise PathFileError(f"{name}:{line}: {says}")
     raise AssertionError("a row that has no fault was refused")
+
+
+def _is_whole(text: str, header: _Header) -> bool:
+    """Whether no number of a row is left out; what is wrong otherwise is said elsewhere."""
+    cells = _cells(text, header.delimiter)
+    if isinstance(cells, str) or len(cells) != header.width:
+        return True
+    return all(cells[column.place].strip() for column in header.numbers)
 
 
 def _plain_cells(texts: list[str], header: _Header) -> tuple[Floats, list[str] | None] | None:
@@ -302,9 +510,9 @@ def _plain_cells(texts: list[str], header: _Header) -> tuple[Floats, list[str] |
         )
     except ValueError:
         return None
-    if not header.is_utc:
+    if header.stamp is None:
         return numbers, None
-    place = header.time.place
+    place = header.stamp.place
     return numbers, [text.split(delimiter, place + 1)[place].strip() for text in texts]
 
 
@@ -320,17 +528,23 @@ def _quoted_cells(texts: list[str], header: _Header) -> tuple[Floats, list[str] 
         numbers = np.array([list(map(float, column)) for column in cells]).T
     except (csv.Error, ValueError):
         return None
-    return numbers, [row[header.time.place].strip() for row in rows] if header.is_utc else None
+    return numbers, None if header.stamp is None else [row[header.stamp.place].strip() for row in rows]
 
 
-def _times(texts: list[str]) -> tuple[Floats, Floats] | None:
-    """Minutes since MJD 0 [s] and the seconds after; None where one of them is no stamp."""
-    minutes = [_minute(text[:17]) for text in texts]
-    seconds = [text[17:] for text in texts]
-    if None in minutes or not all(map(_SECONDS, seconds)):
+def _instants(texts: list[str], header: _Header) -> tuple[Floats, Floats] | None:
+    """Minutes since MJD 0 [s] and the seconds after; None where one of them is no instant.
+
+    NaN where an exporter leaves one out.
+    """
+    is_said = [bool(text) or header.vendor is None for text in texts]
+    minutes = [_minute(text[:17]) if said else math.nan for text, said in zip(texts, is_said, strict=True)]
+    seconds = [text[17:] if said else "00" for text, said in zip(texts, is_said, strict=True)]
+    if None in minutes or not all(
+        header.zone(text) if said else True for text, said in zip(seconds, is_said, strict=True)
+    ):
         return None
     numbers = [text.replace("Z", "").replace("+00:00", "").replace(",", ".") for text in seconds]
-    return np.array(minutes), np.array(numbers, dtype=float)
+    return np.array(minutes, dtype=float), np.array(numbers, dtype=float)
 
 
 @lru_cache(maxsize=256)
@@ -354,10 +568,14 @@ def _row_fault(text: str, header: _Header) -> str | None:
     if isinstance(cells, str):
         return cells
     if len(cells) != header.width:
-        return f"has {_counted(len(cells), 'cell')}, the header has {header.width}"
-    if header.is_utc and parse_instant(cells[header.time.place]) is None:
-        stamp = shown(cells[header.time.place].strip())
-        return f"utc must be an instant of UTC like {_EXAMPLE} (got {stamp!r})"
+        return f"has {counted(len(cells), 'cell')}, the header has {header.width}"
+    stamp = "" if header.stamp is None else cells[header.stamp.place].strip()
+    is_left_out = header.vendor is not None and not stamp
+    if header.stamp is not None and not is_left_out and (_minute(stamp[:17]) is None or not header.zone(stamp[17:])):
+        scale = SCALES[header.scale]
+        return (
+            f"{header.stamp.name} must be an instant of {scale} like {_example(header.scale)} (got {shown(stamp)!r})"
+        )
     for column in header.numbers:
         cell = cells[column.place].strip(" \t")
         if not cell:
@@ -371,14 +589,6 @@ def _row_fault(text: str, header: _Header) -> str | None:
             hint = "; write a decimal point" if re.fullmatch(r"[+-]?\d+,\d+", cell, re.ASCII) else ""
             return f"{column.name} must be a {'finite ' * is_number}number (got {shown(cell)!r}){hint}"
     return None
-
-
-def _time(seconds: float, start: Instant | None) -> str:
-    return start.after(seconds).as_text() if start else f"{seconds:.12g} s"
-
-
-def _counted(number: int, noun: str = "place") -> str:
-    return f"{number} {noun}" + "s" * (number != 1)
 
 
 # ---------------------------------------------------------------------- logs that no platform can have flown

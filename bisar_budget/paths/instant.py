@@ -7,6 +7,9 @@ from datetime import UTC, date, datetime, timedelta
 from typing import NamedTuple
 
 DAY = 86400.0  # s
+WEEK = 604800.0  # s
+GPS_EPOCH = 44244  # MJD of 1980-01-06
+UNIX_EPOCH = 40587  # MJD of 1970-01-01
 _MJD_OF_ORDINAL = 678576  # date.toordinal() less the modified Julian day
 _FORM = re.compile(r"(\d{4})-(\d\d)-(\d\d)[T ](\d\d):(\d\d):(\d\d)(?:[.,](\d{1,12}))?(Z|\+00:00)?", re.ASCII)
 

@@ -1,11 +1,11 @@
-"""Files of orbits: texts, times and numbers, and XML as a tree whose elements know their lines.
+"""Files of orbits and logs: texts, times and numbers, and XML as a tree whose elements know their lines.
 
 XML is that of others: no reference is followed, no entity is expanded.
 """
 
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from sys import intern
 from typing import Protocol, TypeVar
@@ -17,7 +17,7 @@ from bisar_budget.paths.instant import Instant, day_of_year, parse_instant
 
 LARGEST_BYTES = 32_000_000  # a day of an ephemeris at 1 Hz has 26 MB as XML
 EARLIEST, LATEST = 36112, 124593  # modified Julian days of 1957-10-01 and 2200-01-01, for which there are orbits
-_NUMBER = re.compile(r"\s*[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?\s*", re.ASCII)
+_NUMBER = re.compile(r"\s*[+-]?(\d+(?:\.\d*)?|\.\d+)([eEdD][+-]?\d+)?\s*", re.ASCII)
 
 
 def hold_to_size(size: int, name: str, part: str = "objects") -> None:
@@ -123,6 +123,7 @@ def cut(text: str) -> str:
 
 
 # ---------------------------------------------------------------------- XML
+_NONE: Mapping[str, str] = {}
 _MOST = 2_000_000  # elements; a day of an ephemeris at 1 Hz has 0.7 million
 _DEEPEST = 32
 _LONGEST = 10_000  # characters of an element's own text
@@ -130,13 +131,14 @@ _LONGEST = 10_000  # characters of an element's own text
 
 @dataclass(eq=False, slots=True)
 class MessageElement:
-    """An element of a message: its name without namespace, the line where it begins, its units, text and children."""
+    """An element: its name without namespace, the line where it begins, its units, text, children and attributes."""
 
     name: str
     line: int
     units: str = ""
     text: str = ""
     children: list["MessageElement"] = field(default_factory=list)
+    attributes: Mapping[str, str] = field(default_factory=lambda: _NONE)
 
     def all(self, name: str) -> Iterator["MessageElement"]:
         """Elements of a name anywhere below, in the order of the file."""
@@ -174,6 +176,8 @@ def parse_markup(data: bytes, name: str) -> MessageElement:
             parser.CurrentLineNumber,
             intern(attributes.get("units") or attributes.get("unit", "")),  # as CCSDS has it, and ESA
         )
+        if attributes:
+            one.attributes = attributes
         open_ones[-1].children.append(one)
         open_ones.append(one)
 

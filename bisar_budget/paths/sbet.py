@@ -19,12 +19,10 @@ import numpy as np
 from bisar_budget.geometry import Vector
 from bisar_budget.paths.earth import Floats, curvature_radii, earth_fixed_places
 from bisar_budget.paths.flight import Log, PathFileError, slow_times
-from bisar_budget.paths.instant import TAI_LESS, Instant, tai_less_utc, utc
+from bisar_budget.paths.instant import GPS_EPOCH, WEEK, Instant
+from bisar_budget.paths.log_places import around_aperture, scale_words, utc_of
 
 LARGEST = 1_000_000_000  # bytes; ten hours at 200 Hz
-WEEK = 604800.0  # s
-_GPS_EPOCH = 44244  # MJD of 1980-01-06
-_LEAPS_KNOWN = 61587  # MJD, 2027-07-01: Bulletin C 72 has no leap second before
 _LATEST = 2 * WEEK  # a flight over the end of a week may count on
 _ROLLED = WEEK - 3600  # s back that are a new week
 _RIGHT_ANGLE = math.pi / 2 * (1 + 1e-12)
@@ -60,7 +58,17 @@ class Accuracy:
 
 def gps_to_utc(week: int, seconds: float) -> Instant:
     """Instant of UTC of a GPS week, not rolled over, and a second of it."""
-    return utc(Instant(_GPS_EPOCH + 7 * week, 0.0).after(seconds + TAI_LESS["GPS"]))
+    return utc_of(Instant(GPS_EPOCH + 7 * week, 0.0).after(seconds), "gps")
+
+
+def is_sbet(data: bytes) -> bool:
+    """Whether bytes are whole records, of which the first and the last are those of a flight."""
+    width = 17
+    if not data or len(data) % (8 * width):
+        return False
+    ends = np.frombuffer(data, "<f8").reshape(-1, width)[[0, -1]]
+    # Digits of a text are doubles next to zero.
+    return _first_wrong(ends, _FIELDS) is None and bool((np.abs(ends[:, :3]).max(axis=1) > 1e-9).all())
 
 
 def read_sbet(data: bytes, name: str, week: int | None) -> Log:
@@ -97,7 +105,7 @@ def read_sbet(data: bytes, name: str, week: int | None) -> Log:
     if week is not None:
         start = gps_to_utc(week, float(times[0]))
         times = times - times[0]
-        words += f", {_words_of_utc(start)}"
+        words += scale_words(start, "gps")
     return Log(times, earth_fixed_places(latitude, longitude, height), True, words, start)
 
 
@@ -111,8 +119,7 @@ def read_accuracy(
 ) -> Accuracy:
     """Read the accuracy of a trajectory in the aperture.
 
-    The largest of each sigma counts, among the records in the aperture and one on each side of it. A mean would
-    declare less error than the trajectory has at some time of the aperture.
+    The largest of each sigma counts, in the aperture and next to it: see `around_aperture`.
 
     Parameters
     ----------
@@ -137,9 +144,7 @@ def read_accuracy(
         start = gps_to_utc(week, float(times[0]))
         times = times - times[0]
     slow = slow_times(Log(times, records[:, 1:4], True, "", start), center, center_seconds, aperture_time_s, name)
-    half = aperture_time_s / 2
-    first = max(int(np.searchsorted(slow, -half, "right")) - 1, 0)
-    inside = records[first : int(np.searchsorted(slow, half, "left")) + 1]
+    inside = records[around_aperture(slow, aperture_time_s)]
     largest = inside[:, 1:7].max(axis=0)
     if not largest.all():
         empty = ", ".join(field for (field, *_), sigma in zip(_SIGMAS[1:], largest, strict=True) if not sigma)
@@ -254,9 +259,3 @@ def _hold_to_velocities(times: Floats, records: Floats, name: str) -> None:
 
 def _summed(parts: Floats) -> Floats:
     return np.concatenate([np.zeros((1, 3)), np.cumsum(parts, axis=0)])
-
-
-def _words_of_utc(start: Instant) -> str:
-    ahead = tai_less_utc(start.day) - TAI_LESS["GPS"]
-    doubt = " if there was no leap second since" if start.day >= _LEAPS_KNOWN else ""
-    return f"UTC is GPS less {ahead:g} s{doubt}"

@@ -34,14 +34,6 @@ def faults(**changes: object) -> tuple[Fault, ...]:
 @pytest.mark.parametrize(
     ("changes", "key"),
     [
-        *(
-            ({"platforms__receiver": {"trajectory": {"file": "a.csv", key: "1"}}}, f"{OF_RECEIVER}trajectory.{key}")
-            for key in ("time_scale", "geoid_separation")
-        ),
-        *(
-            ({"platforms__receiver": {"trajectory": {"file": "a", "format": one}}}, f"{OF_RECEIVER}trajectory.format")
-            for one in ("pos", "nmea", "gpx", "ulog")
-        ),
     ],
 )  # fmt: skip
 def test_what_is_not_computed_yet_is_one_error_that_says_so(changes: dict[str, object], key: str) -> None:

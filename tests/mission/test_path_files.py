@@ -135,8 +135,8 @@ class TestEveryKindOfPath:
         """`solve` reads its mission some hundred times."""
         monkeypatch.setattr(paths, "_logs", {})
         monkeypatch.setattr(paths, "_paths", {})
-        read, reads = paths.read_csv, []
-        monkeypatch.setattr(paths, "read_csv", lambda *given: reads.append(given) or read(*given))
+        read, reads = paths.read_log, []
+        monkeypatch.setattr(paths, "read_log", lambda *given: reads.append(given) or read(*given))
         (folder / "m.yaml").write_text(aircraft())
         first, again = (load_mission(str(folder / "m.yaml")).platforms.receiver.path for _ in range(2))
         assert again == first
@@ -473,7 +473,7 @@ BROKEN: dict[str, tuple[Callable[[], str], dict[str, bytes | str], str]] = {
     "a week of a log in UTC": (
         lambda: aircraft(platforms__receiver={"trajectory": {"file": "flight.csv", "week": 2421}}),
         {},
-        "is for an SBET; this log is read as CSV",
+        "trajectory.week: is for an SBET; flight.csv is CSV with a header (got 2421). Leave trajectory.week out",
     ),
     "a path below the ground": (lambda: aircraft(height="3500 m"), {}, "below the scene's horizon"),
     "a name with a control character": (

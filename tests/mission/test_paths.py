@@ -199,7 +199,7 @@ class TestAPathInOneOfItsWays:
             ({"orbit": {"tle": "a.tle", "oem": "b.oem"}}, "mixes tle with oem"),
             ({"orbit": {"tle": ["only one"]}}, "must be the name of a file, or the two lines of an element set"),
             ({"orbit": {"tle": "a.tle"}, "speed": "3 m/s"}, "mixes orbit with speed"),
-            ({"trajectory": {"file": "a.csv", "format": "gpx"}}, "is not computed by this version yet"),
+            ({"trajectory": {"file": "a.csv", "format": "kml"}}, "is not a known choice"),
             ({"trajectory": {"file": "a.csv", "format": "txt"}}, "is not a known choice"),
             ({**FLIGHT, "altitude": "-9 km"}, "below the scene's horizon"),
         ],

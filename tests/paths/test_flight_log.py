@@ -145,7 +145,8 @@ PLACES = "places are latitude, longitude, height, or x, y, z, or east, north, up
         (GOOD.replace("latitude", "lat"), "1: has no column latitude"),
         (
             GOOD.replace("height", "altitude"),
-            "1: has no column height; a height counts from the ellipsoid of WGS-84, an altitude often from the sea",
+            "1: altitude counts from mean sea level, and there is no column geoid_separation; a height counts from "
+            "the ellipsoid of WGS-84",
         ),
         (GOOD.replace("time [s]", "t [s]"), "1: has no column of time; write 'time [s]' or 'utc'"),
         (GOOD.replace("height [m]", "height [m],utc"), "1: has both time and utc; keep one"),
@@ -153,10 +154,17 @@ PLACES = "places are latitude, longitude, height, or x, y, z, or east, north, up
         (GOOD.replace("latitude [deg]", "latitude"), "1: latitude has no unit; write 'latitude [deg]'"),
         (GOOD.replace("latitude [deg]", "latitude (deg)"), "1: latitude has no unit; write 'latitude [deg]'"),
         (GOOD.replace("height [m]", "height []"), "1: height has no unit; write 'height [m]'"),
-        (GOOD.replace("time [s]", "time"), "1: time has no unit; write 'time [s]' or 'time [UTC]'"),
         (
-            GOOD.replace("time [s]", "time [gps]"),
-            "1: time has the unknown unit 'gps'; write 'time [s]' or 'time [UTC]'. Did you mean 'ps'?",
+            GOOD.replace("time [s]", "time"),
+            "1: time has no unit; write 'time [s]', 'time [UTC]' or 'time [GPST]', or say trajectory.time_scale",
+        ),
+        (
+            GOOD.replace("time [s]", "time [gpst]"),
+            "2: time must be an instant of GPST like 2026-06-01T05:20:31.250 (got '0')",
+        ),
+        (
+            GOOD.replace("time [s]", "time [fs]"),
+            "1: time has the unknown unit 'fs'; write 'time [s]', 'time [UTC]' or 'time [GPST]'. Did you mean 's'?",
         ),
         (
             GOOD.replace("latitude [deg]", "latitude [degrees]"),

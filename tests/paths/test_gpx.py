@@ -1,0 +1,122 @@
+"""Tracks of GPX."""
+
+import math
+from datetime import UTC, datetime
+
+import numpy as np
+import pytest
+
+from bisar_budget.paths.flight import Log, PathFileError
+from bisar_budget.paths.gpx import read_gpx
+from bisar_budget.paths.instant import parse_instant
+from bisar_budget.paths.log_places import LogKeys
+from tests.paths.flown import flight, stamp
+from tests.paths.log_files import METRES_A_DEGREE, SEPARATION, gpx
+
+FLOWN = flight()
+SHORT = flight(6)
+# Half of 1e-9 deg of 111 km a degree in two coordinates, of 0.1 mm of an elevation.
+DIGITS = math.hypot(0.5e-9 * METRES_A_DEGREE * math.sqrt(2), 0.5e-4)
+
+
+def read(data: bytes, **keys: object) -> Log:
+    return read_gpx(data, "a.gpx", LogKeys(**keys))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("data", "keys", "words"),
+    [
+        (gpx(FLOWN), {}, "GPX track"),
+        (gpx(FLOWN, 3), {}, "GPX track of 3 segments"),
+        (gpx(FLOWN, prefix="g"), {}, "GPX track"),
+        (gpx(FLOWN, has_separation=False), {"geoid_separation": SEPARATION}, "GPX track"),
+        (gpx(FLOWN, zone=""), {"time_scale": "utc"}, "GPX track"),
+        (gpx(FLOWN, zone="+00:00"), {}, "GPX track"),
+        (gpx(FLOWN).decode().encode("utf-16"), {}, "GPX track"),
+        (gpx(FLOWN).replace(b"<trkseg>", b"<extensions><x:time>1</x:time></extensions><trkseg>"), {}, "GPX track"),
+    ],
+)
+def test_the_flight_is_where_it_was(data: bytes, keys: dict[str, object], words: str) -> None:
+    if data[:2] == b"\xff\xfe":
+        data = data.decode("utf-16").replace("UTF-8", "UTF-16").encode("utf-16")
+    log = read(data.replace(b"<gpx ", b'<gpx xmlns:x="urn:x" '), **keys)
+    assert np.abs(log.places - FLOWN.places).max() < DIGITS
+    assert log.times == pytest.approx(FLOWN.times, abs=1e-9)  # microseconds
+    begins = parse_instant(stamp(0))
+    assert begins is not None
+    assert log.start is not None
+    assert log.start.since(begins) == pytest.approx(0, abs=1e-9)
+    assert log.words == f"{words}, 501 places over 10 s"
+
+
+def test_a_file_of_another_writer_is_the_same() -> None:
+    gpxpy = pytest.importorskip("gpxpy")
+    written = gpxpy.parse(gpx(SHORT).decode()).to_xml().encode()
+    assert written != gpx(SHORT)
+    by_other, own = read(written), read(gpx(SHORT))
+    assert by_other.start == own.start
+    assert by_other.times == pytest.approx(own.times, abs=1e-9)
+    assert np.abs(by_other.places - own.places).max() < 1e-9
+
+
+def test_an_offset_is_taken_off_across_midnight() -> None:
+    start = datetime(2026, 2, 28, 23, 59, 55, tzinfo=UTC)
+    for zone, begins in (("+05:30", "2026-02-28T18:29:55.000Z"), ("-01:00", "2026-03-01T00:59:55.000Z")):
+        log = read(gpx(FLOWN, start=start, zone=zone))
+        assert log.times == pytest.approx(FLOWN.times, abs=1e-9)
+        assert log.start is not None
+        assert log.start.as_text() == begins
+
+
+GOOD = gpx(SHORT).decode()
+TRACK = GOOD[GOOD.index("<trk>") : GOOD.index("</gpx>")]
+FIRST = GOOD.splitlines()[4]
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("", "a.gpx:1: is not XML: no element found"),
+        ("<kml/>", "a.gpx:1: is no GPX, its root is kml"),
+        (GOOD.replace(TRACK, ""), "a.gpx: has no track with points"),
+        (GOOD.replace(TRACK, TRACK * 2), "a.gpx: has 2 tracks with points"),
+        (GOOD[:-60], "a.gpx:"),
+        (
+            GOOD.replace("<time>2026", "<time>x026", 1),
+            "a.gpx:5: time must be an instant like 2026-06-01T05:20:01.250Z",
+        ),
+        (GOOD.replace("Z</time>", "</time>", 1), "a.gpx:5: time must be an instant like 2026-06-01T05:20:01.250Z"),
+        (GOOD.replace("<time>", "<when>").replace("</time>", "</when>"), "a.gpx:5: the point has no time"),
+        (GOOD.replace("<ele>2953.1000</ele>", "", 1), "a.gpx:5: the point has no ele"),
+        (GOOD.replace("<ele>2953.1000", "<ele>1e9999", 1), "a.gpx:5: ele must be a number of metres (got '1e9999')"),
+        (GOOD.replace('lat="', 'lat="x', 1), "a.gpx:5: lat must be a number of degrees (got 'x48."),
+        (GOOD.replace('lat="48', 'lat="148', 1), "a.gpx:5: latitude 148."),
+        (GOOD.replace(' lon="', ' lom="', 1), "a.gpx:5: lon must be a number of degrees (got '')"),
+        (GOOD.replace("<geoidheight>46.9000</geoidheight>", "", 1), "a.gpx:5: the point has no geoidheight, others"),
+        (
+            GOOD.replace("</trkseg>", f"</trkseg><trkseg>{FIRST}</trkseg>"),
+            "a.gpx:11: time 2026-06-01T05:20:01.250Z is",
+        ),
+        (
+            '<!DOCTYPE gpx [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;&a;&a;">]>\n<gpx><trk>&b;</trk></gpx>',
+            "a.gpx:1: declares a document type (DOCTYPE), which is not read; take it out",
+        ),
+        ("<gpx>" + "<trk>" * 50, "a.gpx:1: has more than 2000000 elements, or 32 in each other"),
+    ],
+)
+def test_faults_have_lines(text: str, says: str) -> None:
+    with pytest.raises(PathFileError) as error:
+        read(text.encode())
+    assert str(error.value).startswith(says)
+
+
+def test_elevations_need_the_separation_of_the_geoid() -> None:
+    with pytest.raises(PathFileError, match=r"^a\.gpx: has heights above mean sea level, and no geoid separation$"):
+        read(gpx(SHORT, has_separation=False))
+    with pytest.raises(PathFileError, match=r"gives the geoid separation itself"):
+        read(gpx(SHORT), geoid_separation=SEPARATION)
+    with pytest.raises(PathFileError) as error:
+        read(gpx(SHORT, zone=""))
+    assert error.value.hint == "trajectory.time_scale: utc reads times without a zone"
+    with pytest.raises(PathFileError, match=r"counts in UTC, and trajectory.time_scale says GPST"):
+        read(gpx(SHORT), time_scale="gps")

@@ -1,0 +1,88 @@
+"""Formats of logs by their content, and what is said where another one is stated, or none fits."""
+
+from typing import Any
+
+import pytest
+
+from bisar_budget.paths.flight import PathFileError
+from bisar_budget.paths.log_places import LogKeys
+from bisar_budget.paths.recognised import LOG_FORMATS, log_format, read_log
+from tests.paths.flown import earth_fixed_csv, flight, geodetic_csv, sbet, smrmsg
+from tests.paths.log_files import every_format
+from tests.paths.orbit_files import TLE, oem, oem_xml, omm_json, omm_xml
+
+SHORT = flight(34)
+FILES = every_format(SHORT) | {
+    "flight.csv": ("csv", geodetic_csv(SHORT), {}),
+    "earth.csv": ("csv", earth_fixed_csv(SHORT), {}),
+    "sbet.out": ("sbet", sbet(SHORT), {}),
+}
+
+
+@pytest.mark.parametrize(("name", "kind"), [(name, kind) for name, (kind, _, _) in FILES.items()])
+def test_a_log_is_known_by_its_content(name: str, kind: str) -> None:
+    data = FILES[name][1]
+    assert log_format(data) == kind
+    others = [one for one, format in LOG_FORMATS.items() if one != kind and format.is_one(data)]
+    assert others == []
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_another_format_is_named_for_what_it_is(name: str) -> None:
+    kind, data, _ = FILES[name]
+    stated = "csv" if kind != "csv" else "gpx"
+    with pytest.raises(PathFileError) as error:
+        read_log(data, name, stated, LogKeys())
+    assert str(error.value) == f"{name}: is {LOG_FORMATS[kind].words}"
+    assert error.value.accepted == f"accepted: {LOG_FORMATS[stated].words}"
+    assert error.value.hint == f"trajectory.format: {kind} reads it"
+    assert error.value.key == "format"
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        *(TLE.encode(), oem().encode(), oem_xml(oem()), omm_json(), omm_xml(), smrmsg(SHORT.times)),
+        *(b"", b"\0" * 136, b"0" * 136, b"1234567 " * 17, b"{}", b"<kml/>", b"PK\x03\x04", b"hello, world\n"),
+        b"time [s],speed [m/s]\n0,1\n",
+    ],
+)
+def test_what_is_no_log_is_none(data: bytes) -> None:
+    assert log_format(data) is None
+
+
+@pytest.mark.parametrize(
+    ("data", "name", "says"),
+    [
+        (b"PK\x03\x04\0\0", "a.zip", "a.zip: is no log that is known by its content"),
+        (b"\xff" * 136, "a.out", "a.out: record 1: "),  # by the ending of its name
+        (sbet(SHORT)[:-1], "b.out", "b.out: ends at byte 4623, 135 into record 34"),
+        (b"ULog", "a.ulg", "a.ulg: is no ULog"),
+        (b"<kml/>", "a.gpx", "a.gpx:1: is no GPX"),
+        (b"hello\n", "a.csv", "a.csv:1: names no place"),
+        (b"hello\n", "a.txt", "a.txt: is no log that is known by its content"),
+    ],
+)
+def test_what_is_not_known_is_read_by_its_name_or_refused(data: bytes, name: str, says: str) -> None:
+    with pytest.raises(PathFileError) as error:
+        read_log(data, name, None, LogKeys())
+    assert str(error.value).startswith(says)
+    if "known by its content" in says:
+        assert all(f"({one})" in error.value.accepted for one in LOG_FORMATS)
+        assert ("trajectory.format: csv says" in error.value.hint) == (name == "a.txt")
+
+
+@pytest.mark.parametrize("name", [name for name in FILES if name != "sbet.out"])
+def test_a_week_is_for_an_sbet(name: str) -> None:
+    kind, data, _ = FILES[name]
+    with pytest.raises(PathFileError) as error:
+        read_log(data, name, None, LogKeys(week=2421))
+    assert str(error.value) == f"is for an SBET; {name} is {LOG_FORMATS[kind].words}"
+    assert error.value.key == "week"
+
+
+@pytest.mark.parametrize(("keys", "key"), [({"time_scale": "utc"}, "time_scale"), ({"geoid_separation": 1.0}, None)])
+def test_an_sbet_says_its_scale_and_heights(keys: dict[str, Any], key: str | None) -> None:
+    with pytest.raises(PathFileError) as error:
+        read_log(FILES["sbet.out"][1], "sbet.out", None, LogKeys(**keys))
+    assert error.value.key == (key or "geoid_separation")
