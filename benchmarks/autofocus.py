@@ -13,7 +13,7 @@ import math
 import numpy as np
 from run import clock, in_turn
 
-from bisar_budget.simulate.autofocus import phase_gradient_autofocus
+from bisar_budget.simulator.autofocus import phase_gradient_autofocus
 
 SIDE, BAND = 1024, 512
 

@@ -29,11 +29,11 @@ import sys
 from time import process_time
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.mission.load import load_mission
-from bisar_budget.monte_carlo.probability import monte_carlo
+from bisar_budget.sampling.probability import monte_carlo
 
 file, draws, is_compiled = sys.argv[1], int(sys.argv[2]), sys.argv[3] == "compiled"
 if is_compiled:
-    from bisar_budget.monte_carlo import draws as drawing
+    from bisar_budget.sampling import draws as drawing
     drawing._WORTH_COMPILING = 1
 analysis = Analysis(load_mission(file))
 monte_carlo(analysis, 1000, 1)

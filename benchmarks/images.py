@@ -20,8 +20,8 @@ from numba import get_num_threads, njit, prange
 
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.geometry import BistaticGeometry, PlatformState
-from bisar_budget.simulate.image_formation import backprojection, ground_grid, matched_filter
-from bisar_budget.simulate.phase_history import PhaseHistory, cell_centres, path, phase_history
+from bisar_budget.simulator.image_formation import backprojection, ground_grid, matched_filter
+from bisar_budget.simulator.phase_history import PhaseHistory, cell_centres, path, phase_history
 
 PULSES, FREQUENCIES = 512, 512
 SPACING = 0.25  # m, half of the range resolution on the ground and of the cross-range resolution

@@ -331,8 +331,8 @@ def montecarlo(runs: int) -> None:
 
     from bisar_budget.analysis.analysis import Analysis
     from bisar_budget.mission.load import parse_mission
-    from bisar_budget.monte_carlo.draws import _Stream
-    from bisar_budget.monte_carlo.probability import _variables, monte_carlo
+    from bisar_budget.sampling.draws import _Stream
+    from bisar_budget.sampling.probability import _variables, monte_carlo
 
     motion = "{position: 1 m, velocity: 5 mm/s, acceleration: 20 ug}"
     text = f"""{{schema_version: 1, name: m, radar: {{center_frequency: 10 GHz, bandwidth: 300 MHz}},

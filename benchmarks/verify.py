@@ -16,9 +16,9 @@ from pathlib import Path
 
 from bisar_budget.findings.images import VerifiedMission
 from bisar_budget.mission.load import load_mission
-from bisar_budget.simulate import collection
-from bisar_budget.simulate.image_formation import matched_filter
-from bisar_budget.verify.limits import verify_mission
+from bisar_budget.simulator import collection
+from bisar_budget.simulator.image_formation import matched_filter
+from bisar_budget.verifier.limits import verify_mission
 
 ROOT = Path(__file__).resolve().parent.parent
 MISSION = ROOT / "specs" / "missions" / "rigling_moses_section_v_autofocus.yaml"

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from bisar_budget.front.questions import allocate as allocate
     from bisar_budget.front.questions import check as check
     from bisar_budget.front.questions import monte_carlo as monte_carlo
+    from bisar_budget.front.questions import passes as passes
     from bisar_budget.front.questions import sensitivity as sensitivity
     from bisar_budget.front.questions import simulate as simulate
     from bisar_budget.front.questions import solve as solve
@@ -29,16 +30,18 @@ if TYPE_CHECKING:
     from bisar_budget.mission.model import Mission as Mission
     from bisar_budget.mission.quantities import QuestionError as QuestionError
 
-# By the name that others use, the module that it lives in.
-_FROM = {
-    "Mission": "mission.model",
-    "MissionError": "faults",
-    "QuestionError": "mission.quantities",
-    **dict.fromkeys(("geomspace", "linspace", "load", "loads"), "front.missions"),
-    **dict.fromkeys(
-        ("allocate", "check", "monte_carlo", "sensitivity", "simulate", "solve", "sweep", "verify"), "front.questions"
+# By the module that they live in, the names that others use.
+_LIVES = {
+    "faults": ("MissionError",),
+    "mission.model": ("Mission",),
+    "mission.quantities": ("QuestionError",),
+    "front.missions": ("geomspace", "linspace", "load", "loads"),
+    "front.questions": (
+        *("allocate", "check", "monte_carlo", "passes", "sensitivity"),
+        *("simulate", "solve", "sweep", "verify"),
     ),
 }
+_FROM = {name: module for module, names in _LIVES.items() for name in names}
 __all__ = ["__version__", *sorted(_FROM)]
 
 

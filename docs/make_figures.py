@@ -126,8 +126,8 @@ def gallery() -> None:
     """Draw Figures 3 to 7 of the paper, one picture each, a displaced response, and a scene."""
     from bisar_budget.report.drawing import point_plot
     from bisar_budget.report.drawing.point_plot import sheet
-    from bisar_budget.simulate.point import simulate_point
-    from bisar_budget.simulate.targets import parse_targets
+    from bisar_budget.simulator.point import simulate_point
+    from bisar_budget.simulator.targets import parse_targets
 
     mission = load_mission(str(MISSION))
     platforms = mission.platforms

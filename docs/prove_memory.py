@@ -97,10 +97,10 @@ def one(seed: int) -> None:
     if not is_compiled:
         sys.modules["numba"] = sys.modules["finufft"] = None  # type: ignore[assignment]
     from bisar_budget.report.drawing.point_plot import archive
-    from bisar_budget.simulate.image_formation import is_compiled as has_kernels
-    from bisar_budget.simulate.point import SimulationError, simulate_point
-    from bisar_budget.simulate.targets import parse_targets
-    from bisar_budget.verify.limits import rows_to_verify, verify_mission
+    from bisar_budget.simulator.image_formation import is_compiled as has_kernels
+    from bisar_budget.simulator.point import SimulationError, simulate_point
+    from bisar_budget.simulator.targets import parse_targets
+    from bisar_budget.verifier.limits import rows_to_verify, verify_mission
 
     if has_kernels():
         import finufft  # noqa: F401
@@ -148,7 +148,7 @@ def seconds_of_slow(kind: str) -> None:
     """Print the processor time of the image of the short, slow mission [s]; for a process of its own."""
     if kind == "NumPy":
         sys.modules["numba"] = sys.modules["finufft"] = None  # type: ignore[assignment]
-    from bisar_budget.simulate.point import simulate_point
+    from bisar_budget.simulator.point import simulate_point
 
     simulate_point(parse_mission(mission_text(collection__aperture_time="0.5 s")))  # imports, compiles
     began = time.process_time()

@@ -18,7 +18,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from bisar_budget.findings.images import Verdict
 from bisar_budget.mission.load import parse_mission
-from bisar_budget.verify.limits import verify_mission
+from bisar_budget.verifier.limits import verify_mission
 from tests.families import FAMILIES, mission_text
 
 SHARE, FLOOR_RAD = 0.05, 0.02  # of the phase by exact ranges

@@ -37,10 +37,10 @@ _DERIVED = "bisar_budget/theory/differential_range.py"
 _TABLES = "bisar_budget/theory/published.py"
 _EVALUATORS = "bisar_budget/evaluators.py"
 _GEOMETRY = "bisar_budget/geometry.py"
-_POINT = "bisar_budget/simulate/point.py"
+_POINT = "bisar_budget/simulator/point.py"
 _PIECES = "bisar_budget/effects/effect.py"
-_PHASES = "bisar_budget/verify/phase_cases.py"
-_NOISE = "bisar_budget/verify/spread_cases.py"
+_PHASES = "bisar_budget/verifier/phase_cases.py"
+_NOISE = "bisar_budget/verifier/spread_cases.py"
 
 _PLOT = "bisar_budget/report/drawing/point_plot.py"
 
@@ -217,7 +217,7 @@ MUTANTS = (
     ),
     Mutant(
         "autofocus: a correction that amplifies by 1 %",
-        "bisar_budget/simulate/autofocus.py",
+        "bisar_budget/simulator/autofocus.py",
         "    turn = np.exp(-1j * phase)\n    focused = ",
         "    turn = 1.01 * np.exp(-1j * phase)\n    focused = ",
         (f"{_IMAGES}test_autofocus_never_beats_the_error_free_image_within_the_aperture",),

@@ -36,7 +36,7 @@ from bisar_budget.resources import FILES_READ, cores
 from bisar_budget.units import format_quantity
 
 if TYPE_CHECKING:
-    from bisar_budget.monte_carlo.draws import Share
+    from bisar_budget.sampling.draws import Share
 
 _TOGETHER = 256  # cases: arrays of more do not stay in a cache
 
@@ -281,7 +281,7 @@ def _kept(
     places = list(missions)
     for index, found in check_missions(list(missions.values()), today, outside=outside):
         if drawn is not None:
-            from bisar_budget.monte_carlo.probability import monte_carlo
+            from bisar_budget.sampling.probability import monte_carlo
 
             found = found._replace(monte_carlo=monte_carlo(found.analysed(), *drawn))
         kept[places[index]] = keep(found)

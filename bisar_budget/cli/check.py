@@ -403,7 +403,7 @@ def _with_images(
     for (place, found), images in zip(usable.items(), verified, strict=True):
         judged = with_verdicts(found, images, today)
         if illustrated:
-            from bisar_budget.verify.limits import form_image_evidence
+            from bisar_budget.verifier.limits import form_image_evidence
 
             shown = form_image_evidence(judged.analysed().mission, judged)
             result[place] = judged._replace(image_evidence=shown)

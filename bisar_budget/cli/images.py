@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from bisar_budget.faults import SetValue
     from bisar_budget.findings.images import VerifiedMission
     from bisar_budget.mission.model import Mission
-    from bisar_budget.simulate.targets import Targets
+    from bisar_budget.simulator.targets import Targets
 
 
 @click.command()
@@ -92,8 +92,8 @@ def verify_all(
 ) -> "list[VerifiedMission]":
     """Verify missions in processes here, or on workers of a scheduler; a bar shows it, where somebody watches."""
     from bisar_budget.findings.row import where_ids_are
-    from bisar_budget.simulate.image_formation import is_compiled
-    from bisar_budget.verify.limits import rows_to_verify, seconds_to_verify, verify_mission
+    from bisar_budget.simulator.image_formation import is_compiled
+    from bisar_budget.verifier.limits import rows_to_verify, seconds_to_verify, verify_mission
 
     total = sum(len(rows_to_verify(mission, only)) for mission in missions)
     if not total and only != "*":
@@ -122,7 +122,7 @@ def verify_all(
 
 def faster(jobs: int | None = None) -> str:
     """Say what would make image formation faster here."""
-    from bisar_budget.simulate.image_formation import is_compiled
+    from bisar_budget.simulator.image_formation import is_compiled
 
     if not is_compiled():
         return ", and pip install 'bisar-budget[fast]' makes it tens of times faster"
@@ -181,7 +181,7 @@ def simulate(
     if is_phase_history and plot is not None:
         raise click.UsageError("--plot draws images, and none is formed for a .cphd file.")
     spare([mission], [plot, output])
-    from bisar_budget.simulate.targets import Targets, parse_targets
+    from bisar_budget.simulator.targets import Targets, parse_targets
 
     try:
         standing = Targets() if targets is None else parse_targets(targets)
@@ -192,7 +192,7 @@ def simulate(
         _export(mission, loaded, str(output), standing)
         return
     from bisar_budget.report.drawing import point_plot
-    from bisar_budget.simulate.point import SimulationError, simulate_point
+    from bisar_budget.simulator.point import SimulationError, simulate_point
 
     try:
         with watched(FORMING) as progress:
@@ -220,7 +220,7 @@ def _export(mission: str, loaded: "Mission", output: str, standing: "Targets") -
     """Write the phase history, and say what is in it."""
     from bisar_budget.formats.containers import MissingExtraError
     from bisar_budget.formats.exporting import export_phase_history
-    from bisar_budget.simulate.point import SimulationError
+    from bisar_budget.simulator.point import SimulationError
 
     try:
         written = export_phase_history(loaded, standing)

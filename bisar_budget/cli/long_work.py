@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from bisar_budget.cluster.scheduler import Workers
     from bisar_budget.design.sweep import Asked
     from bisar_budget.design.table import Swept
-    from bisar_budget.monte_carlo.draws import Drawing, DrawsPiece, Share, Tally
+    from bisar_budget.sampling.draws import Drawing, DrawsPiece, Share, Tally
     from bisar_budget.workers import Progress
 
 LONG = 60.0  # s; what takes longer is announced
@@ -167,7 +167,7 @@ def drawn_by(
         yield None
         return
     from bisar_budget.budget.check import MANY, Draws
-    from bisar_budget.monte_carlo.draws import in_turn, shared_out
+    from bisar_budget.sampling.draws import in_turn, shared_out
 
     with workers_of(scheduler, patience) as workers:
         if workers is not None:
@@ -178,7 +178,7 @@ def drawn_by(
 
 def _watched(make: "Share", workers: "Workers | None", drawing: "Drawing") -> "Iterator[tuple[DrawsPiece, Tally]]":
     """Pass on the pieces of draws that `make` gives; say how long they will take, and how far they are."""
-    from bisar_budget.monte_carlo.draws import Drawer, DrawsPiece
+    from bisar_budget.sampling.draws import Drawer, DrawsPiece
 
     if drawing.draws > _MANY and drawing.judged:
         drawer = Drawer(drawing)

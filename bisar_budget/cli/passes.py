@@ -108,7 +108,7 @@ def passes(
 ) -> None:
     """List the passes of a satellite over the scene, with the verdict of the mission in each.
 
-    The mission names an orbit (tle, omm or oem) and the scene's place on the Earth; its collection.center_time is
+    The mission names an orbit of a platform and the scene's place on the Earth; its collection.center_time is
     that of each pass in turn. A pass that cannot be checked is listed with the reason. Exit code: 0 if the mission
     complies in some pass, 1 if in none, 2 for wrong usage, an unusable mission file or an orbit that is not known at
     any time that was asked for.

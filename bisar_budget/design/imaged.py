@@ -9,7 +9,7 @@ from bisar_budget.design.table import Variation
 from bisar_budget.design.varied import scaled
 from bisar_budget.faults import SetValue
 from bisar_budget.mission.model import Mission
-from bisar_budget.verify.limits import rows_to_verify, seconds_to_verify, verify_mission
+from bisar_budget.verifier.limits import rows_to_verify, seconds_to_verify, verify_mission
 from bisar_budget.workers import Progress, unseen
 
 

@@ -27,11 +27,11 @@ from bisar_budget.geometry import Axes, PlatformState, Vector
 from bisar_budget.mission.model import Mission, Simulation, has_instruments
 from bisar_budget.paths.earth import Geodetic, SceneAxes, axes_at, geodetic
 from bisar_budget.paths.instant import Instant, parse_instant
-from bisar_budget.simulate.collection import PointCollection
-from bisar_budget.simulate.phase_history import Errors, Flight
-from bisar_budget.simulate.point import SimulationError, declared_errors, pulses_for
-from bisar_budget.simulate.realisations import has_unset_clocks
-from bisar_budget.simulate.targets import Targets
+from bisar_budget.simulator.collection import PointCollection
+from bisar_budget.simulator.phase_history import Errors, Flight
+from bisar_budget.simulator.point import SimulationError, declared_errors, pulses_for
+from bisar_budget.simulator.realisations import has_unset_clocks
+from bisar_budget.simulator.targets import Targets
 
 Floats = NDArray[np.float64]
 

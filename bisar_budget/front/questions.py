@@ -1,35 +1,37 @@
 """Questions of a mission: what `import bisar_budget as bb` offers beside reading one."""
 
+import datetime as dt
 import os
 from collections.abc import Mapping, Sequence
-from datetime import UTC, date, datetime
 from typing import Any
 
 from bisar_budget.budget.check import check_mission
 from bisar_budget.budget.waivers import Outside, overrides
 from bisar_budget.design.table import Swept
 from bisar_budget.findings.requirement import Override
-from bisar_budget.front.answers import (
+from bisar_budget.front.missions import cases_of
+from bisar_budget.front.progress import watched, watched_parts
+from bisar_budget.front.results import (
     AllocateResult,
     CheckResult,
     MonteCarloResult,
+    PassesResult,
     SensitivityResult,
     SimulateResult,
     SolveResult,
     SweepResult,
     VerifyResult,
 )
-from bisar_budget.front.missions import cases_of
-from bisar_budget.front.progress import watched, watched_parts
 from bisar_budget.mission.given import text_of
-from bisar_budget.mission.load import parse_mission
+from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.mission.model import Mission
 from bisar_budget.resources import cores
+from bisar_budget.units import ANGLE, parse_quantity
 
 _CALLER = "the caller"
 
 
-def day_of(given: str | date | None) -> date:
+def day_of(given: str | dt.date | None) -> dt.date:
     """Day on which waivers are judged: one that is given, else of SOURCE_DATE_EPOCH, else today, UTC.
 
     Raises
@@ -37,15 +39,15 @@ def day_of(given: str | date | None) -> date:
     ValueError
         It is no day.
     """
-    if isinstance(given, datetime):
+    if isinstance(given, dt.datetime):
         return given.date()
     if given is not None:
-        return given if isinstance(given, date) else date.fromisoformat(given)
+        return given if isinstance(given, dt.date) else dt.date.fromisoformat(given)
     epoch = os.environ.get("SOURCE_DATE_EPOCH")
-    return datetime.fromtimestamp(int(epoch), UTC).date() if epoch else datetime.now(UTC).date()
+    return dt.datetime.fromtimestamp(int(epoch), dt.UTC).date() if epoch else dt.datetime.now(dt.UTC).date()
 
 
-def _outside(model: str | None, given: str | date | None) -> Outside:
+def _outside(model: str | None, given: str | dt.date | None) -> Outside:
     """What the arguments of a question bear on its verdict."""
     options = () if model is None else (Override("--model", model, _CALLER),)
     origin = "environment, SOURCE_DATE_EPOCH" if os.environ.get("SOURCE_DATE_EPOCH") else "the day of the run"
@@ -59,7 +61,7 @@ def _with_model(mission: Mission, model: str | None) -> Mission:
     return parse_mission(mission.data, mission.file, model, changes=mission.changes)
 
 
-def check(mission: Mission, *, model: str | None = None, date: str | date | None = None) -> CheckResult:
+def check(mission: Mission, *, model: str | None = None, date: str | dt.date | None = None) -> CheckResult:
     """Check a mission against its requirements.
 
     Parameters
@@ -85,7 +87,7 @@ def sweep(
     *,
     columns: Sequence[str] = (),
     model: str | None = None,
-    date: str | date | None = None,
+    date: str | dt.date | None = None,
     jobs: int | None = None,
 ) -> SweepResult:
     """Check a mission for every combination of values of its keys.
@@ -130,7 +132,7 @@ def solve(
     row: str | None = None,
     target: str = "fail",
     model: str | None = None,
-    date: str | date | None = None,
+    date: str | dt.date | None = None,
 ) -> SolveResult:
     """Find the values of a number at which a mission begins or ceases to comply.
 
@@ -167,7 +169,7 @@ def solve(
 
 
 def sensitivity(
-    mission: Mission, *, row: str | None = None, model: str | None = None, date: str | date | None = None
+    mission: Mission, *, row: str | None = None, model: str | None = None, date: str | dt.date | None = None
 ) -> SensitivityResult:
     """Rank the numbers of a mission by what they do to its worst utilization; arguments are those of `solve`."""
     from bisar_budget.design.sensitivity import sensitivity as asked
@@ -183,7 +185,7 @@ def allocate(
     *,
     reserve: float | None = None,
     model: str | None = None,
-    date: str | date | None = None,
+    date: str | dt.date | None = None,
 ) -> AllocateResult:
     """Find specifications for the errors of a mission that together meet every requirement.
 
@@ -211,6 +213,60 @@ def allocate(
     return AllocateResult(found._replace(overrides=overrides(mission, _outside(model, date), day_of(date))))
 
 
+def passes(
+    mission: Mission | str | os.PathLike[str],
+    start: str | dt.date | None = None,
+    *,
+    days: float = 3.0,
+    min_elevation: Any = "20 deg",
+    squint: Any = "0 deg",
+    platform: str | None = None,
+    model: str | None = None,
+    date: str | dt.date | None = None,
+) -> PassesResult:
+    """List the passes of a satellite over the scene, with the verdict of the mission in each.
+
+    Parameters
+    ----------
+    mission : Mission or path
+        Of which a platform has an orbit. A file needs no `collection.center_time`.
+    start : str or date, optional
+        Day of UTC to begin with, or an instant such as `2026-07-01T05:30:00Z`; omitted: the day of the check.
+    days : float
+        How many to look at.
+    min_elevation, squint : str, float or quantity
+        Least elevation seen from the scene, and the squint of the mid-time: texts with a unit, or radians.
+    platform : str, optional
+        Whose passes: `transmitter` or `receiver`; omitted: the one that has an orbit, of two the transmitter.
+    model, date
+        As of `check`.
+
+    Raises
+    ------
+    QuestionError
+        The question cannot be asked of this mission.
+    """
+    from bisar_budget.design.passes import passes as listed
+    from bisar_budget.design.passes import start_of
+
+    asked = mission if isinstance(mission, Mission) else load_mission(os.fspath(mission), is_placed=False)
+    judged_on = day_of(date)
+    least, wanted = (parse_quantity(text_of("rad", one), ANGLE) for one in (min_elevation, squint))
+    with watched("Checking passes") as progress:
+        found = listed(
+            asked,
+            start_of(str(start) if start is not None else judged_on.isoformat()),
+            days=days,
+            min_elevation=least,
+            squint=wanted,
+            platform=platform,
+            model=model,
+            today=judged_on,
+            progress=progress,
+        )
+    return PassesResult(found._replace(overrides=overrides(asked, _outside(model, date), judged_on)))
+
+
 def monte_carlo(mission: Mission, draws: int = 20_000, *, seed: int | None = None) -> MonteCarloResult:
     """Draw the declared errors from their distributions, and count how often each requirement holds.
 
@@ -229,7 +285,7 @@ def monte_carlo(mission: Mission, draws: int = 20_000, *, seed: int | None = Non
         So many draws cannot be made.
     """
     from bisar_budget.analysis.analysis import Analysis
-    from bisar_budget.monte_carlo.probability import monte_carlo as drawn
+    from bisar_budget.sampling.probability import monte_carlo as drawn
 
     return MonteCarloResult(drawn(Analysis(mission, is_whole=True), draws, seed))
 
@@ -246,8 +302,8 @@ def verify(mission: Mission, only: str = "*", *, jobs: int | None = None) -> Ver
     jobs : int, optional
         Processes; omitted: the number of cores, or 1 with the extra `fast`, which uses all cores itself.
     """
-    from bisar_budget.simulate.image_formation import is_compiled
-    from bisar_budget.verify.limits import verify_mission
+    from bisar_budget.simulator.image_formation import is_compiled
+    from bisar_budget.verifier.limits import verify_mission
 
     with watched("Forming images") as progress:
         return VerifyResult(verify_mission(mission, only, jobs or (1 if is_compiled() else cores()), progress))
@@ -270,8 +326,8 @@ def simulate(mission: Mission, targets: str | None = None, *, image_former: str 
     SimulationError
         The images cannot be formed as asked; says what to change.
     """
-    from bisar_budget.simulate.point import simulate_point
-    from bisar_budget.simulate.targets import Targets, parse_targets
+    from bisar_budget.simulator.point import simulate_point
+    from bisar_budget.simulator.targets import Targets, parse_targets
 
     standing = Targets() if targets is None else parse_targets(targets)
     with watched("Forming images") as progress:

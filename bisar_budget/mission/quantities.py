@@ -28,7 +28,6 @@ from bisar_budget.mission.readers import (
     ELEVATION,
     INVALID,
     LATITUDE,
-    NOT_COMPUTED,
     ListOf,
     OneOf,
     Quantity,
@@ -185,8 +184,6 @@ def _found(tree: dict[str, Any], key: str) -> tuple[Reader, Any]:
         inner = reader.below(part)
         if inner is None and isinstance(value, str):
             raise QuestionError(f"{shown(key)}: the file has {shown(value)!r} there, which has no {shown(part)!r}")
-        if isinstance(reader, Section) and part in reader.later:
-            raise QuestionError(f"{key}: {NOT_COMPUTED}; {reader.later[part]}")
         if inner is None:
             known = f"accepted: {', '.join(reader.keys)}" if isinstance(reader, Section) else ""
             problem = fault_words(f"{shown(part)!r} is not a known key", "", known, nearest_keys(key))

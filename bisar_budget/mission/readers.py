@@ -425,7 +425,6 @@ class Section(Reader):
         }
         self.defaults: dict[str, Any] = kind._field_defaults
         self.required = [name for name in self.keys if name not in self.defaults]
-        self.later = LATER.get(kind.__name__, {})
         self.problems = getattr(kind, "problems", None)
 
     def read(self, value: Any, path: KeyPath, report: Report) -> Any:
@@ -437,10 +436,6 @@ class Section(Reader):
         values = {}
         for name, item in value.items():
             key = self.keys.get(name)
-            if name in self.later:
-                report((*path, name), Problem(NOT_COMPUTED, self.later[name], is_of_key=True))
-                is_valid = False
-                continue
             if key is None:
                 known = f"accepted: {', '.join(self.keys)}"
                 hint = _POINT if name[:1].isdigit() else did_you_mean(name, tuple(self.keys))
@@ -450,14 +445,12 @@ class Section(Reader):
             values[name] = item if item is INVALID else key.reader.read(item, (*path, name), report)
         if INVALID in values.values():
             is_valid = False
-        # What is to come may stand in the place of another key, or of a default.
-        is_whole = self.later.keys().isdisjoint(value)
         for name in self.required:
-            if name not in value and is_whole:
+            if name not in value:
                 report((*path, name), Problem("is missing"))
                 is_valid = False
         if self.problems is not None:
-            right = self.defaults | values if is_whole else values
+            right = self.defaults | values
             if not is_valid:
                 right = {name: item for name, item in right.items() if item is not INVALID}
             for problem in self.problems(right):
@@ -590,13 +583,3 @@ SIDELOBE_REQUIREMENT = Quantity(units.POWER_RATIO, lt=0, ge=-200)
 SHARE = Quantity(units.RATIO, gt=0, ge=1e-6, le=1)
 DISTRIBUTION = Choice("normal", "uniform", "bound")
 DISTRIBUTIONS = "normal: the values are one sigma; uniform, bound: they are not exceeded."
-
-
-# ---------------------------------------------------------------------- what is not computed yet
-# Keys and words that the contract of the mission file has and this version does not compute, each with a way out. One
-# of them in a file is an error that says so: an unknown key would be told which other key was perhaps meant.
-NOT_COMPUTED = "is not computed by this version yet"
-_LEAVE = "accepted: leave it out"
-
-# By the name of the section, as its class has it, and the key: what is accepted instead.
-LATER: Mapping[str, Mapping[str, str]] = {}

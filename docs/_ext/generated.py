@@ -31,7 +31,7 @@ from bisar_budget.mission.parts import SECTIONS
 from bisar_budget.phrases import CODES
 from bisar_budget.report import FORMATS
 from bisar_budget.units import DIMENSIONS
-from bisar_budget.verify import reasons
+from bisar_budget.verifier import reasons
 
 MISSIONS = ROOT / "specs" / "missions"
 SPOKEN = (file_warnings, reasons)  # imported, they add to CODES

@@ -7,7 +7,7 @@ import pytest
 
 from bisar_budget.analysis.spread import islr_db, spread_phase
 from bisar_budget.constants import MAINLOBE_ENERGY
-from bisar_budget.simulate.image_formation import taylor_window
+from bisar_budget.simulator.image_formation import taylor_window
 from tests.responses import energy_within, first_null, pattern
 
 WINDOWS = ("uniform", "taylor")

@@ -13,8 +13,8 @@ from bisar_budget.budget.check import check_mission
 from bisar_budget.budget.judged_requirements import declared_kinds
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.mission.load import parse_mission
-from bisar_budget.monte_carlo.probability import monte_carlo
 from bisar_budget.report.explain.explanation import explain
+from bisar_budget.sampling.probability import monte_carlo
 from tests.conftest import TODAY, mission_text, row
 from tests.conftest import findings as found_of
 from tests.design.test_sweep import assert_as_checked, grid, swept

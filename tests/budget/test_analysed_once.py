@@ -8,10 +8,10 @@ from bisar_budget.budget.check import check_mission
 from bisar_budget.effects.sources import ErrorListing
 from bisar_budget.findings.mission import Report
 from bisar_budget.mission.load import parse_mission
-from bisar_budget.monte_carlo.probability import monte_carlo
 from bisar_budget.ranges.exact_ranges import ExactRanges
 from bisar_budget.report import FORMATS, Style, render
 from bisar_budget.report.explain.explanation import explain
+from bisar_budget.sampling.probability import monte_carlo
 from tests.conftest import mission_text
 
 

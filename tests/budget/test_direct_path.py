@@ -10,7 +10,7 @@ from bisar_budget.effects.declared import QUADRATIC
 from bisar_budget.faults import MissionError
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.mission.model import Mission
-from bisar_budget.monte_carlo.probability import monte_carlo
+from bisar_budget.sampling.probability import monte_carlo
 from tests import reference
 from tests.conftest import ROOT, findings, mission_text, row
 

@@ -7,8 +7,8 @@ import pytest
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.design.varied import scaled
 from bisar_budget.mission.load import parse_mission
-from bisar_budget.monte_carlo.probability import monte_carlo
-from bisar_budget.simulate.point import declared_errors
+from bisar_budget.sampling.probability import monte_carlo
+from bisar_budget.simulator.point import declared_errors
 from tests.conftest import findings, mission_text, row
 
 ERROR = "platforms__receiver__motion_error"

@@ -14,8 +14,8 @@ from bisar_budget.mission.load import load_mission
 from bisar_budget.phrases import CODES, Note
 from bisar_budget.report import Style, render
 from bisar_budget.report.formats import verification
-from bisar_budget.verify import reasons
-from bisar_budget.verify.limits import verify_mission
+from bisar_budget.verifier import reasons
+from bisar_budget.verifier.limits import verify_mission
 from tests.conftest import ROOT, TODAY, findings
 
 MISSIONS = [

@@ -18,9 +18,9 @@ from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.cli import long_work
 from bisar_budget.cluster.scheduler import Workers, connected
 from bisar_budget.mission.load import load_mission
-from bisar_budget.monte_carlo import draws as drawing
-from bisar_budget.monte_carlo.draws import Drawing, in_turn, joined, shared_out
-from bisar_budget.monte_carlo.probability import monte_carlo
+from bisar_budget.sampling import draws as drawing
+from bisar_budget.sampling.draws import Drawing, in_turn, joined, shared_out
+from bisar_budget.sampling.probability import monte_carlo
 from tests.cli.test_sweep import read_all
 from tests.cluster.conftest import Cluster, wait_until
 from tests.cluster.test_scheduler import Client

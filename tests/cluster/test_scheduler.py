@@ -29,7 +29,7 @@ from bisar_budget.design.sweep import Asked, Chunks, part_of
 from bisar_budget.faults import ClusterError
 from bisar_budget.mission.load import load_mission
 from bisar_budget.mission.quantities import tree_of
-from bisar_budget.verify.limits import verify_mission
+from bisar_budget.verifier.limits import verify_mission
 from tests.cluster.conftest import Cluster, free_port, wait_until
 from tests.conftest import APART, ROOT, heed_signals
 

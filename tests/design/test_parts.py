@@ -17,7 +17,7 @@ from bisar_budget.mission.changes import read_changes
 from bisar_budget.mission.load import load_mission
 from bisar_budget.mission.parts import entries, folders
 from bisar_budget.mission.quantities import QuestionError
-from bisar_budget.verify import spread_cases
+from bisar_budget.verifier import spread_cases
 from tests.conftest import ROOT, mission_text
 
 MISSIONS = ROOT / "specs" / "missions"

@@ -10,8 +10,8 @@ from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.ranges import exact_ranges
 from bisar_budget.ranges.exact_ranges import FINE, STILL, ExactRanges, Lanes, aperture_nodes, followed
-from bisar_budget.simulate.phase_history import cell_centres, exact_effect
-from bisar_budget.verify.study import Study
+from bisar_budget.simulator.phase_history import cell_centres, exact_effect
+from bisar_budget.verifier.study import Study
 from tests.conftest import mission_text
 from tests.families import DIRECT_PATH, FAMILIES
 from tests.families import mission_text as family_text

@@ -19,12 +19,12 @@ from bisar_budget.effects.spectra import PowerLawPiece, heard_parts, set_parts, 
 from bisar_budget.faults import MissionError
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.quantities import number_of, tree_of
-from bisar_budget.monte_carlo.probability import monte_carlo
 from bisar_budget.ranges.exact_ranges import aperture_nodes
-from bisar_budget.simulate.point import simulate_point
-from bisar_budget.simulate.realisations import drawn_errors, phase_courses
-from bisar_budget.verify.spread_cases import verify_random
-from bisar_budget.verify.study import Study
+from bisar_budget.sampling.probability import monte_carlo
+from bisar_budget.simulator.point import simulate_point
+from bisar_budget.simulator.realisations import drawn_errors, phase_courses
+from bisar_budget.verifier.spread_cases import verify_random
+from bisar_budget.verifier.study import Study
 from tests.conftest import ROOT, findings, mission_text, row
 from tests.effects.test_random_errors import MISSION, OSCILLATORS, agrees_with_draws, of, through_the_clock
 from tests.verify.test_random_errors import off

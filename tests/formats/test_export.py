@@ -22,7 +22,7 @@ from bisar_budget.formats.collected import mission_text as imported_text
 from bisar_budget.formats.exporting import export_phase_history
 from bisar_budget.formats.importing import import_collection
 from bisar_budget.mission.load import parse_mission
-from bisar_budget.simulate.targets import Target, Targets, parse_targets
+from bisar_budget.simulator.targets import Target, Targets, parse_targets
 from tests.conftest import ROOT, findings, mission_text, row
 
 C = 299792458.0

@@ -23,10 +23,10 @@ FLOORS = [
     {"effects"},
     {"analysis"},
     {"findings"},
-    {"monte_carlo"},
+    {"sampling"},
     {"budget"},
-    {"simulate"},
-    {"verify"},
+    {"simulator"},
+    {"verifier"},
     {"formats"},
     {"design"},
     {"cluster"},
@@ -79,6 +79,15 @@ def test_imports_go_down(path: Path) -> None:
             there = there if any(there in rooms for rooms in FLOORS) else ""  # a name of the package itself
             is_ground = floor(here) == floor(there) == 0
             assert there == here or floor(there) < floor(here) or is_ground, f"{module_name(path)}: {imported}"
+
+
+def test_no_name_of_the_front_door_is_that_of_a_room() -> None:
+    """A room that is imported takes the place of a function of its name."""
+    import bisar_budget
+
+    assert all(getattr(bisar_budget, name) is not None for name in bisar_budget.__all__)
+    rooms = {module_name(path).split(".")[1] for path in MODULES if path != PACKAGE / "__init__.py"}
+    assert rooms.isdisjoint(bisar_budget.__all__)
 
 
 def door(name: str) -> set[str]:

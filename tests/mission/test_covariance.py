@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from bisar_budget.faults import MissionError
 from bisar_budget.geometry import FRAME_AXES
 from bisar_budget.mission.load import parse_mission
-from bisar_budget.monte_carlo.draws import eigensystem
+from bisar_budget.sampling.draws import eigensystem
 from tests.conftest import findings, mission_text, row
 
 ERROR = "platforms__receiver__motion_error"

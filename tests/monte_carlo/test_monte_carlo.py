@@ -14,9 +14,9 @@ from bisar_budget.constants import MAX_DRAWS
 from bisar_budget.findings.monte_carlo import MonteCarlo, Requirement
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import Mission
-from bisar_budget.monte_carlo import draws as drawing
-from bisar_budget.monte_carlo.draws import Variable
-from bisar_budget.monte_carlo.probability import _wilson, _within, monte_carlo
+from bisar_budget.sampling import draws as drawing
+from bisar_budget.sampling.draws import Variable
+from bisar_budget.sampling.probability import _wilson, _within, monte_carlo
 from tests import reference
 from tests.cli.test_settings import project, table  # noqa: F401
 from tests.conftest import findings, mission_text, row

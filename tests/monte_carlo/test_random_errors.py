@@ -6,7 +6,7 @@ import pytest
 
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.mission.load import parse_mission
-from bisar_budget.monte_carlo.probability import monte_carlo
+from bisar_budget.sampling.probability import monte_carlo
 from tests.effects.test_random_errors import MISSION, OSCILLATORS
 
 DRAWS = 20_000  # know a sigma to 0.5 %

@@ -21,7 +21,6 @@ from bisar_budget.findings.images import ImageEvidence, PointImage, Verdict
 from bisar_budget.findings.mission import MissionFindings, Option, Report, UnusableMission
 from bisar_budget.findings.row import worst_first
 from bisar_budget.mission.load import load_mission
-from bisar_budget.monte_carlo.probability import monte_carlo
 from bisar_budget.report import Style, pictures, render
 from bisar_budget.report.compliance.document import (
     Badge,
@@ -41,6 +40,7 @@ from bisar_budget.report.compliance.document import (
 )
 from bisar_budget.report.compliance.summary import compliance
 from bisar_budget.report.words.sentences import sentence
+from bisar_budget.sampling.probability import monte_carlo
 from tests.conftest import COMPLIES, ROOT, TODAY, findings, mission_text
 from tests.page import Element, read_page
 

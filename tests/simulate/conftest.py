@@ -11,8 +11,8 @@ import pytest
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.geometry import BistaticGeometry, PlatformState, state_from_angles
 from bisar_budget.mission.load import parse_mission
-from bisar_budget.simulate import point
-from bisar_budget.simulate.phase_history import PathError, PhaseHistory, cell_centres, path, phase_history
+from bisar_budget.simulator import point
+from bisar_budget.simulator.phase_history import PathError, PhaseHistory, cell_centres, path, phase_history
 
 
 @dataclass(frozen=True)

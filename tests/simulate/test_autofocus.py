@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bisar_budget.simulate.autofocus import (
+from bisar_budget.simulator.autofocus import (
     aperture_band,
     autofocus_in_scene_axes,
     map_drift,
@@ -16,9 +16,9 @@ from bisar_budget.simulate.autofocus import (
     rotated,
     scene_axes,
 )
-from bisar_budget.simulate.image_formation import backprojection, ground_grid, taylor_window
-from bisar_budget.simulate.impulse_response import upsampled
-from bisar_budget.simulate.phase_history import cell_centres
+from bisar_budget.simulator.image_formation import backprojection, ground_grid, taylor_window
+from bisar_budget.simulator.impulse_response import upsampled
+from bisar_budget.simulator.phase_history import cell_centres
 from tests.simulate.conftest import Collection, collection
 
 

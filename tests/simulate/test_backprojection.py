@@ -13,8 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bisar_budget.geometry import BistaticGeometry
-from bisar_budget.simulate.image_formation import backprojection, ground_grid, matched_filter
-from bisar_budget.simulate.phase_history import PhaseHistory
+from bisar_budget.simulator.image_formation import backprojection, ground_grid, matched_filter
+from bisar_budget.simulator.phase_history import PhaseHistory
 from tests.conftest import ROOT
 from tests.simulate.conftest import Collection, collection, platform
 
@@ -155,7 +155,7 @@ def test_compiled_and_numpy_form_the_same_image(at, turn, spacing, shape, squint
 @settings(max_examples=50, deadline=None)
 def test_no_pixel_is_outside_the_bounds_of_its_ranges(seed, shape, length, bend, is_on_a_pixel) -> None:
     """Profiles are refined between them. Bent lines, their pixels moved at random, some of them at a platform."""
-    from bisar_budget.simulate.compiled import _boxes, _reach
+    from bisar_budget.simulator.compiled import _boxes, _reach
 
     rng = np.random.default_rng(seed)
     place, line = np.linspace(-0.5, 0.5, shape[1]), np.arange(shape[0])[:, None]
@@ -200,7 +200,7 @@ def test_without_numba_numpy_does_the_same() -> None:
 import sys
 sys.modules["numba"] = None
 import numpy as np
-from bisar_budget.simulate.image_formation import backprojection, matched_filter
+from bisar_budget.simulator.image_formation import backprojection, matched_filter
 from tests.simulate.conftest import collection
 history = collection(pulses=8).record([1, 2, 0])
 points = np.array([[1.0, 2, 0], [0, 0, 0]])

@@ -7,8 +7,8 @@ import pytest
 
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.mission.load import parse_mission
-from bisar_budget.simulate.phase_history import PathError, cell_centres, direct_path_error, path, phase_history
-from bisar_budget.verify.limits import verify_mission
+from bisar_budget.simulator.phase_history import PathError, cell_centres, direct_path_error, path, phase_history
+from bisar_budget.verifier.limits import verify_mission
 from tests import reference
 from tests.conftest import mission_text
 from tests.simulate.conftest import images_of

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.geometry import BistaticGeometry, PlatformState
-from bisar_budget.simulate.far_field import far_field_filter, look_sum, polar_format
-from bisar_budget.simulate.image_formation import backprojection, ground_grid, matched_filter
-from bisar_budget.simulate.phase_history import PathError
+from bisar_budget.simulator.far_field import far_field_filter, look_sum, polar_format
+from bisar_budget.simulator.image_formation import backprojection, ground_grid, matched_filter
+from bisar_budget.simulator.phase_history import PathError
 from tests.simulate.conftest import Collection, collection, measured_phase
 
 pytestmark = pytest.mark.extras

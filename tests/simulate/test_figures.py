@@ -13,13 +13,13 @@ from bisar_budget.mission.load import parse_mission
 from bisar_budget.report.drawing import point_plot
 from bisar_budget.report.drawing.figure import figure_file
 from bisar_budget.report.drawing.point_plot import ImagePanel, rotated_back, sheet
-from bisar_budget.simulate import former, image_formation
-from bisar_budget.simulate import point as point_module
-from bisar_budget.simulate.former import IMAGE_FORMERS
-from bisar_budget.simulate.image_formation import ground_grid
-from bisar_budget.simulate.impulse_response import resampled
-from bisar_budget.simulate.point import PointImages, simulate_point
-from bisar_budget.simulate.targets import Target, Targets, parse_targets
+from bisar_budget.simulator import former, image_formation
+from bisar_budget.simulator import point as point_module
+from bisar_budget.simulator.former import IMAGE_FORMERS
+from bisar_budget.simulator.image_formation import ground_grid
+from bisar_budget.simulator.impulse_response import resampled
+from bisar_budget.simulator.point import PointImages, simulate_point
+from bisar_budget.simulator.targets import Target, Targets, parse_targets
 from tests.conftest import ROOT, mission_text
 from tests.simulate.conftest import images_of
 

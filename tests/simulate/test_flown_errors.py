@@ -5,7 +5,7 @@ import pytest
 
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.mission.load import load_mission, parse_mission
-from bisar_budget.simulate.point import declared_errors
+from bisar_budget.simulator.point import declared_errors
 from tests.conftest import ROOT, mission_text
 
 

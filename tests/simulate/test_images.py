@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from bisar_budget.simulate.image_formation import backprojection, ground_grid, matched_filter, taylor_window
-from bisar_budget.simulate.impulse_response import impulse_response, upsampled
-from bisar_budget.simulate.phase_history import (
+from bisar_budget.simulator.image_formation import backprojection, ground_grid, matched_filter, taylor_window
+from bisar_budget.simulator.impulse_response import impulse_response, upsampled
+from bisar_budget.simulator.phase_history import (
     PathError,
     PathSinusoid,
     cell_centres,

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bisar_budget.simulate.image_formation import taylor_window
-from bisar_budget.simulate.impulse_response import impulse_response, impulse_response_2d, upsampled
-from bisar_budget.simulate.phase_history import cell_centres
+from bisar_budget.simulator.image_formation import taylor_window
+from bisar_budget.simulator.impulse_response import impulse_response, impulse_response_2d, upsampled
+from bisar_budget.simulator.phase_history import cell_centres
 
 APERTURE = 256  # samples
 OVERSAMPLING = 8  # of a cut

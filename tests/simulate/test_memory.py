@@ -10,11 +10,11 @@ import pytest
 
 from bisar_budget.faults import SetValue
 from bisar_budget.mission.load import load_mission, parse_mission
-from bisar_budget.simulate import far_field, image_formation
-from bisar_budget.simulate.far_field import far_field_filter
-from bisar_budget.simulate.image_formation import backprojection, is_compiled, kernel_within, matched_filter
-from bisar_budget.simulate.point import SimulationError, simulate_point
-from bisar_budget.verify.limits import rows_to_verify, seconds_to_verify, verify_mission
+from bisar_budget.simulator import far_field, image_formation
+from bisar_budget.simulator.far_field import far_field_filter
+from bisar_budget.simulator.image_formation import backprojection, is_compiled, kernel_within, matched_filter
+from bisar_budget.simulator.point import SimulationError, simulate_point
+from bisar_budget.verifier.limits import rows_to_verify, seconds_to_verify, verify_mission
 from tests.conftest import ROOT, mission_text
 from tests.simulate.conftest import collection
 
@@ -54,7 +54,7 @@ class TestFarApart:
     @needs_numba
     def test_what_lies_between_them_is_refined_where_it_pays(self) -> None:
         """It took twenty times as long as NumPy; 2000 pixels pay for the cells between them, 200 do not."""
-        from bisar_budget.simulate import compiled
+        from bisar_budget.simulator import compiled
 
         history = collection(pulses=64, frequencies=256).record([1, 2, 0])
         near, far = np.tile(far_apart(1e3), (10, 1)), np.tile(far_apart(1e5), (10, 1))
@@ -184,8 +184,8 @@ class TestTime:
 
     def test_a_long_one_grows_with_its_rows(self, monkeypatch) -> None:
         """Measured are images of two sizes; the rest is counted."""
-        monkeypatch.setattr("bisar_budget.verify.limits._SLOWEST", 1e3)
-        monkeypatch.setattr("bisar_budget.verify.limits._seconds", lambda study, cells: 10.0)
+        monkeypatch.setattr("bisar_budget.verifier.limits._SLOWEST", 1e3)
+        monkeypatch.setattr("bisar_budget.verifier.limits._seconds", lambda study, cells: 10.0)
         mission = load_mission(str(SECTION_V))
         rows = rows_to_verify(mission)
         whole = seconds_to_verify(mission)
@@ -195,22 +195,22 @@ class TestTime:
 
     def test_a_larger_image_takes_what_a_larger_one_took(self, monkeypatch) -> None:
         """A small image takes more for its size than a large one: 97 s were foreseen as 216 s."""
-        monkeypatch.setattr("bisar_budget.verify.limits._SLOWEST", 1e3)
+        monkeypatch.setattr("bisar_budget.verifier.limits._SLOWEST", 1e3)
         mission, seconds = load_mission(str(SECTION_V)), {}
         for large in (10.0, 320.0):
             took = {48: 10.0, 8 * 48: large}
-            monkeypatch.setattr("bisar_budget.verify.limits._seconds", lambda study, cells, took=took: took[cells])
+            monkeypatch.setattr("bisar_budget.verifier.limits._seconds", lambda study, cells, took=took: took[cells])
             seconds[large] = seconds_to_verify(mission)
         assert seconds[10.0] < seconds[320.0]
 
     def test_the_smallest_pair_is_measured(self, monkeypatch) -> None:
-        monkeypatch.setattr("bisar_budget.verify.limits._SLOWEST", 1e3)
+        monkeypatch.setattr("bisar_budget.verifier.limits._SLOWEST", 1e3)
         assert 0 < seconds_to_verify(load_mission(str(SECTION_V)), "timing.quadratic") < 60
 
     @pytest.mark.parametrize("command", ["verify", "simulate"])
     def test_the_command_says_so_and_what_to_change(self, run, monkeypatch, command) -> None:
         monkeypatch.setattr("bisar_budget.cli.long_work.LONG", 1e-9)
-        monkeypatch.setattr("bisar_budget.verify.limits._SLOWEST", 1e3)
+        monkeypatch.setattr("bisar_budget.verifier.limits._SLOWEST", 1e3)
         result = run(command, SECTION_V, *(["--only", "timing.quadratic"] if command == "verify" else []))
         (line,) = [line for line in result.stderr.splitlines() if line.startswith("Forming the images of ")]
         assert re.search(r"will take about [\d.]+ (s|minutes); ", line)

@@ -9,10 +9,10 @@ import pytest
 
 from bisar_budget.effects.effect import gradients_of
 from bisar_budget.mission.load import parse_mission
-from bisar_budget.simulate import point as point_module
-from bisar_budget.simulate.autofocus import phase_gradient_autofocus
-from bisar_budget.simulate.phase_history import cell_centres
-from bisar_budget.simulate.point import SimulationError, simulate_point
+from bisar_budget.simulator import point as point_module
+from bisar_budget.simulator.autofocus import phase_gradient_autofocus
+from bisar_budget.simulator.phase_history import cell_centres
+from bisar_budget.simulator.point import SimulationError, simulate_point
 from tests.conftest import ROOT, mission_text
 from tests.simulate.conftest import images_of
 

@@ -7,9 +7,9 @@ import pytest
 
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.mission.load import load_mission, parse_mission
-from bisar_budget.simulate import point as point_module
-from bisar_budget.simulate.impulse_response import upsampled
-from bisar_budget.simulate.point import simulate_point
+from bisar_budget.simulator import point as point_module
+from bisar_budget.simulator.impulse_response import upsampled
+from bisar_budget.simulator.point import simulate_point
 from tests.conftest import ROOT, mission_text
 from tests.simulate.conftest import images_of
 

@@ -8,9 +8,9 @@ import pytest
 from bisar_budget.budget.pull_in import ROOM, Caps, caps, needed_sentence
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.report.explain.explanation import explain
-from bisar_budget.simulate.autofocus import ALGORITHMS
-from bisar_budget.simulate.phase_history import Errors
-from bisar_budget.verify.limits import Study
+from bisar_budget.simulator.autofocus import ALGORITHMS
+from bisar_budget.simulator.phase_history import Errors
+from bisar_budget.verifier.limits import Study
 from tests.conftest import findings, mission_text, row
 
 F0_MHZ = 10_000

@@ -9,10 +9,10 @@ from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.constants import SPEED_OF_LIGHT, STANDARD_GRAVITY
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import Mission
-from bisar_budget.monte_carlo.probability import monte_carlo
-from bisar_budget.simulate.point import declared_errors
-from bisar_budget.simulate.realisations import drawn_errors, phase_courses
-from bisar_budget.verify.limits import verify_mission
+from bisar_budget.sampling.probability import monte_carlo
+from bisar_budget.simulator.point import declared_errors
+from bisar_budget.simulator.realisations import drawn_errors, phase_courses
+from bisar_budget.verifier.limits import verify_mission
 
 QUALIFICATION = "spectrum: {20 Hz: 0.04 g^2/Hz, 1 kHz: 0.04 g^2/Hz}"
 

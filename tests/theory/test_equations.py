@@ -10,9 +10,9 @@ from sympy.core.function import AppliedUndef
 
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.geometry import BistaticGeometry, PlatformState
-from bisar_budget.simulate.far_field import far_field_filter
-from bisar_budget.simulate.image_formation import matched_filter
-from bisar_budget.simulate.phase_history import PathError, PhaseHistory, path, phase_history
+from bisar_budget.simulator.far_field import far_field_filter
+from bisar_budget.simulator.image_formation import matched_filter
+from bisar_budget.simulator.phase_history import PathError, PhaseHistory, path, phase_history
 from bisar_budget.theory import differential_range as dr
 from bisar_budget.theory import equations as paper
 from bisar_budget.theory.symbols import PLATFORMS, c, clock_coefficients, point, scatterer, tau

@@ -12,7 +12,7 @@ from bisar_budget.effects.effect import PRINTED, TRUE, LinePiece, gradients_of, 
 from bisar_budget.geometry import BistaticGeometry, PlatformState
 from bisar_budget.mission.load import load_mission
 from bisar_budget.ranges.exact_ranges import aperture_nodes
-from bisar_budget.simulate.phase_history import Path, PathError, exact_effect, path
+from bisar_budget.simulator.phase_history import Path, PathError, exact_effect, path
 from bisar_budget.theory import full, published
 from bisar_budget.theory.symbols import TRANSMITTER, T, islr, positive, pslr, share, total_qpe, wavelength
 from tests.conftest import ROOT, findings, row

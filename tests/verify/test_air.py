@@ -7,12 +7,12 @@ import pytest
 
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.mission.load import parse_mission
-from bisar_budget.simulate.collection import PointCollection
-from bisar_budget.simulate.point import declared_errors
-from bisar_budget.simulate.realisations import delay_courses, drawn_errors
-from bisar_budget.verify.limits import verify_mission
-from bisar_budget.verify.spread_cases import verify_random
-from bisar_budget.verify.study import Study
+from bisar_budget.simulator.collection import PointCollection
+from bisar_budget.simulator.point import declared_errors
+from bisar_budget.simulator.realisations import delay_courses, drawn_errors
+from bisar_budget.verifier.limits import verify_mission
+from bisar_budget.verifier.spread_cases import verify_random
+from bisar_budget.verifier.study import Study
 from tests.conftest import mission_text
 from tests.effects.test_propagation import ORBITS, SECTION_V, TECU
 

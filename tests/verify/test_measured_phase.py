@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.evaluators import LEGENDRE_FITS
 from bisar_budget.mission.load import parse_mission
-from bisar_budget.simulate.collection import PointCollection
-from bisar_budget.simulate.phase_history import Errors, PathError, cell_centres, superposed
-from bisar_budget.verify.aperture_reading import _distance, _squares, measured_shift, read_aperture
-from bisar_budget.verify.limits import verify_mission
+from bisar_budget.simulator.collection import PointCollection
+from bisar_budget.simulator.phase_history import Errors, PathError, cell_centres, superposed
+from bisar_budget.verifier.aperture_reading import _distance, _squares, measured_shift, read_aperture
+from bisar_budget.verifier.limits import verify_mission
 from tests.conftest import mission_text
 from tests.simulate.conftest import collection
 
@@ -249,7 +249,7 @@ def test_superposed_errors_add_along_the_whole_path() -> None:
 
 def test_a_taylor_window_is_honoured() -> None:
     """-35 dB sidelobes, mainlobe wider by the window's own factor, and the same quadratic phase."""
-    from bisar_budget.simulate.impulse_response import impulse_response
+    from bisar_budget.simulator.impulse_response import impulse_response
 
     tapered = point_collection(0, simulation={"window": "taylor"})
     uniform = point_collection(0)

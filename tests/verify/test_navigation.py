@@ -3,10 +3,10 @@
 import pytest
 
 from bisar_budget.mission.load import parse_mission
-from bisar_budget.verify import phase_cases
-from bisar_budget.verify.limits import cases
-from bisar_budget.verify.spread_cases import verify_random
-from bisar_budget.verify.study import Study
+from bisar_budget.verifier import phase_cases
+from bisar_budget.verifier.limits import cases
+from bisar_budget.verifier.spread_cases import verify_random
+from bisar_budget.verifier.study import Study
 from tests.effects.test_navigation_frames import TURN
 from tests.verify.test_random_errors import of, off
 

@@ -7,9 +7,9 @@ import pytest
 
 from bisar_budget.budget.check import check_mission
 from bisar_budget.mission.load import parse_mission
-from bisar_budget.simulate.image_formation import taylor_window
-from bisar_budget.verify.limits import verify_mission
-from bisar_budget.verify.spread_cases import Mainlobe, added_islr
+from bisar_budget.simulator.image_formation import taylor_window
+from bisar_budget.verifier.limits import verify_mission
+from bisar_budget.verifier.spread_cases import Mainlobe, added_islr
 from tests.conftest import TODAY, mission_text
 from tests.effects.test_random_errors import MISSION
 from tests.responses import energy_within, shown_db

@@ -10,11 +10,11 @@ from bisar_budget.effects.random_effect import RandomError
 from bisar_budget.effects.spectra import PowerLawPiece
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.report.drawing import point_plot
-from bisar_budget.simulate.point import simulate_point
-from bisar_budget.simulate.realisations import _Tones
-from bisar_budget.verify.limits import verify_mission
-from bisar_budget.verify.spread_cases import verify_islr, verify_random
-from bisar_budget.verify.study import Study
+from bisar_budget.simulator.point import simulate_point
+from bisar_budget.simulator.realisations import _Tones
+from bisar_budget.verifier.limits import verify_mission
+from bisar_budget.verifier.spread_cases import verify_islr, verify_random
+from bisar_budget.verifier.study import Study
 from tests.conftest import ROOT
 from tests.effects.test_random_errors import MISSION, OSCILLATORS
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from bisar_budget.mission.load import parse_mission
-from bisar_budget.simulate.autofocus import ALGORITHMS, Focused, aperture_band, phase_gradient_autofocus
-from bisar_budget.simulate.phase_history import cell_centres
-from bisar_budget.verify.limits import verify_mission
-from bisar_budget.verify.phase_cases import _through_the_limit
+from bisar_budget.simulator.autofocus import ALGORITHMS, Focused, aperture_band, phase_gradient_autofocus
+from bisar_budget.simulator.phase_history import cell_centres
+from bisar_budget.verifier.limits import verify_mission
+from bisar_budget.verifier.phase_cases import _through_the_limit
 from tests import families
 from tests.conftest import mission_text
 from tests.responses import shown_db

@@ -11,11 +11,11 @@ import pytest
 from bisar_budget.budget.check import check_mission
 from bisar_budget.findings.images import Verdict
 from bisar_budget.mission.load import load_mission, parse_mission
-from bisar_budget.simulate import collection as collection_module
-from bisar_budget.simulate.image_formation import backprojection
-from bisar_budget.simulate.phase_history import NoGroundPointError
-from bisar_budget.verify.limits import rows_to_verify, verify_mission
-from bisar_budget.verify.study import Study
+from bisar_budget.simulator import collection as collection_module
+from bisar_budget.simulator.image_formation import backprojection
+from bisar_budget.simulator.phase_history import NoGroundPointError
+from bisar_budget.verifier.limits import rows_to_verify, verify_mission
+from bisar_budget.verifier.study import Study
 from tests import families
 from tests.conftest import ROOT, mission_text
 from tests.responses import shown_db

@@ -12,7 +12,7 @@ from bisar_budget.budget.verdicts import with_verdicts
 from bisar_budget.cli import cli
 from bisar_budget.findings.images import Verdict, VerifiedMission
 from bisar_budget.findings.status import exit_code
-from bisar_budget.verify.limits import verify_mission
+from bisar_budget.verifier.limits import verify_mission
 from tests.conftest import TODAY, findings, mission_text
 from tests.conftest import row as row_of
 from tests.verify.test_verify import SECTION_V, verdicts

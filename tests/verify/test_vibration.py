@@ -5,7 +5,7 @@ import math
 import pytest
 
 from bisar_budget.mission.load import parse_mission
-from bisar_budget.verify.limits import verify_mission
+from bisar_budget.verifier.limits import verify_mission
 from tests.conftest import findings, mission_text, row
 from tests.simulate.conftest import images_of
 

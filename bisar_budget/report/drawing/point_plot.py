@@ -19,10 +19,10 @@ from bisar_budget.report.drawing.evidence_drawings import FOCUSED, WITH_ERRORS, 
 from bisar_budget.report.drawing.figure import drawing_file, figure_file, new_figure, paint
 from bisar_budget.report.drawing.svg import Canvas
 from bisar_budget.report.words.sentences import wrapped
-from bisar_budget.simulate.impulse_response import ImpulseResponse, between, resampled, upsampled
-from bisar_budget.simulate.phase_history import Complexes, Floats
-from bisar_budget.simulate.point import PointImages
-from bisar_budget.simulate.realisations import has_unset_clocks
+from bisar_budget.simulator.impulse_response import ImpulseResponse, between, resampled, upsampled
+from bisar_budget.simulator.phase_history import Complexes, Floats
+from bisar_budget.simulator.point import PointImages
+from bisar_budget.simulator.realisations import has_unset_clocks
 
 FLOOR_DB = -35.0
 _FINE, _FINE_CUT = 4, 8  # interpolation, at most, so that a mainlobe has a shape

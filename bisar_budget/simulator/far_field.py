@@ -12,9 +12,9 @@ import numpy as np
 
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.geometry import GroundVector
-from bisar_budget.simulate.image_formation import direct_sum
-from bisar_budget.simulate.impulse_response import lagrange_weight
-from bisar_budget.simulate.phase_history import Complexes, Floats, PhaseHistory
+from bisar_budget.simulator.image_formation import direct_sum
+from bisar_budget.simulator.impulse_response import lagrange_weight
+from bisar_budget.simulator.phase_history import Complexes, Floats, PhaseHistory
 
 _TOLERANCE = 1e-8  # asked of the non-uniform FFT
 _FINE, _BESIDE = 2, 10  # samples per cell of the grid of a non-uniform FFT, along each axis; cells beyond the box

@@ -30,9 +30,9 @@ from bisar_budget.findings.images import Verdict
 from bisar_budget.mission.model import Simulation
 from bisar_budget.phrases import Note
 from bisar_budget.ranges.exact_ranges import FINE, Found, aperture_nodes, nodes
-from bisar_budget.simulate.collection import CELLS, PointCollection
-from bisar_budget.simulate.impulse_response import upsampled
-from bisar_budget.simulate.phase_history import (
+from bisar_budget.simulator.collection import CELLS, PointCollection
+from bisar_budget.simulator.impulse_response import upsampled
+from bisar_budget.simulator.phase_history import (
     SMOOTH,
     Course,
     Errors,
@@ -42,7 +42,7 @@ from bisar_budget.simulate.phase_history import (
     cell_centres,
     direct_path_error,
 )
-from bisar_budget.simulate.realisations import (
+from bisar_budget.simulator.realisations import (
     MOVING,
     clock_seconds,
     delay_courses,
@@ -52,10 +52,10 @@ from bisar_budget.simulate.realisations import (
     position_courses,
     slowest_shake,
 )
-from bisar_budget.verify import reasons
-from bisar_budget.verify.aperture_reading import measured_shift
-from bisar_budget.verify.phase_cases import TOLERANCE, compare
-from bisar_budget.verify.study import Study
+from bisar_budget.verifier import reasons
+from bisar_budget.verifier.aperture_reading import measured_shift
+from bisar_budget.verifier.phase_cases import TOLERANCE, compare
+from bisar_budget.verifier.study import Study
 
 TOLERANCE_DB = 0.5
 UNDECLARED_CYCLES = 10  # of a vibration per aperture, where the file gives no frequency

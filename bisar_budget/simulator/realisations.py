@@ -33,7 +33,7 @@ from bisar_budget.mission.instruments import GaussMarkov
 from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.mission.platforms import MotionError
 from bisar_budget.mission.propagation import DELAYS
-from bisar_budget.simulate.phase_history import Course, Errors, Floats, PathError, PathSinusoid
+from bisar_budget.simulator.phase_history import Course, Errors, Floats, PathError, PathSinusoid
 
 _STEPS = 512  # from mid-aperture to the end of it, in which a walk is summed up
 _SLOW_TONES = 80  # over logarithms, below a tone per two apertures

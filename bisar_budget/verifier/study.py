@@ -12,10 +12,10 @@ from bisar_budget.effects.effect import PLATFORMS, ErrorSource, Subject
 from bisar_budget.findings.images import Verdict
 from bisar_budget.mission.model import Mission
 from bisar_budget.ranges.exact_ranges import FINE, STILL, ExactRanges, Found, followed
-from bisar_budget.simulate.autofocus import ALGORITHMS
-from bisar_budget.simulate.collection import CELLS, MAX_CELLS, OVERSAMPLING, RANGE_CELLS, Chip, PointCollection
-from bisar_budget.simulate.phase_history import Errors, ExactEffect, Floats, PathError, superposed
-from bisar_budget.verify.aperture_reading import READ_CELLS, ApertureReading, read_aperture, refocused
+from bisar_budget.simulator.autofocus import ALGORITHMS
+from bisar_budget.simulator.collection import CELLS, MAX_CELLS, OVERSAMPLING, RANGE_CELLS, Chip, PointCollection
+from bisar_budget.simulator.phase_history import Errors, ExactEffect, Floats, PathError, superposed
+from bisar_budget.verifier.aperture_reading import READ_CELLS, ApertureReading, read_aperture, refocused
 
 Sizes = Sequence[tuple[ErrorSource, float]]  # errors and how large each is, signed
 _SHARED_RAD = 0.5  # of phase by which lines on which one phase is estimated may differ

@@ -22,11 +22,11 @@ from bisar_budget.faults import printable
 from bisar_budget.findings.images import FLOOR_DB, ImageEvidence, PointImage, Verdict, VerifiedMission
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.mission.model import Mission, Simulation
-from bisar_budget.simulate.collection import CELLS, OVERSAMPLING, RANGE_CELLS, Chip, PointCollection, pulses_for
-from bisar_budget.simulate.impulse_response import upsampled
-from bisar_budget.simulate.phase_history import Errors, Floats
-from bisar_budget.verify import phase_cases
-from bisar_budget.verify.spread_cases import (
+from bisar_budget.simulator.collection import CELLS, OVERSAMPLING, RANGE_CELLS, Chip, PointCollection, pulses_for
+from bisar_budget.simulator.impulse_response import upsampled
+from bisar_budget.simulator.phase_history import Errors, Floats
+from bisar_budget.verifier import phase_cases
+from bisar_budget.verifier.spread_cases import (
     Case,
     limits_of,
     tone_cases,
@@ -35,7 +35,7 @@ from bisar_budget.verify.spread_cases import (
     verify_random,
     vibration_cases,
 )
-from bisar_budget.verify.study import Responses, Study
+from bisar_budget.verifier.study import Responses, Study
 from bisar_budget.workers import MapBlocks, Progress, in_processes, unseen
 
 __all__ = ["Study", "form_image_evidence", "rows_to_verify", "seconds_to_verify", "verify_mission"]

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bisar_budget.simulate.phase_history import Complexes, Floats
+from bisar_budget.simulator.phase_history import Complexes, Floats
 
 _UPSAMPLING = 32
 _CHIP_UPSAMPLING = 8

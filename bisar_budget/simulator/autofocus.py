@@ -18,7 +18,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from bisar_budget.simulate.phase_history import Complexes, Floats
+from bisar_budget.simulator.phase_history import Complexes, Floats
 
 Indices = NDArray[np.int64]
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.memory import is_spacious
-from bisar_budget.simulate.phase_history import Complexes, Floats, PhaseHistory, is_even, split
+from bisar_budget.simulator.phase_history import Complexes, Floats, PhaseHistory, is_even, split
 
 PROFILE_BYTES = 3 * 16  # of a sample while it is formed: spectrum, profile and what the FFT holds
 _SAMPLES = 16  # of a profile in a range cell: what lies between two of them is read to -119 dB
@@ -123,7 +123,7 @@ def backprojection(history: PhaseHistory, points: Floats, kernel: Kernel = "auto
         return _backprojection(history, points)
     if not is_compiled():
         raise ImportError(f"kernel {kernel} needs Numba, which is missing: pip install 'bisar-budget[fast]'")
-    from bisar_budget.simulate.compiled import backproject
+    from bisar_budget.simulator.compiled import backproject
 
     image = backproject(history, points, kernel)
     return _backprojection(history, points) if image is None else image
@@ -145,7 +145,7 @@ def is_compiled() -> bool:
     if not is_spacious():
         return False
     try:
-        import bisar_budget.simulate.compiled  # noqa: F401
+        import bisar_budget.simulator.compiled  # noqa: F401
     except (ImportError, RuntimeError):  # not installed, or nowhere to keep what it compiles
         return False
     return True

@@ -14,10 +14,10 @@ import numpy as np
 
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.geometry import GroundVector
-from bisar_budget.simulate.collection import RangeLines
-from bisar_budget.simulate.far_field import far_field_filter, is_nonuniform, polar_format
-from bisar_budget.simulate.image_formation import Kernel, backprojection, bytes_held, ground_grid, matched_filter
-from bisar_budget.simulate.phase_history import Complexes, Floats, PhaseHistory
+from bisar_budget.simulator.collection import RangeLines
+from bisar_budget.simulator.far_field import far_field_filter, is_nonuniform, polar_format
+from bisar_budget.simulator.image_formation import Kernel, backprojection, bytes_held, ground_grid, matched_filter
+from bisar_budget.simulator.phase_history import Complexes, Floats, PhaseHistory
 
 IMAGE_FORMERS = ("backprojection", "polar_format", "matched_filter", "far_field")
 

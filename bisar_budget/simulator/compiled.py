@@ -16,7 +16,7 @@ from numba import njit, prange
 from numpy.polynomial import Chebyshev, Polynomial
 
 from bisar_budget.constants import SPEED_OF_LIGHT
-from bisar_budget.simulate.image_formation import (
+from bisar_budget.simulator.image_formation import (
     PROFILE_BYTES,
     carrier_frequency,
     cells_per_metre,
@@ -24,7 +24,7 @@ from bisar_budget.simulate.image_formation import (
     profile_length,
     range_profiles,
 )
-from bisar_budget.simulate.phase_history import Complexes, Floats, PhaseHistory
+from bisar_budget.simulator.phase_history import Complexes, Floats, PhaseHistory
 
 Spline = Literal["linear", "cubic"]
 

@@ -23,8 +23,8 @@ from bisar_budget.effects.effect import PLATFORMS, ErrorSource
 from bisar_budget.effects.random_effect import RandomError
 from bisar_budget.findings.monte_carlo import MonteCarlo, Requirement
 from bisar_budget.mission.model import Mission, Simulation, has_instruments
-from bisar_budget.monte_carlo.draws import HeldSum, Share, Variable, drawing_of, eigensystem, in_turn, joined
 from bisar_budget.phrases import Note
+from bisar_budget.sampling.draws import HeldSum, Share, Variable, drawing_of, eigensystem, in_turn, joined
 
 CONFIDENCE = 0.95
 DOMINANT = 0.5  # of the variance: beyond, a sum has the shape of that one error, whatever the others are

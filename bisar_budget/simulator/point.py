@@ -16,12 +16,12 @@ from bisar_budget.effects.vibration import counted, lines_of
 from bisar_budget.geometry import GroundVector, Vector
 from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.mission.platforms import MotionError as DeclaredError
-from bisar_budget.simulate.autofocus import ALGORITHMS
-from bisar_budget.simulate.collection import PointCollection, RangeLines
-from bisar_budget.simulate.former import IMAGE_FORMERS, ExactRangeFormer, Former, PlaneWaves
-from bisar_budget.simulate.image_formation import ground_grid
-from bisar_budget.simulate.impulse_response import ImpulseResponse, between, impulse_response
-from bisar_budget.simulate.phase_history import (
+from bisar_budget.simulator.autofocus import ALGORITHMS
+from bisar_budget.simulator.collection import PointCollection, RangeLines
+from bisar_budget.simulator.former import IMAGE_FORMERS, ExactRangeFormer, Former, PlaneWaves
+from bisar_budget.simulator.image_formation import ground_grid
+from bisar_budget.simulator.impulse_response import ImpulseResponse, between, impulse_response
+from bisar_budget.simulator.phase_history import (
     Complexes,
     Errors,
     ExactEffect,
@@ -32,8 +32,8 @@ from bisar_budget.simulate.phase_history import (
     PhaseHistory,
     cell_centres,
 )
-from bisar_budget.simulate.realisations import drawn_errors, oscillator_sinusoids
-from bisar_budget.simulate.targets import Target, Targets
+from bisar_budget.simulator.realisations import drawn_errors, oscillator_sinusoids
+from bisar_budget.simulator.targets import Target, Targets
 from bisar_budget.workers import Progress, unseen
 
 _MARGIN_CELLS = 16  # of the patch beyond the smear, each way

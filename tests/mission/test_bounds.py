@@ -1,4 +1,4 @@
-"""Keys that the mission file will have and this version does not compute; bounds that a verdict rests on."""
+"""Bounds that a verdict rests on."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -7,13 +7,8 @@ import pytest
 
 from bisar_budget.design.sensitivity import sensitivity
 from bisar_budget.faults import Fault, MissionError
-from bisar_budget.mission import model
-from bisar_budget.mission.instruments import Imu, Oscillator, Synchronization
 from bisar_budget.mission.load import parse_mission
-from bisar_budget.mission.parts import ImuPart, OscillatorPart
-from bisar_budget.mission.platforms import CommonMotionError, MotionError, OrbitSource, TrajectorySource, Vibration
 from bisar_budget.mission.quantities import QuestionError, number_of, range_of, tree_of
-from bisar_budget.mission.readers import LATER
 from tests.conftest import TODAY, mission_text
 
 RECEIVER = "platforms__receiver__"
@@ -29,31 +24,6 @@ def faults(**changes: object) -> tuple[Fault, ...]:
         parse_mission(mission_text(**changes), "m.yaml")
     # Logs that these missions name are not there, which is said beside it.
     return tuple(fault for fault in caught.value.faults if "cannot be read: No such file" not in fault.problem)
-
-
-@pytest.mark.parametrize(
-    ("changes", "key"),
-    [
-    ],
-)  # fmt: skip
-def test_what_is_not_computed_yet_is_one_error_that_says_so(changes: dict[str, object], key: str) -> None:
-    """It used to be told which other key was meant, or that a key was missing in its place."""
-    (fault,) = faults(**changes)
-    assert fault.key == key
-    assert fault.problem.startswith("is not computed by this version yet")
-    assert fault.accepted.startswith("accepted: ")
-    assert fault.line is not None
-    assert not fault.hint
-
-
-def test_the_table_names_sections_of_the_file_and_keys_that_they_do_not_have() -> None:
-    kinds = (
-        *(MotionError, Vibration, Oscillator, Synchronization, CommonMotionError, OrbitSource, TrajectorySource),
-        *(model.Mission, model.OtherError, ImuPart, OscillatorPart, Imu),
-    )
-    by_name = {kind.__name__: kind for kind in kinds}
-    for name, keys in LATER.items():
-        assert keys.keys().isdisjoint(by_name[name]._fields), name
 
 
 @pytest.mark.parametrize(("value", "is_valid"), [("0.999999", False), ("0.5", False), ("1", True), ("1.01", True)])

@@ -15,6 +15,7 @@ import numpy as np
 
 from bisar_budget import __version__
 from bisar_budget.design.cases import Grid
+from bisar_budget.design.passes import Passes, SatellitePass
 from bisar_budget.design.sensitivity import Sensitivity
 from bisar_budget.design.solve import Solution
 from bisar_budget.design.table import Part, Swept
@@ -33,7 +34,7 @@ from bisar_budget.report.words.requirements import declared_words, requirement_l
 from bisar_budget.report.words.sentences import allowable_words, matters, percent, row_size, shown_use
 
 if TYPE_CHECKING:
-    from bisar_budget.simulate.point import PointImages
+    from bisar_budget.simulator.point import PointImages
 
 _COMPLIES = ("fail", "pass")
 _DECIDING = 12  # rows of a result that a notebook shows
@@ -379,6 +380,47 @@ class VerifyResult(_Answer):
             notebook.heading(self.found.status, f"Images at the limits of {self.found.name}"),
             notebook.table(("row", "limit", "unit", "verdict"), rows),
         )
+
+
+class PassesResult(_Answer):
+    """Passes of a satellite, each with the verdict of the mission then: a sequence of them."""
+
+    found: Passes
+
+    def __repr__(self) -> str:
+        """How many passes comply, on one line."""
+        found = self.found
+        return f"<passes of {found.name!r}: {len(found.complying)} of {len(found.found)} comply>"
+
+    def __len__(self) -> int:
+        """Number of passes."""
+        return len(self.found.found)
+
+    def __getitem__(self, place: int) -> SatellitePass:
+        """A pass, counted from 0."""
+        return self.found.found[place]
+
+    def _document(self) -> str:
+        from bisar_budget.report.formats.pass_list import as_json
+
+        return as_json(__version__, self.found)
+
+    def to_dataframe(self, library: str | None = None) -> Any:
+        """The passes as a data frame; angles in radians, lengths in metres, times as texts of UTC."""
+        rows = self.to_dict()["passes"]
+        return frame_of({key: [row.get(key) for row in rows] for key in rows[0]} if rows else {}, library)
+
+    def plot(self) -> Picture:
+        """Tracks in the sky, and resolutions over time."""
+        from bisar_budget.report.drawing.figure import drawing_file
+        from bisar_budget.report.drawing.sky_plot import sky_plot
+        from bisar_budget.report.formats.pass_list import verdict
+
+        svg = sky_plot(self.found, self.found.name, verdict(self.found))
+        return Picture(self.found.name, lambda kind: drawing_file(svg, kind))
+
+    def _repr_html_(self) -> str:
+        return self.plot()._repr_html_()
 
 
 class MonteCarloResult(_Answer):

@@ -14,12 +14,12 @@ from bisar_budget.effects.vibration import Line, unit_of_line
 from bisar_budget.findings.images import Verdict
 from bisar_budget.geometry import GroundVector
 from bisar_budget.phrases import NOTHING, Note
-from bisar_budget.simulate.collection import CELLS, MAX_CELLS, OVERSAMPLING, RANGE_CELLS
-from bisar_budget.simulate.impulse_response import highest, impulse_response
-from bisar_budget.simulate.phase_history import Errors, ExactEffect, NoGroundPointError, PathError, PathSinusoid
-from bisar_budget.verify import reasons
-from bisar_budget.verify.aperture_reading import READ_CELLS, ApertureReading, measured_shift
-from bisar_budget.verify.study import Responses, Sizes, Study
+from bisar_budget.simulator.collection import CELLS, MAX_CELLS, OVERSAMPLING, RANGE_CELLS
+from bisar_budget.simulator.impulse_response import highest, impulse_response
+from bisar_budget.simulator.phase_history import Errors, ExactEffect, NoGroundPointError, PathError, PathSinusoid
+from bisar_budget.verifier import reasons
+from bisar_budget.verifier.aperture_reading import READ_CELLS, ApertureReading, measured_shift
+from bisar_budget.verifier.study import Responses, Sizes, Study
 
 TOLERANCE = 0.05  # of the budget: nearer than this a limit is confirmed
 INSIDE, BEYOND = 0.9, 1.1  # of the limit: through it the phase must grow with the error
