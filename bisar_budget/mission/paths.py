@@ -42,7 +42,7 @@ from bisar_budget.paths.flight import (
 from bisar_budget.paths.flight_log import hold_to_motion
 from bisar_budget.paths.instant import DAY, Instant
 from bisar_budget.paths.log_places import LogKeys, around_aperture
-from bisar_budget.paths.orbit_formats import ORBIT_FORMATS, hold_to_format
+from bisar_budget.paths.orbit_formats import ORBIT_FORMATS, hold_to_format, hold_to_log
 from bisar_budget.paths.orientation import UNKNOWN, Orientation, read_finals
 from bisar_budget.paths.recognised import read_log
 from bisar_budget.paths.sbet import read_accuracy
@@ -403,7 +403,12 @@ def _log(route: TrajectorySource, data: bytes, digest: str) -> Log:
     """Read a log, or take it as it was read before."""
     keys = LogKeys(route.week, route.time_scale, route.geoid_separation)
     key = (route.file, route.format, keys, digest)
-    log: Log = _kept(_logs, _LOGS_KEPT, key, lambda: read_log(data, route.file, route.format, keys))
+
+    def made() -> Log:
+        hold_to_log(data, route.file)
+        return read_log(data, route.file, route.format, keys)
+
+    log: Log = _kept(_logs, _LOGS_KEPT, key, made)
     return log
 
 

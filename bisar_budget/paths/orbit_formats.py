@@ -11,6 +11,7 @@ from bisar_budget.paths.messages import is_markup
 from bisar_budget.paths.oem import read_oem
 from bisar_budget.paths.omm import read_omm
 from bisar_budget.paths.orientation import Orientation
+from bisar_budget.paths.recognised import LOG_FORMATS, log_format
 from bisar_budget.paths.sp3 import read_sp3
 from bisar_budget.paths.tle import read_tle
 
@@ -63,14 +64,29 @@ def orbit_format(data: bytes) -> str | None:
 
 
 def hold_to_format(data: bytes, name: str, form: str) -> None:
-    """Refuse a file that is known to be of another format, and say which key reads that."""
+    """Refuse a file that is known to be of another format than an orbit's, and say which key reads that."""
     found = orbit_format(data)
-    if found not in (None, form):
-        raise PathFileError(
-            f"{name}: is {ORBIT_FORMATS[found or form].words}",
-            f"accepted: {ORBIT_FORMATS[form].words}",
-            f"orbit.{found} reads it",
-        )
+    if found == form:
+        return
+    accepted = f"accepted: {ORBIT_FORMATS[form].words}"
+    if found is not None:
+        raise PathFileError(f"{name}: is {ORBIT_FORMATS[found].words}", accepted, f"orbit.{found} reads it")
+    _hold_to_others(data, name, accepted)
+    log = log_format(data)
+    if log is not None:
+        raise PathFileError(f"{name}: is {LOG_FORMATS[log].words}", accepted, "trajectory.file reads it")
+
+
+def hold_to_log(data: bytes, name: str) -> None:
+    """Refuse a file that is known to be no log of a flight, and say which key reads it."""
+    accepted = "accepted: a log of a flight"
+    found = orbit_format(data)
+    if found is not None:
+        raise PathFileError(f"{name}: is {ORBIT_FORMATS[found].words}", accepted, f"orbit.{found} reads it")
+    _hold_to_others(data, name, accepted)
+
+
+def _hold_to_others(data: bytes, name: str, accepted: str) -> None:
     for sign, words, remedy in _OTHERS:
-        if found is None and sign.search(data[:_BEGINNING]):
-            raise PathFileError(f"{name}: is {words}", f"accepted: {ORBIT_FORMATS[form].words}", remedy)
+        if sign.search(data[:_BEGINNING]):
+            raise PathFileError(f"{name}: is {words}", accepted, remedy)

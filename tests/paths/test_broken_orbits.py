@@ -14,11 +14,14 @@ from bisar_budget.paths.flight import PathFileError
 from bisar_budget.paths.instant import Instant
 from bisar_budget.paths.oem import read_oem
 from bisar_budget.paths.omm import read_omm
-from bisar_budget.paths.orbit_formats import ORBIT_FORMATS, hold_to_format, orbit_format
+from bisar_budget.paths.orbit_formats import ORBIT_FORMATS, hold_to_format, hold_to_log, orbit_format
 from bisar_budget.paths.orientation import read_finals
+from bisar_budget.paths.recognised import LOG_FORMATS
 from bisar_budget.paths.sp3 import read_sp3
 from bisar_budget.paths.tle import read_tle
 from tests.conftest import ROOT
+from tests.paths.flown import flight, geodetic_csv
+from tests.paths.log_files import every_format
 from tests.paths.orbit_files import (
     CENTER,
     CONSTANTS,
@@ -463,3 +466,24 @@ def test_what_is_often_taken_for_an_orbit_is_named(data: bytes, said: str, hint:
     with pytest.raises(PathFileError) as error:
         hold_to_format(data, "x", "oem")
     assert (str(error.value), error.value.hint) == (said, hint)
+
+
+LOGS = [*every_format(flight()).values(), ("csv", geodetic_csv(flight()), {})]
+
+
+@pytest.mark.parametrize(("form", "data", "_"), LOGS)
+def test_a_log_where_an_orbit_is_asked_for_is_named(form: str, data: bytes, _: object) -> None:
+    with pytest.raises(PathFileError) as error:
+        hold_to_format(data, "x", "oem")
+    assert str(error.value) == f"x: is {LOG_FORMATS[form].words}"
+    assert error.value.hint == "trajectory.file reads it"
+    hold_to_log(data, "x")
+
+
+@pytest.mark.parametrize("form", SHOWN)
+def test_an_orbit_where_a_log_is_asked_for_is_named(form: str) -> None:
+    with pytest.raises(PathFileError) as error:
+        hold_to_log(SHOWN[form][0], "x")
+    assert str(error.value) == f"x: is {ORBIT_FORMATS[form].words}"
+    assert error.value.accepted == "accepted: a log of a flight"
+    assert error.value.hint == f"orbit.{form} reads it"
