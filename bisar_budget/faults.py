@@ -173,7 +173,8 @@ class InvalidValueError(ValueError):
 class Fault(NamedTuple):
     """One fault of a mission file. Line and column count from 1; None where the whole file is meant.
 
-    `option` is the option that the value comes from, instead of a line; empty if it stands in the file.
+    `option` is the option that the value comes from, instead of a line; empty if it stands in the file. `file` is
+    that of the mission, known where the fault is one of a `MissionError`.
     """
 
     line: int | None
@@ -184,6 +185,12 @@ class Fault(NamedTuple):
     accepted: str = ""
     hint: str = ""
     option: str = ""
+    file: str = ""
+
+    @property
+    def message(self) -> str:
+        """What is wrong, without where, what was given and what is accepted."""
+        return self.problem
 
     def __str__(self) -> str:
         """Write `key: what is wrong (got value); what is accepted. Hint`, with the option before the key."""
@@ -212,10 +219,14 @@ class MissionError(Exception):
     """
 
     def __init__(self, file: str, faults: tuple[Fault, ...]) -> None:
-        super().__init__(f"{file}: {len(faults)} fault(s)")
+        super().__init__(file, faults)
         self.file = file
-        self.faults = faults
+        self.faults = tuple(fault._replace(file=file) for fault in faults)
         self.data: bytes | None = None
+
+    def __str__(self) -> str:
+        """Every fault on a line of its own."""
+        return "\n".join(self.lines())
 
     def lines(self) -> list[str]:
         """Write one `file:line:column: fault` per fault."""

@@ -440,7 +440,8 @@ class MonteCarloResult(_Answer):
         """What `check --monte-carlo --format json` writes of it."""
         from bisar_budget.report.formats.json_document import monte_carlo_item
 
-        return monte_carlo_item(self.found)
+        found: dict[str, Any] = json.loads(json.dumps(monte_carlo_item(self.found)))
+        return found
 
     def _repr_html_(self) -> str:
         rows = [

@@ -180,7 +180,7 @@ def test_pure_python_parser_reads_the_same(monkeypatch) -> None:
     slow = parse_mission(text)
     assert slow._replace(places={}) == fast._replace(places={})
     assert {path: slow.line(path) for path in slow.places} == {path: fast.line(path) for path in fast.places}
-    with pytest.raises(MissionError, match="fault"):
+    with pytest.raises(MissionError, match="is missing"):
         parse_mission("radar:\nname: x\n")
 
 
