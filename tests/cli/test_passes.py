@@ -401,6 +401,7 @@ def test_a_file_that_cannot_be_used_has_its_place(run, mission, given: str, want
     done = run("passes", mission, *SPAN)
     assert done.exit_code == 2
     assert said in done.stderr
+    assert "Read with" not in done.stderr
     assert "Traceback" not in done.stderr
 
 
