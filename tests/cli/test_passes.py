@@ -13,10 +13,12 @@ from pathlib import Path
 import pytest
 import yaml
 
-from bisar_budget.design.passes import start_of
+from bisar_budget.design.passes import passes, start_of
 from bisar_budget.mission.load import load_mission
+from bisar_budget.report import Style
+from bisar_budget.report.formats import pass_list
 from bisar_budget.report.formats.pass_list import _folded as folded
-from tests.conftest import ROOT
+from tests.conftest import ROOT, TODAY
 from tests.design.test_passes import ROOF, tree
 from tests.drawing import Drawing
 from tests.fuzz import RAW, RUN
@@ -115,6 +117,20 @@ class TestList:
         assert {one["name"] for one in found["overrides"]} == {"--model", "--set"}
         text = run("passes", BESANCON, *SPAN, "--set", "requirements.location_error=1 km").stdout
         assert "--set 'requirements.location_error=1 km'" in " ".join(text.split())
+
+
+def test_a_use_without_a_number_is_null_and_one_pass_is_said_as_one(tmp_path: Path) -> None:
+    """Where an error moves the image out of sight its use is infinite."""
+    mission = load_mission(str(BESANCON), is_placed=False)
+    found = passes(mission, start_of("2021-03-20"), days=0.4, today=TODAY)
+    (one,) = found.found
+    assert pass_list.verdict(found).startswith("one pass, which complies: transmitter above 20 deg and at broadside,")
+    lost = found._replace(found=(one._replace(utilization=math.inf, status="fail", requirement=None, row=None),))
+    assert json.loads(pass_list.as_json("0", lost))["passes"][0]["utilization"] is None
+    text = pass_list.as_text(lost, Style())
+    assert text.startswith("one pass, which does not comply:")
+    assert ">1e5 %" in text
+    assert "decides" not in text.partition("above:")[0]
 
 
 class Calendar:

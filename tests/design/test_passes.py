@@ -16,7 +16,7 @@ from bisar_budget.mission.quantities import QuestionError
 from bisar_budget.paths import earth
 from bisar_budget.paths.instant import Instant
 from tests.conftest import ROOT, TODAY, mission_text
-from tests.paths.orbit_files import CENTER, LINE_1, LINE_2, TLE, checked
+from tests.paths.orbit_files import CENTER, LINE_1, LINE_2, TLE, checked, omm_json
 from tests.paths.test_visibility import GEOSTATIONARY, ephemeris, of_elements
 
 BESANCON = ROOT / "specs" / "missions" / "sentinel1_elements_besancon.yaml"
@@ -263,6 +263,17 @@ class TestQuestions:
     def test_what_cannot_be_asked_says_why(self, text: str, asked: dict[str, Any], said: str) -> None:
         with pytest.raises(QuestionError, match=said):
             found(text, **asked)
+
+    def test_a_message_of_mean_elements_has_the_passes_of_its_element_set(self, tmp_path: Path) -> None:
+        (tmp_path / "a.json").write_bytes(omm_json())
+        file = tmp_path / "m.yaml"
+        file.write_text(tree({"orbit": {"omm": "a.json"}}, ROOF))
+        result = passes(load_mission(str(file), is_placed=False), CENTER, days=1, today=TODAY)
+        ours, theirs = result.found, found(tree(lines(LINE_1, LINE_2), ROOF)).found
+        assert len(ours) == len(theirs) > 2
+        for one, other in zip(ours, theirs, strict=True):
+            # Digits of the epoch: 0.4 ms, and those of the mean motion.
+            assert one.start.since(other.start) == pytest.approx(0, abs=0.01)
 
     def test_an_orbit_without_a_place_at_any_time_is_the_fault_of_a_check(self, tmp_path: Path) -> None:
         (tmp_path / "a.oem").write_bytes(ephemeris(CENTER, 3600.0))
