@@ -16,7 +16,7 @@ from bisar_budget.budget.check import check_missions
 from bisar_budget.constants import MAX_DAYS
 from bisar_budget.design.table import Variation
 from bisar_budget.effects.effect import PLATFORMS
-from bisar_budget.faults import MissionError, SetValue, printable, shown
+from bisar_budget.faults import MissionError, SetValue, changes_words, printable, shown
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.requirement import Override
 from bisar_budget.findings.row import worst_first
@@ -240,9 +240,21 @@ def _watched(
         except PathFileError as error:  # the file went away since the mission was loaded
             raise QuestionError(f"platforms.{name}.orbit: {error}") from None
         if not seen[name].pieces:
-            variation.read([SetValue(CENTER_TIME, start.as_text())])
+            _hold_to_an_orbit(mission, variation, start)
             raise QuestionError(f"platforms.{name}.orbit: {seen[name].gaps[0].reason}")
     return seen
+
+
+def _hold_to_an_orbit(mission: Mission, variation: Variation, start: Instant) -> None:
+    """Say what a check at an instant says of an orbit, but that it was asked for then by an option."""
+    try:
+        variation.read(center_time(start))
+    except MissionError as error:
+        asked = [change for change in mission.changes if change.key != CENTER_TIME]
+        read_with = f"Read with {changes_words([*asked, *center_time(start)])}"
+        given = f"Read with {changes_words(asked)}" if asked else ""
+        faults = [fault._replace(hint=fault.hint.replace(read_with, given).strip()) for fault in error.faults]
+        raise MissionError(error.file, tuple(faults)) from None
 
 
 def _at_mid_time(number: int, stretch: Stretch, satellite: Watched, axes: SceneAxes, squint: float) -> SatellitePass:

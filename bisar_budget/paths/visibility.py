@@ -278,9 +278,9 @@ def _orbits(
     begin = times[0]
     for before, time in pairwise(times):
         if not _are_one(known[before], known[time]):
-            yield begin, before, known[before]
+            yield begin, before, known[begin]
             begin = time
-    yield begin, times[-1], known[times[-1]]
+    yield begin, times[-1], known[begin]
 
 
 def _is_gap(orbit: Orbit | PathFileError) -> bool:

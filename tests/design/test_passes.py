@@ -16,7 +16,7 @@ from bisar_budget.mission.quantities import QuestionError
 from bisar_budget.paths import earth
 from bisar_budget.paths.instant import Instant
 from tests.conftest import ROOT, TODAY, mission_text
-from tests.paths.orbit_files import CENTER, LINE_1, LINE_2, TLE, checked
+from tests.paths.orbit_files import CENTER, LINE_1, LINE_2, TLE, checked, omm_json
 from tests.paths.test_visibility import GEOSTATIONARY, ephemeris, of_elements
 
 BESANCON = ROOT / "specs" / "missions" / "sentinel1_elements_besancon.yaml"
@@ -182,6 +182,19 @@ class TestWhereItStands:
             assert one.state.slant_range == pytest.approx(distance.m, abs=500)
             assert one.max_elevation >= one.state.elevation - 1e-9
 
+    def test_at_broadside_the_range_is_least(self, three_days: Passes) -> None:
+        """By Skyfield's distances 2 s apart; UT1 less UTC moves the site by less than 0.4 km, 0.06 s of the orbit."""
+        api = pytest.importorskip("skyfield.api")
+        scale = api.load.timescale(builtin=True)
+        text = BESANCON.parent.joinpath("paths", "sentinel1a_2021079.tle").read_text()
+        satellite = api.EarthSatellite(*text.strip().splitlines()[-2:], "", scale)
+        site = api.wgs84.latlon(47.2512, 5.9938, 360.0)
+        for one in three_days.found:
+            assert one.center is not None
+            moments = scale.from_datetimes([one.center.after(seconds).as_datetime() for seconds in (-2, 0, 2)])
+            before, there, after = (satellite - site).at(moments).distance().m
+            assert abs((before - after) / (before - 2 * there + after)) < 0.1  # vertex of the parabola [s]
+
     def test_a_bearing_is_counted_from_north_clockwise(self) -> None:
         for azimuth, expected in ((0, 90), (90, 0), (180, 270), (-90, 180), (135, 315)):
             assert math.degrees(bearing(math.radians(azimuth))) == pytest.approx(expected, abs=1e-9)
@@ -263,6 +276,17 @@ class TestQuestions:
     def test_what_cannot_be_asked_says_why(self, text: str, asked: dict[str, Any], said: str) -> None:
         with pytest.raises(QuestionError, match=said):
             found(text, **asked)
+
+    def test_a_message_of_mean_elements_has_the_passes_of_its_element_set(self, tmp_path: Path) -> None:
+        (tmp_path / "a.json").write_bytes(omm_json())
+        file = tmp_path / "m.yaml"
+        file.write_text(tree({"orbit": {"omm": "a.json"}}, ROOF))
+        result = passes(load_mission(str(file), is_placed=False), CENTER, days=1, today=TODAY)
+        ours, theirs = result.found, found(tree(lines(LINE_1, LINE_2), ROOF)).found
+        assert len(ours) == len(theirs) > 2
+        for one, other in zip(ours, theirs, strict=True):
+            # Digits of the epoch: 0.4 ms, and those of the mean motion.
+            assert one.start.since(other.start) == pytest.approx(0, abs=0.01)
 
     def test_an_orbit_without_a_place_at_any_time_is_the_fault_of_a_check(self, tmp_path: Path) -> None:
         (tmp_path / "a.oem").write_bytes(ephemeris(CENTER, 3600.0))

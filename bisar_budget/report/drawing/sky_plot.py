@@ -18,6 +18,7 @@ _WIDTH = 900.0  # px
 _RIM = 178.0  # px from the zenith to the horizon
 _BESIDE = 34.0  # px for the names of directions
 _APART = 78.0  # px between the sky and the axes of the resolution
+_RIGHT = 24.0  # px beside them, for half a date
 _HEAD = 7.0  # px, of an arrow
 _MANY, _THIN, _BROAD = 20, 1.3, 2.0  # tracks, from which on they are thin; px
 _NUMBERED = 40  # passes, at most
@@ -44,7 +45,7 @@ def sky_plot(passes: Passes, title: str, verdict: str) -> str:
     middle = (_BESIDE + _RIM + 8, top + _BESIDE + _RIM)
     statuses = sorted({one.status for one in passes.found}, key=RANK.__getitem__)
     _sky(canvas, middle, passes)
-    frame = svg.Box(2 * (_BESIDE + _RIM) + _APART, middle[1] - _RIM, _WIDTH - 14, middle[1] + _RIM)
+    frame = svg.Box(2 * (_BESIDE + _RIM) + _APART, middle[1] - _RIM, _WIDTH - _RIGHT, middle[1] + _RIM)
     _resolutions(canvas, frame, passes)
     entries = [svg.line_entry(canvas, svg.status_words(name), f"track is-{name}") for name in statuses]
     entries += [
