@@ -30,7 +30,7 @@ from tests.conftest import APART, ROOT, TODAY
 from tests.fuzz import RAW, RUN
 from tests.fuzz_commands import MISSION, Question, break_parts, broken_log, flown, radar_file, small_mission, targets
 
-CODES = {"solve": {0, 1, 2}, "check": {0, 1, 2}, "allocate": {0, 1, 2}}
+CODES = {"solve": {0, 1, 2}, "sweep": {0, 1, 2}, "check": {0, 1, 2}, "allocate": {0, 1, 2}}
 SECTION_V = str(ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml")
 # Three parts, which arrays hold.
 SWEEP = ("sweep", SECTION_V, "--vary", "collection.aperture_time=1:2s:17000", "--date", TODAY.isoformat())
