@@ -30,7 +30,7 @@ from tests.conftest import APART, ROOT, TODAY
 from tests.fuzz import RAW, RUN
 from tests.fuzz_commands import MISSION, Question, break_parts, broken_log, flown, radar_file, small_mission, targets
 
-CODES = {name: {0, 1, 2} for name in ("solve", "check", "allocate", "passes")}
+CODES = {name: {0, 1, 2} for name in ("solve", "sweep", "check", "allocate", "passes")}
 SECTION_V = str(ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml")
 # Three parts, which arrays hold.
 SWEEP = ("sweep", SECTION_V, "--vary", "collection.aperture_time=1:2s:17000", "--date", TODAY.isoformat())
