@@ -97,6 +97,8 @@ def path_files(mission: Mission) -> Iterator[tuple[str, str]]:
             for form in _FILES:
                 if isinstance(file := getattr(section, form, None), str):
                     yield f"platforms.{name}.{key}.{form}", file
+    if mission.earth_orientation is not None and mission.earth_orientation.file is not None:
+        yield "earth_orientation.file", mission.earth_orientation.file
 
 
 def report_files(root: Any, read: Beside, report: Report) -> None:
