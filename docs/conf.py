@@ -48,4 +48,7 @@ napoleon_use_rtype = False
 
 nitpicky = True
 # Types in docstrings are words of NumPy, or names that have no page here.
-nitpick_ignore_regex = [("py:class", ".*"), ("py:exc", "MissingTablesError|MissionError|QuestionError|TableError")]
+nitpick_ignore_regex = [
+    ("py:class", ".*"),
+    ("py:exc", "MissingPackageError|MissingTablesError|MissionError|QuestionError|SimulationError|TableError"),
+]
