@@ -46,7 +46,7 @@ __all__ = ["__version__", *sorted(_FROM)]
 
 
 def __getattr__(name: str) -> Any:
-    """What is named in `__all__`, from where it lives."""
+    """A name of `__all__`, from where it lives."""
     if name not in _FROM:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(f"{__name__}.{_FROM[name]}"), name)

@@ -189,7 +189,7 @@ class Fault(NamedTuple):
 
     @property
     def message(self) -> str:
-        """What is wrong, without where, what was given and what is accepted."""
+        """The problem, without its place, the value given and what is accepted."""
         return self.problem
 
     def __str__(self) -> str:

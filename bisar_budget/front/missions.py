@@ -55,11 +55,10 @@ class Spaced:
     start: str
     stop: str
     count: int
-
     is_log: bool = False
 
     def of(self, key: str) -> str:
-        """What `sweep --vary` would be given."""
+        """The same as `sweep --vary` has it."""
         return f"{key}={self.start}:{self.stop}:{self.count}" + (":log" if self.is_log else "")
 
 

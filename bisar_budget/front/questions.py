@@ -48,7 +48,7 @@ def day_of(given: str | dt.date | None) -> dt.date:
 
 
 def _outside(model: str | None, given: str | dt.date | None) -> Outside:
-    """What the arguments of a question bear on its verdict."""
+    """Influences of a question's arguments on its verdict."""
     options = () if model is None else (Override("--model", model, _CALLER),)
     origin = "environment, SOURCE_DATE_EPOCH" if os.environ.get("SOURCE_DATE_EPOCH") else "the day of the run"
     return Outside(options, _CALLER if given is not None else origin, given is not None, _CALLER)

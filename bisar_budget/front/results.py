@@ -110,7 +110,7 @@ def _as_png(png: bytes, words: str) -> str:
 class CheckResult(Mapping[str, Row]):
     """Findings of a check: its rows by their ids, in the order of the contract.
 
-    `findings` are all of them, as the reports have them; `judged_on` is the day of waivers.
+    `findings` are all of them, as the reports have them.
     """
 
     findings: MissionFindings
@@ -146,7 +146,7 @@ class CheckResult(Mapping[str, Row]):
 
     @property
     def exit_code(self) -> int:
-        """What `bisar-budget check` ends with: 0 all judged and met, 1 not."""
+        """Exit code of `bisar-budget check`: 0 all judged and met, 1 not."""
         return exit_code({self.status}, False)
 
     @property
@@ -155,7 +155,7 @@ class CheckResult(Mapping[str, Row]):
         return {one.key: one for one in self.findings.requirements}
 
     def to_dict(self) -> dict[str, Any]:
-        """What `--format json` writes."""
+        """The document of `--format json`."""
         found: dict[str, Any] = json.loads(render("json", self._report, Style()))
         return found
 
@@ -254,7 +254,7 @@ class _Answer:
     found: Any
 
     def __getattr__(self, name: str) -> Any:
-        """Of what was found."""
+        """An attribute of what was found."""
         if name.startswith("_") or name == "found":
             raise AttributeError(name)
         return getattr(self.found, name)
@@ -266,7 +266,7 @@ class _Answer:
         raise NotImplementedError
 
     def to_dict(self) -> dict[str, Any]:
-        """What `--format json` of the command writes."""
+        """The document of `--format json` of the command."""
         found: dict[str, Any] = json.loads(self._document())
         return found
 
@@ -437,7 +437,7 @@ class MonteCarloResult(_Answer):
         return f"<monte_carlo: {found.draws} draws, all hold in {found.probability:.4g} ({interval})>"
 
     def to_dict(self) -> dict[str, Any]:
-        """What `check --monte-carlo --format json` writes of it."""
+        """The same as `check --monte-carlo --format json` writes it."""
         from bisar_budget.report.formats.json_document import monte_carlo_item
 
         found: dict[str, Any] = json.loads(json.dumps(monte_carlo_item(self.found)))
