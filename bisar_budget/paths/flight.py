@@ -54,6 +54,12 @@ class PathFileError(Exception):
         self.accepted, self.hint, self.key, self.spans = accepted, hint, key, spans
 
 
+def hold_to_bytes(data: bytes, most: int, name: str) -> None:
+    """Refuse a log of more bytes than are read; raises `PathFileError`."""
+    if len(data) > most:
+        raise PathFileError(f"{name}: has {len(data) / 1e6:.0f} MB, at most {most / 1e6:.0f} MB are read")
+
+
 class PathDoubt(NamedTuple):
     """How far the truth may be from a path, by what is known of its own source [m], and what that is."""
 

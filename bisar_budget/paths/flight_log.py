@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from bisar_budget import units
 from bisar_budget.faults import InvalidValueError, fault_words, shown
 from bisar_budget.paths.earth import Floats, earth_fixed_places
-from bisar_budget.paths.flight import Log, PathFileError
+from bisar_budget.paths.flight import Log, PathFileError, hold_to_bytes
 from bisar_budget.paths.instant import DAY, GPS_EPOCH, WEEK, Instant, parse_instant
 from bisar_budget.paths.log_places import (
     NOTHING_SAID,
@@ -301,8 +301,7 @@ def _places(table: _Table, header: _Header, rows: LogRows, keys: LogKeys) -> Flo
 
 def _text(data: bytes, name: str) -> str:
     """Text of the file, with a line feed at the end of each line."""
-    if len(data) > LARGEST:
-        raise PathFileError(f"{name}: has {len(data) / 1e6:.0f} MB, at most {LARGEST / 1e6:.0f} MB are read")
+    hold_to_bytes(data, LARGEST, name)
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         raise PathFileError(f"{name}:1: is in UTF-16; save it in UTF-8")
     zero = data.find(b"\0")

@@ -21,7 +21,7 @@ from typing import NamedTuple, NoReturn
 import numpy as np
 
 from bisar_budget.faults import shown
-from bisar_budget.paths.flight import Log, PathFileError
+from bisar_budget.paths.flight import Log, PathFileError, hold_to_bytes
 from bisar_budget.paths.instant import DAY, Instant, parse_instant
 from bisar_budget.paths.log_places import LogKeys, LogRows, counted, from_sea_level, geodetic_log, hold_to_scale
 
@@ -77,8 +77,7 @@ def read_nmea(data: bytes, name: str, keys: LogKeys) -> Log:
         Names the file and the line of the fault. The package pynmea2 is not installed.
     """
     hold_to_scale("utc", keys, name)
-    if len(data) > LARGEST:
-        raise PathFileError(f"{name}: has {len(data) / 1e6:.0f} MB, at most {LARGEST / 1e6:.0f} MB are read")
+    hold_to_bytes(data, LARGEST, name)
     try:
         from pynmea2 import ParseError
         from pynmea2 import parse as parse_sentence

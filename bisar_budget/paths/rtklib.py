@@ -22,7 +22,7 @@ import numpy as np
 
 from bisar_budget.faults import shown
 from bisar_budget.paths.earth import Floats, Geodetic, axes_at, geodetic_places
-from bisar_budget.paths.flight import Log, PathFileError
+from bisar_budget.paths.flight import Log, PathFileError, hold_to_bytes
 from bisar_budget.paths.instant import DAY, GPS_EPOCH, WEEK, Instant, parse_instant
 from bisar_budget.paths.log_places import (
     LogKeys,
@@ -87,8 +87,7 @@ def read_solution(data: bytes, name: str, keys: LogKeys) -> Log:
     PathFileError
         Names the file and the line of the fault.
     """
-    if len(data) > LARGEST:
-        raise PathFileError(f"{name}: has {len(data) / 1e6:.0f} MB, at most {LARGEST / 1e6:.0f} MB are read")
+    hold_to_bytes(data, LARGEST, name)
     header: _Columns | None = None
     height_said, lines, days, numbers = "", [], [], []
     for number, text in enumerate(decoded(data, name).splitlines(), 1):

@@ -18,7 +18,7 @@ import numpy as np
 
 from bisar_budget.geometry import Vector
 from bisar_budget.paths.earth import Floats, curvature_radii, earth_fixed_places
-from bisar_budget.paths.flight import Log, PathFileError, slow_times
+from bisar_budget.paths.flight import Log, PathFileError, hold_to_bytes, slow_times
 from bisar_budget.paths.instant import GPS_EPOCH, WEEK, Instant
 from bisar_budget.paths.log_places import around_aperture, scale_words, utc_of
 
@@ -156,8 +156,7 @@ def read_accuracy(
 def _records(data: bytes, name: str, width: int, fields: tuple[tuple[str, int, float, float, str], ...]) -> Floats:
     """Records (n, width) whose fields are where they can be."""
     size = 8 * width
-    if len(data) > LARGEST:
-        raise PathFileError(f"{name}: has {len(data) / 1e6:.0f} MB, at most {LARGEST / 1e6:.0f} MB are read")
+    hold_to_bytes(data, LARGEST, name)
     if not data:
         raise PathFileError(f"{name}: is empty")
     whole, rest = divmod(len(data), size)
