@@ -14,19 +14,19 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from bisar_budget.faults import MissionError as MissionError
+    from bisar_budget.front.checks import check as check
+    from bisar_budget.front.imaging import simulate as simulate
+    from bisar_budget.front.imaging import verify as verify
     from bisar_budget.front.missions import geomspace as geomspace
     from bisar_budget.front.missions import linspace as linspace
     from bisar_budget.front.missions import load as load
     from bisar_budget.front.missions import loads as loads
     from bisar_budget.front.questions import allocate as allocate
-    from bisar_budget.front.questions import check as check
     from bisar_budget.front.questions import monte_carlo as monte_carlo
     from bisar_budget.front.questions import passes as passes
     from bisar_budget.front.questions import sensitivity as sensitivity
-    from bisar_budget.front.questions import simulate as simulate
     from bisar_budget.front.questions import solve as solve
     from bisar_budget.front.questions import sweep as sweep
-    from bisar_budget.front.questions import verify as verify
     from bisar_budget.mission.model import Mission as Mission
     from bisar_budget.mission.quantities import QuestionError as QuestionError
 
@@ -36,10 +36,9 @@ _LIVES = {
     "mission.model": ("Mission",),
     "mission.quantities": ("QuestionError",),
     "front.missions": ("geomspace", "linspace", "load", "loads"),
-    "front.questions": (
-        *("allocate", "check", "monte_carlo", "passes", "sensitivity"),
-        *("simulate", "solve", "sweep", "verify"),
-    ),
+    "front.checks": ("check",),
+    "front.imaging": ("simulate", "verify"),
+    "front.questions": ("allocate", "monte_carlo", "passes", "sensitivity", "solve", "sweep"),
 }
 _FROM = {name: module for module, names in _LIVES.items() for name in names}
 __all__ = ["__version__", *sorted(_FROM)]

@@ -22,11 +22,12 @@ from bisar_budget.budget.file_warnings import file_warnings
 from bisar_budget.budget.judged_mission import JudgedMission, judged_mission
 from bisar_budget.budget.judged_requirements import declared_kinds
 from bisar_budget.budget.requirement_table import negligible_effects, requirements_in_words, rows_in_words
-from bisar_budget.budget.waivers import NOTHING_OUTSIDE, Outside, apply_waivers, overrides
+from bisar_budget.budget.waivers import apply_waivers, overrides
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.effect import PLATFORMS, override_notes
 from bisar_budget.faults import MissionError, SetValue
 from bisar_budget.findings.mission import MissionFindings, Resolution, UnusableMission
+from bisar_budget.findings.requirement import NOTHING_OUTSIDE, Outside
 from bisar_budget.mission.load import load_mission
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import FlownPath

@@ -13,7 +13,7 @@ from typing import NamedTuple
 from bisar_budget.budget import file_warnings
 from bisar_budget.budget.judged_requirements import KEYS
 from bisar_budget.faults import KeyPath, printable
-from bisar_budget.findings.requirement import JudgedRequirement, Override
+from bisar_budget.findings.requirement import JudgedRequirement, Outside, Override
 from bisar_budget.findings.row import DECLARE, AppliedWaiver, Row
 from bisar_budget.mission.model import Mission
 from bisar_budget.phrases import Note
@@ -111,18 +111,6 @@ def named_by(pattern: str, ids: Sequence[str]) -> list[int]:
 
 
 # ---------------------------------------------------------------------- from outside the file
-class Outside(NamedTuple):
-    """Influences on all missions of a run: options that somebody gave, and where the day of waivers comes from."""
-
-    options: tuple[Override, ...] = ()
-    day_origin: str = "the caller"
-    is_day_given: bool = False  # by the option --date, which is said even where no waiver stands
-    set_origin: str = "command line"  # of values in place of the file's
-
-
-NOTHING_OUTSIDE = Outside()
-
-
 def overrides(mission: Mission, outside: Outside, today: date) -> tuple[Override, ...]:
     """Gather what from outside the file bears on the verdict of one mission.
 

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import click
 
 from bisar_budget import __version__
-from bisar_budget.cli.long_work import watched_checks
 from bisar_budget.cli.options import DATE, FILE, MISSIONS, MODEL, OUTPUT, SET, day, outside, root_of_names
 from bisar_budget.cli.streams import (
     EXIT_BROKEN,
@@ -110,9 +109,7 @@ def _answers(
     today: datetime | None,
 ) -> "Iterator[Answer]":
     """Ask each mission in turn, with a bar; exits where one cannot be asked."""
-    from bisar_budget.budget.waivers import overrides
-    from bisar_budget.design.allocate import allocate as allocated
-    from bisar_budget.design.offers import offer
+    from bisar_budget.front import questions
     from bisar_budget.mission.quantities import QuestionError
     from bisar_budget.report.formats.specification_sheet import Answer
 
@@ -123,19 +120,18 @@ def _answers(
     offered = None if other is None else load_all([other], model, changes)[0]
     for mission in missions:
         try:
-            with watched_checks(mission.name) as progress:
-                sheet = allocated(
-                    mission,
-                    keys=dict.fromkeys(keys, 1.0),
-                    reserve=None if reserve is None else reserve / 100,
-                    model=model,
-                    today=judged_on,
-                    progress=progress,
-                )
+            found = questions.allocate(
+                mission,
+                keys,
+                reserve=None if reserve is None else reserve / 100,
+                offer=offered,
+                model=model,
+                date=judged_on,
+                outside=from_outside,
+            )
         except QuestionError as error:
             fail(f"{mission.file}: {error}")
-        sheet = sheet._replace(overrides=overrides(mission, from_outside, judged_on))
-        yield Answer(sheet, None if offered is None else offer(sheet, offered, judged_on))
+        yield Answer(found.found, found.offer)
 
 
 def _written(answers: "Sequence[Answer]", format_name: str, output: str | None) -> str:

@@ -4,7 +4,6 @@ import os
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from datetime import date, datetime
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -31,6 +30,7 @@ from bisar_budget.cli.streams import (
     complain,
     deliver,
     expand,
+    fail,
     is_terminal,
     load_all,
     say_faults,
@@ -43,10 +43,9 @@ from bisar_budget.faults import closed, fault_words, printable
 from bisar_budget.report import FORMATS
 
 if TYPE_CHECKING:
-    from bisar_budget.budget.check import Draws
-    from bisar_budget.budget.waivers import Outside
     from bisar_budget.faults import SetValue
     from bisar_budget.findings.mission import MissionFindings, Option, Report, UnusableMission
+    from bisar_budget.findings.requirement import Outside
     from bisar_budget.report import Style
 
 
@@ -255,7 +254,7 @@ def check(
     [tool.bisar-budget] in the nearest pyproject.toml, and over it the variables BISAR_BUDGET_FORMAT and so on.
     """
     from bisar_budget.findings.status import exit_code
-    from bisar_budget.report import Style, joined, piece
+    from bisar_budget.report import Style, joined
 
     written = [(name, _format_of(name)) for name in reports]
     formats = [format_name, *(its_format for _, its_format in written)]
@@ -265,10 +264,7 @@ def check(
     given = click.get_current_context().get_parameter_source
     if seed is not None and draws is None and given("seed") is ParameterSource.COMMANDLINE:
         raise click.UsageError("--seed needs --monte-carlo N.")
-    if draws is not None or scheduler is not None:
-        from bisar_budget.cli.long_work import check_draws
-
-        check_draws(draws, scheduler)
+    _check_draws(draws, scheduler)
     if explain is not None:
         excluded = ("format_name", "reports", "draws", "scheduler", "swept")
         if any(given(name) is ParameterSource.COMMANDLINE for name in excluded):
@@ -278,10 +274,7 @@ def check(
             )
         _explain(files, explain, day(today), model, output, changes, outside(today))
         return
-    if swept:
-        from bisar_budget.cli.studies import check_options
-
-        check_options(swept, formats)
+    _check_sweep(swept, formats)
     illustrated = any(FORMATS[name].is_illustrated for name in formats)
     judged_on, from_outside = day(today), outside(today)
     use_color = color == "always" or (color == "auto" and output is None and wants_color())
@@ -291,33 +284,33 @@ def check(
         color=use_color, verbosity=verbosity, root=root, is_checkout=is_checkout, all_rows=all_rows, detail=detail
     )
     says_faults = format_name != "text" or output is not None or quiet or not is_terminal()
+    asked: dict[str, Any] = {"model": model, "changes": changes, "outside": from_outside}
     if FORMATS[format_name].is_piecewise and not (written or verifying or draws):
-        from bisar_budget.budget.check import check_files
+        from bisar_budget.front.checks import pieces
 
-        keep = partial(piece, format_name=format_name, style=style)
-        pieces = check_files(files, judged_on, model, keep, changes=changes, outside=from_outside)
+        texts = pieces(files, judged_on, format_name, style, **asked)
         if says_faults:
-            _say_faults(piece.unusable for piece in pieces)
-        deliver(joined(format_name, pieces, __version__, style), output, format_name)
-        statuses = {piece.status for piece in pieces}
+            _say_faults(one.unusable for one in texts)
+        deliver(joined(format_name, texts, __version__, style), output, format_name)
+        statuses = {one.status for one in texts}
     else:
-        from bisar_budget.cli.long_work import drawn_by
+        from bisar_budget.findings.mission import Report
+        from bisar_budget.front.checks import checked
+        from bisar_budget.front.shared_work import drawn_by
+        from bisar_budget.mission.quantities import QuestionError
 
-        with drawn_by(scheduler, patience, draws, seed, len(files)) as drawn:
-            report = check_all(files, judged_on, model, verifying, illustrated, drawn, changes, from_outside)
+        asked |= {"swept": swept, "is_verified": verifying, "is_illustrated": illustrated}
+        try:
+            with drawn_by(scheduler, patience, draws, seed, len(files)) as drawn:
+                found = checked(files, judged_on, drawn=drawn, **asked)
+        except QuestionError as error:
+            fail(str(error))
         # The day that somebody gave, or that decides: with no other a report is reproducible.
         is_given = today is not None or os.environ.get("SOURCE_DATE_EPOCH")
-        told = [one.name for mission in report.missions for one in getattr(mission, "overrides", ())]
+        told = [one.name for mission in found for one in getattr(mission, "overrides", ())]
         shown_day = judged_on if is_given or "--date" in told else None
-        if swept:
-            from bisar_budget.cli.studies import with_studies
-
-            report = report._replace(missions=tuple(with_studies(report.missions, swept, model, judged_on)))
-        if illustrated:
-            from bisar_budget.cli.studies import with_sheets
-
-            report = report._replace(missions=tuple(with_sheets(report.missions, model, judged_on)))
-        report = report._replace(options=tuple(_options(shown_day, today)), day=shown_day)
+        options = tuple(_options(shown_day, today))
+        report = Report(version=__version__, missions=tuple(found), options=options, day=shown_day)
         if says_faults:
             _say_faults(report.missions)
         for path, its_format in written:
@@ -360,56 +353,29 @@ def _options(judged_on: date | None, today: datetime | None) -> "Iterator[Option
             yield Option(parameter.opts[0], said, origin)
 
 
-def check_all(
-    files: Sequence[str],
-    today: date,
-    model: str | None,
-    verifying: bool,
-    illustrated: bool = False,
-    drawn: "Draws | None" = None,
-    changes: "Sequence[SetValue]" = (),
-    from_outside: "Outside | None" = None,
-) -> "Report":
-    """Check every file; `verifying` adds verdicts of images. `illustrated` keeps the analyses, and the images.
-
-    `drawn` are the draws of a Monte Carlo, `changes` are values in place of the files', and `from_outside` is what
-    else bears on the verdicts.
-    """
-    from bisar_budget.budget.check import check_files, whole, without_analysis
-    from bisar_budget.budget.waivers import NOTHING_OUTSIDE
-    from bisar_budget.findings.mission import Report
-
-    keep = whole if verifying or illustrated else without_analysis
-    missions = check_files(
-        files, today, model, keep, drawn=drawn, changes=changes, outside=from_outside or NOTHING_OUTSIDE
-    )
-    if verifying:
-        missions = _with_images(missions, today, illustrated)
-    return Report(version=__version__, missions=tuple(missions))
+def _check_draws(draws: int | None, scheduler: str | None) -> None:
+    """Refuse a scheduler that has nothing to draw, and more draws than are made without one."""
+    if scheduler is None:
+        if draws is not None and draws > MAX_DRAWS_HERE:
+            raise click.UsageError(
+                f"--monte-carlo {draws:,}: must be at most {MAX_DRAWS_HERE:,} draws; with --scheduler ADDRESS, whose "
+                f"workers share them, {MAX_DRAWS:,}."
+            )
+    elif draws is None:
+        raise click.UsageError(f"--scheduler {scheduler}: shares out draws, and needs --monte-carlo N.")
 
 
-def _with_images(
-    missions: "Sequence[MissionFindings | UnusableMission]", today: date, illustrated: bool
-) -> "list[MissionFindings | UnusableMission]":
-    """Add the verdicts of images, and the images of the rows that decide most."""
-    from bisar_budget.budget.check import without_analysis
-    from bisar_budget.budget.verdicts import with_verdicts
-    from bisar_budget.cli.images import verify_all
-    from bisar_budget.findings.mission import MissionFindings
-
-    usable = {place: found for place, found in enumerate(missions) if isinstance(found, MissionFindings)}
-    verified = verify_all([found.analysed().mission for found in usable.values()], "*", None) if usable else []
-    result = list(missions)
-    for (place, found), images in zip(usable.items(), verified, strict=True):
-        judged = with_verdicts(found, images, today)
-        if illustrated:
-            from bisar_budget.verifier.limits import form_image_evidence
-
-            shown = form_image_evidence(judged.analysed().mission, judged)
-            result[place] = judged._replace(image_evidence=shown)
-        else:
-            result[place] = without_analysis(judged)
-    return result
+def _check_sweep(texts: Sequence[str], formats: Sequence[str]) -> None:
+    """Refuse a sweep that no report shows, and more keys than a drawing has axes."""
+    if not texts:
+        return
+    if not any(FORMATS[name].is_illustrated for name in formats):
+        raise click.UsageError(
+            "--sweep is shown in a compliance report; accepted: --report FILE.html or FILE.md, or --format html or "
+            "markdown. `bisar-budget sweep` writes tables and plots."
+        )
+    if len(texts) > 2:
+        raise click.UsageError(f"--sweep draws one key or two, and there are {len(texts)}.")
 
 
 def _explain(
@@ -422,15 +388,15 @@ def _explain(
     from_outside: "Outside",
 ) -> None:
     """Explain a row, or a requirement, in every mission that has it."""
-    from bisar_budget.budget.check import check_mission
     from bisar_budget.findings.row import unknown_id
+    from bisar_budget.front.checks import check as ask
     from bisar_budget.report.explain.explanation import explain, explain_requirement
     from bisar_budget.report.words.requirements import overrides_lines, requirement_id
 
     texts: list[str] = []
     known: dict[str, None] = {}
     for mission in load_all(files, model, changes):
-        found = check_mission(mission, today, outside=from_outside)
+        found = ask(mission, date=today, outside=from_outside).findings
         required = {requirement_id(one): one for one in found.requirements}
         known |= dict.fromkeys([*(row.id for row in found.rows), *required])
         required |= {one.id: one for one in found.requirements}

@@ -194,12 +194,12 @@ def _with_revision(patterns: Sequence[str], base: str, output: str | None, today
 
 def _compared(before: Sequence[_Read], after: Sequence[_Read], today: datetime | None) -> "tuple[MissionChange, ...]":
     """Compare each mission with the other of its place; where one cannot be used, say every fault of all and exit."""
-    from bisar_budget.budget.check import check_mission
+    from bisar_budget.front.checks import check
     from bisar_budget.report.change.comparison import compare
 
     missions = read_all(read for pair in zip(before, after, strict=True) for read in pair)
     judged_on, from_outside = day(today), outside(today)
-    found = [check_mission(mission, judged_on, outside=from_outside) for mission in missions]
+    found = [check(mission, date=judged_on, outside=from_outside).findings for mission in missions]
     return tuple(compare(*pair) for pair in zip(found[::2], found[1::2], strict=True))
 
 

@@ -3,12 +3,10 @@
 import os
 import sys
 from collections.abc import Sequence
-from datetime import date
 from typing import TYPE_CHECKING
 
 import click
 
-from bisar_budget.cli.long_work import FORMING, foretell, watched, workers_of
 from bisar_budget.cli.options import FILE, MISSIONS, OUTPUT, SET, TEXT_OR_JSON, scheduler_options
 from bisar_budget.cli.streams import (
     EXIT_BROKEN,
@@ -24,12 +22,9 @@ from bisar_budget.cli.streams import (
     write_file,
 )
 from bisar_budget.faults import changes_words, printable
-from bisar_budget.resources import cores
 
 if TYPE_CHECKING:
-    from bisar_budget.cluster.scheduler import Workers
     from bisar_budget.faults import SetValue
-    from bisar_budget.findings.images import VerifiedMission
     from bisar_budget.mission.model import Mission
     from bisar_budget.simulator.targets import Targets
 
@@ -64,20 +59,19 @@ def verify(
     each limit is formed again with its gain and refocused. Exit code: 0, or 1 if a limit is optimistic, 2
     for wrong usage, an unusable file, or a mission on whose limits no image gave a verdict.
     """
-    from bisar_budget.budget.waivers import NOTHING_OUTSIDE, overrides
+    from bisar_budget.front.imaging import verify_all
+    from bisar_budget.front.shared_work import workers_of
+    from bisar_budget.mission.quantities import QuestionError
     from bisar_budget.report.formats import verification
 
     files = expand(missions)
     spare(files, [output])
     loaded = load_all(files, changes=changes)
-    with workers_of(scheduler, patience) as workers:
-        images = verify_all(loaded, only, jobs, workers)
-    verified = [
-        found._replace(
-            overrides=overrides(mission._replace(waivers=()), NOTHING_OUTSIDE, date.min)
-        )  # images waive nothing
-        for mission, found in zip(loaded, images, strict=True)
-    ]
+    try:
+        with workers_of(scheduler, patience) as workers:
+            verified = verify_all(loaded, only, jobs, workers)
+    except QuestionError as error:
+        raise click.UsageError(str(error)) from None
     deliver_found(verification, verified, format_name, output)
     doubts = [mission for mission in verified if mission.doubt]
     for mission in doubts:
@@ -85,48 +79,6 @@ def verify(
     if doubts:
         sys.exit(EXIT_USAGE)
     sys.exit(EXIT_BROKEN if any(mission.status == "fail" for mission in verified) else 0)
-
-
-def verify_all(
-    missions: "Sequence[Mission]", only: str, jobs: int | None, workers: "Workers | None" = None
-) -> "list[VerifiedMission]":
-    """Verify missions in processes here, or on workers of a scheduler; a bar shows it, where somebody watches."""
-    from bisar_budget.findings.row import where_ids_are
-    from bisar_budget.simulator.image_formation import is_compiled
-    from bisar_budget.verifier.limits import rows_to_verify, seconds_to_verify, verify_mission
-
-    total = sum(len(rows_to_verify(mission, only)) for mission in missions)
-    if not total and only != "*":
-        listed = where_ids_are(missions[0].file)
-        raise click.UsageError(
-            f"--only {printable(only)}: no row with a limit matches, nothing was verified; {listed}."
-        )
-    jobs = workers.threads if workers else jobs or (1 if is_compiled() else cores())
-    seconds = sum(seconds_to_verify(mission, only, jobs) for mission in missions)
-    foretell(
-        seconds,
-        f"Forming the images of {total} rows",
-        "--only looks at some of them" + faster(None if workers else jobs),
-    )
-    found: list[VerifiedMission] = []
-    with watched(FORMING, total) as progress:
-        for mission in missions:
-            before = sum(len(one.rows) for one in found)
-
-            def formed(done: int, _: int, before: int = before) -> None:
-                progress(before + done, total)
-
-            found.append(verify_mission(mission, only, jobs, formed, workers.mapped if workers else None))
-    return found
-
-
-def faster(jobs: int | None = None) -> str:
-    """Say what would make image formation faster here."""
-    from bisar_budget.simulator.image_formation import is_compiled
-
-    if not is_compiled():
-        return ", and pip install 'bisar-budget[fast]' makes it tens of times faster"
-    return f", --jobs {cores()} uses all cores" if jobs is not None and 1 < jobs < cores() else ""
 
 
 @click.command()
@@ -181,46 +133,36 @@ def simulate(
     if is_phase_history and plot is not None:
         raise click.UsageError("--plot draws images, and none is formed for a .cphd file.")
     spare([mission], [plot, output])
-    from bisar_budget.simulator.targets import Targets, parse_targets
+    from bisar_budget.front import imaging
+    from bisar_budget.mission.quantities import QuestionError
 
     try:
-        standing = Targets() if targets is None else parse_targets(targets)
-    except ValueError as error:
-        raise click.UsageError(f"--targets: {printable(str(error))}.") from None
+        standing = imaging.standing(targets)
+    except QuestionError as error:
+        raise click.UsageError(str(error)) from None
     (loaded,) = load_all([mission], changes=changes)
     if is_phase_history:
         _export(mission, loaded, str(output), standing)
         return
     from bisar_budget.report.drawing import point_plot
-    from bisar_budget.simulator.point import SimulationError, simulate_point
 
     try:
-        with watched(FORMING) as progress:
-
-            def foreseen(seconds: float) -> None:
-                foretell(
-                    seconds,
-                    f"Forming the images of {printable(loaded.name)}",
-                    "smaller errors, targets nearer to each other, no clutter and fewer collection.pulses take less"
-                    + faster(),
-                )
-
-            images = simulate_point(loaded, progress, image_former=image_former, targets=standing, foreseen=foreseen)
-    except (SimulationError, ValueError) as error:
+        found = imaging.simulate(loaded, standing, image_former=image_former).images
+    except (imaging.SimulationError, ValueError) as error:
         fail(f"{mission}: {error}")
     if output is not None:
-        write_file(output, point_plot.archive(images, changes))
+        write_file(output, point_plot.archive(found, changes))
     if plot is not None:
         title = f"{loaded.name} {changes_words(changes)}".rstrip()
-        write_file(plot, point_plot.drawn(images, title, os.path.splitext(plot)[1][1:].lower()))
-    deliver(point_plot.summary(images, loaded))
+        write_file(plot, point_plot.drawn(found, title, os.path.splitext(plot)[1][1:].lower()))
+    deliver(point_plot.summary(found, loaded))
 
 
 def _export(mission: str, loaded: "Mission", output: str, standing: "Targets") -> None:
     """Write the phase history, and say what is in it."""
     from bisar_budget.formats.containers import MissingExtraError
     from bisar_budget.formats.exporting import export_phase_history
-    from bisar_budget.simulator.point import SimulationError
+    from bisar_budget.front.imaging import SimulationError
 
     try:
         written = export_phase_history(loaded, standing)

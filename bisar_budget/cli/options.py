@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable
-from datetime import UTC, date, datetime
+from datetime import date, datetime
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from click import ParamType as ParamType
     from click.shell_completion import CompletionItem
 
-    from bisar_budget.budget.waivers import Outside
     from bisar_budget.faults import SetValue
+    from bisar_budget.findings.requirement import Outside
     from bisar_budget.settings import Settings
 else:
 
@@ -152,8 +152,7 @@ def settings_here(files: Files = DISK) -> "Settings | None":
 
 def outside(today: datetime | None) -> "Outside":
     """Gather the options of the command that bear on verdicts; `today` is the value of --date."""
-    from bisar_budget.budget.waivers import Outside
-    from bisar_budget.findings.requirement import Override
+    from bisar_budget.findings.requirement import Outside, Override
 
     context, found = click.get_current_context(), []
     for parameter in context.command.params:
@@ -174,17 +173,12 @@ def day_origin(today: datetime | None) -> str:
 
 def day(today: datetime | None) -> date:
     """Day on which waivers are judged: that of --date, else of SOURCE_DATE_EPOCH, else today, UTC."""
-    if today is not None:
-        return today.date()
-    epoch = os.environ.get("SOURCE_DATE_EPOCH")
-    if not epoch:
-        return datetime.now(UTC).date()
+    from bisar_budget.front.checks import day_of
+
     try:
-        if not (epoch.isascii() and epoch.isdigit()):
-            raise ValueError
-        return datetime.fromtimestamp(int(epoch), UTC).date()
-    except (ValueError, OverflowError, OSError):
-        raise click.UsageError(f"SOURCE_DATE_EPOCH must be seconds since 1970 (got {printable(epoch)!r})") from None
+        return day_of(today)
+    except ValueError as error:
+        raise click.UsageError(str(error)) from None
 
 
 def root_of_names() -> tuple[str, bool]:

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 import click
 
 from bisar_budget import __version__
-from bisar_budget.cli.long_work import watched
 from bisar_budget.cli.options import DATE, FILE, MODEL, SET, day, outside
 from bisar_budget.cli.streams import (
     EXIT_BROKEN,
@@ -32,7 +31,7 @@ from bisar_budget.constants import MAX_DAYS
 if TYPE_CHECKING:
     from bisar_budget.design.passes import Passes, SatellitePass
     from bisar_budget.faults import SetValue
-    from bisar_budget.mission.model import Mission
+    from bisar_budget.front.results import PassesResult
 
 _FORMATS = {".txt": "text", ".json": "json", ".csv": "csv", ".ics": "ics"}  # by the suffix of -o
 _MISSION = (".yaml", ".yml")
@@ -122,41 +121,37 @@ def passes(
             hold_to_suffixes(output, tuple(_FORMATS))
         format_name = _FORMATS.get(os.path.splitext(output or "")[1].lower() if not is_folder else "", "text")
     spare([mission], [None if is_folder else output, plot])
-    from bisar_budget.budget.waivers import overrides
-    from bisar_budget.design.passes import passes as passes_of
-    from bisar_budget.design.passes import start_of
     from bisar_budget.faults import MissionError
+    from bisar_budget.front import questions
     from bisar_budget.mission.load import load_mission
     from bisar_budget.mission.quantities import QuestionError
 
-    judged_on, from_outside = day(today), outside(today)
+    judged_on = day(today)
     least, wanted = _angle("--min-elevation", min_elevation, 0.0), _angle("--squint", squint, -90.0)
     (loaded,) = read_all([partial(load_mission, mission, model, changes, is_placed=False)])
     try:
-        with watched("Checking passes") as progress:
-            found = passes_of(
-                loaded,
-                start_of(start or judged_on.isoformat()),
-                days=days,
-                platform=platform,
-                min_elevation=least,
-                squint=wanted,
-                model=model,
-                today=judged_on,
-                progress=progress,
-            )
+        found = questions.passes(
+            loaded,
+            start or None,
+            days=days,
+            platform=platform,
+            min_elevation=least,
+            squint=wanted,
+            model=model,
+            date=judged_on,
+            outside=outside(today),
+        )
     except QuestionError as error:
         fail(f"{mission}: {error}")
     except MissionError as error:
         say_faults(error.file, error.faults)
         sys.exit(EXIT_USAGE)
-    found = found._replace(overrides=overrides(loaded, from_outside, judged_on))
     if is_folder and output is not None:
-        _write_missions(found, loaded, output, model, judged_on)
+        _write_missions(found, output, judged_on)
         output = None
     if plot is not None:
-        _draw(found, plot)
-    deliver(_written(found, format_name, output, judged_on), output, format_name)
+        write_file(plot, found.plot().of(os.path.splitext(plot)[1][1:].lower()))
+    deliver(_written(found.found, format_name, output, judged_on), output, format_name)
     sys.exit(0 if found.complying else EXIT_BROKEN)
 
 
@@ -184,26 +179,14 @@ def _written(found: "Passes", format_name: str, output: str | None, stamp: date)
     return pass_list.as_json(__version__, found) if format_name == "json" else pass_list.as_csv(found)
 
 
-def _draw(found: "Passes", plot: str) -> None:
-    from bisar_budget.report.drawing.figure import drawing_file
-    from bisar_budget.report.drawing.sky_plot import sky_plot
-    from bisar_budget.report.formats.pass_list import verdict
-
-    drawing = sky_plot(found, f"Passes over the scene of {found.name}", verdict(found))
-    write_file(plot, drawing_file(drawing, os.path.splitext(plot)[1][1:].lower()))
-
-
 # ---------------------------------------------------------------- a mission file for each pass
-def _write_missions(found: "Passes", mission: "Mission", folder: str, model: str | None, today: date) -> None:
+def _write_missions(found: "PassesResult", folder: str, today: date) -> None:
     """Write the mission of each pass that complies, none of them where one would not be checked to the same status.
 
     They are read first as they will lie there: files that they name are looked for from the folder.
     """
-    texts = {
-        os.path.join(folder, _name(one, mission.file)): _mission_text(one, mission, folder, model)
-        for one in found.complying
-    }
-    spare([mission.file], texts)
+    texts = {os.path.join(folder, _name(one, found.file)): found.mission_text(one, folder) for one in found.complying}
+    spare([found.file], texts)
     if not texts:
         complain(f"no mission file is written to {folder}: no pass complies")
         return
@@ -231,32 +214,16 @@ def _name(one: "SatellitePass", file: str) -> str:
     return f"{stem}_{time}Z{suffix}"
 
 
-def _mission_text(one: "SatellitePass", mission: "Mission", folder: str, model: str | None) -> str:
-    from bisar_budget.design.passes import center_time
-    from bisar_budget.faults import SetValue
-    from bisar_budget.mission.edited import in_folder, with_values
-
-    text = mission.data.decode("utf-8-sig")
-    of_model = [SetValue("allocation.model", model)] if model else []
-    at_mid_time = [] if one.center is None else center_time(one.center)
-    return with_values(text, [*mission.changes, *of_model, *in_folder(mission, folder), *at_mid_time])
-
-
 def _hold_to_statuses(passes: "Sequence[SatellitePass]", texts: dict[str, str], today: date) -> None:
     """Exit where a file cannot be read in its folder, or is checked to another status than its pass."""
-    from bisar_budget.budget.check import check_missions
     from bisar_budget.faults import MissionError
-    from bisar_budget.mission.load import parse_mission
+    from bisar_budget.front.checks import check
+    from bisar_budget.front.missions import loads
 
-    missions = []
-    for path, text in texts.items():
+    for one, (path, text) in zip(passes, texts.items(), strict=True):
         try:
-            missions.append(parse_mission(text, path))
+            status = check(loads(text, path), date=today).status
         except MissionError as error:
             fail(f"{path} is not written: {error.faults[0]}")
-    for place, findings in check_missions(missions, today):
-        if findings.status != passes[place].status:
-            path = missions[place].file
-            fail(
-                f"{path} is not written: in its folder it is checked to {findings.status}; does it name a part there?"
-            )
+        if status != one.status:
+            fail(f"{path} is not written: in its folder it is checked to {status}; does it name a part there?")

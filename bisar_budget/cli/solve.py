@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bisar_budget.cli.long_work import FORMING, foretell, watched, watched_checks
 from bisar_budget.cli.options import DATE, FILE, MISSIONS, MODEL, OUTPUT, SET, TEXT_OR_JSON, day, outside
 from bisar_budget.cli.streams import (
     EXIT_BROKEN,
@@ -23,8 +22,6 @@ from bisar_budget.cli.streams import (
 )
 
 if TYPE_CHECKING:
-    from bisar_budget.design.compare import Comparison
-    from bisar_budget.design.solve import Solution
     from bisar_budget.faults import SetValue
     from bisar_budget.mission.model import Mission
 
@@ -85,27 +82,17 @@ def solve(
     1 if no value of the range or no part complies or if the image refutes the limit (--verify), 2 for wrong usage or
     an unusable mission file.
     """
-    from bisar_budget.design.compare import compare_parts, is_of_parts
-    from bisar_budget.design.solve import solve as solved
+    from bisar_budget.front import questions
     from bisar_budget.report.formats import answers
 
-    of_parts = is_of_parts(key)
-    if of_parts and (between is not None or is_scale):
+    if questions.names_parts(key) and (between is not None or is_scale):
         option = "--scale" if is_scale else "--between"
         raise click.UsageError(f"{option}: {key} names parts of the catalogue, which are compared one by one.")
     files = expand(missions)
     spare(files, [output])
-
-    def ask(mission: "Mission", **asked: Any) -> "Solution | Comparison":
-        asked |= {"row": row, "target": target}
-        if of_parts:
-            return compare_parts(mission, key, **asked)
-        return solved(mission, key, between=between, is_scale=is_scale, **asked)
-
-    found = [
-        _imaged(mission, answer, model) if is_imaged else answer
-        for mission, answer in _answers(load_all(files, model, changes), model, today, ask)
-    ]
+    asked: dict[str, Any] = {"between": between, "scale": is_scale, "row": row, "target": target, "verify": is_imaged}
+    ask = partial(questions.solve, key=key, **asked)
+    found = list(_answers(load_all(files, model, changes), model, today, ask))
     deliver_found(answers, found, format_name, output)
     is_broken = any(one.status == "none" or (one.imaged and one.imaged.is_optimistic) for one in found)
     sys.exit(EXIT_BROKEN if is_broken else 0)
@@ -113,32 +100,16 @@ def solve(
 
 def _answers(
     missions: "Sequence[Mission]", model: str | None, today: datetime | None, ask: Callable[..., Any]
-) -> "Iterator[tuple[Mission, Any]]":
-    """Ask each mission in turn, with a bar; exits where one cannot be asked."""
-    from bisar_budget.budget.waivers import overrides
+) -> Iterator[Any]:
+    """Ask each mission in turn; exits where one cannot be asked."""
     from bisar_budget.mission.quantities import QuestionError
 
     judged_on, from_outside = day(today), outside(today)
     for mission in missions:
         try:
-            with watched_checks(mission.name) as progress:
-                found = ask(mission, model=model, today=judged_on, progress=progress)
+            yield ask(mission, model=model, date=judged_on, outside=from_outside).found
         except QuestionError as error:
             fail(f"{mission.file}: {error}")
-        yield mission, found._replace(overrides=overrides(mission, from_outside, judged_on))
-
-
-def _imaged(mission: "Mission", found: "Solution | Comparison", model: str | None) -> "Solution | Comparison":
-    """Add what images say of the solution."""
-    from bisar_budget.cli.images import faster
-    from bisar_budget.design.imaged import imaged, to_image
-
-    asked = to_image(mission, found, model)
-    if asked is None:
-        return found
-    foretell(asked.seconds, f"Forming the images of {asked.row}", "without --verify none is formed" + faster())
-    with watched(FORMING) as progress:
-        return found._replace(imaged=imaged(asked, progress))
 
 
 @click.command()
@@ -168,7 +139,7 @@ def sensitivity(
     smaller slant range. With balanced shares a second table says what relaxing an error costs the others. Exit code:
     0, or 2 for wrong usage or an unusable mission file.
     """
-    from bisar_budget.design.sensitivity import sensitivity as asked
+    from bisar_budget.front import questions
     from bisar_budget.report.formats import answers
 
     hold_to_suffixes(plot, (".svg", ".png", ".pdf"))
@@ -177,7 +148,7 @@ def sensitivity(
         raise click.UsageError("--plot draws one mission.")
     spare(files, [output, plot])
     loaded = load_all(files, model, changes)
-    found = [answer for _, answer in _answers(loaded, model, today, partial(asked, row=row))]
+    found = list(_answers(loaded, model, today, partial(questions.sensitivity, row=row)))
     if plot is not None:
         from bisar_budget.report.drawing.tornado import tornado
 

@@ -11,9 +11,17 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bisar_budget.faults import Fault, InvalidValueError, printable, shown
+from bisar_budget.faults import Fault, InvalidValueError, shown
 from bisar_budget.mission.changes import parts_of
-from bisar_budget.mission.quantities import Choices, Number, QuestionError, Varied, choices_of, number_of
+from bisar_budget.mission.quantities import (
+    Choices,
+    Number,
+    QuestionError,
+    TableError,
+    Varied,
+    choices_of,
+    number_of,
+)
 from bisar_budget.mission.readers import DIRECTION, TextList
 from bisar_budget.units import Dimension, normal_unit, parse_quantity
 
@@ -75,14 +83,6 @@ class CaseTable:
 
 
 Cases = Grid | CaseTable
-
-
-class TableError(QuestionError):
-    """A table of cases that cannot be read: one line `file:line:column: fault` for each fault."""
-
-    def __init__(self, file: str, faults: Sequence[Fault]) -> None:
-        self.lines = [f"{printable(file)}:{fault.line}:{fault.column}: {fault}" for fault in faults]
-        super().__init__("\n".join(self.lines))
 
 
 # ---------------------------------------------------------------- cases at hand as arrays
@@ -377,6 +377,19 @@ def _rounded(values: Floats) -> Floats:
 
 
 # ---------------------------------------------------------------- cases of a file
+def table_file(tree: dict[str, Any], path: str) -> CaseTable:
+    """Read the CSV of cases of a file, as `table` does; a `TableError` too where it is unreadable or too large."""
+    try:
+        with open(path, encoding="utf-8", newline="") as file:
+            text = file.read(LARGEST_TABLE + 1)
+    except (OSError, ValueError) as error:  # ValueError: not UTF-8, a NUL in the name
+        raise TableError.of_file(path, f"cannot be read: {getattr(error, 'strerror', None) or error}") from None
+    if len(text) > LARGEST_TABLE:
+        most = f"{LARGEST_TABLE >> 20} MiB; accepted: up to {MAX_VALUES} values"
+        raise TableError.of_file(path, f"is larger than {most}")
+    return table(tree, text, path)
+
+
 def table(tree: dict[str, Any], text: str, file: str) -> CaseTable:
     """Read a CSV of cases: a header `KEY [unit]` for each column, then one case in each line.
 
@@ -422,7 +435,7 @@ def table(tree: dict[str, Any], text: str, file: str) -> CaseTable:
     if not given and not faults:
         faults.append(Fault(place, 1, "", "the table has no case", accepted="accepted: lines below the header"))
     if faults:
-        raise TableError(file, faults)
+        raise TableError.of_faults(file, faults)
     values: list[Values] = []
     for one, column, known in zip(varied, np.array(given).reshape(-1, len(varied)).T, words, strict=True):
         if isinstance(one, Choices):
@@ -447,7 +460,7 @@ def _headed(tree: dict[str, Any], header: str, place: int, file: str) -> tuple[V
     """Keys of the header, numbers each with its unit."""
     if not header:
         accepted = "accepted: KEY [unit], KEY [unit], ..."
-        raise TableError(file, [Fault(place, 1, "", "has no header", accepted=accepted)])
+        raise TableError.of_faults(file, [Fault(place, 1, "", "has no header", accepted=accepted)])
     varied: dict[tuple[str, ...], Varied] = {}
     faults: list[Fault] = []
     for column, cell in _cells(header):
@@ -461,7 +474,7 @@ def _headed(tree: dict[str, Any], header: str, place: int, file: str) -> tuple[V
         except QuestionError as error:
             faults.append(Fault(place, column, "", str(error)))
     if faults:
-        raise TableError(file, faults[:_FAULTS])
+        raise TableError.of_faults(file, faults[:_FAULTS])
     return tuple(varied.values())
 
 

@@ -73,6 +73,18 @@ class Override(NamedTuple):
     origin: str
 
 
+class Outside(NamedTuple):
+    """Influences on all missions of a run: options that somebody gave, and where the day of waivers comes from."""
+
+    options: tuple[Override, ...] = ()
+    day_origin: str = "the caller"
+    is_day_given: bool = False  # by the option --date, which is said even where no waiver stands
+    set_origin: str = "command line"  # of values in place of the file's
+
+
+NOTHING_OUTSIDE = Outside()
+
+
 def unjudged(requirements: Sequence[JudgedRequirement]) -> list[JudgedRequirement]:
     """Requirements that could not be judged."""
     return [one for one in requirements if one.status == "not_evaluated"]

@@ -7,7 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from bisar_budget.design.cases import Grid, grid, grid_of
+from bisar_budget.design.cases import Cases, Grid, grid, table_file
+from bisar_budget.design.cases import grid_of as grid_of_arrays
+from bisar_budget.design.cases import sample as sample_of
 from bisar_budget.mission.given import is_quantity, magnitude, text_of
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.mission.model import Mission
@@ -80,25 +82,38 @@ def geomspace(start: Any, stop: Any, count: int) -> Spaced:
     return Spaced(text_of("", start), text_of("", stop), count, is_log=True)
 
 
-def cases_of(mission: Mission, values: Mapping[str, Any]) -> Grid:
-    """The cases of a sweep: every combination of the values of each key; the last key is the fastest.
+def cases_of(mission: Mission, values: Mapping[str, Any] | str | os.PathLike[str]) -> Cases:
+    """The cases of a sweep: every combination of the values of each key, the last key the fastest; or of a file.
 
     Parameters
     ----------
     mission : Mission
         As loaded.
-    values : mapping
+    values : mapping or path
         Of each key a range of `linspace`, an array of numbers in SI, a quantity that holds an array, or a list of
-        texts: values with units, or words.
+        texts: values with units, or words. Or a CSV file, whose header has a `KEY [unit]` for each column.
 
     Raises
     ------
     QuestionError
-        No such key, no number or word for it, no value.
+        No such key, no number or word for it, no value; of a file a `TableError`, which has a line for each fault.
     """
+    if not isinstance(values, Mapping):
+        return table_file(tree_of(mission), os.fspath(values))
+    return grid_of(mission, values)
+
+
+def grid_of(mission: Mission, values: Mapping[str, Any]) -> Grid:
+    """Every combination of values of keys, as `cases_of` takes them."""
     tree = tree_of(mission)
     each = [_axis(tree, key, given) for key, given in values.items()]
     return Grid(tuple(one.varied[0] for one in each), tuple(one.axes[0] for one in each))
+
+
+def cases_of_texts(mission: Mission, texts: Sequence[str], sample: str | None = None) -> Cases:
+    """The cases of texts such as `collection.aperture_time=1:5s:101`; every combination, or a sample of them."""
+    tree = tree_of(mission)
+    return grid(tree, texts) if sample is None else sample_of(tree, texts, sample)
 
 
 def _axis(tree: dict[str, Any], key: str, given: Any) -> Grid:
@@ -111,4 +126,4 @@ def _axis(tree: dict[str, Any], key: str, given: Any) -> Grid:
         return grid(tree, [f"{key}={','.join(text_of('', one) for one in given)}"], "sweep")
     if is_quantity(given):
         given = np.atleast_1d(magnitude(given, number_of(tree, key).dimension.si))
-    return grid_of(tree, {key: given})
+    return grid_of_arrays(tree, {key: given})

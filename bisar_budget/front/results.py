@@ -4,41 +4,39 @@ import json
 import os
 from base64 import b64encode
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from datetime import date
 from functools import cached_property
 from importlib import import_module
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from bisar_budget import __version__
-from bisar_budget.design.cases import Grid
-from bisar_budget.design.passes import Passes, SatellitePass
-from bisar_budget.design.sensitivity import Sensitivity
-from bisar_budget.design.solve import Solution
-from bisar_budget.design.table import Part, Swept
+from bisar_budget.faults import SetValue
 from bisar_budget.findings.images import VerifiedMission
 from bisar_budget.findings.mission import MissionFindings, Report
 from bisar_budget.findings.monte_carlo import MonteCarlo
 from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.findings.row import Row, unknown_id, worst_first
 from bisar_budget.findings.specification import SpecificationSheet
-from bisar_budget.findings.status import complying, exit_code
+from bisar_budget.findings.status import exit_code
 from bisar_budget.front import notebook
 from bisar_budget.mission.model import Mission
-from bisar_budget.mission.quantities import QuestionError
 from bisar_budget.report import FORMATS, Style, format_of, pictures, render
 from bisar_budget.report.words.requirements import declared_words, requirement_lines, verdict
 from bisar_budget.report.words.sentences import allowable_words, matters, percent, row_size, shown_use
 
 if TYPE_CHECKING:
+    from bisar_budget.design.compare import Comparison
+    from bisar_budget.design.offers import Offer
+    from bisar_budget.design.passes import Passes, SatellitePass
+    from bisar_budget.design.sensitivity import Sensitivity
+    from bisar_budget.design.solve import Solution
     from bisar_budget.simulator.point import PointImages
 
 _COMPLIES = ("fail", "pass")
 _DECIDING = 12  # rows of a result that a notebook shows
-_SHOWN = 10  # cases of a sweep without a drawing
 
 
 class MissingPackageError(ImportError):
@@ -98,7 +96,11 @@ class Picture:
         if kind not in ("svg", "png", "pdf"):
             raise ValueError(f"{os.fspath(path)}: the suffix must be one of .svg, .png, .pdf")
         with open(path, "wb") as file:
-            file.write(self._made(kind))
+            file.write(self.of(kind))
+
+    def of(self, kind: str) -> bytes:
+        """Content of a file of a kind, `svg`, `png` or `pdf`."""
+        return self._made(kind)
 
 
 def _as_png(png: bytes, words: str) -> str:
@@ -110,10 +112,12 @@ def _as_png(png: bytes, words: str) -> str:
 class CheckResult(Mapping[str, Row]):
     """Findings of a check: its rows by their ids, in the order of the contract.
 
-    `findings` are all of them, as the reports have them.
+    `findings` are all of them, as the reports have them; `model` and `day` are what they were asked with.
     """
 
     findings: MissionFindings
+    model: str | None
+    day: date
 
     def __repr__(self) -> str:
         """Mission, status and how many rows have which, on one line."""
@@ -192,9 +196,13 @@ class CheckResult(Mapping[str, Row]):
             suffixes = ", ".join(suffix for one in FORMATS.values() for suffix in one.suffixes)
             raise ValueError(f"{name}: the suffix must be one of {suffixes}")
         folder = f"{os.path.splitext(name)[0]}.assets" if FORMATS[form].has_pictures else ""
-        style = Style(detail=detail, assets=os.path.basename(folder))
-        text = render(form, self._report, style)
-        for picture, content in pictures(form, self._report, style).items():
+        style, shown = Style(detail=detail, assets=os.path.basename(folder)), self._report
+        if FORMATS[form].is_illustrated:
+            from bisar_budget.front.checks import with_sheets
+
+            shown = shown._replace(missions=tuple(with_sheets(shown.missions, self.model, self.day)))
+        text = render(form, shown, style)
+        for picture, content in pictures(form, shown, style).items():
             os.makedirs(folder, exist_ok=True)
             with open(os.path.join(folder, picture), "wb") as file:
                 file.write(content)
@@ -272,14 +280,22 @@ class _Answer:
 
 
 class SolveResult(_Answer):
-    """Values at which compliance begins or ends: `value` in SI, `crossings`, `status`, `nearest`."""
+    """Values at which compliance begins or ends: `value` in SI, `crossings`, `status`, `nearest`.
 
-    found: Solution
+    Where a key names parts of the catalogue: `parts`, those that comply first, `complying`, `status`.
+    """
+
+    found: "Solution | Comparison"
 
     def __repr__(self) -> str:
         """Key and value, on one line."""
-        value = "none" if self.found.value is None else f"{self.found.value:.6g} {self.found.unit}"
-        return f"<solve of {self.found.key} for {self.found.name!r}: {value}>"
+        return f"<solve of {self.found.key} for {self.found.name!r}: {self._said}>"
+
+    @property
+    def _said(self) -> str:
+        if (parts := getattr(self.found, "parts", None)) is not None:
+            return f"{len(self.complying)} of {len(parts)} parts comply"
+        return "none" if self.value is None else f"{self.value:.6g} {self.unit}"
 
     def _document(self) -> str:
         from bisar_budget.report.formats.answers import as_json
@@ -287,21 +303,28 @@ class SolveResult(_Answer):
         return as_json(__version__, [self.found])
 
     def _repr_html_(self) -> str:
-        found = self.found
-        rows = [
-            (one.inside.value, one.inside.row or "", _percent(one.inside.utilization), one.outside.row or "")
-            for one in found.crossings
-        ]
+        found, rows = self.found, list[tuple[object, ...]]()
+        if (parts := getattr(found, "parts", None)) is not None:
+            columns = ("part", "status", "worst row", "use")
+            for part in parts:
+                at = part.standing
+                rows.append((part.id, at.status, at.row or part.reason, _percent(at.utilization)))
+        else:
+            columns = (f"complies at [{self.unit}]", "worst row", "use", "breaks beyond by")
+            for one in self.crossings:
+                inside = one.inside
+                rows.append((inside.value, inside.row or "", _percent(inside.utilization), one.outside.row or ""))
+        title = f"{found.key} of {found.name}"
         return notebook.page(
-            notebook.heading(_COMPLIES[found.status != "none"], f"{found.key} of {found.name}", found.status),
-            notebook.table((f"complies at [{found.unit}]", "worst row", "use", "breaks beyond by"), rows),
+            notebook.heading(_COMPLIES[found.status != "none"], title, f"{found.status}: {self._said}"),
+            notebook.table(columns, rows),
         )
 
 
 class SensitivityResult(_Answer):
     """What each number does to the worst utilization: `slopes`, ranked."""
 
-    found: Sensitivity
+    found: "Sensitivity"
 
     def __repr__(self) -> str:
         """The number that matters most, on one line."""
@@ -323,10 +346,15 @@ class SensitivityResult(_Answer):
         return self.plot()._repr_html_()
 
 
+@dataclass(frozen=True, repr=False, eq=False)
 class AllocateResult(_Answer):
-    """Specifications that together meet every requirement: `specifications`, `complies`, `requirements`."""
+    """Specifications that together meet every requirement: `specifications`, `complies`, `requirements`.
+
+    `offer` says how the figures of another mission stand to them, where one was given.
+    """
 
     found: SpecificationSheet
+    offer: "Offer | None" = None
 
     def __repr__(self) -> str:
         """How many specifications, and whether the mission complies with them, on one line."""
@@ -336,7 +364,7 @@ class AllocateResult(_Answer):
     def _document(self) -> str:
         from bisar_budget.report.formats import specification_sheet as sheets
 
-        return sheets.as_json(__version__, [sheets.Answer(self.found)])
+        return sheets.as_json(__version__, [sheets.Answer(self.found, self.offer)])
 
     def to_dataframe(self, library: str | None = None) -> Any:
         """The specifications as a data frame; numbers in SI, lists of three where axes differ."""
@@ -382,10 +410,16 @@ class VerifyResult(_Answer):
         )
 
 
+@dataclass(frozen=True, repr=False, eq=False)
 class PassesResult(_Answer):
-    """Passes of a satellite, each with the verdict of the mission then: a sequence of them."""
+    """Passes of a satellite, each with the verdict of the mission then: a sequence of them.
 
-    found: Passes
+    `mission` and `model` are those that were asked about.
+    """
+
+    found: "Passes"
+    mission: Mission
+    model: str | None = None
 
     def __repr__(self) -> str:
         """How many passes comply, on one line."""
@@ -396,9 +430,19 @@ class PassesResult(_Answer):
         """Number of passes."""
         return len(self.found.found)
 
-    def __getitem__(self, place: int) -> SatellitePass:
+    def __getitem__(self, place: int) -> "SatellitePass":
         """A pass, counted from 0."""
         return self.found.found[place]
+
+    def mission_text(self, one: "SatellitePass", folder: str | os.PathLike[str]) -> str:
+        """Text of a mission file that takes the aperture in a pass; files that it names are found from a folder."""
+        from bisar_budget.design.passes import center_time
+        from bisar_budget.mission.edited import in_folder, with_values
+
+        of_model = [SetValue("allocation.model", self.model)] if self.model else []
+        at_mid_time = [] if one.center is None else center_time(one.center)
+        changes = [*self.mission.changes, *of_model, *in_folder(self.mission, os.fspath(folder)), *at_mid_time]
+        return with_values(self.mission.data.decode("utf-8-sig"), changes)
 
     def _document(self) -> str:
         from bisar_budget.report.formats.pass_list import as_json
@@ -416,8 +460,9 @@ class PassesResult(_Answer):
         from bisar_budget.report.drawing.sky_plot import sky_plot
         from bisar_budget.report.formats.pass_list import verdict
 
-        svg = sky_plot(self.found, self.found.name, verdict(self.found))
-        return Picture(self.found.name, lambda kind: drawing_file(svg, kind))
+        title = f"Passes over the scene of {self.found.name}"
+        svg = sky_plot(self.found, title, verdict(self.found))
+        return Picture(title, lambda kind: drawing_file(svg, kind))
 
     def _repr_html_(self) -> str:
         return self.plot()._repr_html_()
@@ -479,133 +524,3 @@ class SimulateResult:
         from bisar_budget.report.drawing.point_plot import drawn
 
         return notebook.page(_as_png(drawn(self.images, self._mission.name, "png"), "images of a point"))
-
-
-# ---------------------------------------------------------------------- a sweep
-@dataclass(repr=False, eq=False)
-class SweepResult:
-    """A mission checked for many values: its table, by `to_dataframe`, `to_xarray`, or as columns.
-
-    Cases are those of `mission` with the values of `cases`; they are checked when they are first asked for.
-    """
-
-    mission: Mission
-    cases: Grid
-    _ask: Callable[[Sequence[str]], Swept]
-    _columns: Sequence[str] = ()
-    _parts: list[Part] = field(default_factory=list)
-
-    def __repr__(self) -> str:
-        """Keys, number of cases and how many comply, on one line."""
-        keys = ", ".join(one.key for one in self.cases.varied)
-        return f"<sweep of {self.mission.name!r} over {keys}: {self.summary}>"
-
-    @cached_property
-    def _swept(self) -> Swept:
-        swept = self._ask(self._columns)
-        self._parts = list(swept.parts)
-        return replace(swept, parts=iter(()))
-
-    def _again(self) -> Swept:
-        swept = self._swept
-        return replace(swept, parts=iter(self._parts))
-
-    @cached_property
-    def columns(self) -> Mapping[str, Any]:
-        """Values of each column by its name, (cases,); what varies stands in the unit that it was asked for in."""
-        from bisar_budget.report.tables import Described
-
-        swept = self._again()
-        described = Described(swept, self.cases, self.mission, __version__)
-        parts = [described.values(part) for part in swept.parts]
-        return {one.name: np.concatenate([part[one.name] for part in parts]) for one in described.columns}
-
-    def __getitem__(self, name: str) -> Any:
-        """Values of a column, (cases,)."""
-        if name not in self.columns:
-            raise KeyError(f"{name}: no such column; accepted: {', '.join(self.columns)}")
-        return self.columns[name]
-
-    @property
-    def summary(self) -> str:
-        """How many cases there are, and how many comply."""
-        statuses = Counter(self["status"].tolist())
-        return f"{self.cases.count} cases, {complying(statuses)} comply"
-
-    def to_dataframe(self, library: str | None = None) -> Any:
-        """The table as a data frame of pandas, or of polars: what `sweep` writes as CSV."""
-        return frame_of({name: _plain(values) for name, values in self.columns.items()}, library)
-
-    def to_xarray(self, chunks: Any = None) -> Any:
-        """The table as `xarray.Dataset`, a dimension for each key, with units and long names (CF).
-
-        Parameters
-        ----------
-        chunks : optional
-            As `Dataset.chunk` takes them: arrays of Dask.
-
-        Raises
-        ------
-        MissingTablesError
-            xarray is not installed.
-        """
-        from bisar_budget.report.tables import dataset
-
-        found = dataset(self._again(), self.cases, self.mission)
-        return found if chunks is None else found.chunk(chunks)
-
-    def plot(self, column: str | None = None) -> Picture:
-        """One key as curves of utilization, two as a map of what complies.
-
-        Parameters
-        ----------
-        column : str, optional
-            Draw this column instead.
-
-        Raises
-        ------
-        QuestionError
-            There are more keys than a drawing has axes.
-        """
-        from functools import partial
-
-        from bisar_budget.report.drawing.figure import drawing_file
-        from bisar_budget.report.drawing.trade_drawing import head_of, trade_drawing
-        from bisar_budget.report.drawing.trades import Gathered, check_plot, uses_of_rows
-        from bisar_budget.report.tables import Described
-
-        check_plot(self.cases, is_polar=False)
-
-        def gathered(swept: Swept, more: Sequence[str] = (), drawn: str | None = None) -> Gathered:
-            described = Described(swept, self.cases, self.mission, __version__)
-            found = Gathered(described, ("binding_requirement", *more), column=drawn)
-            for part in swept.parts:
-                found.add(part)
-            return found
-
-        trade = gathered(self._again(), drawn=column).trade(is_polar=False)
-        rows = uses_of_rows(trade, lambda columns: gathered(self._ask(columns), columns))
-        keys = " and ".join(axis.key for axis in trade.axes)
-        svg = trade_drawing(
-            trade,
-            rows,
-            self.mission.file,
-            f"Trade study: {keys}, {self.mission.name}",
-            self.summary,
-            above=head_of(trade, self.mission, is_polar=False),
-        )
-        return Picture(f"{keys}, {self.mission.name}", partial(drawing_file, svg))
-
-    def _repr_html_(self) -> str:
-        try:
-            drawn = self.plot()._repr_html_()
-        except QuestionError:
-            names = list(self.columns)
-            rows = zip(*(self.columns[name][:_SHOWN] for name in names), strict=True)
-            drawn = notebook.table(names, rows)
-        return notebook.page(drawn, notebook.note(f"{self.mission.name}: {self.summary}"))
-
-
-def _plain(values: Any) -> Any:
-    """Texts as a list, numbers as they are."""
-    return values.tolist() if values.dtype == object else values

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bisar_budget import units
-from bisar_budget.faults import InvalidValueError, Problem, fault_words, shown
+from bisar_budget.faults import Fault, InvalidValueError, Problem, fault_words, printable, shown
 from bisar_budget.mission.changes import (
     ACCEPTED_ERRORS,
     apply_changes,
@@ -48,6 +48,24 @@ FACTOR = Quantity(units.RATIO, gt=0, ge=1e-12, le=1e12)
 
 class QuestionError(Exception):
     """A question that cannot be asked of a mission; the message says why, and what can."""
+
+
+class TableError(QuestionError):
+    """A table of cases that cannot be read; `lines` says each fault, `file:line:column: fault`."""
+
+    def __init__(self, lines: Sequence[str]) -> None:
+        self.lines = list(lines)
+        super().__init__("\n".join(self.lines))
+
+    @classmethod
+    def of_faults(cls, file: str, faults: Sequence[Fault]) -> "TableError":
+        """An error of places in a file."""
+        return cls([f"{printable(file)}:{fault.line}:{fault.column}: {fault}" for fault in faults])
+
+    @classmethod
+    def of_file(cls, file: str, problem: str) -> "TableError":
+        """An error of the whole file."""
+        return cls([f"Error: {printable(file)}: {printable(problem)}"])
 
 
 class Number(NamedTuple):

@@ -1,13 +1,16 @@
 """`bisar-budget sweep`: its table is what `check` says case by case, its files are whole or not there."""
 
 import csv
+import fcntl
 import json
 import math
 import os
 import pty
 import signal
+import struct
 import subprocess
 import sys
+import termios
 import time
 from collections.abc import Callable, Iterator
 from datetime import date
@@ -16,9 +19,10 @@ from typing import Any
 
 import pytest
 
-from bisar_budget.cli import sweep as command
 from bisar_budget.design import sweep as engine
-from bisar_budget.design.table import Part, Swept
+from bisar_budget.design.table import Part
+from bisar_budget.front.progress import lasting
+from bisar_budget.front.sweeps import part_of
 from tests.conftest import ROOT, heed_signals, mission_text
 
 SECTION_V = str(ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml")
@@ -183,11 +187,11 @@ def test_very_many_cases_are_started_only_by_force(run, tmp_path: Path) -> None:
     ("seconds", "words"), [(0.1, "1 s"), (119, "119 s"), (121, "2 minutes"), (9e3, "2 hours"), (1e6, "12 days")]
 )
 def test_how_long(seconds: float, words: str) -> None:
-    assert command.lasting(seconds) == words
+    assert lasting(seconds) == words
 
 
 def test_parts_of_a_whole() -> None:
-    assert [command._part(some, 10**6) for some in (0, 1, 233_000, 999_999, 10**6)] == [
+    assert [part_of(some, 10**6) for some in (0, 1, 233_000, 999_999, 10**6)] == [
         "0 %",
         "0.1 %",
         "23.3 %",
@@ -201,18 +205,13 @@ def test_parts_of_a_whole() -> None:
 def test_what_ends_in_the_middle_leaves_no_half_file(
     run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, suffix: str, error: type[BaseException]
 ) -> None:
-    whole = engine.sweep
+    whole = engine.Asked.shared_out
 
-    def broken(*args: Any, **kwargs: Any) -> Swept:
-        swept = whole(*args, **kwargs)
+    def broken(*args: Any, **kwargs: Any) -> Iterator[Part]:
+        yield next(whole(*args, **kwargs))
+        raise error
 
-        def parts() -> Iterator[Part]:
-            yield next(swept.parts)
-            raise error
-
-        return Swept(**{**vars(swept), "parts": parts()})
-
-    monkeypatch.setattr(engine, "sweep", broken)
+    monkeypatch.setattr(engine.Asked, "shared_out", broken)
     output = tmp_path / f"t{suffix}"
     output.write_text("what was there")
     found = run("sweep", SECTION_V, "--vary", f"{TIME}=1:6s:9", "-o", str(output))
@@ -260,14 +259,22 @@ def test_nobody_reads_on(run) -> None:
 
 
 def test_a_terminal_has_a_bar(tmp_path: Path) -> None:
-    master, slave = pty.openpty()
-    with started("--vary", f"{TIME}=1:2s:200", "-o", str(tmp_path / "t.csv"), stderr=slave) as process:
+    """What takes longer than a second has one."""
+    master, slave = terminal()
+    with started("--vary", f"{TIME}=1:2s:300000", "-o", str(tmp_path / "t.csv"), stderr=slave) as process:
         os.close(slave)
         shown = read_all(lambda: os.read(master, 65536))
         assert process.wait(timeout=120) == 0
     os.close(master)
     assert "Checking cases" in shown
-    assert "200 cases" in shown
+    assert "300000 cases" in shown
+
+
+def terminal() -> tuple[int, int]:
+    """Both ends of a terminal of 80 columns."""
+    master, slave = pty.openpty()
+    fcntl.ioctl(slave, termios.TIOCSWINSZ, struct.pack("4H", 24, 80, 0, 0))
+    return master, slave
 
 
 def read_all(read: Callable[[], bytes]) -> str:

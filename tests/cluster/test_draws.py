@@ -1,7 +1,6 @@
 """Draws on the workers of a scheduler: the bytes of draws without one, whoever is lost, and clear words otherwise."""
 
 import os
-import pty
 import random
 import signal
 import subprocess
@@ -15,13 +14,13 @@ pytest.importorskip("distributed")
 pytest.importorskip("pyarrow")
 
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.cli import long_work
 from bisar_budget.cluster.scheduler import Workers, connected
+from bisar_budget.front import progress, shared_work
 from bisar_budget.mission.load import load_mission
 from bisar_budget.sampling import draws as drawing
 from bisar_budget.sampling.draws import Drawing, in_turn, joined, shared_out
 from bisar_budget.sampling.probability import monte_carlo
-from tests.cli.test_sweep import read_all
+from tests.cli.test_sweep import read_all, terminal
 from tests.cluster.conftest import Cluster, wait_until
 from tests.cluster.test_scheduler import Client
 from tests.conftest import ROOT, heed_signals
@@ -123,8 +122,8 @@ def test_how_many_draws_one_machine_makes(run) -> None:
 
 
 def test_a_terminal_has_a_bar() -> None:
-    master, slave = pty.openpty()
-    line = [sys.executable, "-m", "bisar_budget", "check", "-q", DRONES, "--monte-carlo", "1e5"]
+    master, slave = terminal()
+    line = [sys.executable, "-m", "bisar_budget", "check", "-q", DRONES, "--monte-carlo", "2e7"]
     with subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=slave) as process:
         os.close(slave)
         shown = read_all(lambda: os.read(master, 65536))
@@ -135,9 +134,9 @@ def test_a_terminal_has_a_bar() -> None:
 
 def test_how_long_many_draws_take(run, monkeypatch: pytest.MonkeyPatch) -> None:
     """By the time of some of them, shared by as many threads as there are."""
-    monkeypatch.setattr(long_work, "_MANY", 10_000)
-    monkeypatch.setattr(long_work, "_TRIAL", 0.001)
-    monkeypatch.setattr(long_work, "LONG", 0.0)
+    monkeypatch.setattr(shared_work, "_MANY", 10_000)
+    monkeypatch.setattr(progress, "_TRIAL", 0.001)
+    monkeypatch.setattr(progress, "LONG", 0.0)
     found = run("check", "-q", DRONES, "--monte-carlo", "20e3")
     assert found.stderr.startswith("20,000 draws of Two drones with the same GNSS will take about ")
     assert found.stderr.endswith(" s.\n")

@@ -19,7 +19,7 @@ pytest.importorskip("distributed")
 pytest.importorskip("pyarrow")
 
 from bisar_budget import __version__
-from bisar_budget.cli import cli, long_work
+from bisar_budget.cli import cli
 from bisar_budget.cli.streams import complain
 from bisar_budget.cluster import scheduler
 from bisar_budget.cluster.scheduler import UnlikeWorkerError, Workers
@@ -347,7 +347,7 @@ def test_a_worker_that_comes_in_time_does_the_work(
     with LocalCluster(n_workers=0, processes=False, dashboard_address="127.0.0.1:0", protocol="tcp") as empty:
         later = threading.Timer(0.5, empty.scale, (1,))
         # It is started when the command says that it waits.
-        monkeypatch.setattr(long_work, "complain", lambda text: (complain(text), later.start()))
+        monkeypatch.setattr("bisar_budget.cli.complain", lambda text: (complain(text), later.start()))
         found = run(*ASKED, "-o", str(output), "--scheduler", empty.scheduler_address)
         later.join()
     assert found.exit_code == 0, found.stderr

@@ -14,11 +14,11 @@ import pytest
 
 from bisar_budget import evaluators
 from bisar_budget.budget.check import check_mission
-from bisar_budget.cli.long_work import watched_checks
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.design import sensitivity as asking
 from bisar_budget.design.sensitivity import Sensitivity, Slope
 from bisar_budget.faults import SetValue
+from bisar_budget.front.progress import watched_checks
 from bisar_budget.mission.changes import read_changes
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.mission.model import names_parts
@@ -312,7 +312,7 @@ class TestProgress:
         errors = StringIO()
         monkeypatch.setattr(errors, "isatty", lambda: is_watched)
         monkeypatch.setattr("sys.stderr", errors)
-        monkeypatch.setattr("bisar_budget.cli.long_work._MOMENT", moment)
+        monkeypatch.setattr("bisar_budget.front.progress._MOMENT", moment)
         with watched_checks("Section V") as progress:
             for done in range(1, 4):
                 progress(done, 3)

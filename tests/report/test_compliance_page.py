@@ -13,8 +13,8 @@ from pathlib import Path
 
 import pytest
 
-from bisar_budget.cli.studies import with_studies
 from bisar_budget.findings.mission import Report, UnusableMission
+from bisar_budget.front.checks import with_studies
 from bisar_budget.report import Style, render
 from tests.conftest import ROOT, findings
 from tests.report.test_report_compliance import EVERY_KEY, FAULT, SECTION_V, found_in, illustrated

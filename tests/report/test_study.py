@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bisar_budget.cli.studies import with_studies
 from bisar_budget.findings.mission import MissionFindings
+from bisar_budget.front.checks import with_studies
 from bisar_budget.report.drawing.trades import level_lines
 from tests.conftest import ROOT
 from tests.drawing import Drawing

@@ -9,9 +9,9 @@ import pytest
 
 from bisar_budget.budget.check import check_mission
 from bisar_budget.budget.verdicts import rows_worth_showing
-from bisar_budget.cli.check import check_all
 from bisar_budget.findings.images import FLOOR_DB, ImageEvidence, Verdict
 from bisar_budget.findings.mission import Report
+from bisar_budget.front.checks import checked
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.report import Style, render
 from bisar_budget.simulator.collection import RANGE_CELLS
@@ -225,11 +225,10 @@ class TestRowsWorthShowing:
 @pytest.mark.parametrize("illustrated", [True, False])
 def test_only_a_report_that_shows_images_keeps_them(illustrated: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
-        "bisar_budget.cli.images.verify_all",
+        "bisar_budget.front.imaging.verify_all",
         lambda missions, *_: [verify_mission(m, "transmitter.acceleration.x") for m in missions],
     )
-    report = check_all([str(SECTION_V)], TODAY, None, True, illustrated)
-    (mission,) = report.missions
+    (mission,) = checked([str(SECTION_V)], TODAY, is_verified=True, is_illustrated=illustrated)
     assert [one.verdict.id for one in mission.image_evidence] == ["transmitter.acceleration.x"] * illustrated
     # Images are no part of the JSON contract.
     document = json.loads(render("json", Report(version="", missions=(mission,)), Style()))

@@ -1,6 +1,6 @@
 """The content of a drawing of a sweep, as arrays."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -77,6 +77,12 @@ class Gathered:
         """Take what is needed of a part."""
         for name, pieces in self.found.items():
             pieces.append(self.described.said(name, part.values[name]))
+
+    def passing(self, parts: Iterable[Part]) -> Iterator[Part]:
+        """Hand parts on, and take what is needed of each."""
+        for part in parts:
+            self.add(part)
+            yield part
 
     def trade(self, *, is_polar: bool = False) -> Trade:
         """Lay it out; the azimuth first in a polar map."""

@@ -1,0 +1,316 @@
+"""Checks of missions, and what their reports may show besides: draws, verdicts of images, studies, specifications."""
+
+import datetime as dt
+import os
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any, cast
+
+from bisar_budget import __version__
+from bisar_budget.budget.check import check_files, check_mission, whole, without_analysis
+from bisar_budget.faults import SetValue, printable
+from bisar_budget.findings.mission import FileWarning, MissionFindings, UnusableMission
+from bisar_budget.findings.requirement import NOTHING_OUTSIDE, Outside, Override
+from bisar_budget.findings.status import complying
+from bisar_budget.front.progress import watched
+from bisar_budget.mission.load import parse_mission
+from bisar_budget.mission.model import Mission
+from bisar_budget.mission.quantities import QuestionError, tree_of
+from bisar_budget.phrases import no_specifications
+from bisar_budget.report import Piece, Style, piece
+from bisar_budget.resources import cores
+
+if TYPE_CHECKING:
+    from bisar_budget.budget.check import Draws
+    from bisar_budget.design.cases import Cases, Grid
+    from bisar_budget.front.results import CheckResult
+    from bisar_budget.report.drawing.trades import Gathered
+
+MAX_CASES = 40_000  # of a study: a page has no room for more
+_CALLER = "the caller"
+_OPTION = "--sweep"
+
+Found = MissionFindings | UnusableMission
+
+
+# ---------------------------------------------------------------------- the day, and where it comes from
+def day_of(given: str | dt.date | None) -> dt.date:
+    """Day on which waivers are judged: one that is given, else of SOURCE_DATE_EPOCH, else today, UTC.
+
+    Raises
+    ------
+    ValueError
+        It is no day.
+    """
+    if isinstance(given, dt.datetime):
+        return given.date()
+    if given is not None:
+        return given if isinstance(given, dt.date) else dt.date.fromisoformat(given)
+    epoch = os.environ.get("SOURCE_DATE_EPOCH")
+    if not epoch:
+        return dt.datetime.now(dt.UTC).date()
+    try:
+        if not (epoch.isascii() and epoch.isdigit()):
+            raise ValueError
+        return dt.datetime.fromtimestamp(int(epoch), dt.UTC).date()
+    except (ValueError, OverflowError, OSError):
+        raise ValueError(f"SOURCE_DATE_EPOCH must be seconds since 1970 (got {printable(epoch)!r})") from None
+
+
+def outside_of(model: str | None, given: str | dt.date | None) -> Outside:
+    """Influences of a question's arguments on its verdict."""
+    options = () if model is None else (Override("--model", model, _CALLER),)
+    origin = "environment, SOURCE_DATE_EPOCH" if os.environ.get("SOURCE_DATE_EPOCH") else "the day of the run"
+    return Outside(options, _CALLER if given is not None else origin, given is not None, _CALLER)
+
+
+# ---------------------------------------------------------------------- one mission
+def check(
+    mission: Mission,
+    *,
+    model: str | None = None,
+    date: str | dt.date | None = None,
+    monte_carlo: int | None = None,
+    seed: int | None = None,
+    verify: bool = False,
+    sweep: Mapping[str, Any] | None = None,
+    outside: Outside | None = None,
+) -> "CheckResult":
+    """Check a mission against its requirements.
+
+    Parameters
+    ----------
+    mission : Mission
+        Of `load`, `loads` or `Mission.replace`.
+    model : str, optional
+        `published`, `full` or `strictest` in place of the mission's own.
+    date : str or date, optional
+        Day on which waivers are judged; omitted: that of SOURCE_DATE_EPOCH, else today, UTC.
+    monte_carlo : int, optional
+        Also draw the errors so often, and report how often each requirement holds; `seed` is as of `monte_carlo`.
+    verify : bool
+        Also form images at the limits, and judge by them.
+    sweep : mapping, optional
+        For the report: other values of one key or two, as of `sweep`.
+    outside : Outside, optional
+        Where model and day come from; omitted: the caller.
+
+    Raises
+    ------
+    MissionError
+        The model is none.
+    QuestionError
+        The sweep cannot be asked of this mission.
+    """
+    from bisar_budget.front.results import CheckResult
+
+    today, given = day_of(date), outside or outside_of(model, date)
+    if model is not None:
+        mission = parse_mission(mission.data, mission.file, model, changes=mission.changes)
+    found = check_mission(mission, today, outside=given)
+    if monte_carlo is not None:
+        from bisar_budget.front.shared_work import drawn_by
+        from bisar_budget.sampling.probability import monte_carlo as drawn
+
+        with drawn_by(None, 0, monte_carlo, seed) as draws:
+            found = found._replace(monte_carlo=draws and drawn(found.analysed(), *draws))
+    if verify:
+        found = cast("MissionFindings", with_images([found], today, is_illustrated=True)[0])
+    if sweep:
+        found = cast("MissionFindings", with_studies([found], sweep, model, today)[0])
+    return CheckResult(found, model, today)
+
+
+# ---------------------------------------------------------------------- many files
+def checked(
+    files: Sequence[str],
+    today: dt.date,
+    *,
+    model: str | None = None,
+    changes: Sequence[SetValue] = (),
+    outside: Outside = NOTHING_OUTSIDE,
+    drawn: "Draws | None" = None,
+    is_verified: bool = False,
+    swept: Sequence[str] = (),
+    is_illustrated: bool = False,
+) -> list[Found]:
+    """Check files, with all that a report shows.
+
+    Parameters
+    ----------
+    files : sequence of str
+        Names of mission files; `-` is standard input.
+    today : date
+        Day on which waivers are judged, UTC.
+    model, changes, outside
+        As of `check_files`.
+    drawn : Draws, optional
+        Of a Monte Carlo.
+    is_verified : bool
+        Whether images at the limits add their verdicts.
+    swept : sequence of str
+        Texts `KEY=VALUES` of a study.
+    is_illustrated : bool
+        Whether the report has room for pictures: analyses and images are kept, sheets of specifications added.
+
+    Raises
+    ------
+    QuestionError
+        The study cannot be asked of a mission; the message begins with its file.
+    """
+    keep = whole if is_verified or is_illustrated else without_analysis
+    found = check_files(files, today, model, keep, drawn=drawn, changes=changes, outside=outside)
+    if is_verified:
+        found = with_images(found, today, is_illustrated=is_illustrated)
+    if swept:
+        found = with_studies(found, swept, model, today)
+    return with_sheets(found, model, today) if is_illustrated else found
+
+
+def pieces(
+    files: Sequence[str],
+    today: dt.date,
+    format_name: str,
+    style: Style,
+    *,
+    model: str | None = None,
+    changes: Sequence[SetValue] = (),
+    outside: Outside = NOTHING_OUTSIDE,
+) -> list[Piece]:
+    """Check files for a report that is joined of a text for each mission: no findings are kept."""
+    keep = partial(piece, format_name=format_name, style=style)
+    return check_files(files, today, model, keep, changes=changes, outside=outside)
+
+
+# ---------------------------------------------------------------------- images
+def with_images(missions: Sequence[Found], today: dt.date, *, is_illustrated: bool) -> list[Found]:
+    """Add the verdicts of images, and where pictures are shown the images of the rows that decide most."""
+    from bisar_budget.budget.verdicts import with_verdicts
+    from bisar_budget.front import imaging
+    from bisar_budget.verifier.limits import form_image_evidence
+
+    usable = [found.analysed().mission for found in missions if isinstance(found, MissionFindings)]
+    verified = iter(imaging.verify_all(usable) if usable else ())
+    result: list[Found] = []
+    for found in missions:
+        if isinstance(found, MissionFindings):
+            found = with_verdicts(found, next(verified), today)
+            if is_illustrated:
+                found = found._replace(image_evidence=form_image_evidence(found.analysed().mission, found))
+            else:
+                found = found._replace(analysis=None)
+        result.append(found)
+    return result
+
+
+# ---------------------------------------------------------------------- studies
+def with_studies(
+    missions: Sequence[Found], asked: Sequence[str] | Mapping[str, Any], model: str | None, today: dt.date
+) -> list[Found]:
+    """Add to each mission that can be used what a sweep of it finds; `asked` are texts `KEY=VALUES`, or a mapping.
+
+    Raises
+    ------
+    QuestionError
+        One cannot be asked; the message begins with its file.
+    """
+    from bisar_budget.findings.trade import TradeStudy
+    from bisar_budget.report.drawing.trades import uses_of_rows
+
+    usable = [found.analysed().mission for found in missions if isinstance(found, MissionFindings)]
+    all_cases = [_of(mission, study_cases, mission, asked) for mission in usable]
+    done, total = 0, sum(cases.count for cases in all_cases)
+    studies = []
+    with watched("Checking cases") as progress:
+
+        def advance(cases: int) -> None:
+            nonlocal done
+            done += cases
+            progress(done, total)
+
+        for mission, cases in zip(usable, all_cases, strict=True):
+            again = partial(gathered, mission, cases, model, today)
+            trade = _of(mission, again, (), advance).trade()
+            rows = _of(mission, uses_of_rows, trade, again)
+            counts = Counter(trade.values["status"].ravel().tolist())
+            study = TradeStudy(
+                asked=tuple(asked),
+                trade=trade,
+                rows=rows,
+                cases=cases.count,
+                complying=complying(counts),
+                unevaluated=counts["not_evaluated"],
+                missing=counts["error"],
+                day=today,
+                model=model,
+            )
+            studies.append(study)
+    left = iter(studies)
+    return [one._replace(study=next(left)) if isinstance(one, MissionFindings) else one for one in missions]
+
+
+def _of(mission: Mission, ask: Callable[..., Any], *arguments: Any) -> Any:
+    """An answer about a mission; what cannot be asked names its file."""
+    try:
+        return ask(*arguments)
+    except QuestionError as error:
+        raise QuestionError(f"{mission.file}: {error}") from None
+
+
+def study_cases(mission: Mission, asked: Sequence[str] | Mapping[str, Any]) -> "Grid":
+    """Cases of a study: each key has several values, and a page can show them all."""
+    from bisar_budget.design.cases import grid
+    from bisar_budget.front.missions import grid_of
+
+    cases = grid_of(mission, asked) if isinstance(asked, Mapping) else grid(tree_of(mission), asked, _OPTION)
+    for one, size in zip(cases.varied, cases.shape, strict=True):
+        if size < 2:
+            raise QuestionError(f"{_OPTION} {one.key}: has one value; accepted: several. --set puts in one")
+    if cases.count > MAX_CASES:
+        raise QuestionError(
+            f"{_OPTION}: {cases.count} cases; accepted: up to {MAX_CASES}, for which a page has room. "
+            "`bisar-budget sweep` checks more"
+        )
+    return cases
+
+
+def gathered(
+    mission: Mission,
+    cases: "Cases",
+    model: str | None,
+    today: dt.date,
+    columns: Sequence[str],
+    advance: Callable[[int], None] = lambda _: None,
+    jobs: int | None = None,
+) -> "Gathered":
+    """Check all cases, and gather what a drawing needs, and some columns; `advance` is told how many are done."""
+    from bisar_budget.design.sweep import sweep
+    from bisar_budget.report.drawing.trades import Gathered
+    from bisar_budget.report.tables import Described
+
+    swept = sweep(mission, cases, columns=columns, model=model, today=today, jobs=jobs or cores())
+    found = Gathered(Described(swept, cases, mission, __version__), ("binding_requirement", *columns))
+    for part in swept.parts:
+        found.add(part)
+        advance(part.stop - part.start)
+    return found
+
+
+# ---------------------------------------------------------------------- specifications
+def with_sheets(missions: Sequence[Found], model: str | None, today: dt.date) -> list[Found]:
+    """Add the sheet of specifications to each mission whose file names what to specify, or say why there is none."""
+    return [_with_sheet(found, model, today) if isinstance(found, MissionFindings) else found for found in missions]
+
+
+def _with_sheet(found: MissionFindings, model: str | None, today: dt.date) -> MissionFindings:
+    mission = found.analysed().mission
+    if not mission.allocation.specify:
+        return found
+    from bisar_budget.design.allocate import allocate
+
+    try:
+        return found._replace(sheet=allocate(mission, model=model, today=today))
+    except QuestionError as error:
+        said = FileWarning(mission.line(("allocation", "specify")), no_specifications(str(error)))
+        return found._replace(warnings=(*found.warnings, said))

@@ -1,0 +1,130 @@
+"""Images of a mission: at its limits, and with its declared errors."""
+
+from collections.abc import Sequence
+from datetime import date
+from typing import TYPE_CHECKING
+
+from bisar_budget.budget.waivers import overrides
+from bisar_budget.faults import printable
+from bisar_budget.findings.images import VerifiedMission
+from bisar_budget.findings.requirement import NOTHING_OUTSIDE, Outside
+from bisar_budget.findings.row import where_ids_are
+from bisar_budget.front.checks import outside_of
+from bisar_budget.front.progress import FORMING, foretell, watched
+from bisar_budget.front.results import SimulateResult, VerifyResult
+from bisar_budget.mission.model import Mission
+from bisar_budget.mission.quantities import QuestionError
+from bisar_budget.resources import cores
+from bisar_budget.simulator.image_formation import is_compiled
+from bisar_budget.simulator.point import SimulationError as SimulationError
+from bisar_budget.simulator.point import simulate_point
+from bisar_budget.simulator.targets import Targets, parse_targets
+from bisar_budget.verifier.limits import rows_to_verify, seconds_to_verify, verify_mission
+
+if TYPE_CHECKING:
+    from bisar_budget.cluster.scheduler import Workers
+
+
+def verify(mission: Mission, only: str = "*", *, jobs: int | None = None) -> VerifyResult:
+    """Form images at the limits of a mission, and measure whether they are true.
+
+    Parameters
+    ----------
+    mission : Mission
+        As of `check`.
+    only : str
+        Glob of row ids.
+    jobs : int, optional
+        Processes; omitted: the number of cores, or 1 with the extra `fast`, which uses all cores itself.
+
+    Raises
+    ------
+    QuestionError
+        No row with a limit has such an id.
+    """
+    (found,) = verify_all([mission], only, jobs, outside=outside_of(None, None))
+    return VerifyResult(found)
+
+
+def verify_all(
+    missions: Sequence[Mission],
+    only: str = "*",
+    jobs: int | None = None,
+    workers: "Workers | None" = None,
+    *,
+    outside: Outside = NOTHING_OUTSIDE,
+) -> list[VerifiedMission]:
+    """Verify missions in processes here, or on workers of a scheduler; arguments and faults are those of `verify`."""
+    total = sum(len(rows_to_verify(mission, only)) for mission in missions)
+    if not total and only != "*":
+        listed = where_ids_are(missions[0].file)
+        raise QuestionError(f"--only {printable(only)}: no row with a limit matches, nothing was verified; {listed}.")
+    jobs = workers.threads if workers else jobs or (1 if is_compiled() else cores())
+    seconds = sum(seconds_to_verify(mission, only, jobs) for mission in missions)
+    advice = "--only looks at some of them" + faster(None if workers else jobs)
+    foretell(seconds, f"Forming the images of {total} rows", advice)
+    found: list[VerifiedMission] = []
+    with watched(FORMING) as progress:
+        for mission in missions:
+            before = sum(len(one.rows) for one in found)
+
+            def formed(done: int, _: int, before: int = before) -> None:
+                progress(before + done, total)
+
+            images = verify_mission(mission, only, jobs, formed, workers.mapped if workers else None)
+            said = overrides(mission._replace(waivers=()), outside, date.min)  # images waive nothing
+            found.append(images._replace(overrides=said))
+    return found
+
+
+def faster(jobs: int | None = None) -> str:
+    """Say what would make image formation faster here."""
+    if not is_compiled():
+        return ", and pip install 'bisar-budget[fast]' makes it tens of times faster"
+    return f", --jobs {cores()} uses all cores" if jobs is not None and 1 < jobs < cores() else ""
+
+
+def standing(targets: str | None) -> Targets:
+    """Targets that a text says; one point at the scene's centre without it.
+
+    Raises
+    ------
+    QuestionError
+        It says none; the message begins with `--targets`.
+    """
+    try:
+        return Targets() if targets is None else parse_targets(targets)
+    except ValueError as error:
+        raise QuestionError(f"--targets: {printable(str(error))}.") from None
+
+
+def simulate(
+    mission: Mission, targets: str | Targets | None = None, *, image_former: str = "backprojection"
+) -> SimulateResult:
+    """Form the image of a point, or of a scene, with the declared errors, before and after autofocus.
+
+    Parameters
+    ----------
+    mission : Mission
+        As of `check`.
+    targets : str, optional
+        What stands in the scene, as `simulate --targets` has it; omitted: one point at its centre.
+    image_former : str
+        `backprojection`, `polar_format`, `matched_filter` or `far_field`.
+
+    Raises
+    ------
+    QuestionError
+        The targets are none.
+    SimulationError
+        The images cannot be formed as asked; says what to change.
+    """
+
+    def foreseen(seconds: float) -> None:
+        advice = "smaller errors, targets nearer to each other, no clutter and fewer collection.pulses take less"
+        foretell(seconds, f"Forming the images of {printable(mission.name)}", advice + faster())
+
+    scene = targets if isinstance(targets, Targets) else standing(targets)
+    with watched(FORMING) as progress:
+        images = simulate_point(mission, progress, image_former=image_former, targets=scene, foreseen=foreseen)
+    return SimulateResult(images, mission)

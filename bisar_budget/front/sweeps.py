@@ -1,0 +1,242 @@
+"""A mission checked in many cases: a table, a drawing, a line that says how many comply."""
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from dataclasses import dataclass, field, replace
+from datetime import date
+from functools import cached_property, partial
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bisar_budget import __version__
+from bisar_budget.design.cases import Cases, some_of
+from bisar_budget.design.sweep import Asked
+from bisar_budget.design.sweep import sweep as swept_by
+from bisar_budget.design.table import Part, Swept
+from bisar_budget.faults import printable
+from bisar_budget.findings.requirement import Override
+from bisar_budget.findings.status import complying
+from bisar_budget.front import notebook, progress
+from bisar_budget.front.checks import gathered
+from bisar_budget.front.results import Picture, frame_of
+from bisar_budget.front.shared_work import kept
+from bisar_budget.mission.model import Mission
+from bisar_budget.mission.quantities import QuestionError
+from bisar_budget.report.drawing.trades import Gathered, check_plot, uses_of_rows
+from bisar_budget.report.tables import Described, dataset
+from bisar_budget.resources import cores
+
+if TYPE_CHECKING:
+    from bisar_budget.cluster.scheduler import Workers
+
+_MANY = 20_000  # cases from which on it is measured how long they will take
+_FEW = 100  # cases of the first trial
+_SHOWN = 10  # cases of a sweep without a drawing
+
+
+@dataclass(repr=False, eq=False)
+class SweepResult:
+    """A mission checked for many values: its table, by `to_dataframe`, `to_xarray`, or as columns.
+
+    Cases are those of `mission` with the values of `cases`; they are checked when they are first asked for.
+    `statuses` counts those that have been. `workers` of a scheduler check them, where there are any; parts are kept
+    beside the file `beside` where one is named, and gone on from if `is_resumed`.
+    """
+
+    mission: Mission
+    cases: Cases
+    more: tuple[str, ...]
+    model: str | None
+    day: date
+    jobs: int
+    overrides: tuple[Override, ...] = ()
+    workers: "Workers | None" = None
+    beside: str | None = None
+    is_resumed: bool = False
+    statuses: Counter[str] = field(default_factory=Counter)
+
+    def __repr__(self) -> str:
+        """Keys, number of cases and how many comply, on one line."""
+        return f"<sweep of {self.mission.name!r} over {self._keys(', ')}: {self._said}>"
+
+    def _keys(self, between: str) -> str:
+        return between.join(one.key for one in self.cases.varied)
+
+    # ------------------------------------------------------------------ cases, as they are checked
+    def asked(self, more: Sequence[str] = ()) -> Asked:
+        """The question, with some columns more than its own."""
+        columns = (*self.more, *more)
+        return Asked(self.mission, self.cases, columns=columns, model=self.model, today=self.day)
+
+    def foreseen(self) -> float:
+        """About how long the cases take; 0 where there are few. [s]"""
+        if self.cases.count <= _MANY:
+            return 0.0
+
+        def trial(some: int) -> float:
+            few = some_of(self.cases, some)
+            parts = swept_by(self.mission, few, columns=self.more, model=self.model, today=self.day).parts
+            began = perf_counter()
+            for _ in parts:
+                pass
+            return perf_counter() - began
+
+        seconds = progress.foreseen(self.cases.count, trial, _FEW, self.cases.count)
+        if self.asked().chunks().is_slow:  # else processes are no faster than arrays
+            seconds /= self.workers.threads if self.workers else min(self.jobs, cores())
+        return seconds
+
+    @contextmanager
+    def checked(self, more: Sequence[str] = ()) -> Iterator[tuple[Described, Iterator[Part]]]:
+        """Give the table and its parts, each checked as it is asked for; a bar shows it, where somebody watches."""
+        asked = self.asked(more)
+        found: AbstractContextManager[Swept]
+        if self.beside is None:
+            chunks = asked.chunks()
+            found = nullcontext(asked.swept(asked.shared_out(chunks, chunks.starts, self.jobs)))
+        else:
+            found = kept(asked, self.beside, self.jobs, self.workers, is_resumed=self.is_resumed)
+        label = "Checking cases" if self.beside is None else "Writing"
+        with found as swept, progress.watched(label) as told:
+            yield self._described(swept), self._counted(swept.parts, told)
+
+    def _described(self, swept: Swept) -> Described:
+        return Described(swept, self.cases, self.mission, __version__, self.overrides)
+
+    def _counted(self, parts: Iterator[Part], told: Callable[[int, int], None]) -> Iterator[Part]:
+        self.statuses.clear()
+        for part in parts:
+            self.statuses.update(part.values["status"].tolist())
+            yield part
+            told(self.statuses.total(), self.cases.count)
+
+    @property
+    def summary(self) -> str:
+        """How many cases were checked, and how many comply."""
+        done, comply = self.statuses.total(), complying(self.statuses)
+        if not done:
+            return "no case was checked"
+        said = [f"{done} case{'' if done == 1 else 's'}"]
+        if done < self.cases.count:
+            said[0] += f" of {self.cases.count}"
+        said.append(f"{comply} comply ({part_of(comply, done)})")
+        if self.statuses["not_evaluated"]:
+            said.append(f"{self.statuses['not_evaluated']} not evaluated")
+        if self.statuses["error"]:
+            said.append(f"{self.statuses['error']} without a mission")
+        return ", ".join(said)
+
+    @property
+    def is_unjudged(self) -> bool:
+        """Whether no case that is a mission could be judged."""
+        return self.statuses.keys() - {"error"} == {"not_evaluated"}
+
+    def drawing(self, found: Gathered, *, is_polar: bool = False) -> str:
+        """SVG of what was gathered; over one key also the rows that are the worst somewhere."""
+        from bisar_budget.report.drawing.trade_drawing import head_of, trade_drawing
+
+        trade = found.trade(is_polar=is_polar)
+        again = partial(gathered, self.mission, self.cases, self.model, self.day, jobs=self.jobs)
+        return trade_drawing(
+            trade,
+            uses_of_rows(trade, again),
+            self.mission.file,
+            f"Trade study: {' and '.join(axis.key for axis in trade.axes)}, {self.mission.name}",
+            f"{printable(self.mission.name)}: {self.summary}",
+            above=head_of(trade, self.mission, is_polar=is_polar),
+            seen_from_above=self.mission.geometry if is_polar else None,
+        )
+
+    # ------------------------------------------------------------------ all of them, for a notebook
+    @cached_property
+    def _parts(self) -> tuple[Swept, tuple[Part, ...]]:
+        with self.checked() as (described, parts):
+            return described.swept, tuple(parts)
+
+    @property
+    def _table(self) -> Described:
+        swept, parts = self._parts
+        return self._described(replace(swept, parts=iter(parts)))
+
+    @property
+    def _said(self) -> str:
+        return self.summary if self._parts else ""  # they are counted as they are checked
+
+    @cached_property
+    def columns(self) -> Mapping[str, Any]:
+        """Values of each column by its name, (cases,); what varies stands in the unit that it was asked for in."""
+        table = self._table
+        parts = [table.values(part) for part in table.swept.parts]
+        return {one.name: np.concatenate([part[one.name] for part in parts]) for one in table.columns}
+
+    def __getitem__(self, name: str) -> Any:
+        """Values of a column, (cases,)."""
+        if name not in self.columns:
+            raise KeyError(f"{name}: no such column; accepted: {', '.join(self.columns)}")
+        return self.columns[name]
+
+    def to_dataframe(self, library: str | None = None) -> Any:
+        """The table as a data frame of pandas, or of polars: what `sweep` writes as CSV."""
+        return frame_of({name: _plain(values) for name, values in self.columns.items()}, library)
+
+    def to_xarray(self, chunks: Any = None) -> Any:
+        """The table as `xarray.Dataset`, a dimension for each key, with units and long names (CF).
+
+        Parameters
+        ----------
+        chunks : optional
+            As `Dataset.chunk` takes them: arrays of Dask.
+
+        Raises
+        ------
+        MissingTablesError
+            xarray is not installed.
+        """
+        found = dataset(self._table.swept, self.cases, self.mission)
+        return found if chunks is None else found.chunk(chunks)
+
+    def plot(self, column: str | None = None) -> Picture:
+        """One key as curves of utilization, two as a map of what complies.
+
+        Parameters
+        ----------
+        column : str, optional
+            Draw this column instead.
+
+        Raises
+        ------
+        QuestionError
+            There are more keys than a drawing has axes.
+        """
+        from bisar_budget.report.drawing.figure import drawing_file
+
+        check_plot(self.cases, is_polar=False)
+        table = self._table
+        found = Gathered(table, column=column)
+        for part in table.swept.parts:
+            found.add(part)
+        return Picture(f"{self._keys(' and ')}, {self.mission.name}", partial(drawing_file, self.drawing(found)))
+
+    def _repr_html_(self) -> str:
+        try:
+            drawn = self.plot()._repr_html_()
+        except QuestionError:
+            names = list(self.columns)
+            rows = zip(*(self.columns[name][:_SHOWN] for name in names), strict=True)
+            drawn = notebook.table(names, rows)
+        return notebook.page(drawn, notebook.note(f"{self.mission.name}: {self._said}"))
+
+
+def part_of(some: int, of: int) -> str:
+    """Say a part of a whole; all and none are said only where it is so."""
+    if some in (0, of):
+        return "100 %" if some else "0 %"
+    return f"{min(max(100 * some / of, 0.1), 99.9):.3g} %"
+
+
+def _plain(values: Any) -> Any:
+    """Texts as a list, numbers as they are."""
+    return values.tolist() if values.dtype == object else values
