@@ -123,7 +123,7 @@ def test_how_many_draws_one_machine_makes(run) -> None:
 
 def test_a_terminal_has_a_bar() -> None:
     master, slave = terminal()
-    line = [sys.executable, "-m", "bisar_budget", "check", "-q", DRONES, "--monte-carlo", "2e7"]
+    line = [sys.executable, "-m", "bisar_budget", "check", "-q", DRONES, "--monte-carlo", "12e6"]
     with subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=slave) as process:
         os.close(slave)
         shown = read_all(lambda: os.read(master, 65536))

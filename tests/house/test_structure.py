@@ -90,6 +90,30 @@ def test_no_name_of_the_front_door_is_that_of_a_room() -> None:
     assert rooms.isdisjoint(bisar_budget.__all__)
 
 
+# Rooms that compute; the command line asks the front door instead.
+ENGINES = {"ranges", "effects", "analysis", "sampling", "budget", "simulator", "verifier", "design", "cluster"}
+
+
+def imported_for_use(path: Path) -> set[str]:
+    """Modules that a module runs, those left out that only its types name."""
+    tree = parsed(path)
+    of_types = {
+        id(node)
+        for block in ast.walk(tree)
+        if isinstance(block, ast.If) and getattr(block.test, "id", "") == "TYPE_CHECKING"
+        for part in block.body
+        for node in ast.walk(part)
+    }
+    return {
+        str(node.module) for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and id(node) not in of_types
+    }
+
+
+@pytest.mark.parametrize("path", sorted((PACKAGE / "cli").glob("*.py")), ids=module_name)
+def test_the_command_line_is_a_client_of_the_front_door(path: Path) -> None:
+    assert not {name for name in imported_for_use(path) if room(name) in ENGINES}
+
+
 def door(name: str) -> set[str]:
     """What a room lets others use: names of its modules, or, of `report`, what its `__init__` defines."""
     tree = parsed(PACKAGE / name / "__init__.py")
