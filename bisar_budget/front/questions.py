@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.budget.waivers import overrides
-from bisar_budget.findings.requirement import Outside
+from bisar_budget.findings.requirement import Outside, Override
 from bisar_budget.front.checks import day_of, outside_of
 from bisar_budget.front.missions import cases_of
 from bisar_budget.front.progress import FORMING, foretell, watched, watched_checks
@@ -32,6 +32,14 @@ if TYPE_CHECKING:
     from bisar_budget.design.cases import Cases
     from bisar_budget.design.compare import Comparison
     from bisar_budget.design.solve import Solution
+
+
+def _judged(
+    mission: Mission, model: str | None, date: str | dt.date | None, outside: Outside | None
+) -> tuple[dt.date, tuple[Override, ...]]:
+    """Day on which waivers are judged, and what from outside the file bears on the verdict."""
+    today = day_of(date)
+    return today, overrides(mission, outside or outside_of(model, date), today)
 
 
 def sweep(
@@ -66,9 +74,8 @@ def sweep(
     QuestionError
         No such key, no value for it, no such column.
     """
-    today = day_of(date)
+    today, said = _judged(mission, model, date, outside)
     cases = cases_of(mission, values) if isinstance(values, Mapping | str | os.PathLike) else values
-    said = overrides(mission, outside or outside_of(model, date), today)
     found = SweepResult(mission, cases, tuple(columns), model, today, jobs or cores(), said)
     found.asked()  # a question that cannot be asked is said here
     return found
@@ -118,7 +125,7 @@ def solve(
     from bisar_budget.design.compare import compare_parts
     from bisar_budget.design.solve import solve as solved
 
-    today = day_of(date)
+    today, said = _judged(mission, model, date, outside)
     if between is not None and not isinstance(between, str):
         between = "..".join(text_of("", one) for one in between)
     how: dict[str, Any] = {"row": row, "target": target, "model": model, "today": today}
@@ -131,7 +138,7 @@ def solve(
             found = compare_parts(mission, key, **how, progress=progress)
         else:
             found = solved(mission, key, between=between, is_scale=scale, **how, progress=progress)
-    found = found._replace(overrides=overrides(mission, outside or outside_of(model, date), today))
+    found = found._replace(overrides=said)
     return SolveResult(_imaged(mission, found, model) if verify else found)
 
 
@@ -166,10 +173,10 @@ def sensitivity(
     """Rank the numbers of a mission by what they do to its worst utilization; arguments are those of `solve`."""
     from bisar_budget.design.sensitivity import sensitivity as asked
 
-    today = day_of(date)
+    today, said = _judged(mission, model, date, outside)
     with watched_checks(mission.name) as progress:
         found = asked(mission, row=row, model=model, today=today, progress=progress)
-    return SensitivityResult(found._replace(overrides=overrides(mission, outside or outside_of(model, date), today)))
+    return SensitivityResult(found._replace(overrides=said))
 
 
 def allocate(
@@ -205,11 +212,11 @@ def allocate(
     from bisar_budget.design.allocate import allocate as allocated
     from bisar_budget.design.offers import offer as offered
 
-    today = day_of(date)
+    today, said = _judged(mission, model, date, outside)
     wanted = keys if keys is None or isinstance(keys, Mapping) else dict.fromkeys(keys, 1.0)
     with watched_checks(mission.name) as progress:
         found = allocated(mission, keys=wanted, reserve=reserve, model=model, today=today, progress=progress)
-    found = found._replace(overrides=overrides(mission, outside or outside_of(model, date), today))
+    found = found._replace(overrides=said)
     return AllocateResult(found, None if offer is None else offered(found, offer, today))
 
 
@@ -251,7 +258,7 @@ def passes(
     from bisar_budget.design.passes import start_of
 
     asked = mission if isinstance(mission, Mission) else load_mission(os.fspath(mission), is_placed=False)
-    today = day_of(date)
+    today, said = _judged(asked, model, date, outside)
     least, wanted = (parse_quantity(text_of("rad", one), ANGLE) for one in (min_elevation, squint))
     with watched("Checking passes") as progress:
         found = listed(
@@ -265,8 +272,7 @@ def passes(
             today=today,
             progress=progress,
         )
-    found = found._replace(overrides=overrides(asked, outside or outside_of(model, date), today))
-    return PassesResult(found, asked, model)
+    return PassesResult(found._replace(overrides=said), asked, model)
 
 
 def monte_carlo(mission: Mission, draws: int = 20_000, *, seed: int | None = None) -> MonteCarloResult:
