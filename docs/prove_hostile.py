@@ -81,6 +81,9 @@ _SWEEP = (
     *("--vary", "platforms.receiver.azimuth=40:60deg:60", "--vary", "collection.aperture_time=1:6s:40"),
     *("--column", "receiver.velocity.x.islr_db", "--jobs", "2"),
 )
+_TWO = str(ROOT / "specs" / "missions" / "tandem_x.yaml")
+_ORBIT = str(ROOT / "specs" / "missions" / "sentinel1_elements_besancon.yaml")
+_FROM = ("--from", "2026-06-30", "--days", "3", "--min-elevation", "25 deg")
 Outcome = tuple[Counter[str], list[str]]  # cases by kind, and what was mishandled
 
 
@@ -343,6 +346,18 @@ def signals(seeds: range) -> Outcome:
                     ["sweep", *_SWEEP, "-o", str(Path(folder, f"t.{random.choice(_TABLES)}"))],
                     ["sweep", *_SWEEP, "-o", str(Path(folder, "t.csv")), "--resume"],
                     ["import", str(SAMPLES / "example-cphd-1.0.1.xml"), "-o", str(report), "--force"],
+                    ["allocate", *missions, "--set", "allocation.combine=rss", "-o", str(report)],
+                    ["allocate", _TWO, "-o", str(Path(folder, "offered.yaml"))],
+                    ["passes", _ORBIT, *_FROM, "-o", str(Path(folder, "passes")) + os.sep],
+                    [
+                        "passes",
+                        _ORBIT,
+                        *_FROM,
+                        "-o",
+                        str(Path(folder, "p.ics")),
+                        "--plot",
+                        str(Path(folder, "p.svg")),
+                    ],
                 )
             )
             number = random.choice((signal.SIGTERM, signal.SIGINT, signal.SIGHUP))
@@ -373,6 +388,54 @@ def signals(seeds: range) -> Outcome:
             text = report.read_text(encoding="utf-8")
             if left or not (text == "old" or text.endswith("\n") or arguments[0] != "check"):
                 missed.append(f"signals {seed}: leaves {left}, {len(text)} characters of a report")
+    return tried, missed
+
+
+def pairs(seeds: range) -> Outcome:
+    """Run a command twice at once with one output, and sometimes kill one: the output is the whole one of either."""
+    tried, missed = Counter[str](), list[str]()
+    for seed in seeds:
+        random = Random(f"pairs {seed}")
+        with TemporaryDirectory() as folder:
+            at = partial(os.path.join, folder)
+            arguments, output = random.choice(
+                (
+                    (["sweep", *_SWEEP, "-o", at("t.csv")], "t.csv"),
+                    (["sweep", *_SWEEP, "-o", at("t.parquet")], "t.parquet"),
+                    (["check", _TWO, "--report", at("r.html"), "-q"], "r.html"),
+                    (["check", _TWO, "--report", at("r.md"), "-q"], "r.md"),
+                    (["allocate", _TWO, "-o", at("m.yaml")], "m.yaml"),
+                    (["passes", _ORBIT, *_FROM, "-o", at("p.ics")], "p.ics"),
+                    (["sensitivity", _TWO, "-o", at("s.json"), "--format", "json"], "s.json"),
+                )
+            )
+            dated = [*arguments, "--date", TODAY.isoformat()]
+            lines = [[*COMMAND, *dated], [*COMMAND, *dated, "--set", "name=the other"]]
+            whole = []
+            for line in lines:
+                alone = subprocess.run(line, capture_output=True, cwd=ROOT)
+                whole.append(Path(folder, output).read_bytes())
+                if alone.returncode not in (0, 1):
+                    missed.append(f"pairs {seed}: {line[3:]} exits with {alone.returncode}: {alone.stderr[-300:]!r}")
+            tried["pairs"] += 1
+            both = [
+                subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, cwd=ROOT) for line in lines
+            ]
+            is_killed = random.random() < 0.3
+            if is_killed:
+                time.sleep(random.uniform(0.2, 3))
+                both[0].kill()
+            for process in both:
+                errors = process.communicate(timeout=HANG_S)[1]
+                is_fine = process.returncode in (0, 1) or (is_killed and process is both[0])
+                if not is_fine and not (process.returncode == 2 and errors and b"Traceback" not in errors):
+                    missed.append(f"pairs {seed}: {arguments[0]} exits with {process.returncode}: {errors[-300:]!r}")
+            if Path(folder, output).read_bytes() not in whole:
+                missed.append(f"pairs {seed}: {output} is of neither")
+            subprocess.run(lines[0], capture_output=True, cwd=ROOT)  # removes what a killed one left
+            left = [name for name in os.listdir(folder) if name.startswith(".")]
+            if left:
+                missed.append(f"pairs {seed}: {arguments[0]} leaves {left}")
     return tried, missed
 
 
@@ -446,7 +509,16 @@ def limits(seeds: range) -> Outcome:
 
 
 Part = Callable[[range], Outcome]
-SHARES: dict[Part, int] = {settings: 10, logs: 10, paths: 20, radar_files: 50, parts: 200, signals: 500, limits: 500}
+SHARES: dict[Part, int] = {
+    settings: 10,
+    logs: 10,
+    paths: 20,
+    radar_files: 50,
+    parts: 200,
+    signals: 500,
+    limits: 500,
+    pairs: 1000,
+}
 SIZES: dict[Part, int] = {files: 100, settings: 500, logs: 500, paths: 50, radar_files: 50}
 Slices = dict[str, tuple[dict[str, int], list[str]]]  # outcomes by `part first..last`
 

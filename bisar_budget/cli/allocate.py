@@ -1,6 +1,7 @@
 """`bisar-budget allocate`: one specification for every error, such that all together meet every requirement."""
 
 import math
+import os
 import sys
 from collections.abc import Iterator, Sequence
 from datetime import datetime
@@ -157,10 +158,10 @@ def _written(answers: "Sequence[Answer]", format_name: str, output: str | None) 
 def _write_mission(answer: "Answer", output: str, model: str | None) -> None:
     """Write the mission with what is ordered in place and as specifications; nothing where there are none.
 
-    What is written is read first as it will lie there: files that it names are looked for from its folder.
+    It is read first as it will lie there, with the files that it names.
     """
     from bisar_budget.faults import MissionError, SetValue
-    from bisar_budget.mission.edited import with_section, with_values
+    from bisar_budget.mission.edited import in_folder, with_section, with_values
     from bisar_budget.mission.load import parse_mission
 
     sheet, findings = answer.sheet, answer.sheet.findings
@@ -169,7 +170,8 @@ def _write_mission(answer: "Answer", output: str, model: str | None) -> None:
         return
     text = (findings.mission.data or b"").decode("utf-8-sig")
     of_model = [SetValue("allocation.model", model)] if model else []
-    text = with_values(text, [*sheet.changes, *of_model, *sheet.ordered])
+    beside = in_folder(findings.mission, os.path.dirname(output) or os.curdir)
+    text = with_values(text, [*sheet.changes, *of_model, *beside, *sheet.ordered])
     text = with_section(text, "specifications", {one.key: one.text for one in sheet.specifications if one.text})
     try:
         parse_mission(text, output)
