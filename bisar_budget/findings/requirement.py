@@ -38,6 +38,11 @@ class JudgedRequirement(NamedTuple):
     line: int | None = None
     waivers: tuple[AppliedWaiver, ...] = ()
 
+    def __repr__(self) -> str:
+        """Key, what is reached of what is allowed, and status, on one line."""
+        sizes = ("-" if one is None else f"{one:.6g}" for one in (self.reached, self.allowed))
+        return f"<{self.key}: {' of '.join(sizes)} {self.unit}, {self.status}>"
+
     @property
     def id(self) -> str:
         """Its name in waivers and reports: that of the mission's own row, should there be one."""

@@ -92,6 +92,11 @@ class Row(NamedTuple):
         words: dict[str, Any] = {"reason": None, "remarks": (), "evidence": None, "is_independent": True}
         return cls(subject, metric, unit, declared, status=status, **(numbers | words | others))
 
+    def __repr__(self) -> str:
+        """Id, what is declared of what is allowed, and status, on one line."""
+        sizes = ("-" if one is None else f"{one:.6g}" for one in (self.declared, self.allowable))
+        return f"<{self.id}: {' of '.join(sizes)} {self.unit}, {self.status}>"
+
     @property
     def id(self) -> str:
         """Its name in reports, waivers and the mission file's `requirement_ids`."""

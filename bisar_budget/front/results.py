@@ -12,7 +12,7 @@ from importlib import import_module
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
-from bisar_budget import __version__
+from bisar_budget import __version__, notebook
 from bisar_budget.faults import SetValue
 from bisar_budget.findings.images import VerifiedMission
 from bisar_budget.findings.mission import MissionFindings, Report
@@ -21,7 +21,6 @@ from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.findings.row import Row, unknown_id, worst_first
 from bisar_budget.findings.specification import SpecificationSheet
 from bisar_budget.findings.status import exit_code
-from bisar_budget.front import notebook
 from bisar_budget.mission.model import Mission
 from bisar_budget.report import FORMATS, Style, format_of, pictures, render
 from bisar_budget.report.words.requirements import declared_words, requirement_lines, verdict

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bisar_budget import __version__
+from bisar_budget import __version__, notebook
 from bisar_budget.design.cases import Cases, some_of
 from bisar_budget.design.sweep import Asked
 from bisar_budget.design.sweep import sweep as swept_by
@@ -19,7 +19,7 @@ from bisar_budget.design.table import Part, Swept
 from bisar_budget.faults import printable
 from bisar_budget.findings.requirement import Override
 from bisar_budget.findings.status import complying
-from bisar_budget.front import notebook, progress
+from bisar_budget.front import progress
 from bisar_budget.front.checks import gathered
 from bisar_budget.front.results import Picture, frame_of
 from bisar_budget.front.shared_work import kept

@@ -413,6 +413,11 @@ class Mission(NamedTuple):
         """File and name, on one line."""
         return f"Mission({self.file!r}, {shown(self.name)!r})"
 
+    def _repr_html_(self) -> str:
+        from bisar_budget.mission.overview import overview
+
+        return overview(self)
+
     def __eq__(self, other: object) -> bool:
         """Whether it says the same, in the same file; `places` are where the bytes of `data` stand."""
         return isinstance(other, Mission) and tuple(self._replace(places={})) == tuple(other._replace(places={}))

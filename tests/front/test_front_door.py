@@ -299,7 +299,9 @@ def answers(mission: bb.Mission) -> dict[str, Any]:
             mission,
             {TIME: [1.0, 2.0], AZIMUTH: ["20 deg", "40 deg"], "radar.bandwidth": [1e8, 3e8]},
         ),
+        "mission": mission,
         "solve": bb.solve(mission, TIME),
+        "parts": bb.solve(bb.load(UAV), "platforms.receiver.motion_error.sensor"),
         "sensitivity": bb.sensitivity(mission),
         "allocate": bb.allocate(bb.load(UAV)),
         "monte_carlo": bb.monte_carlo(bb.load(TANDEM_X), 1000),
@@ -319,9 +321,64 @@ def test_every_answer_prints_in_one_line_and_shows_itself(answers: dict[str, Any
         assert "prefers-color-scheme" in shown or "currentColor" in shown or "<img" in shown, name
 
 
+def test_rows_and_requirements_print_in_one_line(answers: dict[str, Any]) -> None:
+    found = answers["check"]
+    assert repr(found["receiver.velocity.y"]) == "<receiver.velocity.y: - of 0.0417101 m/s, not_declared>"
+    assert repr(found.requirements["quadratic_phase_error"]).startswith("<quadratic_phase_error: ")
+
+
+def test_a_report_has_what_was_asked_besides(tmp_path: Path) -> None:
+    """Draws, a study and verdicts of images, as `check` writes them with the options of these names."""
+    values = {TIME: ["1 s", "2 s"]}
+    found = bb.check(bb.load(TANDEM_X), date=DAY, monte_carlo=1000, seed=3, sweep=values)
+    assert found.findings.monte_carlo is not None
+    assert found.findings.monte_carlo.draws == 1000
+    found.report(tmp_path / "r.html")
+    page = (tmp_path / "r.html").read_text(encoding="utf-8")
+    assert "1,000 draws" in page
+    assert "Trade study" in page
+    with pytest.raises(bb.QuestionError, match="has one value"):
+        bb.check(bb.load(TANDEM_X), sweep={TIME: ["1 s"]})
+
+
+def test_a_report_of_a_result_has_the_sheet_of_specifications(tmp_path: Path) -> None:
+    specified = bb.load(MISSIONS / "tandem_x.yaml").replace(
+        {"allocation.specify": "{platforms.receiver.motion_error.velocity: 1}"}
+    )
+    bb.check(specified).report(tmp_path / "r.html")
+    assert "Specifications" in (tmp_path / "r.html").read_text(encoding="utf-8")
+
+
+def test_cases_of_a_file(run: Any, tmp_path: Path, mission: bb.Mission) -> None:
+    """As `sweep --cases`; what cannot be read has a line for each fault."""
+    cases, written = tmp_path / "cases.csv", tmp_path / "t.csv"
+    cases.write_text(f"{TIME} [s],{AZIMUTH} [deg]\n1,20\n2.5,40\n")
+    assert run("sweep", SECTION_V, "--cases", cases, "-o", written, "--date", DAY).exit_code == 0
+    found = bb.sweep(mission, cases, date=DAY)
+    assert found["status"].tolist() == table(written.read_text())["status"]
+    cases.write_text(f"{TIME} [s]\nx\n")
+    with pytest.raises(bb.QuestionError, match=r"cases\.csv:2:1: "):
+        bb.sweep(mission, cases)
+    with pytest.raises(bb.QuestionError, match="cannot be read"):
+        bb.sweep(mission, tmp_path / "none.csv")
+
+
+def test_an_offer_is_held_to_specifications() -> None:
+    asked = bb.load(UAV)
+    found = bb.allocate(asked, offer=asked)
+    assert found.offer is not None
+    assert found.offer.file == str(UAV)
+    assert found.to_dict()["missions"][0]["offer"]["status"] == found.offer.status
+
+
+def test_images_of_no_row_are_a_question_that_cannot_be_asked(mission: bb.Mission) -> None:
+    with pytest.raises(bb.QuestionError, match="no row with a limit matches"):
+        bb.verify(mission, "receiver.nothing")
+
+
 def test_a_name_of_the_file_is_text_in_a_notebook() -> None:
     named = bb.loads(mission_text(name="<script>alert(1)</script>", **COMPLIES))
-    for answer in (bb.check(named), bb.solve(named, TIME)):
+    for answer in (named, bb.check(named), bb.solve(named, TIME)):
         assert "<script" not in answer._repr_html_()
 
 

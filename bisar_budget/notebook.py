@@ -7,6 +7,7 @@ _STYLE = """<style>
 .bisar-budget { font-size: 0.92em; line-height: 1.35 }
 .bisar-budget table { border-collapse: collapse; margin: 0.4em 0 }
 .bisar-budget th, .bisar-budget td { padding: 0.15em 0.7em; text-align: left; background: transparent }
+.bisar-budget td:not(:last-child) { white-space: nowrap }
 .bisar-budget thead th { border-bottom: 1px solid currentColor; font-weight: 600 }
 .bisar-budget td.number { text-align: right; font-variant-numeric: tabular-nums }
 .bisar-budget .status { display: inline-block; padding: 0 0.5em; border-radius: 0.3em; color: #fff; font-weight: 600 }
