@@ -102,24 +102,6 @@ def grid_of(tree: dict[str, Any], values: Mapping[str, ArrayLike]) -> Grid:
     QuestionError
         No such key, no number or word for it, no value.
     """
-    return Grid(*_at_hand(tree, values))
-
-
-def table_of(tree: dict[str, Any], values: Mapping[str, ArrayLike]) -> CaseTable:
-    """Cases of which each takes one value of every array; arguments and faults are those of `grid_of`.
-
-    Raises
-    ------
-    QuestionError
-        Also where arrays differ in length.
-    """
-    varied, arrays = _at_hand(tree, values)
-    if len({array.size for array in arrays}) > 1:
-        raise QuestionError(f"{', '.join(values)}: differ in length; accepted: one value of each for every case")
-    return CaseTable(varied, arrays)
-
-
-def _at_hand(tree: dict[str, Any], values: Mapping[str, ArrayLike]) -> tuple[tuple[Varied, ...], tuple[Values, ...]]:
     varied: list[Varied] = []
     arrays: list[Values] = []
     for key, given in values.items():
@@ -139,7 +121,7 @@ def _at_hand(tree: dict[str, Any], values: Mapping[str, ArrayLike]) -> tuple[tup
         varied.append(choices)
     if not varied:
         raise QuestionError(f"no key: nothing would vary; {_FORMS}")
-    return tuple(varied), tuple(arrays)
+    return Grid(tuple(varied), tuple(arrays))
 
 
 def _texts(option: str, choices: Choices, words: Sequence[str]) -> Values:

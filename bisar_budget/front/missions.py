@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from bisar_budget.design.cases import Cases, Grid, grid, table_file
+from bisar_budget.design.cases import Cases, CaseTable, Grid, grid, table_file
 from bisar_budget.design.cases import grid_of as grid_of_arrays
 from bisar_budget.design.cases import sample as sample_of
 from bisar_budget.mission.given import is_quantity, magnitude, text_of
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.mission.model import Mission
-from bisar_budget.mission.quantities import number_of, tree_of
+from bisar_budget.mission.quantities import QuestionError, number_of, tree_of
 
 
 def load(path: str | os.PathLike[str]) -> Mission:
@@ -82,7 +82,7 @@ def geomspace(start: Any, stop: Any, count: int) -> Spaced:
     return Spaced(text_of("", start), text_of("", stop), count, is_log=True)
 
 
-def cases_of(mission: Mission, values: Mapping[str, Any] | str | os.PathLike[str]) -> Cases:
+def cases_of(mission: Mission, values: Mapping[str, Any] | str | os.PathLike[str], paired: bool = False) -> Cases:
     """The cases of a sweep: every combination of the values of each key, the last key the fastest; or of a file.
 
     Parameters
@@ -92,15 +92,23 @@ def cases_of(mission: Mission, values: Mapping[str, Any] | str | os.PathLike[str
     values : mapping or path
         Of each key a range of `linspace`, an array of numbers in SI, a quantity that holds an array, or a list of
         texts: values with units, or words. Or a CSV file, whose header has a `KEY [unit]` for each column.
+    paired : bool
+        Each case takes one value of every key, instead of every combination.
 
     Raises
     ------
     QuestionError
-        No such key, no number or word for it, no value; of a file a `TableError`, which has a line for each fault.
+        No such key, no number or word for it, no value, pairs of different length; of a file a `TableError`, which
+        has a line for each fault.
     """
     if not isinstance(values, Mapping):
         return table_file(tree_of(mission), os.fspath(values))
-    return grid_of(mission, values)
+    found = grid_of(mission, values)
+    if not paired:
+        return found
+    if len(set(found.shape)) > 1:
+        raise QuestionError(f"{', '.join(values)}: differ in length; accepted: one value of each for every case")
+    return CaseTable(found.varied, found.axes)
 
 
 def grid_of(mission: Mission, values: Mapping[str, Any]) -> Grid:

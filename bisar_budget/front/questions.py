@@ -46,6 +46,7 @@ def sweep(
     mission: Mission,
     values: "Mapping[str, Any] | str | os.PathLike[str] | Cases",
     *,
+    paired: bool = False,
     columns: Sequence[str] = (),
     model: str | None = None,
     date: str | dt.date | None = None,
@@ -62,6 +63,8 @@ def sweep(
         By the path of a key, such as `collection.aperture_time`: `linspace("1 s", "5 s", 101)`, an array of numbers
         in SI, a quantity that holds an array, a list of texts with units, or of words such as parts of the catalogue.
         Or the path of a CSV file, whose header has a `KEY [unit]` for each column.
+    paired : bool
+        Each case takes one value of every key, instead of every combination.
     columns : sequence of str
         Columns more, `ROW.FIELD` such as `receiver.velocity.x.allowable`.
     model, date, outside
@@ -75,7 +78,7 @@ def sweep(
         No such key, no value for it, no such column.
     """
     today, said = _judged(mission, model, date, outside)
-    cases = cases_of(mission, values) if isinstance(values, Mapping | str | os.PathLike) else values
+    cases = cases_of(mission, values, paired) if isinstance(values, Mapping | str | os.PathLike) else values
     found = SweepResult(mission, cases, tuple(columns), model, today, jobs or cores(), said)
     found.asked()  # a question that cannot be asked is said here
     return found

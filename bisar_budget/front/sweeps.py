@@ -13,15 +13,16 @@ import numpy as np
 
 from bisar_budget import __version__, notebook
 from bisar_budget.design.cases import Cases, some_of
-from bisar_budget.design.sweep import Asked
+from bisar_budget.design.sweep import Asked, Block
+from bisar_budget.design.sweep import part_of as checked_part
 from bisar_budget.design.sweep import sweep as swept_by
-from bisar_budget.design.table import Part, Swept
+from bisar_budget.design.table import Part, Question, Swept
 from bisar_budget.faults import printable
 from bisar_budget.findings.requirement import Override
 from bisar_budget.findings.status import complying
 from bisar_budget.front import progress
 from bisar_budget.front.checks import gathered
-from bisar_budget.front.results import Picture, frame_of
+from bisar_budget.front.results import MissingPackageError, Picture, frame_of
 from bisar_budget.front.shared_work import kept
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.quantities import QuestionError
@@ -187,16 +188,48 @@ class SweepResult:
 
         Parameters
         ----------
-        chunks : optional
-            As `Dataset.chunk` takes them: arrays of Dask.
+        chunks : mapping, int or "auto", optional
+            Sizes of chunks by dimension, of all dimensions, or those of the sweep. Values are then arrays of Dask,
+            and cases are checked when it computes.
 
         Raises
         ------
         MissingTablesError
             xarray is not installed.
+        MissingPackageError
+            Dask is asked for and not installed.
         """
-        found = dataset(self._table.swept, self.cases, self.mission)
-        return found if chunks is None else found.chunk(chunks)
+        if chunks is None:
+            return dataset(self._table, self.columns)
+        found = dataset(self._described(self.asked().swept(iter(()))), self._later())
+        sizes = (
+            {} if chunks == "auto" else chunks if isinstance(chunks, Mapping) else dict.fromkeys(found.dims, chunks)
+        )
+        # `Dataset.chunk` would compute the columns of texts.
+        return found.map(
+            lambda one: one.copy(data=one.data.rechunk({one.get_axis_num(key): size for key, size in sizes.items()})),
+            keep_attrs=True,
+        )
+
+    def _later(self) -> dict[str, Any]:
+        """Columns as arrays of Dask: each chunk of the sweep is a task, which gives what it would give now."""
+        try:
+            from dask import array
+            from dask.delayed import delayed
+            from dask.utils import SerializableLock
+        except ImportError:
+            raise MissingPackageError("chunks need Dask: pip install dask") from None
+        asked = self.asked()
+        table, chunks = self._described(asked.swept(iter(()))), asked.chunks()
+        common = delayed((asked.travelling, table, SerializableLock()), pure=False)
+        columns: dict[str, list[Any]] = {column.name: [] for column in table.columns}
+        for start in chunks.starts:
+            stop = chunks.stop(start)
+            values = delayed(_values)(common, (start, stop, self.cases.values(start, stop)))
+            for column in table.columns:
+                kind = object if column.is_text else float
+                columns[column.name].append(array.from_delayed(values[column.name], (stop - start,), kind))
+        return {name: array.concatenate(parts) for name, parts in columns.items()}
 
     def plot(self, column: str | None = None) -> Picture:
         """One key as curves of utilization, two as a map of what complies.
@@ -228,6 +261,13 @@ class SweepResult:
             rows = zip(*(self.columns[name][:_SHOWN] for name in names), strict=True)
             drawn = notebook.table(names, rows)
         return notebook.page(drawn, notebook.note(f"{self.mission.name}: {self._said}"))
+
+
+def _values(common: tuple[Question, Described, Any], block: Block) -> Mapping[str, Any]:
+    """Values of the columns in a block of cases; threads take turns, because a table keeps what it finds."""
+    question, table, lock = common
+    with lock:
+        return table.values(checked_part(question, block))
 
 
 def part_of(some: int, of: int) -> str:

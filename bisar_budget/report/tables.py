@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from bisar_budget import __version__
 from bisar_budget.design.cases import Cases, Grid, in_unit
 from bisar_budget.design.table import Column, Part, Swept, Values
 from bisar_budget.faults import changes_words, printable
@@ -328,17 +327,15 @@ def _missing(name: str, library: str) -> str:
     return f"{name} needs {library}, which is not installed; pip install 'bisar-budget[tables]' brings it"
 
 
-def dataset(swept: Swept, cases: Cases, mission: Mission) -> "Dataset":
-    """Check all cases of a sweep, and lay them out.
+def dataset(described: Described, whole: Mapping[str, Any]) -> "Dataset":
+    """Lay out the columns of a sweep.
 
     Parameters
     ----------
-    swept : Swept
-        What `sweep` gave, its parts not yet taken.
-    cases : Cases
-        Those that it was given.
-    mission : Mission
-        Likewise.
+    described : Described
+        The table.
+    whole : mapping
+        Values of each column by its name, (cases,): arrays of NumPy or of Dask.
 
     Returns
     -------
@@ -355,21 +352,18 @@ def dataset(swept: Swept, cases: Cases, mission: Mission) -> "Dataset":
         from xarray import Dataset
     except ImportError:
         raise MissingTablesError(_missing("a dataset", "xarray")) from None
-    described = Described(swept, cases, mission, __version__)
-    parts = [described.values(part) for part in swept.parts]
-    whole = {column.name: np.concatenate([part[column.name] for part in parts]) for column in described.columns}
-    columns = {column.name: column for column in described.columns}
+    cases, varied = described.cases, described.swept.varied
     attributes = {
-        name: {"long_name": column.words, **({} if column.is_text else {"units": column.unit or "1"})}
-        for name, column in columns.items()
+        column.name: {"long_name": column.words, **({} if column.is_text else {"units": column.unit or "1"})}
+        for column in described.columns
     }
     if isinstance(cases, Grid):
-        dimensions = tuple(swept.varied)
+        dimensions = tuple(varied)
         axes = zip(cases.varied, cases.axes, strict=True)
         coordinates = {one.key: (one.key, described.said(one.key, axis), attributes[one.key]) for one, axis in axes}
     else:
         dimensions = ("case",)
-        coordinates = {key: ("case", whole[key], attributes[key]) for key in swept.varied}
+        coordinates = {key: ("case", np.asarray(whole[key]), attributes[key]) for key in varied}
     variables = {
         name: (dimensions, values.reshape(cases.shape or values.shape), attributes[name])
         for name, values in whole.items()

@@ -13,6 +13,8 @@ import numpy as np
 import pytest
 
 import bisar_budget as bb
+from bisar_budget.design import sweep as engine
+from bisar_budget.design.table import Table
 from bisar_budget.front import results
 from bisar_budget.front.missions import Spaced
 from tests.conftest import COMPLIES, ROOT, mission_text
@@ -227,6 +229,34 @@ def test_a_sweep_as_dataset_and_frame(mission: bb.Mission) -> None:
     assert data.utilization.values.ravel().tolist() == swept["utilization"].tolist()
     again = swept.to_xarray()  # parts are kept
     assert again.equals(data)
+
+
+@pytest.mark.parametrize("chunks", [{}, {TIME: 3}, "auto"])
+def test_a_dataset_of_dask_is_checked_when_it_computes(
+    mission: bb.Mission, monkeypatch: pytest.MonkeyPatch, chunks: Any
+) -> None:
+    """To the last bit what is checked at once, in the sweep's own parts."""
+    pytest.importorskip("dask")
+    monkeypatch.setattr(engine, "_TOGETHER", 16)
+    values = {TIME: bb.linspace("1 s", "5 s", 11), "radar.center_frequency": ["9 GHz", "10 GHz", "11 GHz"]}
+    swept = bb.sweep(mission, values, columns=["receiver.velocity.y.allowable"])
+    checked: list[int] = []
+    part = Table.part
+    monkeypatch.setattr(Table, "part", lambda self, *block: checked.append(block[0]) or part(self, *block))
+    lazy = swept.to_xarray(chunks=chunks)
+    assert not checked
+    now = bb.sweep(mission, values, columns=["receiver.velocity.y.allowable"]).to_xarray()
+    assert sorted(checked) == [0, 16, 32]
+    assert lazy.compute().identical(now)
+    assert sorted(checked) == [0, 0, 16, 16, 32, 32]
+    paired = bb.sweep(mission, {TIME: [1.0, 2.0], AZIMUTH: ["20 deg", "40 deg"]}, paired=True)
+    assert paired.to_xarray(chunks={}).compute().identical(paired.to_xarray())
+
+
+def test_without_dask(mission: bb.Mission, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "dask", None)
+    with pytest.raises(ImportError, match="chunks need Dask: pip install dask"):
+        bb.sweep(mission, {TIME: [1.0, 2.0]}).to_xarray(chunks={})
 
 
 def test_a_frame_needs_pandas_or_polars(mission: bb.Mission, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,15 +12,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bisar_budget.design.cases import Cases, grid, grid_of, table, table_of
-from bisar_budget.design.sweep import sweep
+import bisar_budget as bb
+from bisar_budget.design.cases import Cases, grid, grid_of, table
 from bisar_budget.design.table import Column, Part, Swept, Values
 from bisar_budget.faults import SetValue
 from bisar_budget.mission.load import load_mission
 from bisar_budget.mission.quantities import QuestionError
 from bisar_budget.mission.tree import read_tree
 from bisar_budget.report import tables
-from bisar_budget.report.tables import TABLES, Described, MissingTablesError, dataset, slabs, writer_of
+from bisar_budget.report.tables import TABLES, Described, MissingTablesError, slabs, writer_of
 from tests.conftest import ROOT
 
 FILE = ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml"
@@ -189,9 +189,7 @@ class TestDatasets:
         mission = load_mission(str(FILE))
         times = np.linspace(1, 6, 11)
         cases = grid_of(TREE, {"allocation.model": ["published", "full"], TIME: times})
-        found = dataset(
-            sweep(mission, cases, columns=("transmitter.acceleration.x.status",), today=DAY), cases, mission
-        )
+        found = bb.sweep(mission, cases, columns=["transmitter.acceleration.x.status"], date=DAY).to_xarray()
         assert dict(found.sizes) == {"allocation.model": 2, TIME: 11}
         published = found["utilization"].sel({"allocation.model": "published"})
         assert published.values == pytest.approx(11.78124183 * (times / 6) ** 2)
@@ -203,8 +201,8 @@ class TestDatasets:
 
     def test_pairs_of_values_are_cases(self) -> None:
         mission = load_mission(str(FILE))
-        cases = table_of(TREE, {TIME: [1, 6], AZIMUTH: np.radians([45, 45])})
-        found = dataset(sweep(mission, cases, today=DAY), cases, mission)
+        values = {TIME: [1, 6], AZIMUTH: np.radians([45, 45])}
+        found = bb.sweep(mission, values, paired=True, date=DAY).to_xarray()
         assert dict(found.sizes) == {"case": 2}
         assert found["utilization"].values == pytest.approx([11.78124183 / 36, 11.78124183])
         assert found[AZIMUTH].values == pytest.approx([45, 45])  # in the unit of the file
@@ -220,18 +218,21 @@ class TestDatasets:
             ({"allocation.model": [1.0]}, "is no number with a unit"),
             ({"name": ["a"]}, "is no number with a unit"),
             ({}, "nothing would vary"),
-            ({TIME: [1, 2], AZIMUTH: [1]}, "differ in length"),
         ],
     )
     def test_arrays_that_are_no_cases(self, values: Any, said: str) -> None:
         with pytest.raises(QuestionError) as error:
-            table_of(TREE, values)
+            grid_of(TREE, values)
         assert said in str(error.value)
+
+    def test_pairs_of_different_length(self) -> None:
+        with pytest.raises(QuestionError, match="differ in length; accepted: one value of each for every case"):
+            bb.sweep(MISSION, {TIME: [1, 2], AZIMUTH: [1]}, paired=True)
 
     def test_without_xarray(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setitem(sys.modules, "xarray", None)
         with pytest.raises(MissingTablesError, match=r"needs xarray.*tables"):
-            dataset(sweep(MISSION, GRID, today=DAY), GRID, MISSION)
+            bb.sweep(MISSION, GRID, date=DAY).to_xarray()
 
 
 @given(st.lists(st.integers(1, 5), min_size=1, max_size=4), st.data())
