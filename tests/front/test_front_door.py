@@ -17,6 +17,7 @@ from bisar_budget.design import sweep as engine
 from bisar_budget.design.table import Table
 from bisar_budget.front import results
 from bisar_budget.front.missions import Spaced
+from docs._ext.blocks import blocks
 from tests.conftest import COMPLIES, ROOT, mission_text
 
 MISSIONS = ROOT / "specs" / "missions"
@@ -355,6 +356,43 @@ def test_rows_and_requirements_print_in_one_line(answers: dict[str, Any]) -> Non
     found = answers["check"]
     assert repr(found["receiver.velocity.y"]) == "<receiver.velocity.y: - of 0.0417101 m/s, not_declared>"
     assert repr(found.requirements["quadratic_phase_error"]).startswith("<quadratic_phase_error: ")
+
+
+def test_the_surface_as_it_was_agreed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each line of it, on a satellite and a roof; the examples of the reference run when the docs are built."""
+    (tmp_path / "mission.yaml").write_bytes(bb.load(MISSIONS / "sentinel1_elements_besancon.yaml").data)
+    (tmp_path / "paths").symlink_to(MISSIONS / "paths")
+    monkeypatch.chdir(tmp_path)
+    mission = bb.load("mission.yaml")
+    longer = mission.replace({"collection.aperture_time": "0.8 s"})
+    assert longer.collection.aperture_time == 0.8
+    result = bb.check(mission)
+    assert (result.status in {"pass", "warn"}, result.exit_code) == (True, 0)
+    assert result["receiver.velocity.y"].allowable > 0
+    assert result.requirements["location_error"].status in {"pass", "warn"}
+    assert result.to_dict()["format"] == "bisar-budget/check/1"
+    assert len(result.to_dataframe()) == len(result)
+    result.report("r.html")
+    assert (tmp_path / "r.html").exists()
+    table = bb.sweep(mission, {"collection.aperture_time": bb.linspace("0.2 s", "0.8 s", 5)})
+    assert table.to_xarray().sizes["collection.aperture_time"] == len(table.to_dataframe()) == 5
+    table.plot()
+    assert bb.solve(mission, "collection.aperture_time", between=("0.2 s", "20 s")).value > 0.2
+    assert bb.allocate(mission.replace({"allocation.combine": "rss"})).complies
+    assert bb.sensitivity(mission).slopes
+    assert len(bb.passes(mission, "2021-03-19", days=7)) > 10
+    assert bb.monte_carlo(mission, 20000).probability > 0.9
+    assert bb.verify(mission, "receiver.velocity.y").rows
+    simulated = bb.simulate(mission)
+    assert simulated.image.ndim == 2
+    simulated.plot()
+
+
+def test_every_name_has_an_example_in_the_reference() -> None:
+    page = (ROOT / "docs" / "reference" / "python.md").read_text(encoding="utf-8")
+    examples = "".join(text for language, text in blocks(page) if language in ("pycon", "python"))
+    named = {name for name in bb.__all__ if name not in ("Mission", "__version__")}
+    assert {name for name in named if f"bb.{name}" not in examples} == set()
 
 
 def test_a_report_has_what_was_asked_besides(tmp_path: Path) -> None:
