@@ -27,6 +27,16 @@ if TYPE_CHECKING:
     from bisar_budget.front.questions import sensitivity as sensitivity
     from bisar_budget.front.questions import solve as solve
     from bisar_budget.front.questions import sweep as sweep
+    from bisar_budget.front.results import AllocateResult as AllocateResult
+    from bisar_budget.front.results import CheckResult as CheckResult
+    from bisar_budget.front.results import MonteCarloResult as MonteCarloResult
+    from bisar_budget.front.results import PassesResult as PassesResult
+    from bisar_budget.front.results import Picture as Picture
+    from bisar_budget.front.results import SensitivityResult as SensitivityResult
+    from bisar_budget.front.results import SimulateResult as SimulateResult
+    from bisar_budget.front.results import SolveResult as SolveResult
+    from bisar_budget.front.results import VerifyResult as VerifyResult
+    from bisar_budget.front.sweeps import SweepResult as SweepResult
     from bisar_budget.mission.model import Mission as Mission
     from bisar_budget.mission.quantities import QuestionError as QuestionError
 
@@ -37,6 +47,11 @@ _LIVES = {
     "mission.quantities": ("QuestionError",),
     "front.missions": ("geomspace", "linspace", "load", "loads"),
     "front.checks": ("check",),
+    "front.results": (
+        *("AllocateResult", "CheckResult", "MonteCarloResult", "PassesResult", "Picture"),
+        *("SensitivityResult", "SimulateResult", "SolveResult", "VerifyResult"),
+    ),
+    "front.sweeps": ("SweepResult",),
     "front.imaging": ("simulate", "verify"),
     "front.questions": ("allocate", "monte_carlo", "passes", "sensitivity", "solve", "sweep"),
 }

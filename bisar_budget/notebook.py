@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 from html import escape
 
 _STYLE = """<style>
-.bisar-budget { font-size: 0.92em; line-height: 1.35 }
+.bisar-budget { overflow-x: auto; font-size: 0.92em; line-height: 1.35 }
 .bisar-budget table { border-collapse: collapse; margin: 0.4em 0 }
 .bisar-budget th, .bisar-budget td { padding: 0.15em 0.7em; text-align: left; background: transparent }
 .bisar-budget td:not(:last-child) { white-space: nowrap }

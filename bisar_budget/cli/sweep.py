@@ -190,4 +190,4 @@ def _write(run: "SweepResult", output: str | None, plot: str | None, plot_column
     if plot is not None and gathered is not None:
         kind = os.path.splitext(plot)[1][1:].lower()
         write_file(plot, drawing_file(run.drawing(gathered, is_polar=is_polar), kind))
-    complain(f"{printable(run.mission.name)}: {run.summary}")
+    complain(f"{printable(run.mission.name)}: {run.so_far}")

@@ -31,7 +31,7 @@ def watched(label: str) -> "Iterator[Progress]":
 
     def progress(done: int, total: int) -> None:
         if not bars:
-            is_notebook = "ipykernel" in sys.modules
+            is_notebook = _is_notebook()
             is_seen = is_notebook or (sys.stderr is not None and sys.stderr.isatty())
             if not is_seen or monotonic() - began < _MOMENT:
                 return
@@ -44,6 +44,12 @@ def watched(label: str) -> "Iterator[Progress]":
     finally:
         for bar in bars:
             bar.close()
+
+
+def _is_notebook() -> bool:
+    """Whether a kernel of Jupyter runs this; that its modules are there is not enough."""
+    shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
+    return hasattr(shell, "kernel")
 
 
 def _bar(label: str, total: int, is_notebook: bool) -> Any:

@@ -81,7 +81,7 @@ class Picture:
         return f"Picture({self.title!r})"
 
     def _repr_html_(self) -> str:
-        return self._made("svg").decode()
+        return notebook.page(self._made("svg").decode())
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write a file: .svg, .png or .pdf.

@@ -61,7 +61,7 @@ class SweepResult:
 
     def __repr__(self) -> str:
         """Keys, number of cases and how many comply, on one line."""
-        return f"<sweep of {self.mission.name!r} over {self._keys(', ')}: {self._said}>"
+        return f"<sweep of {self.mission.name!r} over {self._keys(', ')}: {self.summary}>"
 
     def _keys(self, between: str) -> str:
         return between.join(one.key for one in self.cases.varied)
@@ -115,8 +115,8 @@ class SweepResult:
             told(self.statuses.total(), self.cases.count)
 
     @property
-    def summary(self) -> str:
-        """How many cases were checked, and how many comply."""
+    def so_far(self) -> str:
+        """How many cases were checked until now, and how many comply."""
         done, comply = self.statuses.total(), complying(self.statuses)
         if not done:
             return "no case was checked"
@@ -146,7 +146,7 @@ class SweepResult:
             uses_of_rows(trade, again),
             self.mission.file,
             f"Trade study: {' and '.join(axis.key for axis in trade.axes)}, {self.mission.name}",
-            f"{printable(self.mission.name)}: {self.summary}",
+            f"{printable(self.mission.name)}: {self.so_far}",
             above=head_of(trade, self.mission, is_polar=is_polar),
             seen_from_above=self.mission.geometry if is_polar else None,
         )
@@ -163,8 +163,9 @@ class SweepResult:
         return self._described(replace(swept, parts=iter(parts)))
 
     @property
-    def _said(self) -> str:
-        return self.summary if self._parts else ""  # they are counted as they are checked
+    def summary(self) -> str:
+        """How many cases there are, and how many comply."""
+        return self.so_far if self._parts else ""  # they are counted as they are checked
 
     @cached_property
     def columns(self) -> Mapping[str, Any]:
@@ -255,12 +256,12 @@ class SweepResult:
 
     def _repr_html_(self) -> str:
         try:
-            drawn = self.plot()._repr_html_()
+            drawn = self.plot().of("svg").decode()
         except QuestionError:
             names = list(self.columns)
             rows = zip(*(self.columns[name][:_SHOWN] for name in names), strict=True)
             drawn = notebook.table(names, rows)
-        return notebook.page(drawn, notebook.note(f"{self.mission.name}: {self._said}"))
+        return notebook.page(drawn, notebook.note(f"{self.mission.name}: {self.summary}"))
 
 
 def _values(common: tuple[Question, Described, Any], block: Block) -> Mapping[str, Any]:

@@ -19,6 +19,7 @@ from bisar_budget.front import results
 from bisar_budget.front.missions import Spaced
 from docs._ext.blocks import blocks
 from tests.conftest import COMPLIES, ROOT, mission_text
+from tests.front.user_script import report
 
 MISSIONS = ROOT / "specs" / "missions"
 SECTION_V, UAV, TANDEM_X = (
@@ -388,10 +389,18 @@ def test_the_surface_as_it_was_agreed(tmp_path: Path, monkeypatch: pytest.Monkey
     simulated.plot()
 
 
+def test_a_users_script_runs() -> None:
+    """It is also what mypy holds the types of the surface to, in strict mode."""
+    said = report(str(SECTION_V)).splitlines()
+    assert said[0].startswith("fail 1 transmitter.acceleration.x fail 0.039")
+    assert "10 cases" in said[1]
+    assert report(str(ROOT / "tests" / "acceptance" / "bad" / "bare_angle.yaml")).endswith("azimuth")
+
+
 def test_every_name_has_an_example_in_the_reference() -> None:
     page = (ROOT / "docs" / "reference" / "python.md").read_text(encoding="utf-8")
     examples = "".join(text for language, text in blocks(page) if language in ("pycon", "python"))
-    named = {name for name in bb.__all__ if name not in ("Mission", "__version__")}
+    named = {name for name in bb.__all__ if name[0].islower()} | {"MissionError", "QuestionError"}
     assert {name for name in named if f"bb.{name}" not in examples} == set()
 
 

@@ -1,5 +1,6 @@
 """What the README shows is what the software does. Pages of `docs` are held to the same when the site is built."""
 
+import json
 import re
 from pathlib import Path
 
@@ -154,4 +155,13 @@ def test_every_page_has_a_place_in_the_site() -> None:
         for entry in text.splitlines()
         if entry and not entry.startswith(":")
     }
-    assert listed == {page.with_suffix("").resolve() for page in PAGES} - {(ROOT / "docs" / "index").resolve()}
+    pages = [*PAGES, *(ROOT / "docs").rglob("*.ipynb")]
+    assert listed == {page.with_suffix("").resolve() for page in pages} - {(ROOT / "docs" / "index").resolve()}
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "docs" / "notebooks").glob("*.ipynb")), ids=lambda path: path.stem)
+def test_a_notebook_is_kept_without_what_it_prints(path: Path) -> None:
+    """The build of the docs runs it; outputs in the file would be another run's."""
+    cells = [cell for cell in json.loads(path.read_text(encoding="utf-8"))["cells"] if cell["cell_type"] == "code"]
+    assert cells
+    assert not any(cell["outputs"] or cell["execution_count"] for cell in cells)

@@ -11,6 +11,7 @@ from bisar_budget.report.words.sentences import percent
 
 MOST = 20  # bars
 _WIDTH, _EDGE, _MOST_LEFT = 860.0, 12.0, 580.0  # px, of the drawing, at its right, for the names of numbers
+_BOLD = 0.86  # width of a text over that of a bold one
 _ROW, _HALF = 22.0, 8.0  # px for a number, half of its bar
 _STYLE = (
     "svg.drawing .worse{fill:var(--receiver,#a8471a)}svg.drawing .better{fill:var(--transmitter,#1f5fa8)}"
@@ -33,7 +34,9 @@ def tornado_drawing(found: Sensitivity) -> str:
     shown = found.shown[:MOST]
     name = printable(f"{found.name} {changes_words(found.changes)}".rstrip())
     what = printable(f"row {found.row}" if found.row else f"worst utilization: {found.worst_row}")
-    top = svg.head(canvas, [svg.short(name, _WIDTH), what, f"change of the utilization, {percent(found.asked)} now"])
+    top = svg.head(
+        canvas, [svg.short(name, _BOLD * _WIDTH), what, f"change of the utilization, {percent(found.asked)} now"]
+    )
     labels = [svg.short(_label(slope), 1.1 * _MOST_LEFT) for slope in shown]
     left = min(0.9 * max(map(svg.text_width, labels), default=0.0) + 16, _MOST_LEFT)
     frame = svg.Box(left, top, _WIDTH - _EDGE, top + _ROW * max(len(shown), 1))
