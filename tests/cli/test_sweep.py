@@ -238,7 +238,7 @@ def test_an_interrupt_leaves_no_half_file(tmp_path: Path) -> None:
     with started(*vary, "-o", str(tmp_path / "t.csv"), stderr=subprocess.PIPE) as process:
         try:
             deadline = time.monotonic() + 60
-            while not any(file.stat().st_size for file in tmp_path.iterdir()):
+            while not any(file.stat().st_size for file in tmp_path.rglob("*.csv")):
                 assert time.monotonic() < deadline
                 assert process.poll() is None
                 time.sleep(0.05)
