@@ -6,9 +6,10 @@ phase noise is a sum of tones, and synchronisation joins samples of it by straig
 
 import math
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.constants import SPEED_OF_LIGHT
@@ -33,7 +34,7 @@ from bisar_budget.mission.instruments import GaussMarkov
 from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.mission.platforms import MotionError
 from bisar_budget.mission.propagation import DELAYS
-from bisar_budget.simulator.phase_history import Course, Errors, Floats, PathError, PathSinusoid
+from bisar_budget.simulator.phase_history import Complexes, Course, Errors, Floats, PathError, PathSinusoid
 
 _STEPS = 512  # from mid-aperture to the end of it, in which a walk is summed up
 _SLOW_TONES = 80  # over logarithms, below a tone per two apertures
@@ -41,8 +42,11 @@ _SLOWEST = 1e-4  # of a tone per aperture; its quadratic phase is nothing
 _PERIODS = 4  # apertures in which phase noise repeats
 _AGES, _PER_AGE = 24, 8  # turns within the age of a setting that are followed, and tones for each
 _TURNED = 256  # turns within an averaging, beyond which nothing of a tone is left in its line
-_PER_CYCLE = 8  # samples of the fastest tone, joined by straight lines
+_PER_CYCLE = 8  # samples of the fastest tone that is flown, joined by straight lines
 _MAX_TONES = 1 << 18
+_NUMBERS = 1 << 20  # drawn at once
+_FAR = 32  # apertures from which on an exchange knows nothing of a tone that turns in one
+_FEWEST = 4  # exchanges in a period of tones: those on either side of an aperture are not the same
 _MOST_KNOTS = 1 << 13  # exchanges in an aperture that are drawn
 _FLOWN = 4097  # moments of a time series that is flown
 _MOST_FLOWN = 1 << 19  # of phase noise, whose fastest tones would else be joined by straight lines
@@ -278,8 +282,9 @@ def phase_courses(
 ) -> Floats:
     """Phases of one oscillator, or of the link, at the centre frequency, (draws, times), of one sigma. [rad]
 
-    Parameters are those of `position_courses`; of an oscillator `declared` is a factor on its amplitude. Tones above
-    `highest` [Hz] may be left out, where no exchange of pulses folds them.
+    Parameters are those of `position_courses`; of an oscillator `declared` is a factor on its amplitude. Times are
+    evenly spaced and divide the aperture. Tones above `highest` [Hz] may be left out, where no exchange of pulses
+    folds them.
     """
     sync, T = mission.synchronization, mission.collection.aperture_time
     size = error.declared or 0.0
@@ -304,39 +309,76 @@ def phase_courses(
         oscillator = getattr(mission.platforms, error.owner).oscillator
         pieces = noise_of(oscillator, mission.radar.center_frequency, T).pieces
     interval = None if sync is None else sync.interval
-    if interval is None:
-        pieces = _below(pieces, highest)
+    bends = [bend.draw(rng) for _ in range(draws)] if bend is not None else []
+    if interval is not None:
+        # Pulses that follow each other faster take the phase away to nothing that an image shows.
+        return size * _between_exchanges(pieces, T, max(interval, T / _MOST_KNOTS), times, draws, rng, bends)
+    pieces = _below(pieces, highest)
     if sync is not None and sync.is_direct_path:
         if error.owner == "transmitter":  # both paths have its phase at one time
             return np.zeros((draws, times.size))
-        tones, later = _Tones(pieces, T), times + float(mission.geometry.echo_delay)
-        waves_of = (tones.draw(rng) for _ in range(draws))
-        heard_twice: Floats = size * np.stack([one.at(later) - one.at(times) for one in waves_of])
-        return heard_twice
-    is_set = sync is not None and sync.is_holdover and not error.subject.axis
-    setting = _Setting(pieces, T, sync.age or T, sync.averaging or T) if sync is not None and is_set else None
-    tones = _Tones(pieces, T) if setting is None else setting.tones
-    waves = _slow_waves(tones.slow, times) if times.size <= _FLOWN else None
-    found = np.empty((draws, times.size))
-    for index in range(draws):
-        drawn = tones.draw(rng)
-        bent = bend.draw(rng) if bend is not None else None
-        found[index] = drawn.at(times, waves)
-        if bent is not None:
-            found[index] += bent(times)
-        if setting is not None:
-            found[index] -= setting.line(drawn, times, rng)
-        if interval is not None:
-            # Pulses that follow each other faster take the phase away to nothing that an image shows.
-            knots = _knots(times, max(interval, T / _MOST_KNOTS), rng)
-            sampled = drawn.at(knots) + (0.0 if bent is None else bent(knots))
-            found[index] -= np.interp(times, knots, sampled)
+        return size * _Tones(pieces, T).at(times, draws, rng, later=float(mission.geometry.echo_delay))
+    if sync is not None and sync.is_holdover and not error.subject.axis:
+        setting = _Setting(pieces, T, sync.age or T, sync.averaging or T)
+        slow = setting.tones.draw_slow(draws, rng)
+        found = setting.tones.slow_at(times, slow) + setting.tones.fast_at(times, draws, rng)
+        found -= setting.lines(slow, times, rng)
+    else:
+        found = _Tones(pieces, T).at(times, draws, rng)
+    if bends:
+        found += np.stack([bent(times) for bent in bends])
     return size * found
+
+
+def _between_exchanges(
+    pieces: tuple[PowerLawPiece, ...],
+    aperture_time: float,
+    interval: float,
+    times: Floats,
+    draws: int,
+    rng: np.random.Generator,
+    bends: Sequence[Callable[[Floats], Floats]] = (),
+) -> Floats:
+    """Phases without the straight lines between their values at exchanges of pulses, (draws, times). [rad]
+
+    The tones repeat after a whole number of intervals, so that exchanges divide their period as evenly as moments do.
+    For this the moments spread by less than the share that one of them has of the period.
+    """
+    step = min(interval, _FAR * aperture_time)
+    parts = max(_FEWEST, math.ceil(_PERIODS * aperture_time / step))
+    tones = _Tones(pieces, aperture_time, period=parts * step)
+    middle, apart = (times[0] + times[-1]) / 2, float(times[-1] - times[0]) / (times.size - 1)
+    count = round(tones.period / apart)
+    moments: Floats = middle + (times - middle) * (tones.period / count / apart)
+    slow = tones.draw_slow(draws, rng)
+    found = tones.slow_at(moments, slow)
+    for index in range(draws):
+        knots = _knots(moments, interval, rng)
+        sampled = tones.slow_at(knots, slow[:, index : index + 1])[0]
+        if bends:
+            found[index] += bends[index](moments)
+            sampled += bends[index](knots)
+        cosine, sine = rng.standard_normal((2, tones.fast_size.size)) * tones.fast_size
+        fast: Complexes = cosine - 1j * sine
+        found[index] += tones_at(fast, count)[: times.size]
+        # Exchanges farther apart than that lie where the tones have begun again, which is as far for fast ones.
+        fast *= _turned((knots[0] - moments[0]) / interval * step / tones.period, fast.size)
+        sampled += np.resize(tones_at(fast, parts), knots.size)
+        if tones.rest:  # of which two moments know nothing of each other
+            found[index] += tones.rest * rng.standard_normal(times.size)
+            sampled += tones.rest * rng.standard_normal(knots.size)
+        found[index] -= np.interp(moments, knots, sampled)
+    return found
 
 
 def _below(pieces: tuple[PowerLawPiece, ...], highest: float) -> tuple[PowerLawPiece, ...]:
     """Pieces of a spectrum up to a frequency."""
     return tuple(piece._replace(high=min(piece.high, highest)) for piece in pieces if piece.low < highest)
+
+
+def _above(pieces: tuple[PowerLawPiece, ...], lowest: float) -> tuple[PowerLawPiece, ...]:
+    """Pieces of a spectrum from a frequency on."""
+    return tuple(piece._replace(low=max(piece.low, lowest)) for piece in pieces if piece.high > lowest)
 
 
 def _fastest(mission: Mission, error: RandomError) -> float:
@@ -414,52 +456,74 @@ def _knots(times: Floats, interval: float, rng: np.random.Generator) -> Floats:
     return knots
 
 
-class _Drawn(NamedTuple):
-    """One draw of a spectrum: slow tones, (n,) each, and the fast ones over a time in which they repeat.
-
-    What is faster still is another number at every moment, of the sigma `rest`.
-    """
-
-    frequency: Floats
-    cosine: Floats
-    sine: Floats
-    fast: Course
-    rest: float
-    rng: np.random.Generator
-
-    def at(self, times: Floats, waves: tuple[Floats, Floats] | None = None) -> Floats:
-        """Sum of the tones; `waves` are those of the slow ones at these times, where they are known. [rad]"""
-        few = times if times.size <= _FLOWN else np.linspace(times[0], times[-1], _FLOWN)
-        cosines, sines = waves or _slow_waves(self.frequency, few)
-        slow = cosines @ self.cosine + sines @ self.sine
-        found: Floats = (slow if few is times else np.interp(times, few, slow)) + self.fast.at(times)
-        return found + self.rest * self.rng.standard_normal(times.size) if self.rest else found
-
-
 def _slow_waves(frequency: Floats, times: Floats) -> tuple[Floats, Floats]:
     """Cosines and sines of tones at some times, (times, tones) each."""
     turn = 2 * math.pi * np.multiply.outer(times, frequency)
     return np.cos(turn), np.sin(turn)
 
 
-class _Tones:
-    """A spectrum as tones: those that turn within the aperture at even distances, the others by logarithms."""
+def _turned(turns: float, count: int) -> Complexes:
+    """Phasors of the tones 1 … `count`, of which the first turns so many times."""
+    side = math.isqrt(count) + 1
+    whole = np.exp(2j * math.pi * turns * np.arange(side + 1) * side)
+    found: Complexes = np.multiply.outer(whole, np.exp(2j * math.pi * turns * np.arange(side))).ravel()
+    return found[1 : count + 1]
 
-    def __init__(self, pieces: tuple[PowerLawPiece, ...], aperture_time: float, slow: Floats | None = None) -> None:
-        high, fine = max((piece.high for piece in pieces), default=0.0), 1 / (_PERIODS * aperture_time)
+
+def _folded(values: NDArray[Any], count: int) -> NDArray[Any]:
+    """Sums of the tones 1, 2 … that are one at `count` moments of their period, (count,)."""
+    found = np.zeros(-(-(values.size + 1) // count) * count, values.dtype)
+    found[1 : values.size + 1] = values
+    folded: NDArray[Any] = found.reshape(-1, count).sum(axis=0)
+    return folded
+
+
+def tones_at(amplitudes: Complexes, count: int) -> Floats:
+    """Sum of the tones 1, 2 … at `count` moments that divide their period evenly, (count,), from its beginning on."""
+    found: Floats = np.fft.ifft(_folded(amplitudes, count), norm="forward").real
+    return found
+
+
+def powers_at(powers: Floats, count: int) -> Floats:
+    """Powers of tones 0 … count / 2 that have at `count` moments the covariance of the tones 1, 2 … of random phase.
+
+    A tone's phase at a moment is 2πkn/count: one of `count` turns more is the same there, and one of as many less a
+    whole number of them turns the other way, which a random phase does not show. So their powers add.
+    """
+    folded = _folded(powers, count)
+    found: Floats = folded[: count // 2 + 1].copy()
+    found[1 : (count + 1) // 2] += folded[: count // 2 : -1]
+    return found
+
+
+class _Tones:
+    """A spectrum as tones: those that turn within the aperture at even distances, the others by logarithms.
+
+    The fast ones repeat after a period [s]. What is faster still is another number at every moment, of the sigma
+    `rest`.
+    """
+
+    def __init__(
+        self,
+        pieces: tuple[PowerLawPiece, ...],
+        aperture_time: float,
+        slow: Floats | None = None,
+        period: float | None = None,
+    ) -> None:
+        self.period = _PERIODS * aperture_time if period is None else period
+        high, fine = max((piece.high for piece in pieces), default=0.0), 1 / self.period
         if slow is None:
             slow = np.geomspace(_SLOWEST / aperture_time, fine / 2, _SLOW_TONES + 1)
         self.slow: Floats = (slow[1:] + slow[:-1]) / 2
         widths: Floats = slow[1:] - slow[:-1]
         self.slow_size = self._size(pieces, self.slow, widths)
+        pieces = _above(pieces, float(slow[-1]))
         count = min(_MAX_TONES, max(1, math.ceil(high / fine)))
-        fast: Floats = fine * np.arange(1.0, count + 1)
-        self.fast_size = self._size(pieces, fast, np.full(count, fine))
-        top = float(fast[-1]) + fine / 2
+        self.fast: Floats = fine * np.arange(1.0, count + 1)
+        self.fast_size = self._size(pieces, self.fast, np.full(count, fine))
+        top = float(self.fast[-1]) + fine / 2
         beyond = [piece.integral(max(piece.low, top), piece.high) for piece in pieces if piece.high > top]
         self.rest = math.sqrt(math.fsum(beyond))
-        samples = 1 << (2 * _PER_CYCLE * count - 1).bit_length() - 1
-        self.times: Floats = (np.arange(samples + 1) / samples - 0.5) / fine
 
     @staticmethod
     def _size(pieces: tuple[PowerLawPiece, ...], frequency: Floats, width: Floats) -> Floats:
@@ -467,29 +531,57 @@ class _Tones:
         found: Floats = np.sqrt(density(pieces, frequency) * width)
         return found
 
-    def draw(self, rng: np.random.Generator) -> _Drawn:
-        """Random sizes of cosine and sine."""
-        cosine, sine = rng.standard_normal((2, self.slow.size)) * self.slow_size
-        samples = self.times.size - 1
-        spectrum = np.zeros(samples // 2 + 1, dtype=complex)
-        both = rng.standard_normal((2, self.fast_size.size)) * self.fast_size
-        spectrum[1 : both.shape[1] + 1] = (both[0] - 1j * both[1]) * samples / 2
-        fast = np.fft.irfft(spectrum, samples)
-        return _Drawn(self.slow, cosine, sine, Course(self.times, np.append(fast, fast[0])), self.rest, rng)
+    def draw_slow(self, draws: int, rng: np.random.Generator) -> Floats:
+        """Random sizes of cosine and sine of the slow tones, (2, draws, tones)."""
+        found: Floats = rng.standard_normal((2, draws, self.slow.size)) * self.slow_size
+        return found
+
+    def slow_at(self, times: Floats, drawn: Floats) -> Floats:
+        """Sums of the slow tones, (draws, times). [rad]"""
+        few = times if times.size <= _FLOWN else np.linspace(times[0], times[-1], _FLOWN)
+        cosines, sines = _slow_waves(self.slow, few)
+        found: Floats = drawn[0] @ cosines.T + drawn[1] @ sines.T
+        return found if few is times else np.stack([np.interp(times, few, one) for one in found])
+
+    def fast_at(self, times: Floats, draws: int, rng: np.random.Generator, later: float | None = None) -> Floats:
+        """Sums of the fast tones at times that divide their period evenly, (draws, times); see `at`. [rad]"""
+        count = 2 * round(self.period * (times.size - 1) / float(times[-1] - times[0]) / 2)
+        square, rest = np.square(self.fast_size), self.rest**2
+        if later is not None:
+            square, rest = square * (2 * np.sin(math.pi * self.fast * later)) ** 2, 2 * rest
+        power = powers_at(square, count)
+        power[1 : (count + 1) // 2] += 2 * rest / count
+        power[:: count // 2] += rest / count
+        size = np.sqrt(power) * count / 2
+        size[:: count // 2] *= 2  # these two have no sine
+        found, together = np.empty((draws, times.size)), max(1, _NUMBERS // count)
+        for first in range(0, draws, together):
+            some = min(together, draws - first)
+            drawn = rng.standard_normal((some, size.size, 2)).view(complex)[..., 0] * size
+            found[first : first + some] = np.fft.irfft(drawn, count)[:, : times.size]
+        return found
+
+    def at(self, times: Floats, draws: int, rng: np.random.Generator, later: float | None = None) -> Floats:
+        """Sums of all tones at evenly spaced times, (draws, times), or their change until so much later [s]. [rad]"""
+        slow = self.draw_slow(draws, rng)
+        found = self.slow_at(times, slow)
+        if later is not None:
+            found = self.slow_at(times + later, slow) - found
+        return found + self.fast_at(times, draws, rng, later)
 
 
 class _Setting:
     """A clock that was set before the aperture, by a line fitted to its phase over the averaging.
 
-    Slow tones are the same in the averaging and in the aperture. Of what is faster than a tone per eight apertures,
-    and so often turned within the age, the averaging has a draw of its own.
+    Slow tones are the same in the averaging and in the aperture. Of what is faster than a tone per eight apertures
+    and has turned two dozen times within the age, the averaging has a draw of its own.
     """
 
     def __init__(self, pieces: tuple[PowerLawPiece, ...], aperture_time: float, age: float, averaging: float) -> None:
         self.age = age
-        step, fast = 1 / (_PER_AGE * age), 1 / (2 * _PERIODS * aperture_time)
-        followed = min(_AGES * _PER_AGE * step, fast)
-        edges = [np.geomspace(_SLOWEST / max(age, aperture_time), min(step, fast), _SLOW_TONES + 1)]
+        step, followed = 1 / (_PER_AGE * age), _AGES / age
+        fast = max(followed, 1 / (2 * _PERIODS * aperture_time))
+        edges = [np.geomspace(_SLOWEST / max(age, aperture_time), step, _SLOW_TONES + 1)]
         edges += [np.arange(step, followed, step), np.geomspace(followed, fast, _SLOW_TONES + 1)]
         self.tones = _Tones(pieces, aperture_time, np.unique(np.concatenate(edges)))
         count = 64 + math.ceil(16 * averaging * fast)
@@ -497,17 +589,15 @@ class _Setting:
         self.fit: Floats = np.linalg.pinv(np.stack((np.ones(count), self.window), axis=1)).astype(float)
         cosines, sines = _slow_waves(self.tones.slow, self.window - age)
         self.of_cosine, self.of_sine = self.fit @ cosines, self.fit @ sines
-        own = tuple(piece._replace(low=max(piece.low, fast)) for piece in _below(pieces, _TURNED / averaging))
-        own = tuple(piece for piece in own if piece.low < piece.high)
+        own = _above(_below(pieces, _TURNED / averaging), fast)
         self.fast = _Tones(own, averaging) if own else None
 
-    def line(self, drawn: _Drawn, times: Floats, rng: np.random.Generator) -> Floats:
-        """The line that was fitted, at other times, (times,). [rad]"""
-        value, slope = self.of_cosine @ drawn.cosine + self.of_sine @ drawn.sine
+    def lines(self, slow: Floats, times: Floats, rng: np.random.Generator) -> Floats:
+        """The lines that were fitted, at other times, (draws, times); `slow` is what was drawn. [rad]"""
+        lines = self.of_cosine @ slow[0].T + self.of_sine @ slow[1].T
         if self.fast is not None:
-            own_value, own_slope = self.fit @ self.fast.draw(rng).at(self.window)
-            value, slope = value + own_value, slope + own_slope
-        found: Floats = value + slope * (times + self.age)
+            lines += self.fit @ self.fast.at(self.window, slow.shape[1], rng).T
+        found: Floats = lines[0][:, None] + np.multiply.outer(lines[1], times + self.age)
         return found
 
 

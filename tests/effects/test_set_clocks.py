@@ -131,7 +131,7 @@ def test_a_set_clock_does_what_whole_time_series_do() -> None:
     "sync", ["{method: holdover, age: 20 s, averaging: 4 s}", "{method: direct_path, error: 0 deg}"]
 )
 def test_what_is_flown_is_what_is_computed(sync: str) -> None:
-    """Sums of tones, with a line taken off or heard twice: 4000 know a sigma to 1.1 %."""
+    """Sums of tones, with a line taken off or heard twice: 4000 know a sigma to 1.1 %; 3 of those."""
     text = f"{HELD}\n    oscillator: {{power_law: {{h-2: 4e-23, h-1: 1e-22, h0: 1e-22}}}}\nsynchronization: {sync}\n"
     mission = parse_mission(text)
     (error,) = [one for one in random_errors(mission) if one.subject.kind == "oscillator"]
@@ -142,7 +142,7 @@ def test_what_is_flown_is_what_is_computed(sync: str) -> None:
         fit[0] = 0.0  # a constant phase moves nothing
     found = through_the_clock(mission, np.polynomial.legendre.legval(aperture_nodes(6.0) / 3, fit))
     for drawn, computed in zip(found[1:5], (*error.full[3:5], *error.full[:2]), strict=True):
-        assert np.std(drawn) == pytest.approx(computed, rel=0.045, abs=1e-9)
+        assert np.std(drawn) == pytest.approx(computed, rel=0.035, abs=1e-9)
 
 
 class TestSetting:

@@ -92,7 +92,7 @@ def test_noise_faster_than_every_drawn_tone_has_its_power() -> None:
     """Flat from 1 Hz to 1 GHz, which no tones resolve; it was left out and no longer spread anything."""
     tones = _Tones((PowerLawPiece(1.0, 1e9, 1e-12, 0.0),), 6.0)
     moments = np.linspace(-3, 3, 4001)
-    drawn = tones.draw(np.random.default_rng(5)).at(moments)
+    (drawn,) = tones.at(moments, 1, np.random.default_rng(5))
     assert np.var(drawn) == pytest.approx(1e-12 * 1e9, rel=0.1)  # 4001 samples: 2.2 % of a variance
 
 
