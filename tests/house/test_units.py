@@ -1,6 +1,7 @@
 """Quantities in and out."""
 
 import math
+import re
 
 import pytest
 from hypothesis import given
@@ -247,3 +248,86 @@ def test_no_row_has_a_unit_that_is_not_read_back() -> None:
     found = check_mission(parse_mission(text), TODAY)
     assert {row.unit for row in found.rows} <= PRINTED.keys()
     assert len({row.unit for row in found.rows}) >= 8
+
+
+# Each from its definition, not from the package: SI brochure, the international foot and mile, ISO 80000.
+_ATOMS = {
+    "": 1.0,
+    "1": 1.0,
+    "m": 1.0,
+    "s": 1.0,
+    "rad": 1.0,
+    "Hz": 1.0,
+    "B": 1.0,
+    "dB": 1.0,
+    "dBc": 1.0,
+    "km": 1e3,
+    "cm": 1e-2,
+    "mm": 1e-3,
+    "um": 1e-6,
+    "nm": 1e-9,
+    "ft": 0.3048,
+    "nmi": 1852.0,
+    "NM": 1852.0,
+    "ms": 1e-3,
+    "us": 1e-6,
+    "ns": 1e-9,
+    "ps": 1e-12,
+    "min": 60.0,
+    "h": 3600.0,
+    "day": 86400.0,
+    "month": 30 * 86400.0,
+    "year": 365.25 * 86400.0,
+    "kHz": 1e3,
+    "MHz": 1e6,
+    "GHz": 1e9,
+    "THz": 1e12,
+    "kt": 1852 / 3600,
+    "kn": 1852 / 3600,
+    "mrad": 1e-3,
+    "urad": 1e-6,
+    "nrad": 1e-9,
+    "deg": math.pi / 180,
+    "\N{DEGREE SIGN}": math.pi / 180,
+    "arcmin": math.pi / 10800,
+    "arcsec": math.pi / 648000,
+    "g": 9.80665,
+    "mg": 9.80665e-3,
+    "ug": 9.80665e-6,
+    "Gal": 1e-2,
+    "mGal": 1e-5,
+    "uGal": 1e-8,
+    "%": 1e-2,
+    "ppm": 1e-6,
+    "ppb": 1e-9,
+    "TECU": 1e16,
+    "kB": 1e3,
+    "KB": 1e3,
+    "MB": 1e6,
+    "GB": 1e9,
+    "TB": 1e12,
+    "MiB": 2.0**20,
+    "GiB": 2.0**30,
+}
+
+
+def worked_out(unit: str) -> float:
+    """The factor to SI of a unit as it is written: parts between slashes, powers, square roots."""
+    whole = 1.0
+    for place, part in enumerate(re.split(r"/(?![^(]*\))", unit)):
+        match = re.fullmatch(r"(?:(sqrt)?\((.*)\)|([^()^]*))(?:\^(-?\d))?", part)
+        assert match is not None, part
+        inner = worked_out(match[2]) if match[2] is not None else _ATOMS[match[3]]
+        if match[1]:
+            inner = math.sqrt(inner)
+        inner **= int(match[4] or 1)
+        whole = whole / inner if place else inner
+    return whole
+
+
+def test_every_unit_has_the_factor_of_its_parts() -> None:
+    kinds = [one for one in vars(units).values() if isinstance(one, units.Dimension)]
+    assert len(kinds) > 25
+    for kind in kinds:
+        for unit, factor in kind.units.items():
+            assert factor == pytest.approx(worked_out(unit) / worked_out(kind.si), rel=1e-14), (kind.name, unit)

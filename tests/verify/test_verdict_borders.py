@@ -102,7 +102,9 @@ class TestCubic:
 
 
 class TestRefocused:
-    @pytest.mark.parametrize(("left", "verdict"), [(0.9, "confirmed"), (1.2, "optimistic"), (1.8, "optimistic")])
+    @pytest.mark.parametrize(
+        ("left", "verdict"), [(0.9, "confirmed"), (1.12, "optimistic"), (1.2, "optimistic"), (1.8, "optimistic")]
+    )
     def test_what_autofocus_leaves_is_held_to_the_plain_budget(self, monkeypatch, left: float, verdict: str) -> None:
         """An autofocus that leaves a known share of π/8, at a limit of eight times that."""
 
