@@ -51,6 +51,7 @@ _POINTS_OF_29 = f"{_IMAGES}test_points_of_29_are_where_each_third_of_the_apertur
 _SMEAR_DIRECTION = "tests/theory/test_smear_direction.py::test_a_range_rate_moves_the_image_along_31"
 _SMEAR_OF_A_VERDICT = f"{_BORDERS}test_the_smear_of_a_verdict_lies_along_31"
 _FIVE_PERCENT = f"{_BORDERS}test_a_velocity_limit_is_confirmed_within_5_percent_of_the_budget"
+_SEAMS = "tests/acceptance/test_seams.py::"
 _LINE_OF_SIGHT = "tests/house/test_geometry.py::test_a_line_of_sight_turns_as_the_platform_flies"
 
 MUTANTS = (
@@ -286,5 +287,86 @@ MUTANTS = (
         "(beyond is None or beyond > measured)",
         "True",
         (f"{_BORDERS}TestThroughTheLimit",),
+    ),
+    Mutant(
+        "simulate: noise by 20 log",
+        _POINT,
+        "10 ** (power / 10)",
+        "10 ** (power / 20)",
+        (f"{_SEAMS}test_noise_is_a_power",),
+    ),
+    Mutant(
+        "simulate: a grid with its axes swapped",
+        "bisar_budget/simulator/targets.py",
+        "Target(spacing * (column - (columns - 1) / 2), spacing * (row - (rows - 1) / 2))",
+        "Target(spacing * (row - (rows - 1) / 2), spacing * (column - (columns - 1) / 2))",
+        (f"{_SEAMS}test_a_grid_has_its_columns_along_east",),
+    ),
+    Mutant(
+        "simulate: sensors flown without the coverage factor",
+        "bisar_budget/simulator/realisations.py",
+        "Course(times, factor * drawn[0])",
+        "Course(times, drawn[0])",
+        (f"{_SEAMS}test_the_coverage_factor_is_in_the_time_series_of_sensors_and_clocks",),
+    ),
+    Mutant(
+        "simulate: clocks flown without the coverage factor",
+        "bisar_budget/simulator/realisations.py",
+        "drawn = factor * phase_courses",
+        "drawn = phase_courses",
+        (f"{_SEAMS}test_the_coverage_factor_is_in_the_time_series_of_sensors_and_clocks",),
+    ),
+    Mutant(
+        "verify: one optimistic mission of several passes",
+        "bisar_budget/cli/images.py",
+        'any(mission.status == "fail" for mission in verified)',
+        'all(mission.status == "fail" for mission in verified)',
+        (f"{_SEAMS}test_one_optimistic_mission_of_several_breaks_verify",),
+    ),
+    Mutant(
+        "verify: what autofocus leaves is met within 20 %",
+        _PHASES,
+        "is_met = residual <= budget * (1 + TOLERANCE)",
+        "is_met = residual <= budget * (1 + 4 * TOLERANCE)",
+        (f"{_BORDERS}TestRefocused",),
+    ),
+    Mutant(
+        "SARIF: an expired waiver suppresses",
+        "bisar_budget/report/formats/annotations.py",
+        """    if status != "waived" or not waivers:
+        return {}
+    waiver = next(one for one in waivers if not one.is_expired)""",
+        """    if not waivers:
+        return {}
+    waiver = waivers[0]""",
+        (f"{_SEAMS}test_only_a_waiver_that_holds_suppresses",),
+    ),
+    Mutant(
+        "SARIF: without what passes by autofocus alone",
+        "bisar_budget/findings/status.py",
+        'sarif="note", github="notice", junit="remark", verdict="Complies, with autofocus"',
+        'github="notice", junit="remark", verdict="Complies, with autofocus"',
+        (f"{_SEAMS}test_what_passes_by_autofocus_alone_is_a_result_of_sarif",),
+    ),
+    Mutant(
+        "Monte Carlo: intervals of 90 % called 95 %",
+        "bisar_budget/sampling/probability.py",
+        "_QUANTILE = 1.959963984540054 ",
+        "_QUANTILE = 1.6448536269514722 ",
+        (f"{_SEAMS}test_an_interval_of_95_percent_is_that",),
+    ),
+    Mutant(
+        "units: ft/s/sqrt(h) without the root of an hour",
+        "bisar_budget/units.py",
+        '"ft/s/sqrt(h)": 0.3048 * _ROOT_HOUR',
+        '"ft/s/sqrt(h)": 0.3048',
+        ("tests/house/test_units.py::test_every_unit_has_the_factor_of_its_parts",),
+    ),
+    Mutant(
+        "SOURCE_DATE_EPOCH as a local day",
+        "bisar_budget/front/checks.py",
+        "fromtimestamp(int(epoch), dt.UTC)",
+        "fromtimestamp(int(epoch))",
+        (f"{_SEAMS}test_the_day_of_an_epoch_is_that_of_utc",),
     ),
 )

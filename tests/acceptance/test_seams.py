@@ -120,3 +120,15 @@ def test_the_coverage_factor_is_in_the_time_series_of_sensors_and_clocks(name: s
     for a, b in known:
         assert np.abs(a).max() > 0
         assert b == pytest.approx(2 * a, rel=1e-9)
+
+
+def test_noise_is_a_power() -> None:
+    """Of one seed 20 dB less noise is a tenth of its amplitude, in every pixel."""
+    mission = bb.load(SECTION_V).replace({"collection.pulses": 200})
+    clean, loud, soft = (
+        bb.simulate(one).image
+        for one in (mission, *(mission.replace({"simulation.noise": f"{level} dB"}) for level in (-20, -40)))
+    )
+    assert np.abs(loud - clean).max() > 1e-4
+    # Images are sums in single precision.
+    assert np.abs(loud - clean - 10 * (soft - clean)).max() < 1e-2 * np.abs(loud - clean).max()
