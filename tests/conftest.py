@@ -6,6 +6,7 @@ import os
 import signal
 from collections.abc import Callable
 from datetime import date
+from functools import lru_cache
 from inspect import signature
 from pathlib import Path
 from typing import Any
@@ -26,7 +27,7 @@ from bisar_budget.budget.check import check_mission
 from bisar_budget.cli import cli
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.row import Row
-from bisar_budget.mission.load import parse_mission
+from bisar_budget.mission.load import load_mission, parse_mission
 
 # Shared machines: how long an example takes says nothing.
 settings.register_profile("shared", deadline=None)
@@ -40,6 +41,22 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Begin with the files that take longest; all else stays in its order."""
     place = {name: number for number, name in enumerate(_FIRST)}
     items.sort(key=lambda item: place.get(item.path.name, len(place)))
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """A test that puts something into the package finds it in its findings."""
+    _forget(item)
+
+
+def pytest_runtest_teardown(item: pytest.Item) -> None:
+    """And no other test does."""
+    _forget(item)
+
+
+def _forget(item: pytest.Item) -> None:
+    if "monkeypatch" in getattr(item, "fixturenames", ()):
+        _findings_of.cache_clear()
+        _found_in.cache_clear()
 
 
 _approx = pytest.approx
@@ -119,7 +136,24 @@ def mission_text(**changes: Any) -> str:
 
 def findings(**changes: Any) -> MissionFindings:
     """Check the base mission with changes."""
-    return check_mission(parse_mission(mission_text(**changes), "mission.yaml"), TODAY)
+    return _findings_of(mission_text(**changes))
+
+
+def found_in(path: Path, model: str | None = None) -> MissionFindings:
+    """Check a mission file of the repository."""
+    assert path.is_relative_to(ROOT)  # what is there stays as it is
+    return _found_in(path, model)
+
+
+# Findings cannot be changed, and many tests ask for the same ones.
+@lru_cache(maxsize=64)
+def _findings_of(text: str) -> MissionFindings:
+    return check_mission(parse_mission(text, "mission.yaml"), TODAY)
+
+
+@lru_cache(maxsize=64)
+def _found_in(path: Path, model: str | None) -> MissionFindings:
+    return check_mission(load_mission(str(path), model), TODAY)
 
 
 def row(found: MissionFindings, row_id: str) -> Row:

@@ -7,7 +7,6 @@ import pytest
 
 from bisar_budget import phrases
 from bisar_budget.budget import file_warnings
-from bisar_budget.budget.check import check_mission
 from bisar_budget.findings.images import Verdict, VerifiedMission
 from bisar_budget.findings.mission import Report
 from bisar_budget.mission.load import load_mission
@@ -16,7 +15,7 @@ from bisar_budget.report import Style, render
 from bisar_budget.report.formats import verification
 from bisar_budget.verifier import reasons
 from bisar_budget.verifier.limits import verify_mission
-from tests.conftest import ROOT, TODAY, findings
+from tests.conftest import ROOT, findings, found_in
 
 MISSIONS = [
     *sorted((ROOT / "specs" / "missions").glob("*.yaml")),
@@ -27,7 +26,7 @@ MISSIONS = [
 @pytest.mark.parametrize("model", ["published", "full", "strictest"])
 @pytest.mark.parametrize("path", MISSIONS, ids=lambda path: path.stem)
 def test_every_sentence_of_a_finding_has_its_code(path, model: str) -> None:
-    found = check_mission(load_mission(str(path), model), TODAY)
+    found = found_in(path, model)
     for row in found.rows:
         for note in (*([row.reason] if row.reason else []), *row.notes):
             assert note.code in CODES, (row.id, note)

@@ -216,27 +216,27 @@ class TestLeverArm:
 def walks(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     """White noise of density 1 summed up from mid-aperture on, and twice integrated, at the nodes, (draws, nodes, 3).
 
-    What of it is smooth, up to order 12: between the nodes a walk is not.
+    What of it is smooth, up to order 12: between the nodes a walk is not. A walk is the sum of what each step of the
+    noise does alone.
     """
     count = 200
     step = T / 2 / count
     fine = np.linspace(-T / 2, T / 2, 2 * count + 1)
     basis = np.polynomial.legendre.legvander(2 * fine / T, 12)
     at_nodes = np.polynomial.legendre.legvander(2 * TIMES / T, 12) @ np.linalg.pinv(basis)
-    tilt, twice = np.empty((DRAWS, TIMES.size, 3)), np.empty((DRAWS, TIMES.size, 3))
-    for axis in range(3):
-        sides = []
-        for _ in range(2):
-            area = np.zeros((DRAWS, count + 1))
-            np.cumsum(rng.standard_normal((DRAWS, count)) * math.sqrt(step), axis=1, out=area[:, 1:])
-            walk = area
-            for _ in range(2):
-                steps = (area[:, 1:] + area[:, :-1]) * step / 2
-                area = np.concatenate([np.zeros((DRAWS, 1)), steps.cumsum(axis=1)], axis=1)
-            sides.append((walk, area))
-        for kept, (before, after) in zip((tilt, twice), zip(*sides, strict=True), strict=True):
-            kept[:, :, axis] = np.concatenate([before[:, :0:-1], after], axis=1) @ at_nodes.T
-    return tilt, twice
+    area = np.zeros((count, count + 1))  # by each step
+    np.cumsum(np.eye(count) * math.sqrt(step), axis=1, out=area[:, 1:])
+    walk = area
+    for _ in range(2):
+        steps = (area[:, 1:] + area[:, :-1]) * step / 2
+        area = np.concatenate([np.zeros((count, 1)), steps.cumsum(axis=1)], axis=1)
+    noise = rng.standard_normal((3, DRAWS, 2 * count))
+    none = np.zeros((count, count))
+    tilt, twice = (
+        noise @ np.block([[one[:, :0:-1], np.zeros((count, 1)), none], [none, one]]) @ at_nodes.T
+        for one in (walk, area)
+    )
+    return np.moveaxis(tilt, 0, 2), np.moveaxis(twice, 0, 2)
 
 
 class TestTimeTag:
@@ -407,7 +407,7 @@ class TestCommonFrames:
         # Up to order 12: between the nodes noise is not smooth.
         basis = np.polynomial.legendre.legvander(2 * fine / T, 12)
         at_nodes = np.polynomial.legendre.legvander(2 * TIMES / T, 12) @ np.linalg.pinv(basis)
-        noise = np.einsum("nf,fda->dna", at_nodes, drawn) * sigma
+        noise = np.tensordot(at_nodes, drawn, axes=1).swapaxes(0, 1) * sigma
         of_tx, of_rx = (np.eye(3), np.eye(3)) if frame == "scene" else self.axes("track")
         found = through(mission, noise @ of_rx, noise @ of_tx)
         # 20 000 draws know a sigma to 0.5 %.

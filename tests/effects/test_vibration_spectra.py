@@ -201,13 +201,16 @@ RATES = np.linspace(0.05, 4.0, 251)  # of tones, evenly apart
 
 
 def series(density, T: float, rng: np.random.Generator) -> np.ndarray:
-    """Noise of a spectrum as a sum of tones, at the nodes of exact ranges, up to the order that they tell apart."""
+    """Noise of a spectrum as a sum of tones, at the nodes of exact ranges, up to the order that they tell apart.
+
+    Of each tone by itself, and then of the draws: all of it is linear.
+    """
     t = np.linspace(-T / 2, T / 2, 401)
     sizes = np.sqrt(density(RATES) * (RATES[1] - RATES[0]))
     waves = np.concatenate((np.cos(2 * math.pi * np.outer(RATES, t)), np.sin(2 * math.pi * np.outer(RATES, t))))
-    drawn = rng.standard_normal((DRAWS, 2 * RATES.size)) * np.tile(sizes, 2) @ waves
-    fit = np.polynomial.legendre.legfit(2 * t / T, drawn.T, 3)
-    return np.polynomial.legendre.legval(2 * aperture_nodes(T) / T, fit)
+    fit = np.polynomial.legendre.legfit(2 * t / T, (np.tile(sizes, 2)[:, None] * waves).T, 3)
+    of_tones = np.polynomial.legendre.legval(2 * aperture_nodes(T) / T, fit)  # (tones, nodes)
+    return rng.standard_normal((DRAWS, 2 * RATES.size)) @ of_tones
 
 
 def flown(found: Mission, metres: np.ndarray, *, is_path: bool) -> Found:

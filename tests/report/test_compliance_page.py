@@ -16,8 +16,8 @@ import pytest
 from bisar_budget.findings.mission import Report, UnusableMission
 from bisar_budget.front.checks import with_studies
 from bisar_budget.report import Style, render
-from tests.conftest import ROOT, findings
-from tests.report.test_report_compliance import EVERY_KEY, FAULT, SECTION_V, found_in, illustrated
+from tests.conftest import ROOT, findings, found_in
+from tests.report.test_report_compliance import EVERY_KEY, FAULT, SECTION_V, illustrated
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 if CHROMIUM is None:

@@ -10,13 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bisar_budget.budget.check import check_mission
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.geometry import BistaticGeometry, PlatformState
-from bisar_budget.mission.load import load_mission
 from bisar_budget.report.drawing.geometry_views import geometry_elevation, geometry_plan
 from bisar_budget.report.drawing.svg import LINE_HEIGHT, Box, text_width
-from tests.conftest import ROOT, TODAY, findings
+from tests.conftest import ROOT, findings, found_in
 
 SVG = "{http://www.w3.org/2000/svg}"
 DRAWINGS = {"plan": geometry_plan, "elevation": geometry_elevation}
@@ -132,7 +130,7 @@ def test_the_elevation_view_shows_true_ranges_and_angles(name: str) -> None:
 
 def test_a_receiver_beside_the_scene_is_enlarged_to_scale() -> None:
     """The second panel has a scale of its own; the whole would show 1.5 km of 854 km as half a pixel."""
-    found = check_mission(load_mission(str(ROOT / "specs/missions/sentinel1_fixed_receiver.yaml")), TODAY)
+    found = found_in(ROOT / "specs" / "missions" / "sentinel1_fixed_receiver.yaml")
     root = root_of(geometry_plan(found))
     (small, large) = centroids(root, "receiver")
     crosses = [e for e in root.iter(f"{SVG}path") if e.get("class") == "marker line"]
@@ -199,9 +197,7 @@ def test_a_curved_path_is_drawn_curved() -> None:
 @pytest.mark.parametrize("kind", DRAWINGS)
 @pytest.mark.parametrize("name", [*ODD, *(path.stem for path in SPECS)])
 def test_no_label_covers_another_or_leaves_the_drawing(kind: str, name: str) -> None:
-    found = (
-        ODD[name] if name in ODD else check_mission(load_mission(str(ROOT / f"specs/missions/{name}.yaml")), TODAY)
-    )
+    found = ODD[name] if name in ODD else found_in(ROOT / "specs" / "missions" / f"{name}.yaml")
     root = root_of(DRAWINGS[kind](found))
     width, height = float(root.get("width", "")), float(root.get("height", ""))
     boxes = []

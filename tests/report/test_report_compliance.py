@@ -15,7 +15,6 @@ from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.budget.check import check_mission
 from bisar_budget.faults import Fault, printable
 from bisar_budget.findings.images import ImageEvidence, PointImage, Verdict
 from bisar_budget.findings.mission import MissionFindings, Option, Report, UnusableMission
@@ -41,7 +40,7 @@ from bisar_budget.report.compliance.document import (
 from bisar_budget.report.compliance.summary import compliance
 from bisar_budget.report.words.sentences import sentence
 from bisar_budget.sampling.probability import monte_carlo
-from tests.conftest import COMPLIES, ROOT, TODAY, findings, mission_text
+from tests.conftest import COMPLIES, ROOT, findings, found_in, mission_text
 from tests.page import Element, read_page
 
 SECTION_V = ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml"
@@ -50,10 +49,6 @@ EVERY_KEY = ROOT / "tests" / "acceptance" / "good" / "every_key.yaml"
 FAULT = Fault(line=3, column=7, key="radar.bandwidth", problem="is missing")
 LANGUAGES = ("html", "markdown")
 FULL = Style(detail="full")  # the summary and its annex
-
-
-def found_in(path: Path, model: str | None = None) -> MissionFindings:
-    return check_mission(load_mission(str(path), model), TODAY)
 
 
 def report(*missions, **fields) -> Report:
