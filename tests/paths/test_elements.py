@@ -3,22 +3,19 @@
 import json
 import math
 import sys
-from importlib.resources import files
 
 import numpy as np
 import pytest
-from skyfield.api import EarthSatellite, load, wgs84
+from skyfield.api import EarthSatellite, load
 from skyfield.framelib import itrs
 
 from bisar_budget.geometry import Vector
-from bisar_budget.mission.load import load_mission
 from bisar_budget.paths import elements
 from bisar_budget.paths.earth import Geodetic, axes_at
 from bisar_budget.paths.flight import Orbit, PathFileError, interpolated
 from bisar_budget.paths.instant import Instant
 from bisar_budget.paths.omm import read_omm
 from bisar_budget.paths.tle import element_sets, read_tle
-from tests.conftest import ROOT
 from tests.paths.orbit_files import (
     CENTER,
     CONSTANTS,
@@ -34,43 +31,6 @@ from tests.paths.orbit_files import (
     omm_text,
     omm_xml,
 )
-
-# Near and deep space, half-day and one-day resonance, an eccentric orbit, much drag.
-VERIFIED = (5, 4632, 6251, 8195, 9880, 11801, 14128, 22674, 24208, 28129, 28626, 88888)
-
-
-def published() -> dict[int, tuple[str, list[list[float]]]]:
-    """Element sets of the SGP4 project's verification, and minutes and places that its program gives for them."""
-    texts = [files("sgp4").joinpath(name).read_text(encoding="ascii") for name in ("SGP4-VER.TLE", "tcppver.out")]
-    lines = [line for line in texts[0].splitlines() if line[:1] in ("1", "2")]
-    sets = {int(a[2:7]): f"{a[:69]}\n{b[:69]}" for a, b in zip(lines[::2], lines[1::2], strict=True)}
-    rows: dict[int, list[list[float]]] = {}
-    number = 0
-    for line in texts[1].splitlines():
-        if line.rstrip().endswith("xx"):
-            number = int(line.split()[0])
-            rows[number] = []
-        elif line.strip():
-            rows[number].append([float(one) for one in line.split()[:4]])
-    return {number: (sets[number], rows[number]) for number in VERIFIED}
-
-
-@pytest.mark.parametrize("number", VERIFIED)
-def test_sgp4_gives_the_published_places(number: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """To 1e-5 m: the last digit that is printed is 1e-5 m, and rounding it moves a place by 0.87e-5 m at most."""
-    monkeypatch.setattr(elements, "from_teme", lambda place, *_: place)
-    text, rows = published()[number]
-    read = next(element_sets(text, "ver.tle"))
-    exact = elements.teme(read)
-    smooth = read_tle(text.encode(), "ver.tle", None, CENTER).place
-    assert len(rows) >= 5
-    for minutes, *place_km in rows:
-        place = [1000 * one for one in place_km]
-        at = read.epoch.after(60 * minutes)
-        assert math.dist(exact(at), place) < 1e-5
-        # SGP4 integrates resonances in steps of 720 minutes, where it jumps by up to 13 mm; those are smoothed too.
-        assert math.dist(smooth(at), place) < (0.02 if minutes and minutes % 720 == 0 else 2e-5)
-
 
 TIMESCALE = load.timescale(builtin=True)
 
@@ -97,31 +57,6 @@ def test_skyfield_has_the_satellite_at_the_same_place(hours: float) -> None:
     assert np.linalg.norm(theirs - turned_by_ut1(place, time.dut1)) < 1e-5
     # ω r of an orbit 7 078 km wide, and less on the way to the poles: 0.52 m for each millisecond.
     assert np.linalg.norm(theirs - place) <= 518 * abs(time.dut1) + 1e-5
-
-
-@pytest.mark.parametrize("tau", [-0.25, 0.0, 0.25])
-def test_skyfield_sees_the_satellite_of_the_example_in_the_same_direction(tau: float) -> None:
-    """From the scene of the Besançon example: elevation, azimuth and distance, the axes of the scene included.
-
-    Skyfield has UT1 of its own tables, the mission takes UT1 = UTC: its place is turned by that difference.
-    """
-    mission = load_mission(str(ROOT / "specs" / "missions" / "sentinel1_elements_besancon.yaml"))
-    lines = (ROOT / "specs" / "missions" / "paths" / "sentinel1a_2021079.tle").read_text().splitlines()
-    one, two = (next(line for line in lines if line.startswith(f"{n} ")) for n in (1, 2))
-    scene = mission.scene
-    time = skyfield_time(mission.collection.center_time.after(tau))
-    place = wgs84.latlon(math.degrees(scene.latitude), math.degrees(scene.longitude), scene.height)
-    altitude, azimuth, distance = (EarthSatellite(one, two, None, TIMESCALE) - place).at(time).altaz()
-    state = mission.platforms.transmitter.state
-    turned = turned_by_ut1(scene.axes.earth_fixed(state.at(tau)[0]), time.dut1)
-    east, north, up = scene.axes.place(tuple(turned))
-    away = math.hypot(east, north, up)
-    # 1e-5 m as above; that is 1.2e-11 rad from there.
-    assert away == pytest.approx(distance.m, abs=1e-5)
-    assert math.asin(up / away) == pytest.approx(altitude.radians, abs=1.2e-11)
-    assert math.remainder(math.atan2(east, north) - azimuth.radians, 2 * math.pi) == pytest.approx(0, abs=1.2e-11)
-    # As flown, UT1 = UTC: 0.52 m for each millisecond.
-    assert state.at(tau)[0] == pytest.approx((east, north, up), abs=518 * abs(time.dut1))
 
 
 @pytest.mark.parametrize("days", [0, 6, 20, 100])

@@ -5,14 +5,11 @@ import re
 from fractions import Fraction
 from pathlib import Path
 
-import numpy as np
 import pytest
-from skyfield.api import wgs84
 
 from bisar_budget.geometry import Vector
-from bisar_budget.paths.earth import Floats, Geodetic, axes_at
 from bisar_budget.paths.eof import read_eof
-from bisar_budget.paths.flight import PathFileError, interpolated
+from bisar_budget.paths.flight import PathFileError
 from bisar_budget.paths.instant import Instant
 from tests.paths.orbit_files import instant
 
@@ -63,24 +60,6 @@ def test_places_are_those_of_an_interpolation_of_three_times_the_degree(seconds:
     """To 10 um: the file has micrometres, and velocities to a micrometre a second."""
     at = instant(f"{FIRST}Z").after(float(seconds))
     assert math.dist(read_eof(DATA, "s.EOF", None, MIDDLE).place(at), krogh(Fraction(seconds))) < 1e-5
-
-
-def test_slant_range_and_velocity_in_a_scene() -> None:
-    """By Skyfield's geodesy, to 1 mm and 0.1 mm/s."""
-    below = Geodetic(math.radians(5.0), math.radians(50.0), 100.0)
-    site = wgs84.latlon(5.0, 50.0, elevation_m=100.0).itrs_xyz.m
-    state = interpolated(lambda times: axes_at(below).places(_places(times)), 1.0).state
-    before, middle, after = (math.dist(krogh(Fraction(115) + Fraction(one, 100)), site) for one in (-1, 0, 1))
-    assert state.slant_range == pytest.approx(middle, abs=1e-3)
-    sight = [one / middle for one in state.position]
-    assert sum(a * b for a, b in zip(sight, state.velocity, strict=True)) == pytest.approx(
-        (after - before) / 0.02, abs=1e-4
-    )
-
-
-def _places(times: Floats) -> Floats:
-    orbit = read_eof(DATA, "s.EOF", None, MIDDLE)
-    return np.array([orbit.place(MIDDLE.after(time)) for time in times.tolist()])
 
 
 def test_what_is_said_of_it() -> None:
