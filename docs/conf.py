@@ -18,8 +18,9 @@ extensions = [
     "sphinx.ext.napoleon",
     "sphinx_click",
     "sphinx_copybutton",
-    "executed",  # these four are in _ext
+    "executed",  # these five are in _ext
     "generated",
+    "outside",
     "drawn",
     "checked",
 ]

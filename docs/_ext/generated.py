@@ -75,7 +75,8 @@ class Generated(SphinxDirective):
         return found
 
 
-def _joined(names: Iterable[str], words: Mapping[str, str], what: str) -> list[tuple[str, str]]:
+def joined(names: Iterable[str], words: Mapping[str, str], what: str) -> list[tuple[str, str]]:
+    """Names with their words; raises a ValueError where one is without the other."""
     names = list(names)
     silent, unknown = [name for name in names if name not in words], [name for name in words if name not in names]
     if silent or unknown:
@@ -89,7 +90,7 @@ def _joined(names: Iterable[str], words: Mapping[str, str], what: str) -> list[t
 def statuses(directive: Generated) -> str:
     """Every status, worst first, with the words of the body."""
     rows = []
-    for name, text in _joined(STATUS, directive.words(), "statuses"):
+    for name, text in joined(STATUS, directive.words(), "statuses"):
         status = STATUS[name]
         code = "1" if status.fails else "1 with `--strict`" if status.fails_strict else "0"
         code = "2" if name == "error" else code
@@ -99,7 +100,7 @@ def statuses(directive: Generated) -> str:
 
 def formats(directive: Generated) -> str:
     """Every format of a report, with the names of files that choose it."""
-    rows = _joined(FORMATS, directive.words(), "formats")
+    rows = joined(FORMATS, directive.words(), "formats")
     ends = {name: ", ".join(f"`{suffix}`" for suffix in one.suffixes) for name, one in FORMATS.items()}
     return table(("`--format`", "`--report` with", "is"), [(f"`{name}`", ends[name], text) for name, text in rows])
 
@@ -114,7 +115,7 @@ def json_keys(directive: Generated) -> str:
     parts = {path.rpartition(".")[0].removesuffix("[]") for path in found}
     found = {path: value for path, value in found.items() if path not in parts}  # a part that is null in one of them
     groups: dict[str, list[tuple[str, str, str]]] = {}
-    for path, text in _joined(found, directive.words(), "keys of the JSON"):
+    for path, text in joined(found, directive.words(), "keys of the JSON"):
         part, _, key = path.rpartition(".")
         groups.setdefault(part, []).append((f"`{key}`", _example(found[path]), text))
     heads = ("key", "example", "means")
@@ -389,7 +390,7 @@ def sources(directive: Generated) -> str:
 def missions(directive: Generated) -> str:
     """The gallery's table of contents: a line for each mission of the project, each with a page."""
     rows = []
-    for name, text in _joined([file.stem for file in sorted(MISSIONS.glob("*.yaml"))], directive.words(), "missions"):
+    for name, text in joined([file.stem for file in sorted(MISSIONS.glob("*.yaml"))], directive.words(), "missions"):
         found = _found(name)[0]
         rows.append((f"[{found['name']}]({name}.md)", f"`{STATUS[found['status']].text}`", text))
     return table(("mission", "result", "shows"), rows)
@@ -421,7 +422,7 @@ _OF_A_PLATFORM_IN_LATEX = re.compile(r"_\{[xyz]?[tr]\}$")
 def symbols(directive: Generated) -> str:
     """Every symbol of the formulas, as they draw it, with the words of the body."""
     latex = {_OF_A_PLATFORM.sub("_k", name): text for name, (text, _) in SYMBOLS.items()}
-    rows = _joined(latex, directive.words(), "symbols")
+    rows = joined(latex, directive.words(), "symbols")
     return table(
         ("symbol", "is"), [(f"${_OF_A_PLATFORM_IN_LATEX.sub('_{k}', latex[name])}$", text) for name, text in rows]
     )

@@ -9,7 +9,9 @@ import pytest
 
 from tests.outside import record
 
-FOLDER = "BISAR_BUDGET_OUTSIDE"  # environment variable: where the JSON goes; nothing is written without it
+# Environment variable: the folder of the JSON; nothing is written without it. What begins with BISAR_BUDGET_ is the
+# command's, which refuses what it does not know.
+FOLDER = "COMPARED_OUTSIDE"
 
 
 @pytest.fixture(scope="module", autouse=True)

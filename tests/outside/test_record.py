@@ -49,7 +49,7 @@ def test_rows_reach_a_file(tmp_path: Path) -> None:
     subprocess.run(
         [sys.executable, "-m", "pytest", *alone, test],
         cwd=ROOT,
-        env=environment | {"BISAR_BUDGET_OUTSIDE": str(tmp_path)},
+        env=environment | {"COMPARED_OUTSIDE": str(tmp_path)},
         check=True,
         capture_output=True,
     )
