@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Any
 
 # Processes that test side by side have a core each: threads that wait for each other there take time from the others.
-# Read by NumPy's algebra and by finufft when they are imported. Kernels of Numba keep their threads.
+# Read by NumPy's algebra, finufft and Numba when they are imported.
 if "PYTEST_XDIST_WORKER" in os.environ:
-    for _library in ("OPENBLAS", "OMP", "MKL"):
+    for _library in ("OPENBLAS", "OMP", "MKL", "NUMBA"):
         os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
 
 import numpy as np

@@ -2,10 +2,12 @@
 
 import importlib.util
 import math
+import os
 import subprocess
 import sys
 import tracemalloc
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -180,6 +182,33 @@ def test_a_pixel_on_a_platform_is_its_own_range() -> None:
     where = history.transmitter[5]
     line = where + np.arange(40)[:, None] * np.array([0.0, 0.1, 0.0])
     assert difference_db(history, line, "cubic") < PROMISED["cubic"]
+
+
+@needs_numba
+@pytest.mark.parametrize("kernel", ["linear", "cubic"])
+def test_threads_form_the_same_image(kernel: str, tmp_path: Path) -> None:
+    """Three of them, in a process of their own: where tests share the cores, each process has one."""
+    code = f"""
+import sys
+import numba, numpy as np
+from bisar_budget.simulator.image_formation import backprojection
+from tests.simulate.test_backprojection import many_tiles
+assert numba.get_num_threads() == int(sys.argv[1])
+np.save(sys.argv[2], [backprojection(*given, "{kernel}") for given in many_tiles()])
+"""
+    images = []
+    for threads in ("1", "3"):
+        line = [sys.executable, "-c", code, threads, str(tmp_path / f"{threads}.npy")]
+        subprocess.run(line, cwd=ROOT, check=True, env={**os.environ, "NUMBA_NUM_THREADS": threads})
+        images.append((tmp_path / f"{threads}.npy").read_bytes())
+    assert images[0] == images[1]
+
+
+def many_tiles() -> list[tuple[PhaseHistory, np.ndarray]]:
+    """A history with a grid, whose lines are straight, and with the same number of pixels anywhere."""
+    history = collection(pulses=32).record(SCATTERERS, AMPLITUDES)
+    grid = ground_grid((0, 0), 0.3, (40, 40), (200, 200))
+    return [(history, grid), (history, grid + np.random.default_rng(1).normal(size=grid.shape) * [1, 1, 0])]
 
 
 def test_memory_beyond_the_inputs_stays_small() -> None:
