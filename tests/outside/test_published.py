@@ -1,6 +1,7 @@
 """Figures in print against what this program finds: `published.csv` has each with its source.
 
-Tolerances are half of the last digit printed, where the note says nothing else.
+Tolerances are half of the last digit printed, where the note there says nothing else. A source that prints a formula
+and no number is worked out by hand, apart from the package; the note says that too.
 """
 
 import csv
