@@ -34,7 +34,10 @@ settings.register_profile("shared", deadline=None)
 settings.load_profile("shared")
 
 # Files that take longest; begun last, one core would wait for them. The first waits more than it computes.
-_FIRST = ("test_scheduler.py", "test_compliance_page.py", "test_hostile.py", "test_gate.py")
+_FIRST = (
+    *("test_scheduler.py", "test_compliance_page.py", "test_hostile.py", "test_gate.py"),
+    *("test_report_explanation.py", "test_sweep.py", "test_allocate.py", "test_random_errors.py"),
+)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
