@@ -1,4 +1,4 @@
-"""What `import bisar_budget as bb` costs: its import, what the first check imports, a check beside the core's.
+"""Cost of `import bisar_budget as bb`: its import, the imports of the first check, a check beside the core's.
 
     python benchmarks/front_door.py
 

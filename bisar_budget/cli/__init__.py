@@ -65,7 +65,7 @@ class _Commands(click.Group):
     def main(self, *args: Any, **kwargs: Any) -> Any:
         self.help = self.help or docstring(self.callback)
         hold_files()
-        SAYING.set(complain)
+        before = SAYING.set(complain)
         output = sys.stdout
         kwargs["standalone_mode"] = False  # click would exit with 1 on an interrupt or a broken pipe
         kwargs["prog_name"] = "bisar-budget"  # whatever name it was called by
@@ -102,6 +102,7 @@ class _Commands(click.Group):
         except Exception as error:
             _own_fault(error)
         finally:
+            SAYING.reset(before)
             release_files()
 
 

@@ -83,11 +83,13 @@ def solve(
     an unusable mission file.
     """
     from bisar_budget.front import questions
+    from bisar_budget.mission.quantities import QuestionError
     from bisar_budget.report.formats import answers
 
-    if questions.names_parts(key) and (between is not None or is_scale):
-        option = "--scale" if is_scale else "--between"
-        raise click.UsageError(f"{option}: {key} names parts of the catalogue, which are compared one by one.")
+    try:
+        questions.hold_to_parts(key, between, is_scale)
+    except QuestionError as error:
+        raise click.UsageError(str(error)) from None
     files = expand(missions)
     spare(files, [output])
     asked: dict[str, Any] = {"between": between, "scale": is_scale, "row": row, "target": target, "verify": is_imaged}

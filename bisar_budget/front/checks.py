@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from bisar_budget.report.drawing.trades import Gathered
 
 MAX_CASES = 40_000  # of a study: a page has no room for more
+MAX_KEYS = 2  # of a study: a drawing has no more axes
 _CALLER = "the caller"
 _OPTION = "--sweep"
 
@@ -263,6 +264,8 @@ def study_cases(mission: Mission, asked: Sequence[str] | Mapping[str, Any]) -> "
     from bisar_budget.design.cases import grid
     from bisar_budget.front.missions import grid_of
 
+    if len(asked) > MAX_KEYS:
+        raise QuestionError(f"{_OPTION} draws one key or two, and there are {len(asked)}.")
     cases = grid_of(mission, asked) if isinstance(asked, Mapping) else grid(tree_of(mission), asked, _OPTION)
     for one, size in zip(cases.varied, cases.shape, strict=True):
         if size < 2:

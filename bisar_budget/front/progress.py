@@ -4,6 +4,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from importlib import import_module
 from importlib.util import find_spec
 from threading import RLock
 from time import monotonic
@@ -53,16 +54,12 @@ def _is_notebook() -> bool:
 
 
 def _bar(label: str, total: int, is_notebook: bool) -> Any:
-    import tqdm
-
-    # A thread that looks after bars, and a lock between processes, would outlive what forks here.
-    tqdm.tqdm.monitor_interval = 0
-    tqdm.tqdm.set_lock(RLock())
-    if is_notebook and find_spec("ipywidgets") is not None:
-        from tqdm.notebook import tqdm_notebook
-
-        return tqdm_notebook(total=total, desc=label, leave=False)
-    return tqdm.tqdm(total=total, desc=label, leave=not is_notebook, file=sys.stderr)
+    has_widgets = is_notebook and find_spec("ipywidgets") is not None
+    kind = import_module("tqdm.notebook").tqdm_notebook if has_widgets else import_module("tqdm").tqdm
+    # A thread that looks after bars, and a lock between processes, would outlive what forks here. Bars of the caller
+    # keep theirs.
+    own = type("Bar", (kind,), {"monitor_interval": 0, "_lock": RLock()})
+    return own(total=total, desc=label, leave=not is_notebook, **({} if has_widgets else {"file": sys.stderr}))
 
 
 @contextmanager

@@ -125,19 +125,17 @@ def solve(
     QuestionError
         The question cannot be asked of this mission.
     """
-    from bisar_budget.design.compare import compare_parts
+    from bisar_budget.design.compare import compare_parts, is_of_parts
     from bisar_budget.design.solve import solve as solved
 
     today, said = _judged(mission, model, date, outside)
     if between is not None and not isinstance(between, str):
         between = "..".join(text_of("", one) for one in between)
     how: dict[str, Any] = {"row": row, "target": target, "model": model, "today": today}
-    if names_parts(key) and (between is not None or scale):
-        option = "--scale" if scale else "--between"
-        raise QuestionError(f"{option}: {key} names parts of the catalogue, which are compared one by one.")
+    hold_to_parts(key, between, scale)
     found: Solution | Comparison
     with watched_checks(mission.name) as progress:
-        if names_parts(key):
+        if is_of_parts(key):
             found = compare_parts(mission, key, **how, progress=progress)
         else:
             found = solved(mission, key, between=between, is_scale=scale, **how, progress=progress)
@@ -145,11 +143,19 @@ def solve(
     return SolveResult(_imaged(mission, found, model) if verify else found)
 
 
-def names_parts(key: str) -> bool:
-    """Whether a key names parts of the catalogue, which `solve` compares."""
+def hold_to_parts(key: str, between: object, scale: bool) -> None:
+    """Refuse a range, or a factor, for a key that names parts of the catalogue.
+
+    Raises
+    ------
+    QuestionError
+        It is one.
+    """
     from bisar_budget.design.compare import is_of_parts
 
-    return is_of_parts(key)
+    if is_of_parts(key) and (between is not None or scale):
+        option = "--scale" if scale else "--between"
+        raise QuestionError(f"{option}: {key} names parts of the catalogue, which are compared one by one.")
 
 
 def _imaged(mission: Mission, found: "Solution | Comparison", model: str | None) -> "Solution | Comparison":

@@ -65,7 +65,7 @@ def frame_of(columns: Mapping[str, Any], library: str | None = None) -> Any:
 
 
 class Picture:
-    """A drawing: a notebook shows it, `save` writes a file.
+    """A drawing: a notebook shows it, `save` writes a file, `of` gives the content of one.
 
     Parameters
     ----------
@@ -74,14 +74,14 @@ class Picture:
     """
 
     def __init__(self, title: str, made: Callable[[str], bytes]) -> None:
-        self.title, self._made = title, made
+        self.title, self.of = title, made
 
     def __repr__(self) -> str:
         """Its title, on one line."""
         return f"Picture({self.title!r})"
 
     def _repr_html_(self) -> str:
-        return notebook.page(self._made("svg").decode())
+        return notebook.page(self.of("svg").decode())
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write a file: .svg, .png or .pdf.
@@ -96,10 +96,6 @@ class Picture:
             raise ValueError(f"{os.fspath(path)}: the suffix must be one of .svg, .png, .pdf")
         with open(path, "wb") as file:
             file.write(self.of(kind))
-
-    def of(self, kind: str) -> bytes:
-        """Content of a file of a kind, `svg`, `png` or `pdf`."""
-        return self._made(kind)
 
 
 def _as_png(png: bytes, words: str) -> str:

@@ -13,8 +13,7 @@ import numpy as np
 
 from bisar_budget import __version__, notebook
 from bisar_budget.design.cases import Cases, some_of
-from bisar_budget.design.sweep import Asked, Block
-from bisar_budget.design.sweep import part_of as checked_part
+from bisar_budget.design.sweep import Asked, Block, part_of
 from bisar_budget.design.sweep import sweep as swept_by
 from bisar_budget.design.table import Part, Question, Swept
 from bisar_budget.faults import printable
@@ -123,7 +122,7 @@ class SweepResult:
         said = [f"{done} case{'' if done == 1 else 's'}"]
         if done < self.cases.count:
             said[0] += f" of {self.cases.count}"
-        said.append(f"{comply} comply ({part_of(comply, done)})")
+        said.append(f"{comply} comply ({percentage(comply, done)})")
         if self.statuses["not_evaluated"]:
             said.append(f"{self.statuses['not_evaluated']} not evaluated")
         if self.statuses["error"]:
@@ -268,10 +267,10 @@ def _values(common: tuple[Question, Described, Any], block: Block) -> Mapping[st
     """Values of the columns in a block of cases; threads take turns, because a table keeps what it finds."""
     question, table, lock = common
     with lock:
-        return table.values(checked_part(question, block))
+        return table.values(part_of(question, block))
 
 
-def part_of(some: int, of: int) -> str:
+def percentage(some: int, of: int) -> str:
     """Say a part of a whole; all and none are said only where it is so."""
     if some in (0, of):
         return "100 %" if some else "0 %"

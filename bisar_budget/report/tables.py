@@ -357,13 +357,13 @@ def dataset(described: Described, whole: Mapping[str, Any]) -> "Dataset":
         column.name: {"long_name": column.words, **({} if column.is_text else {"units": column.unit or "1"})}
         for column in described.columns
     }
-    if isinstance(cases, Grid):
-        dimensions = tuple(varied)
-        axes = zip(cases.varied, cases.axes, strict=True)
-        coordinates = {one.key: (one.key, described.said(one.key, axis), attributes[one.key]) for one, axis in axes}
-    else:
-        dimensions = ("case",)
-        coordinates = {key: ("case", np.asarray(whole[key]), attributes[key]) for key in varied}
+    is_grid = isinstance(cases, Grid)
+    dimensions = tuple(varied) if is_grid else ("case",)
+    given = cases.axes if isinstance(cases, Grid) else cases.columns
+    coordinates = {
+        one.key: (one.key if is_grid else "case", described.said(one.key, values), attributes[one.key])
+        for one, values in zip(cases.varied, given, strict=True)
+    }
     variables = {
         name: (dimensions, values.reshape(cases.shape or values.shape), attributes[name])
         for name, values in whole.items()

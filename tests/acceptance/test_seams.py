@@ -1,4 +1,4 @@
-"""What stands between the numbers and a user: exit codes, columns, statuses, days, intervals.
+"""The seams between the numbers and a user: exit codes, columns, statuses, days, intervals.
 
 Each holds one slip that no other test found: the list of `tests/mutants.py` names it.
 """
@@ -123,7 +123,7 @@ def test_the_coverage_factor_is_in_the_time_series_of_sensors_and_clocks(name: s
 
 
 def test_noise_is_a_power() -> None:
-    """Of one seed 20 dB less noise is a tenth of its amplitude, in every pixel."""
+    """With 20 dB less of it, every pixel has a tenth of its amplitude, by one seed."""
     mission = bb.load(SECTION_V).replace({"collection.pulses": 200})
     clean, loud, soft = (
         bb.simulate(one).image

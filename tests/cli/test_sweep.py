@@ -22,7 +22,7 @@ import pytest
 from bisar_budget.design import sweep as engine
 from bisar_budget.design.table import Part
 from bisar_budget.front.progress import lasting
-from bisar_budget.front.sweeps import part_of
+from bisar_budget.front.sweeps import percentage
 from tests.conftest import ROOT, heed_signals, mission_text
 
 SECTION_V = str(ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml")
@@ -191,7 +191,7 @@ def test_how_long(seconds: float, words: str) -> None:
 
 
 def test_parts_of_a_whole() -> None:
-    assert [part_of(some, 10**6) for some in (0, 1, 233_000, 999_999, 10**6)] == [
+    assert [percentage(some, 10**6) for some in (0, 1, 233_000, 999_999, 10**6)] == [
         "0 %",
         "0.1 %",
         "23.3 %",
@@ -259,7 +259,7 @@ def test_nobody_reads_on(run) -> None:
 
 
 def test_a_terminal_has_a_bar(tmp_path: Path) -> None:
-    """What takes longer than a second has one."""
+    """Work that takes longer than a second has one."""
     master, slave = terminal()
     with started("--vary", f"{TIME}=1:2s:300000", "-o", str(tmp_path / "t.csv"), stderr=slave) as process:
         os.close(slave)

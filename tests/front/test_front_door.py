@@ -11,11 +11,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+import tqdm
 
 import bisar_budget as bb
 from bisar_budget.design import sweep as engine
 from bisar_budget.design.table import Table
-from bisar_budget.front import results
+from bisar_budget.front import progress, results
 from bisar_budget.front.missions import Spaced
 from docs._ext.blocks import blocks
 from tests.conftest import COMPLIES, ROOT, mission_text
@@ -252,7 +253,10 @@ def test_a_dataset_of_dask_is_checked_when_it_computes(
     assert lazy.compute().identical(now)
     assert sorted(checked) == [0, 0, 16, 16, 32, 32]
     paired = bb.sweep(mission, {TIME: [1.0, 2.0], AZIMUTH: ["20 deg", "40 deg"]}, paired=True)
-    assert paired.to_xarray(chunks={}).compute().identical(paired.to_xarray())
+    checked.clear()
+    lazy = paired.to_xarray(chunks=chunks if chunks == "auto" else {})
+    assert not checked  # the coordinates too are those that were given
+    assert lazy.compute().identical(paired.to_xarray())
 
 
 def test_without_dask(mission: bb.Mission, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -389,6 +393,21 @@ def test_the_surface_as_it_was_agreed(tmp_path: Path, monkeypatch: pytest.Monkey
     simulated.plot()
 
 
+def test_bars_of_the_caller_keep_their_lock_and_their_thread(monkeypatch: pytest.MonkeyPatch) -> None:
+    """tqdm has both for all bars of a process: those of long work here took them away."""
+    errors = io.StringIO()
+    monkeypatch.setattr(errors, "isatty", lambda: True)
+    monkeypatch.setattr("sys.stderr", errors)
+    monkeypatch.setattr(progress, "_MOMENT", 0.0)
+    known = (tqdm.tqdm.monitor_interval, tqdm.tqdm.get_lock())
+    with progress.watched("Working") as told:
+        told(1, 2)
+        told(2, 2)
+    assert "Working: 100%" in errors.getvalue()
+    assert (tqdm.tqdm.monitor_interval, tqdm.tqdm.get_lock()) == known
+    assert tqdm.tqdm.monitor_interval > 0
+
+
 def test_a_users_script_runs() -> None:
     """It is also what mypy holds the types of the surface to, in strict mode."""
     said = report(str(SECTION_V)).splitlines()
@@ -418,6 +437,13 @@ def test_a_report_has_what_was_asked_besides(tmp_path: Path) -> None:
     assert "Trade study" in page
     with pytest.raises(bb.QuestionError, match="has one value"):
         bb.check(bb.load(TANDEM_X), sweep={TIME: ["1 s"]})
+    several = {
+        TIME: ["1 s", "2 s"],
+        "radar.bandwidth": ["90 MHz", "100 MHz"],
+        "radar.center_frequency": ["9 GHz", "9.5 GHz"],
+    }
+    with pytest.raises(bb.QuestionError, match="draws one key or two, and there are 3"):
+        bb.check(bb.load(TANDEM_X), sweep=several)
 
 
 def test_a_report_of_a_result_has_the_sheet_of_specifications(tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ def worst(result: bb.CheckResult) -> str:
 
 
 def report(path: str) -> str:
-    """What a script would say of a mission."""
+    """Words of a script about a mission."""
     try:
         mission: bb.Mission = bb.load(path)
     except bb.MissionError as error:
