@@ -76,11 +76,16 @@ def drawn(
     return Drawing(trade_drawing(shown, rows or {}, "m", "t", "d", above=above, seen_from_above=seen_from_above))
 
 
+# Places are written in hundredths of a pixel, of which a decade has more than a hundred.
+READ = 2e-4
+
+
 def uses(drawing: Drawing, style: str) -> list[float]:
-    """Utilizations of a curve, by the line of the limit and the bottom of the frame. [%]"""
+    """Utilizations of a curve, by the line of the limit and the numbers of the axis, in equal ratios. [%]"""
     (_, limit), _ = drawing.line("limit")
-    bottom = drawing.frame[3]
-    return [100 * (bottom - y) / (bottom - limit) for _, y in drawing.line(style)]
+    decade = drawing.place("10")[1] - drawing.place("100")[1]
+    assert decade > 100
+    return [100 * 10 ** ((limit - y) / decade) for _, y in drawing.line(style)]
 
 
 class TestWhatIsDrawn:
@@ -156,16 +161,23 @@ class TestPlots:
         shown = trade(f"{TIME}=0.5:2.5s:5")
         drawing = drawn(shown, rows={"receiver.velocity.x": np.linspace(0.1, 0.5, 5)})
         assert {f"{TIME} [s]", "utilization [%]", "worst row", "receiver.velocity.x"} <= set(drawing.texts)
-        assert uses(drawing, "worst") == pytest.approx([50, 100, 150, 200, 250], abs=0.02)
-        assert uses(drawing, "row0") == pytest.approx([10, 20, 30, 40, 50], abs=0.02)
+        assert uses(drawing, "worst") == pytest.approx([50, 100, 150, 200, 250], rel=READ)
+        assert uses(drawing, "row0") == pytest.approx([10, 20, 30, 40, 50], rel=READ)
         assert drawing.texts[0] == "Rigling & Moses, Section V"
         assert {"fail", "pass", "limit"} <= set(drawing.texts)
         assert [drawing.within(dot)[0] for dot in drawing.circles("dot0")] == pytest.approx([0, 0.25, 0.5, 0.75, 1])
 
-    def test_what_is_far_above_its_limit_is_drawn_in_equal_ratios(self) -> None:
-        assert drawn(trade(f"{TIME}=0.5:2.5s:5")).place("0")
-        drawing = drawn(trade(f"{TIME}=0.5:25s:5"))
+    @pytest.mark.parametrize("longest", ["0.2", "0.9", "2.5", "7"])
+    def test_utilizations_are_drawn_in_equal_ratios_with_the_limit(self, longest: str) -> None:
+        """Far below it, near to it, above it: the limit and a decade below it are always there."""
+        drawing = drawn(trade(f"{TIME}=0.15:{longest}s:5"))
+        _, top, _, bottom = drawing.frame
+        assert top < drawing.line("limit")[0][1] < bottom
         assert "0" not in drawing.texts
+        assert uses(drawing, "worst") == pytest.approx(np.linspace(15, 100 * float(longest), 5), rel=READ)
+
+    def test_the_numbers_of_equal_ratios_stand_where_they_are(self) -> None:
+        drawing = drawn(trade(f"{TIME}=0.5:25s:5"))
         heights = [drawing.place(number)[1] for number in ("100", "200", "500", "1000")]
         steps = [math.log(2), math.log(2.5), math.log(2)]
         assert -np.diff(heights) / steps == pytest.approx([-np.diff(heights)[0] / steps[0]] * 3, rel=1e-3)
@@ -183,7 +195,7 @@ class TestPlots:
         shown = trade(f"{TIME}=0.5:0.6s:100000")
         shown.values["utilization"][77_777] = 0.9
         drawing = drawn(shown)
-        assert max(uses(drawing, "worst")) == pytest.approx(90, abs=0.02)
+        assert max(uses(drawing, "worst")) == pytest.approx(90, rel=READ)
         assert len(drawing.line("worst")) < 5000
         assert drawing.circles("dot0") == []
 
@@ -261,9 +273,12 @@ class TestPlots:
         assert {"one", "[two, three]", "a.b", "receiver.velocity.x", "50 %", "150 %"} <= set(drawing.texts)
         limit, left = drawing.lines("limit")[0][0][0], drawing.frame[0]
         ends = [drawing.boxes(f"bar is-{name}")[0][2] for name in ("pass", "fail")]
-        assert [(end - left) / (limit - left) for end in ends] == pytest.approx([0.5, 1.5], abs=1e-3)
-        dots = [(x - left) / (limit - left) for x, _ in drawing.circles("dot0")][:2]
-        assert dots == pytest.approx([0.1, 0.2], abs=1e-3)
+        decade = drawing.place("100")[0] - drawing.place("10")[0]
+        assert decade > 100
+        assert left == pytest.approx(limit - decade * math.log10(13), abs=0.02)  # 10 % over 1.3
+        assert [10 ** ((end - limit) / decade) for end in ends] == pytest.approx([0.5, 1.5], rel=READ)
+        dots = [10 ** ((x - limit) / decade) for x, _ in drawing.circles("dot0")][:2]
+        assert dots == pytest.approx([0.1, 0.2], rel=READ)
         assert [(run.low, run.high) for run in runs(axis, shown.values["status"])] == [(-0.5, 0.5), (0.5, 1.5)]
 
     def test_a_column_of_words(self) -> None:
@@ -288,8 +303,8 @@ class TestPlots:
         assert {"published", "full", f"{TIME} [s]"} <= set(drawing.texts)
         assert not any("published model" in text for text in drawing.texts)  # none decides for all
         if column is None:
-            assert uses(drawing, "row0") == pytest.approx([50, 100, 150, 200, 250], abs=0.02)
-            assert uses(drawing, "row1") == pytest.approx([25, 50, 75, 100, 125], abs=0.02)
+            assert uses(drawing, "row0") == pytest.approx([50, 100, 150, 200, 250], rel=READ)
+            assert uses(drawing, "row1") == pytest.approx([25, 50, 75, 100, 125], rel=READ)
         else:
             assert "utilization" in drawing.texts
             assert "limit" not in drawing.texts

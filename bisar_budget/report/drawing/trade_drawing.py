@@ -28,7 +28,7 @@ _MOST_LEFT = 190.0  # px that names at an axis may take
 _BAR = 24.0  # px for a word
 _RIM = 165.0  # px, of a polar map
 _HEAT_BAR = 70.0  # px beside a map
-_HIGH, _LEAST = 300.0, 0.1  # % of the limit: above it equal ratios; what is smaller is not of interest there
+_DECADE, _LEAST = 10.0, 0.1  # % of the limit: an axis shows the one; what is smaller than the other is of no interest
 _STRENGTHS = (0.24, 0.13, 0.36)  # opacity of the first, second and third status of one colour
 _DASHES = ("", "7 3", "2 3", "9 3 2 3", "5 5", "1 4", "12 4")
 _CELLS = 60  # of a map that have room for words of their own
@@ -136,14 +136,12 @@ def _heat_colour(part: float) -> str:
 
 
 def _value_scale(values: Floats, start: float, end: float, *, is_use: bool) -> svg.Scale:
-    """Scale of a column; of utilizations [%] one from 0, or in equal ratios where some are far above their limit."""
+    """Scale of a column; of utilizations [%] in equal ratios, with the limit and a decade below it."""
     finite = values[np.isfinite(values)]
     if is_use:
         finite = np.append(finite[finite > 0], 100.0)
-        high = float(finite.max())
-        if high <= _HIGH:
-            return svg.Scale(0.0, 1.08 * high, start, end)
-        return svg.Scale(max(_LEAST, float(finite.min())) / 1.3, 1.3 * high, start, end, is_log=True)
+        low = min(max(_LEAST, float(finite.min())), _DECADE)
+        return svg.Scale(low / 1.3, 1.3 * float(finite.max()), start, end, is_log=True)
     low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 1.0)
     margin = (high - low) / 20 or abs(high) / 20 or 1.0
     return svg.Scale(low - margin, high + margin, start, end)
