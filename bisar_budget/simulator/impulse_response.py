@@ -14,10 +14,12 @@ import numpy as np
 
 from bisar_budget.simulator.phase_history import Complexes, Floats
 
+_WHOLE = slice(None), slice(None)
 _UPSAMPLING = 32
 _CHIP_UPSAMPLING = 8
 _COLUMNS = 512  # interpolated at once
 _ASCENTS = 50  # at most, along x′ and y′ in turn
+_NARROWED = 3  # times: a row is then within a thousandth
 _SETTLED = 1e-4  # samples
 _SEARCH = 8  # towards a pixel's place in a grid
 _CLOSE = 0.02  # pixels: found
@@ -208,6 +210,22 @@ def impulse_response_2d(
     )
 
 
+def line_through_peak(image: Complexes, window: tuple[slice, slice] = _WHOLE) -> tuple[float, Complexes]:
+    """Row of the peak in a window of an image (nx, ny), and the line along y′ there, as long as the window.
+
+    The peak lies between two lines of pixels: a third of a cell apart, the nearer of them may be 0.4 dB below it. The
+    image repeats beyond its edges.
+    """
+    part = np.abs(image[window])
+    row = float(np.argmax(part.max(axis=1))) + window[0].indices(image.shape[0])[0]
+    columns, step = image[:, window[1]], 0.5
+    for _ in range(_NARROWED):
+        lines = upsampled(_cut(columns, row + step * np.arange(-1.0, 2.0)), _UPSAMPLING)
+        row += step * min(max(_vertex(np.max(np.abs(lines) ** 2, axis=1), 1), -1.0), 1.0)
+        step /= 4
+    return row, _cut(columns, row)
+
+
 def highest(chip: Complexes) -> float:
     """Largest magnitude of the interpolation of a chip (nx, ny)."""
     columns = upsampled(chip, _CHIP_UPSAMPLING).T
@@ -222,13 +240,13 @@ def _check(samples: Complexes) -> None:
         raise ValueError("the samples are all zero: there is no response to measure")
 
 
-def _cut(chip: Complexes, row: float) -> Complexes:
-    """Line of a chip along its second axis, at a fraction of a row."""
+def _cut(chip: Complexes, row: float | Floats) -> Complexes:
+    """Line of a chip along its second axis, at a fraction of a row; lines (n, ny) at rows (n,)."""
     spectrum = np.fft.fft(chip, axis=0)
     count = chip.shape[0]
     centre = _carrier(np.abs(spectrum.T) ** 2)
     bins = (np.arange(count) - centre + count // 2) % count - count // 2 + centre
-    cut: Complexes = np.exp(2j * math.pi * bins * row / count) @ spectrum / count
+    cut: Complexes = np.exp(2j * math.pi / count * np.multiply.outer(row, bins)) @ spectrum / count
     return cut
 
 

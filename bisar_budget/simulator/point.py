@@ -20,7 +20,7 @@ from bisar_budget.simulator.autofocus import ALGORITHMS
 from bisar_budget.simulator.collection import PointCollection, RangeLines
 from bisar_budget.simulator.former import IMAGE_FORMERS, ExactRangeFormer, Former, PlaneWaves
 from bisar_budget.simulator.image_formation import ground_grid
-from bisar_budget.simulator.impulse_response import ImpulseResponse, between, impulse_response
+from bisar_budget.simulator.impulse_response import ImpulseResponse, between, impulse_response, line_through_peak
 from bisar_budget.simulator.phase_history import (
     Complexes,
     Errors,
@@ -90,7 +90,7 @@ class PointImages(NamedTuple):
     `points` (3, 2) the ground points (29) of those pieces of the whole range error: the middle one is where (25) puts
     a point at the scene centre; `points_by` says by which gradients (29) has them. `effect` is that of the
     scene centre, too. `responses` are one for each target, and
-    `response`, `focused_response`, `clean_response` the cuts through the brightest pixels. `outside` says which
+    `response`, `focused_response`, `clean_response` the cuts through the peaks. `outside` says which
     declared echoes lie beyond the patch.
     """
 
@@ -483,18 +483,20 @@ def pulses_for(mission: Mission, cells: int) -> int:
     return given
 
 
-def _measured(image: Complexes, spacing: float, mask_m: float | None) -> ImpulseResponse:
-    """Measure the cross-range cut through the brightest pixel, moved to the middle.
+def _measured(
+    image: Complexes, spacing: float, mask_m: float | None, *window: tuple[slice, slice]
+) -> ImpulseResponse:
+    """Measure the cross-range cut through the peak, of a window or of the image, moved to the middle.
 
     A smear over most of the patch has its peak at one end, and would wrap around; it gets as much room again.
     """
-    row, column = np.unravel_index(np.argmax(np.abs(image)), image.shape)
-    cut, count = image[row], image.shape[1]
+    _, cut = line_through_peak(image, *window)
+    count, column = cut.size, int(np.argmax(np.abs(cut)))
     try:
-        return impulse_response(np.roll(cut, count // 2 - int(column)), spacing, mask_m)
+        return impulse_response(np.roll(cut, count // 2 - column), spacing, mask_m)
     except ValueError:
         wide = np.concatenate((cut, np.zeros(count, dtype=complex)))
-        return impulse_response(np.roll(wide, count - int(column)), spacing, mask_m)
+        return impulse_response(np.roll(wide, count - column), spacing, mask_m)
 
 
 def _clutter(level_db: float | None, grid: Floats, seed: int) -> tuple[Floats, Complexes]:
@@ -533,7 +535,7 @@ def _cuts(images: Sequence[Complexes], window: tuple[slice, slice], spacing: flo
     mask = None
     for image in images:
         try:
-            found.append(_measured(image[window], spacing, mask))
+            found.append(_measured(image, spacing, mask, window))
         except ValueError:  # what stands beside it reaches into its mainlobe
             found.append(None)
         mask = found[0].mask_m if found[0] else None

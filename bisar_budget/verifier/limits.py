@@ -23,7 +23,7 @@ from bisar_budget.findings.images import FLOOR_DB, ImageEvidence, PointImage, Ve
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.simulator.collection import CELLS, OVERSAMPLING, RANGE_CELLS, Chip, PointCollection, pulses_for
-from bisar_budget.simulator.impulse_response import upsampled
+from bisar_budget.simulator.impulse_response import line_through_peak, upsampled
 from bisar_budget.simulator.phase_history import Errors, Floats
 from bisar_budget.verifier import phase_cases
 from bisar_budget.verifier.spread_cases import (
@@ -317,12 +317,12 @@ def _shown(images: Responses) -> PointImage:
 
 def _point_image(chip: Chip, reference: Chip, smear_cells: float) -> PointImage:
     """Reduce a chip to what is shown: as far as the response is smeared, and sidelobes."""
-    spacing, middle = chip.spacing, chip.cut.size // 2
+    spacing, middle = chip.spacing, chip.image.shape[1] // 2
     reach = _AROUND + smear_cells / 2
     half = min(math.ceil(reach * OVERSAMPLING), middle - 1)
     stride = math.ceil(2 * half / _MAX_PIXELS)
     half -= half % stride
-    cut, clean = (np.abs(upsampled(one.cut, _FINE)) for one in (chip, reference))
+    cut, clean = (np.abs(upsampled(line_through_peak(one.image)[1], _FINE)) for one in (chip, reference))
     peak = float(clean.max())
     fine = slice(_FINE * (middle - half), _FINE * (middle + half) + 1)
     # A long smear fits into a chip by the brightest of each few samples.

@@ -8,7 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bisar_budget.simulator.image_formation import taylor_window
-from bisar_budget.simulator.impulse_response import impulse_response, impulse_response_2d, upsampled
+from bisar_budget.simulator.impulse_response import (
+    impulse_response,
+    impulse_response_2d,
+    line_through_peak,
+    upsampled,
+)
 from bisar_budget.simulator.phase_history import cell_centres
 
 APERTURE = 256  # samples
@@ -226,6 +231,18 @@ class TestChip:
         assert got.range_cut.pslr_db == pytest.approx(-35, abs=0.5)
         assert got.range_cut.irw_m == pytest.approx(2 * 1.19, abs=0.03)  # Taylor -35 dB, n̄ 5: broadened 1.34 times
         assert got.cross_range_cut.irw_m == pytest.approx(0.8859, abs=1e-3)
+
+    @pytest.mark.parametrize("place", [(0.5, 0.2), (-0.45, -7.4), (3.3, 0.5), (-30.5, 41.4)])
+    def test_a_line_goes_through_a_peak_between_lines_of_pixels(self, place) -> None:
+        """Half a pixel beside the peak a line of pixels is sinc(0.2), 0.58 dB, too low: `simulate` measured that."""
+        image, _ = chip(place, skew=0.5)
+        row, line = line_through_peak(image)
+        assert row == pytest.approx(CHIP // 2 + place[0], abs=1e-3)
+        assert np.abs(upsampled(line, 32)).max() == pytest.approx(1.0, abs=2e-3)  # a chip does not repeat
+        start = CHIP // 2 + round(place[1]) - 12
+        row, part = line_through_peak(image, (slice(None), slice(start, start + 25)))
+        assert row == pytest.approx(CHIP // 2 + place[0], abs=1e-3)
+        assert part == pytest.approx(line[start : start + 25], abs=1e-3)
 
     def test_skewed_sidelobes_do_not_move_the_peak(self) -> None:
         image, spacing = chip((0.45, -0.35), skew=0.5)
