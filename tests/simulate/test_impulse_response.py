@@ -237,12 +237,12 @@ class TestChip:
         """Half a pixel beside the peak a line of pixels is sinc(0.2), 0.58 dB, too low: `simulate` measured that."""
         image, _ = chip(place, skew=0.5)
         row, line = line_through_peak(image)
-        assert row == pytest.approx(CHIP // 2 + place[0], abs=1e-3)
+        assert row == pytest.approx(CHIP // 2 + place[0], abs=5e-3)
         assert np.abs(upsampled(line, 32)).max() == pytest.approx(1.0, abs=2e-3)  # a chip does not repeat
         start = CHIP // 2 + round(place[1]) - 12
         row, part = line_through_peak(image, (slice(None), slice(start, start + 25)))
-        assert row == pytest.approx(CHIP // 2 + place[0], abs=1e-3)
-        assert part == pytest.approx(line[start : start + 25], abs=1e-3)
+        assert row == pytest.approx(CHIP // 2 + place[0], abs=5e-3)
+        assert part == pytest.approx(line[start : start + 25], abs=5e-3)
 
     def test_skewed_sidelobes_do_not_move_the_peak(self) -> None:
         image, spacing = chip((0.45, -0.35), skew=0.5)
