@@ -122,14 +122,11 @@ def differing(_: Generated) -> str:
 
 def side_by_side(directive: Generated) -> str:
     """Images of an independent processor beside those of the package, drawn by the tests' own script."""
-    script = TESTS / "side_by_side.py"
-    if not script.is_file():
-        return ""
-    directive.env.note_dependency(str(script))
+    directive.env.note_dependency(str(TESTS / "side_by_side.py"))
     file = Path(Generated.folder, _PICTURE)
     file.parent.mkdir(parents=True, exist_ok=True)
-    drawing = f"import sys; from tests.outside.side_by_side import draw; draw({str(file)!r})"
-    done = subprocess.run([sys.executable, "-c", drawing], cwd=ROOT, capture_output=True, text=True)
+    command = [sys.executable, "-m", "tests.outside.side_by_side", str(file)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     if done.returncode:
         raise ValueError(done.stderr)
     words = " ".join(directive.content)

@@ -24,7 +24,7 @@ _FINE = 128  # of the spline through them: a minimum is found to a hundredth of 
 _NEAR = 0.25  # cells from one point to the next in the search for the brightest
 _CLIMBS = 8
 _SETTLED = 1e-7  # m
-_ASIDE = 3  # range cells about a line of equal range that can be read
+_ASIDE, _BEYOND = 3, 4  # cells of range about a cut, and of cross range beyond its ends, that can be read
 _BLOCK = 1 << 18  # contributions of pulses to points formed at once
 
 
@@ -60,7 +60,7 @@ class Response(NamedTuple):
 class Collection:
     """Pulses of one channel, and what the file says of them.
 
-    `transmitter` and `receiver` are their measured places along the axes of the scene, (pulses, 3) [m]; `frequency`
+    `transmitter` and `receiver` are their measured places along the `axes` of the scene, (pulses, 3) [m]; `frequency`
     (pulses, samples) [Hz]; `signal` (pulses, samples). `wavelength` and `cell` are λ and c/B of the range sum. [m]
     """
 
@@ -70,10 +70,10 @@ class Collection:
             signal, vectors = reader.read_channel(xml.findtext("{*}Channel/{*}RefChId"))
         plane = "{*}SceneCoordinates/{*}ReferenceSurface/{*}Planar/{*}uIA"
         axes = [_vector(xml.find(plane + one)) for one in "XY"]
-        turn = np.array([*axes, np.cross(*axes)]).T
+        self.axes = np.array([*axes, np.cross(*axes)])
         origin = _vector(xml.find("{*}SceneCoordinates/{*}IARP/{*}ECF"))
         self.transmitter, self.receiver, self.reference = (
-            (vectors[name] - origin) @ turn for name in ("TxPos", "RcvPos", "SRPPos")
+            (vectors[name] - origin) @ self.axes.T for name in ("TxPos", "RcvPos", "SRPPos")
         )
         # A later echo turns backwards.
         self.signal = signal.astype(complex) if float(xml.findtext("{*}Global/{*}SGN")) < 0 else signal.conj()
@@ -137,13 +137,13 @@ class Collection:
 
     # ------------------------------------------------------------------ images
     def steps(self, about: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Steps of a resolution cell at a point: towards the platforms, and along its line of equal range. [m]"""
+        """Steps of a resolution cell at a point: nearer by equal Doppler, and along its line of equal range. [m]"""
         sums = self.farther(about + np.vstack((np.zeros(2), np.eye(2))))
         slopes = sums[:, 1:] - sums[:, :1]
-        middle = slopes[len(slopes) // 2]
-        along = np.array([-middle[1], middle[0]]) / np.hypot(*middle)
-        turn = abs(float((slopes[-1] - slopes[0]) @ along))
-        return -middle / float(middle @ middle) * self.cell, -along * self.wavelength / turn
+        middle, turned = slopes[len(slopes) // 2], slopes[-1] - slopes[0]
+        nearer = np.linalg.solve([middle, turned], [-self.cell, 0.0])
+        along = np.linalg.solve([middle, turned], [0.0, self.wavelength])
+        return nearer, along * np.sign(middle[0] * along[1] - middle[1] * along[0]) * -1.0
 
     def resolution(self, about: np.ndarray) -> float:
         """Resolution cell at a point along its line of equal range. [m]"""
@@ -151,13 +151,13 @@ class Collection:
 
     def line(self, about: np.ndarray, cells: np.ndarray) -> np.ndarray:
         """Points so many resolution cells from one along its line of equal range at mid-aperture, (n, 2). [m]"""
-        towards, along = self.steps(about)
+        nearer, along = self.steps(about)
         points = about + np.multiply.outer(cells, along)
         middle = len(self.transmitter) // 2
         wanted = self.farther(about[None])[middle]
         for _ in range(3):
             off = self.farther(points)[middle] - wanted
-            points = points + off[:, None] / self.cell * towards
+            points = points + off[:, None] / self.cell * nearer
         return points
 
     def response(self, near: np.ndarray, reach: float, mask: float | None = None) -> "Response":
@@ -165,17 +165,23 @@ class Collection:
 
         `mask` is half the mainlobe's width, as another response has it [m]; None: between the first minima.
         """
-        return _Image(self, near, reach + 4).measured(reach, mask)
+        nearer, _ = self.steps(near)
+        ends = self.line(near, np.array([-reach - _BEYOND, reach + _BEYOND]))
+        corners = np.concatenate([ends + way * _ASIDE * nearer for way in (-1, 1)])
+        return _Image(self, near, corners).measured(reach, mask)
+
+    def image(self, points: np.ndarray) -> np.ndarray:
+        """Complex image of points (..., 2), the same shape; they lie about their mean."""
+        flat = points.reshape(-1, 2)
+        found: np.ndarray = _Image(self, flat.mean(axis=0), flat)(flat).reshape(points.shape[:-1])
+        return found
 
 
 class _Image:
-    """Backprojection about a point: the pulses are compressed in range once, then read at any points nearby."""
+    """Backprojection about a point: pulses are compressed in range once, then read at points between `corners`."""
 
-    def __init__(self, of: Collection, about: np.ndarray, cells: float) -> None:
+    def __init__(self, of: Collection, about: np.ndarray, corners: np.ndarray) -> None:
         self.of, self.about, self.here = of, about, of.farther(about[None])
-        towards, _ = of.steps(about)
-        ends = of.line(about, np.array([-cells, cells]))
-        corners = np.concatenate([ends + way * _ASIDE * towards for way in (-1, 1)])
         reach = int(np.abs(of.farther(corners) - self.here).max() / of.cell * _PROFILE) + 3
         offsets = np.arange(-reach, reach + 1) * of.cell / _PROFILE
         turn = np.exp(2j * np.pi / C * np.outer(of.frequency[0] - of.centre, offsets))
