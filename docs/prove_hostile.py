@@ -49,7 +49,7 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.mission.tree import MAX_BYTES
 from bisar_budget.report import FORMATS, Style, pictures, render
 from bisar_budget.report.change import difference
-from bisar_budget.report.change.comparison import compare
+from bisar_budget.report.change.comparison import ChangeSet, Gate, compare
 from bisar_budget.report.explain.explanation import explain
 from bisar_budget.settings import SettingsError, project_settings
 from tests.conftest import ROOT, TODAY
@@ -68,10 +68,11 @@ ORIGINAL, OWN_PROCESS = 16, 200  # one file in so many
 LARGEST = 16 * MAX_BYTES  # of a report of one file
 _WORD = re.compile(r"\w+")  # what a file says, a report may: `nan` and `inf` as Python writes them
 LARGEST_PROCESS = 8 << 30  # bytes of address space; a case that is right takes some 100 MB of memory
+_GATE = Gate(0.1, ("receiver.*",))
 _DIFFERENCES: dict[str, Callable[..., str]] = {
-    "text": partial(difference.as_text, tolerated=0.1, all_rows=True),
-    "markdown": partial(difference.as_markdown, tolerated=0.1, all_rows=True),
-    "json": lambda changes: difference.as_json("", changes, 0.1),
+    "text": partial(difference.as_text, gate=_GATE, all_rows=True),
+    "markdown": partial(difference.as_markdown, gate=_GATE, all_rows=True),
+    "json": partial(difference.as_json, "", gate=_GATE),
 }
 _TABLES = ("csv", "parquet", "nc")
 _VARY = ("--vary", "collection.aperture_time=1:6s:300")
@@ -190,7 +191,7 @@ def _file(
     own = hostile.data + (earlier.mission.data or b"")
     for name, write in _DIFFERENCES.items():
         stage.append(f"diff {name}")
-        text = harmless(write([compare(earlier, found)]), name)
+        text = harmless(write(ChangeSet((compare(earlier, found),))), name)
         missed += [f"seed {seed}: diff {name}: {what}" for what in _wrong(text, name, own)]
         tried["comparisons"] += 1
     for row in random.sample(found.rows, 2):

@@ -275,7 +275,7 @@ def case(seed: int) -> Case:
         return _misspelt(text, random)
     if kind < 0.8:
         tree = tree_of(text)
-        changes = (_scale, _section) if kind < 0.45 else _CHANGES  # many that can be used
+        changes = (_scale, _section, from_schema) if kind < 0.45 else _CHANGES  # many that can be used
         for _ in range(random.choice((1, 1, 1, 2, 3, 8))):
             _change(tree, random, changes)
         text = _written(tree, random)
@@ -500,6 +500,116 @@ def _section(tree: Any, node: Any, key: Any, random: Random) -> None:
     choices[random.choice(list(choices))]()
 
 
+# Quantities of a size that missions have, and their keys; the rest have a unit at random.
+_QUANTITIES = {
+    key: quantity
+    for quantity, keys in {
+        (1, "m"): "position sigma location_error height_error geoid_separation arm",
+        (0.05, "m"): "zenith_delay uncertainty",
+        (10, "um"): "amplitude rms",
+        (0.01, "m/s"): "velocity speed climb",
+        (1e-3, "m/s^2"): "acceleration",
+        (1e-3, "m/s^3"): "jerk",
+        (1e-4, "m/s^4"): "snap",
+        (3, "deg"): "attitude heading azimuth elevation motion_azimuth latitude longitude error",
+        (30, "deg"): "quadratic_phase_error cubic_phase_error",
+        (0.2, "arcsec"): "polar_motion_x polar_motion_y",
+        (0.1, "s"): "ut1_minus_utc time_tag",
+        (5, "s"): "interval age averaging correlation_time aperture_time center",
+        (5, "ns"): "time_error constant",
+        (1e-11, ""): "frequency_error linear",
+        (1e-14, "1/s"): "quadratic",
+        (1e-15, "1/s^2"): "cubic",
+        (-20, "dB"): "pslr islr noise",
+        (3, "dB"): "level spectrum_level",
+        (2, "TECU"): "zenith_electron_content",
+        (1e-10, "/day"): "aging",
+        (1e-9, "/g"): "acceleration_sensitivity",
+        (1, "kHz"): "bandwidth",
+        (10, "MHz"): "frequency",
+        (200, "MB"): "memory_limit",
+        (100, "m"): "radius",
+        (50, "ug"): "accelerometer_bias",
+        (300, "ppm"): "accelerometer_scale_factor",
+        (0.5, "deg/h"): "gyro_bias",
+        (0.05, "m/s/sqrt(h)"): "velocity_random_walk",
+        (0.1, "deg/sqrt(h)"): "angle_random_walk",
+        (3, ""): "coverage_factor n_pull",
+        (0.5, ""): "warn_above",
+    }.items()
+    for key in keys.split()
+}
+# Keys of sections that have them from the user, and units of what stands there.
+_POINTS = {
+    "spectrum": (("20 Hz", "200 Hz", "1 kHz"), ("g^2/Hz", "m^2/Hz"), (1e-6, 1e-2)),
+    "phase_noise": (("1 Hz", "10 Hz", "1 kHz"), ("dBc/Hz",), (-100, -140)),
+    "spurs": (("50 Hz", "100 Hz"), ("dBc",), (-40, -90)),
+    "allan_deviation": (("0.1 s", "1 s", "10 s"), ("",), (1e-12, 1e-10)),
+    "specifications": (("platforms.receiver.motion_error.velocity", "timing_error.linear"), ("", "m/s"), (0.1, 1)),
+    "specify": (("platforms.receiver.motion_error.velocity", "timing_error.linear"), ("",), (1, 2)),
+    "requirement_ids": (("receiver.velocity.x", "mission.islr"), ("",), (1, 2)),
+    "correlation": (("position.x-velocity.x", "position.y-position.z"), ("",), (-1, 1)),
+}
+_PLACES = ("", "collection", "scene", "requirements", "allocation", "Platform", "MotionError", "Oscillator", "Imu")
+
+
+def from_schema(tree: Any, node: Any, key: Any, random: Random) -> None:
+    """A key that the schema has, with a value of its kind."""
+    schema = mission_schema()
+    if not isinstance(tree, dict):
+        return
+    platforms = tree.get("platforms")
+    platform = random.choice(list(platforms.values())) if isinstance(platforms, dict) and platforms else {}
+    for name in {"MotionError": ("motion_error",), "Oscillator": ("oscillator",), "Imu": ("motion_error", "imu")}.get(
+        place := random.choice(_PLACES), ()
+    ):
+        platform = platform.setdefault(name, {}) if isinstance(platform, dict) else {}
+    target = tree if not place else tree.setdefault(place, {}) if place in schema["properties"] else platform
+    kind = place if place in schema["definitions"] else ""
+    if place in schema["properties"]:
+        kind = re.search(r"#/definitions/(\w+)", json.dumps(schema["properties"][place]))[1]  # type: ignore[index]
+    properties = schema["definitions"][kind]["properties"] if kind else schema["properties"]
+    chosen = random.choice(sorted(properties))
+    if isinstance(target, dict):
+        target[chosen] = _filled(properties[chosen], chosen, schema["definitions"], random)
+
+
+def _filled(kind: Any, key: str, definitions: Any, random: Random) -> Any:
+    """A value of a part of the schema."""
+    if "$ref" in kind:
+        return _filled(definitions[kind["$ref"].rpartition("/")[2]], key, definitions, random)
+    for choices in ("allOf", "anyOf"):
+        if choices in kind:
+            return _filled(random.choice(kind[choices]), key, definitions, random)
+    if "enum" in kind:
+        return random.choice(kind["enum"])
+    if "const" in kind:
+        return kind["const"]
+    if kind["type"] == "array":
+        count = kind.get("maxItems") if kind.get("minItems") else random.randint(1, 3)
+        items = [_filled(kind["items"], key, definitions, random) for _ in range(count or 1)]
+        return list(dict.fromkeys(items)) if kind.get("uniqueItems") else items
+    if kind["type"] == "object":
+        if key in _POINTS:
+            names, units, (low, high) = _POINTS[key]
+            unit = random.choice(units)
+            return {name: f"{random.uniform(low, high):.4g} {unit}".rstrip() for name in names}
+        properties = kind.get("properties", {})
+        required = kind.get("required", ())
+        return {
+            name: _filled(part, name, definitions, random)
+            for name, part in properties.items()
+            if name in required or random.random() < 0.4
+        }
+    if kind["type"] == "integer":
+        return random.randint(kind["minimum"], min(kind["maximum"], 10_000))
+    if key not in _QUANTITIES:
+        return _value(random) if random.random() < 0.3 else f"{key} {random.randint(0, 9)}"
+    size, unit = _QUANTITIES[key]
+    number = size * (random.uniform(0.2, 3) if size < 0 else 10 ** random.uniform(-2, 2))
+    return f"{number:.4g} {unit if random.random() < 0.9 else random.choice(UNITS)}".rstrip()
+
+
 def _number(random: Random) -> float:
     return float(f"{random.choice((1,) * 9 + (-1,)) * 10 ** random.uniform(-4, 4):.4g}")
 
@@ -531,6 +641,8 @@ _CHANGES = (
     _bury,
     _section,
     _section,
+    from_schema,
+    from_schema,
 )
 
 

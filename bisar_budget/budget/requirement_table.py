@@ -125,6 +125,7 @@ def _entry(
 ) -> JudgedRequirement:
     mission, key = case.mission, state.key
     value = getattr(mission.requirements, key)
+    utilization = case.number(state.utilization)  # an error without an image has no phase to compare
     status = _STATUSES[state.status[case.place]]
     place = state.decider[case.place]
     decider = rows[place] if place >= 0 else None
@@ -143,7 +144,9 @@ def _entry(
         status=status,
         allowed=allowed,
         reached=reached,
-        utilization=None if decider is None or decider.utilization is None else case.number(state.utilization),
+        utilization=utilization
+        if decider and decider.utilization is not None and math.isfinite(utilization)
+        else None,
         row=None if decider is None else decider.id,
         rows=tuple(row.id for row, judges in zip(rows, state.judges[:, case.place], strict=True) if row and judges),
         reason=reason,

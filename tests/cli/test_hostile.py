@@ -17,7 +17,8 @@ import time
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
-from typing import NamedTuple
+from random import Random
+from typing import Any, NamedTuple
 
 import pytest
 from click.testing import CliRunner
@@ -32,12 +33,13 @@ from bisar_budget.faults import MissionError
 from bisar_budget.findings.mission import Report
 from bisar_budget.mission import load
 from bisar_budget.mission.load import parse_mission
+from bisar_budget.mission.model import mission_schema
 from bisar_budget.mission.tree import MAX_FAULTS
 from bisar_budget.report import FORMATS, Style, render
 from bisar_budget.report.drawing import point_plot
 from bisar_budget.workers import worker_pool
 from tests.conftest import APART, ROOT, TODAY, findings, heed_signals, mission_text
-from tests.fuzz import RAW, RUN, case
+from tests.fuzz import RAW, RUN, case, from_schema
 from tests.mission.test_path_files import satellite
 from tests.paths.orbit_files import TLE
 
@@ -1044,6 +1046,27 @@ def test_an_error_that_no_image_has_is_no_part_of_a_sum(format_name: str) -> Non
     text = render(format_name, Report(version="", missions=(found,)), Style(detail="full"))
     assert not re.search(r"\b(nan|inf)\b", re.sub("<style>.*?</style>", "", text, flags=re.DOTALL))
     assert "no image" in text
+
+
+@pytest.mark.parametrize("model", ["full", "strictest"])
+def test_an_error_without_an_image_has_no_phase_to_compare(model: str) -> None:
+    """A clock of another row's requirement was used infinitely: JSON has no such number, and the exit code was 3."""
+    changes = {"timing_error__linear": 1e-6, "requirements__location_error": 2.0, "allocation__combine": "each"}
+    found = findings(**changes, allocation__model=model)
+    entry = next(one for one in found.requirements if one.key == "quadratic_phase_error")
+    assert (entry.status, entry.row, entry.reached, entry.utilization) == ("fail", "timing.linear", None, None)
+    json.loads(render("json", Report(version="", missions=(found,)), Style()))
+
+
+def test_cases_have_every_key_of_a_mission_file() -> None:
+    """A key that the long round never writes is a key that it never damages."""
+    schema, found = mission_schema(), set[str]()
+    for seed in range(6000):
+        tree: dict[str, Any] = {"platforms": {"transmitter": {}, "receiver": {}}}
+        from_schema(tree, tree, "", Random(seed))
+        found |= set(re.findall(r'"(\w[\w-]*)":', json.dumps(tree)))
+    listed = (schema, *schema["definitions"].values(), schema["definitions"]["Oscillator"]["properties"]["power_law"])
+    assert {key for part in listed for key in part.get("properties", {})} <= found
 
 
 @pytest.mark.parametrize("seed", [*range(0, 400, 4), 52552])
