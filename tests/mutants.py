@@ -409,7 +409,9 @@ MUTANTS = (
         "bisar_budget/budget/verdicts.py",
         'row._replace(status="fail", reason=reason, refuted=refuted)',
         'row._replace(status="warn", reason=reason, refuted=refuted)',
-        ("tests/verify/test_verify_reports.py::TestCheckWithImages::test_a_location_that_the_image_contradicts_fails",),
+        (
+            "tests/verify/test_verify_reports.py::TestCheckWithImages::test_a_location_that_the_image_contradicts_fails",
+        ),
     ),
     Mutant(
         "seam: level of a power as of an amplitude",

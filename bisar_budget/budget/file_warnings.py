@@ -12,6 +12,7 @@ from bisar_budget.budget.doubts import input_doubts
 from bisar_budget.budget.pull_in import ROOM, caps, rounded_down
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.navigation_errors import TILTS
+from bisar_budget.effects.oscillator_acceleration import felt
 from bisar_budget.effects.oscillators import POOR_FIT
 from bisar_budget.faults import KeyPath, changes_words
 from bisar_budget.findings.mission import FileWarning, Resolution
@@ -57,6 +58,7 @@ def file_warnings(
         *_doubtful_paths(mission),
         *_of_instruments(case),
         *_of_lever_arms(mission),
+        *_of_calm_oscillators(mission),
         *_of_autofocus(mission, resolution),
         *_nothing_declared(rows),
     )
@@ -169,6 +171,10 @@ def _of_instruments(case: Case) -> Iterator[_Warned]:
     T = mission.collection.aperture_time
     if sync is not None and not sync.is_direct_path and (sync.interval or 0.0) > T:
         yield _Warned(("synchronization", "interval"), exchanges_are_rare(T))
+    if sync is not None and sync.is_holdover:
+        perfect = [name for name in PLATFORMS if getattr(mission.platforms, name).oscillator is None]
+        if perfect:
+            yield _Warned(("synchronization", "age"), nothing_drifts(perfect))
     for error in case.random:
         if error.noise is not None and error.noise.misfit > POOR_FIT:
             key = f"platforms.{error.owner}.oscillator"
@@ -198,12 +204,39 @@ def nothing_swings_the_arm(platform: str) -> str:
     )
 
 
+def _of_calm_oscillators(mission: Mission) -> Iterator[_Warned]:
+    """Sensitivities to acceleration that the file states, of oscillators that nothing shakes or turns."""
+    for name in PLATFORMS:
+        key, one = ("platforms", name, "oscillator", "acceleration_sensitivity"), felt(mission, name)
+        if one is None or key not in mission.places or one.vibration.sinusoidal or one.vibration.spectrum is not None:
+            continue
+        state = getattr(mission.geometry, name)
+        if not (state.bends or any(state.acceleration)):
+            yield _Warned(key, nothing_shakes_the_oscillator(name))
+
+
+@phrase
+def nothing_shakes_the_oscillator(platform: str) -> str:
+    """Said of a sensitivity to acceleration without vibration."""
+    return (
+        f"platforms.{platform}.oscillator.acceleration_sensitivity: vibration and turns act on it, and the file has "
+        "none: add oscillator.vibration, or sinusoidal or spectrum to motion_error.vibration"
+    )
+
+
 def _unused_correlations(mission: Mission) -> Iterator[_Warned]:
     """Correlations that no row and no aggregate looks at."""
     for name in PLATFORMS if mission.allocation.combine == "each" else ():
         covariance = getattr(mission.platforms, name).motion_error.covariance
         if covariance is not None and covariance.has_correlations():
             yield _Warned(("platforms", name, "motion_error", "covariance"), correlations_not_used(name))
+
+
+@phrase
+def nothing_drifts(platforms: Sequence[str]) -> str:
+    """Said of clocks that were set, of which no oscillator is stated."""
+    keys = " and ".join(f"platforms.{name}.oscillator" for name in platforms)
+    return f"synchronization.age: clocks drift as their oscillators do, and the file has no {keys}"
 
 
 @phrase

@@ -26,6 +26,7 @@ from bisar_budget.mission.model import (
     Shares,
     flies_on_earth,
     least_age,
+    least_bandwidth,
 )
 from bisar_budget.mission.platforms import (
     FARTHEST_BY,
@@ -144,6 +145,9 @@ def _has_possible_figures(mission: Mission, cases: int) -> NDArray[np.bool_]:
     for name in PLATFORMS:
         platform: Platform = getattr(mission.platforms, name)
         if platform.oscillator is not None:
+            if platform.oscillator.bandwidth is not None:
+                least = least_bandwidth(np.asarray(mission.collection.aperture_time))
+                is_one &= np.asarray(platform.oscillator.bandwidth) > SAFE * least
             for (f, level), (g, next_level) in pairwise(platform.oscillator.phase_noise or ()):
                 slope = (np.asarray(next_level) - level) / math.log10(g / f)
                 is_one &= (slope * SAFE > -STEEPEST) & (slope * SAFE < RISE)

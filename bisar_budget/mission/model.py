@@ -236,6 +236,27 @@ def _unset_clocks(values: Mapping[str, Any]) -> Iterator[Problem]:
             )
 
 
+def least_bandwidth(aperture_time: Any) -> Any:
+    """Least bandwidth of an oscillator's noise: below one cycle per aperture, none would be counted. [Hz]"""
+    return 1 / aperture_time
+
+
+def _noise_cut_off(values: Mapping[str, Any]) -> Iterator[Problem]:
+    """Hold bandwidths of oscillators to the aperture, so that their noise is looked at."""
+    platforms, collection = values.get("platforms"), values.get("collection")
+    if platforms is None or collection is None:
+        return
+    T = collection.aperture_time
+    for name, platform in zip(platforms._fields, platforms, strict=True):
+        bandwidth = None if platform.oscillator is None else platform.oscillator.bandwidth
+        if bandwidth is not None and bandwidth < least_bandwidth(T):
+            yield Problem(
+                f"counts no noise within an aperture of {T:g} s",
+                f"accepted: at least {least_bandwidth(T):.3g} Hz, one cycle; omitted, all stated noise counts",
+                at=("platforms", name, "oscillator", "bandwidth"),
+            )
+
+
 WHOLE = 1e-6  # by so much the sum of shares may differ from 1
 
 
@@ -448,6 +469,7 @@ class Mission(NamedTuple):
                 has_direct_path=synchronization is not None and synchronization.is_direct_path,
             )
         yield from _unset_clocks(values)
+        yield from _noise_cut_off(values)
         names, row_ids = set[str](), set[str]()
         for index, other in enumerate(values.get("other_errors", ())):
             if other.name in names or not row_ids.isdisjoint(other.stated):
