@@ -49,7 +49,7 @@ _FAR = 32  # apertures from which on an exchange knows nothing of a tone that tu
 _FEWEST = 4  # exchanges in a period of tones: those on either side of an aperture are not the same
 _MOST_KNOTS = 1 << 13  # exchanges in an aperture that are drawn
 _FLOWN = 4097  # moments of a time series that is flown
-_MOST_FLOWN = 1 << 19  # of phase noise, whose fastest tones would else be joined by straight lines
+_MOST_FLOWN = 1 << 19  # steps of phase noise, whose fastest tones would else be joined by straight lines
 
 
 def position_courses(
@@ -175,8 +175,8 @@ def drawn_errors(analysis: Analysis) -> Errors:
     half = mission.collection.aperture_time / 2
     times: Floats = np.linspace(-half, half, _FLOWN)
     fastest = max((_fastest(mission, error) for error in analysis.random), default=0.0)
-    count = min(max(_FLOWN, math.ceil(4 * _PER_CYCLE * half * fastest)), _MOST_FLOWN)
-    moments: Floats = np.linspace(-half, half, count)
+    steps = fast_steps(min(max(_FLOWN - 1, math.ceil(4 * _PER_CYCLE * half * fastest)), _MOST_FLOWN))
+    moments: Floats = np.linspace(-half, half, steps + 1)
     flown = moments if any(error.subject.kind == "vibration" for error in analysis.random) else times
     moved: dict[str, Floats] = {}
     phase: Floats = np.zeros(moments.size)
@@ -476,6 +476,12 @@ def _folded(values: NDArray[Any], count: int) -> NDArray[Any]:
     found[1 : values.size + 1] = values
     folded: NDArray[Any] = found.reshape(-1, count).sum(axis=0)
     return folded
+
+
+def fast_steps(least: int) -> int:
+    """At least so many steps, and at most a sixteenth more, of a number that a Fourier transform divides well."""
+    unit = 1 << max(0, least.bit_length() - 5)
+    return -(-least // unit) * unit
 
 
 def tones_at(amplitudes: Complexes, count: int) -> Floats:

@@ -47,6 +47,7 @@ from bisar_budget.simulator.realisations import (
     clock_seconds,
     delay_courses,
     electrons_at_1_hz,
+    fast_steps,
     fastest_shake,
     phase_courses,
     position_courses,
@@ -68,7 +69,7 @@ _DRAWS, _CLOCK_DRAWS = 4000, 1000  # know a sigma to 1.1 %, and to 2.2 %
 _SYNCHRONIZED_DRAWS = 400  # whose fast tones are drawn too, because they are folded
 _TURNS = 100  # of a tone per aperture, beyond which it has no quadratic phase to speak of
 _OCTAVES = 16  # times the lowest frequency of a vibration, beyond which it adds less than 3 % to a phase
-_PER_TURN, _MOST_MOMENTS = 8, 1 << 17  # moments of a fast tone, and in all
+_PER_TURN, _MOST_MOMENTS = 8, 1 << 17  # steps of a turn of a fast tone, and in all
 _SURE_SIGMA = 3.0  # standard errors of a sigma
 _IMAGES = 6
 _FINE = 513  # moments of a time series in an image
@@ -443,7 +444,7 @@ def _fits(study: Study, error: RandomError, rng: np.random.Generator) -> tuple[F
     if fastest_shake(mission, error):  # which may begin far beyond what else has a quadratic phase
         draws, highest = _SYNCHRONIZED_DRAWS, max(highest, _OCTAVES * slowest_shake(mission, error))
         highest = min(highest, fastest_shake(mission, error))
-        count = min(_MOST_MOMENTS, max(count, math.ceil(_PER_TURN * highest * T)))
+        count = 1 + fast_steps(min(_MOST_MOMENTS, max(count - 1, math.ceil(_PER_TURN * highest * T))))
     times, found = _moments(study, count), list[Floats]()
     together = max(1, _AT_ONCE * _FINE // count)
     for first in range(0, draws, together):
