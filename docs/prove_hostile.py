@@ -197,7 +197,8 @@ def _file(
     for row in random.sample(found.rows, 2):
         stage.append(f"explain {row.id}")
         missed += [
-            f"seed {seed}: explain: {what}" for what in _wrong(harmless(explain(mission, found, row.id)), "text")
+            f"seed {seed}: explain: {what}"
+            for what in _wrong(harmless(explain(mission, found, row.id)), "text", hostile.data)
         ]
         tried["explanations"] += 1
     return found

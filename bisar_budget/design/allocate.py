@@ -124,7 +124,7 @@ def _broken(of: SpecifiedMission) -> tuple[Broken, ...]:
     of.unjudged = {row.subject.id for row in rows if row.status[0] == CODE["not_evaluated"]}
     found = of.uses(nothing[:, None])
     return tuple(
-        Broken(row_id, requirement, float(use), float(most))
+        Broken(row_id, requirement, float(use) if math.isfinite(use) else None, float(most))
         for row_id, requirement, use, most in zip(
             found.ids, found.requirements, found.uses[:, 0], of.allowed(found.ids), strict=True
         )

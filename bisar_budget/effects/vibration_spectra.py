@@ -38,6 +38,8 @@ def spectrum_pieces(spectrum: Spectrum, law: tuple[float, float] = (1.0, 0.0)) -
         factor, slope = factor / DISPLACED[0], slope - DISPLACED[1]
     found = []
     for (f, density), (g, last) in pairwise(spectrum.points):
+        if not (density and last):  # made so small that nothing is left, of which there is no logarithm
+            continue
         own = math.log(density / last) / math.log(g / f)
         if abs(own) <= _STEEP:
             found.append(PowerLawPiece(f, g, factor * density * f**own, own + slope))

@@ -62,11 +62,14 @@ class RowUse(NamedTuple):
 
 
 class Broken(NamedTuple):
-    """A row that the other errors leave no room in, by its requirement, with what they use of it."""
+    """A row that the other errors leave no room in, by its requirement, with what they use of it.
+
+    `used` is None where they have no image.
+    """
 
     id: str
     requirement: str | None
-    used: float
+    used: float | None
     allowed: float
 
 

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from bisar_budget.faults import Problem
+from bisar_budget.faults import Problem, printable
 from bisar_budget.geometry import STRAIGHT, PlatformState, Vector
 from bisar_budget.mission.instruments import Overridden
 from bisar_budget.mission.model import Mission
@@ -81,9 +81,9 @@ def reader_of(folder: str, files: Files = DISK) -> Beside:
         try:
             data = files.content(os.path.join(folder, name), _MOST_BYTES, name)
         except UnreadableError as error:
-            raise PathFileError(str(error)) from None
+            raise PathFileError(printable(str(error))) from None
         if len(data) > _MOST_BYTES:
-            raise PathFileError(f"{name} is larger than {_MOST_BYTES // 10**6} MB")
+            raise PathFileError(f"{printable(name)} is larger than {_MOST_BYTES // 10**6} MB")
         return data
 
     return read

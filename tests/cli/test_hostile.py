@@ -21,6 +21,7 @@ from random import Random
 from typing import Any, NamedTuple
 
 import pytest
+import yaml
 from click.testing import CliRunner
 
 from bisar_budget import resources
@@ -29,12 +30,14 @@ from bisar_budget.budget.check import check_mission
 from bisar_budget.cli import _end as end
 from bisar_budget.cli import cli
 from bisar_budget.cli.streams import harmless, replacing, write_file
+from bisar_budget.effects.vibration_spectra import spectrum_pieces
 from bisar_budget.faults import MissionError
 from bisar_budget.findings.mission import Report
 from bisar_budget.mission import load
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import mission_schema
 from bisar_budget.mission.tree import MAX_FAULTS
+from bisar_budget.mission.vibrations import Spectrum
 from bisar_budget.report import FORMATS, Style, render
 from bisar_budget.report.drawing import point_plot
 from bisar_budget.workers import worker_pool
@@ -1056,6 +1059,46 @@ def test_an_error_without_an_image_has_no_phase_to_compare(model: str) -> None:
     entry = next(one for one in found.requirements if one.key == "quadratic_phase_error")
     assert (entry.status, entry.row, entry.reached, entry.utilization) == ("fail", "timing.linear", None, None)
     json.loads(render("json", Report(version="", missions=(found,)), Style()))
+
+
+@pytest.mark.parametrize("format_name", ["text", "html", "markdown"])
+def test_a_slow_vibration_whose_displacement_nobody_knows_is_said(tmp_path, format_name: str) -> None:
+    """The sentence had lost a part that the table of requirements took from it: exit code 3."""
+    path = tmp_path / "m.yaml"
+    shake = {"vibration": {"sinusoidal": [{"amplitude": "1 mm", "frequency": "0.1 Hz"}]}}
+    path.write_text(mission_text(requirements__location_error=1e-3, platforms__receiver__motion_error=shake))
+    done = run("check", path, "--format", format_name)
+    assert done.returncode == 1
+    assert b"slow vibration moves the image too" in done.stdout
+
+
+def test_what_has_no_image_leaves_no_room_and_no_number() -> None:
+    """`allocate` used infinitely much of a limit, which JSON cannot say: exit code 3."""
+    path = ROOT / "specs" / "missions" / "astra_drone.yaml"
+    options = ("--set", "common_motion_error.velocity=1053 m/s", "--set", "allocation.combine=sum")
+    done = run("allocate", path, *options, "--format", "json")
+    assert done.returncode == 1
+    (found,) = json.loads(done.stdout)["missions"]
+    assert None in [one["used"] for one in found["broken"]]
+    assert b"they leave no image" in run("allocate", path, *options).stdout
+
+
+def test_a_density_that_became_nothing_is_nothing() -> None:
+    """`allocate` makes a density smaller until it is 0, which was divided by: exit code 3."""
+    flat = Spectrum(((20.0, 1.0), (100.0, 1.0), (1000.0, 0.0)), is_accelerated=True)
+    assert [(piece.low, piece.high) for piece in spectrum_pieces(flat)] == [(20.0, 100.0)]
+
+
+@pytest.mark.parametrize("where", ["orbit: {eof: %s}", "trajectory: {file: %s}"])
+def test_a_name_of_a_file_is_printed_so_that_it_is_seen(tmp_path, where: str) -> None:
+    """A space of no width went to the terminal as it was."""
+    document = yaml.safe_load(mission_text(scene={"latitude": "48 deg", "longitude": "11 deg", "height": "0 m"}))
+    document["collection"]["center_time"] = "2026-06-01T05:20:31Z"
+    document["platforms"]["receiver"] = yaml.safe_load(where % '"\\u200b"')
+    with pytest.raises(MissionError) as caught:
+        parse_mission(yaml.safe_dump(document), str(tmp_path / "m.yaml"))
+    assert any("\\u200b cannot be read" in line for line in caught.value.lines())
+    assert not any(RAW.search(line) for line in caught.value.lines())
 
 
 def test_cases_have_every_key_of_a_mission_file() -> None:

@@ -1,5 +1,6 @@
 """Specifications that hold together, as blocks of a report: on a sheet of their own, or in the annex of a check."""
 
+import math
 from collections.abc import Iterator
 
 from bisar_budget.design.offers import OfferedFigure
@@ -58,14 +59,17 @@ def parts_words(one: Specification) -> str:
 
 def broken_words(one: Broken) -> list[str]:
     """Cells of a row in which there is no room."""
+    if one.used is None:
+        return [one.id, "-", percent(one.allowed), "over its limit: they leave no image"]
     over = "over its limit" if one.used > 1 else "within its limit, but not with the reserve"
     return [one.id, percent(one.used), percent(one.allowed), over]
 
 
 def way_out(sheet: SpecificationSheet) -> str:
     """What can be done where other errors leave no room."""
-    if all(one.used <= 1 for one in sheet.broken):
-        least = 1 - max(one.used for one in sheet.broken)
+    used = [math.inf if one.used is None else one.used for one in sheet.broken]
+    if max(used) <= 1:
+        least = 1 - max(used)
         return (
             f"The other errors use that much by themselves. A smaller --reserve, below {percent(least)}, leaves room."
         )
