@@ -5,6 +5,7 @@ the code with geometry, images or rules of the contract, so that each fails for 
 the committed output of a command is not named here.
 """
 
+import json
 from pathlib import Path
 from typing import NamedTuple
 
@@ -54,7 +55,14 @@ _FIVE_PERCENT = f"{_BORDERS}test_a_velocity_limit_is_confirmed_within_5_percent_
 _SEAMS = "tests/acceptance/test_seams.py::"
 _LINE_OF_SIGHT = "tests/house/test_geometry.py::test_a_line_of_sight_turns_as_the_platform_flies"
 
+# Drawn by chance over the lines of the package: an operator, a number, a comparison, a word.
+SAMPLED = tuple(
+    Mutant(one["name"], one["path"], one["before"], one["after"], (one["test"],))
+    for one in json.loads(Path(__file__).with_name("sampled_mutants.json").read_text(encoding="utf-8"))
+)
+
 MUTANTS = (
+    *SAMPLED,
     Mutant(
         "(31): sign",
         _DERIVED,
@@ -426,5 +434,26 @@ MUTANTS = (
         "level = 20 * math.log10(peaks[0] / peaks[1])",
         "level = 10 * math.log10(peaks[0] / peaks[1])",
         ("tests/verify/test_vibration.py",),
+    ),
+    Mutant(
+        "a void position dates a log",
+        "bisar_budget/paths/nmea.py",
+        'if fields[1] != "A" or not fields[8]:',
+        'if fields[1] != "A" and not fields[8]:',
+        ("tests/paths/test_nmea.py::test_a_void_sentence_dates_nothing",),
+    ),
+    Mutant(
+        "an SBET counts in TAI",
+        "bisar_budget/paths/recognised.py",
+        'hold_to_scale("gps", keys, name)\n    hold_to_ellipsoid',
+        'hold_to_scale("tai", keys, name)\n    hold_to_ellipsoid',
+        ("tests/paths/test_sbet.py::test_a_mission_file_may_say_no_other_time_than_the_log_counts",),
+    ),
+    Mutant(
+        "tones of an oscillator: cycles as a frequency over the aperture",
+        "bisar_budget/simulator/realisations.py",
+        "if one.name == name and one.frequency * T >= SLOWEST",
+        "if one.name == name and one.frequency / T >= SLOWEST",
+        ("tests/simulate/test_realisations.py::test_a_tone_of_an_oscillator_is_flown_from_one_cycle_per_aperture_on",),
     ),
 )

@@ -198,3 +198,11 @@ def test_without_the_package_the_message_says_how_to_install_it(monkeypatch: pyt
         PathFileError, match=r"^a\.nmea: needs the package pynmea2: pip install 'bisar-budget\[logs\]'$"
     ):
         read(nmea(SHORT))
+
+
+def test_a_void_sentence_dates_nothing() -> None:
+    """A receiver without a fix sends RMC with V, and a date that its clock has made up."""
+    void = sentence("GPRMC,052000.00,V,,,,,,,060180,,,N")
+    log = read("\n".join([void, rmc(0), gga(0, 48, 11, 3000)]))
+    assert log.start is not None
+    assert log.start.as_text()[:10] == stamp(0)[:10]

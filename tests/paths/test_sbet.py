@@ -14,6 +14,8 @@ from bisar_budget.paths import sbet as reader
 from bisar_budget.paths.flight import PathFileError, slow_times
 from bisar_budget.paths.flight_log import read_csv
 from bisar_budget.paths.instant import Instant, parse_instant
+from bisar_budget.paths.log_places import LogKeys
+from bisar_budget.paths.recognised import LOG_FORMATS
 from bisar_budget.paths.sbet import WEEK, gps_to_utc, read_accuracy, read_sbet
 from tests.paths.flown import SECOND, START, Flight, flight, geodetic_csv, sbet, smrmsg, stamp
 from tests.paths.flown import WEEK as GPS_WEEK
@@ -380,3 +382,13 @@ def test_flights_of_this_file_fly() -> None:
     steps = np.linalg.norm(np.diff(FLOWN.places, axis=0), axis=1) / 0.02
     assert np.linalg.norm(FLOWN.velocities, axis=1)[1:] == pytest.approx(steps, rel=1e-5)
     assert isinstance(FLOWN, Flight)
+
+
+@pytest.mark.parametrize(("scale", "is_its_own"), [("gps", True), ("tai", False), ("utc", False)])
+def test_a_mission_file_may_say_no_other_time_than_the_log_counts(scale: str, is_its_own: bool) -> None:
+    keys = LogKeys(week=GPS_WEEK, time_scale=scale)
+    if is_its_own:
+        assert LOG_FORMATS["sbet"].read(sbet(SHORT), "a.out", keys).times.size == 6
+        return
+    with pytest.raises(PathFileError, match=r"^a\.out: counts in GPST, and trajectory\.time_scale says"):
+        LOG_FORMATS["sbet"].read(sbet(SHORT), "a.out", keys)

@@ -5,9 +5,18 @@ import math
 import numpy as np
 import pytest
 
+from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.spectra import PowerLawPiece
+from bisar_budget.mission.load import parse_mission
 from bisar_budget.simulator.phase_history import Floats
-from bisar_budget.simulator.realisations import _between_exchanges, _Tones, powers_at, tones_at
+from bisar_budget.simulator.realisations import (
+    _between_exchanges,
+    _Tones,
+    oscillator_sinusoids,
+    powers_at,
+    tones_at,
+)
+from tests.conftest import mission_text
 
 FLICKER = (PowerLawPiece(0.0, 5000.0, 1e-3, 1.0), PowerLawPiece(0.0, 5000.0, 1e-7, 0.0))
 
@@ -78,3 +87,15 @@ def test_exchanges_leave_what_they_leave_of_each_tone(interval: float) -> None:
     line = (1 - place) + place * np.exp(2j * math.pi * frequency * interval)[:, None]
     left = np.mean(np.abs(np.exp(turn) - line) ** 2, axis=1)
     assert float(np.mean(drawn**2)) == pytest.approx(float(np.trapezoid(density * left, frequency)), rel=0.09)
+
+
+def test_a_tone_of_an_oscillator_is_flown_from_one_cycle_per_aperture_on() -> None:
+    """Of 6 s: 0.1 Hz turns 0.6 times and is drawn, 2 Hz turns twelve times."""
+    shake = {"sinusoidal": [{"amplitude": "1 um", "frequency": f} for f in ("0.1 Hz", "2 Hz")]}
+    part = {"power_law": {"h0": 1e-26}, "acceleration_sensitivity": "1e-9 /g", "vibration": shake}
+    mission = parse_mission(mission_text(platforms__receiver__oscillator=part), "m.yaml")
+    (flown,) = oscillator_sinusoids(mission, "receiver")
+    assert flown.frequency == 2.0
+    # Δφ = Γ f₀ a/f, as a motion of λ/2π times as much; a = (2πf)² 1 µm.
+    a = (2 * math.pi * 2) ** 2 * 1e-6
+    assert flown.amplitude == pytest.approx(SPEED_OF_LIGHT / (2 * math.pi) * 1e-9 / 9.80665 * a / 2, rel=1e-9)
