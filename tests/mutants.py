@@ -454,6 +454,15 @@ MUTANTS = (
         "bisar_budget/simulator/realisations.py",
         "if one.name == name and one.frequency * T >= SLOWEST",
         "if one.name == name and one.frequency / T >= SLOWEST",
-        ("tests/simulate/test_realisations.py::test_a_tone_of_an_oscillator_is_flown_from_one_cycle_per_aperture_on",),
+        (
+            "tests/simulate/test_realisations.py::test_a_tone_of_an_oscillator_is_flown_from_one_cycle_per_aperture_on",
+        ),
+    ),
+    Mutant(
+        "what a covariance states is not declared in CPHD",
+        "bisar_budget/formats/exporting.py",
+        "elif error.covariance is None and (common is None",
+        "elif error.covariance is None or (common is None",
+        ("tests/formats/test_export.py::TestBack::test_a_covariance",),
     ),
 )

@@ -171,6 +171,16 @@ class TestBack:
         assert (found.errors.timing_constant, found.errors.timing_linear) == pytest.approx((2e-9, 1e-9))
         parse_mission(imported_text(found), "again.yaml")
 
+    def test_a_covariance(self, tmp_path) -> None:
+        """It states position and velocity, and how they go together: nothing of them is said to be missing."""
+        stated = {"position": [0.1, 0.2, 0.3], "velocity": [0.01, 0.02, 0.03]}
+        covariance = {"covariance": {**stated, "correlation": {"position.x-velocity.y": 0.4}}}
+        changes = {"scene": PLACE, "platforms__receiver__motion_error": covariance}
+        one = import_collection(str(exported(tmp_path, mission_text(**changes)))).errors.receiver
+        assert one.position == pytest.approx(stated["position"], rel=1e-9)
+        assert one.velocity == pytest.approx(stated["velocity"], rel=1e-9)
+        assert one.correlation[0][4] == pytest.approx(0.4, rel=1e-9)
+
     def test_a_mission_without_errors_declares_none(self, tmp_path) -> None:
         found = import_collection(str(exported(tmp_path, mission_text())))
         assert found.errors.transmitter is found.errors.receiver is found.errors.timing_linear is None
