@@ -201,8 +201,10 @@ def test_without_the_package_the_message_says_how_to_install_it(monkeypatch: pyt
 
 
 def test_a_void_sentence_dates_nothing() -> None:
-    """A receiver without a fix sends RMC with V, and a date that its clock has made up."""
-    void = sentence("GPRMC,052000.00,V,,,,,,,060180,,,N")
-    log = read("\n".join([void, rmc(0), gga(0, 48, 11, 3000)]))
-    assert log.start is not None
-    assert log.start.as_text()[:10] == stamp(0)[:10]
+    """A receiver that lost its fix sends RMC with V, and a date that its clock has made up."""
+    lines = [rmc(0), gga(0, 48, 11, 3000), rmc(1), gga(1, 48, 11, 3000)]
+    fields = lines[2].strip().strip("$").partition("*")[0].split(",")
+    fields[2], fields[9] = "V", "060180"
+    lines[2] = sentence(",".join(fields))
+    log = read("\n".join(lines))
+    assert log.times[1] - log.times[0] == pytest.approx(1, abs=1e-6)
