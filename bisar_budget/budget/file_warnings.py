@@ -73,6 +73,8 @@ def _of_the_whole(mission: Mission, rows: Sequence[Row]) -> Iterator[_Warned]:
     for row_id in mission.requirement_ids:
         if row_id not in known:
             yield _Warned(("requirement_ids", row_id), id_of_no_row(row_id))
+    if mission.earth_orientation is not None and all(platform.orbit is None for platform in mission.platforms):
+        yield _Warned(("earth_orientation",), no_orbit_to_turn())
     if mission.gating_model != mission.allocation.model:
         yield _Warned(("synchronization", "method"), full_model_gates(mission.allocation.model))
 
@@ -92,6 +94,12 @@ def another_mission(changes: str) -> str:
 def id_of_no_row(row_id: str) -> str:
     """Said of a key of `requirement_ids`."""
     return f"requirement_ids: {row_id} is the id of no row"
+
+
+@phrase
+def no_orbit_to_turn() -> str:
+    """Said of figures of the Earth's rotation that nothing uses."""
+    return "earth_orientation: it turns orbits into the axes of the Earth, and no platform has one"
 
 
 @phrase
