@@ -246,7 +246,8 @@ def _with_instruments(tree: Any, random: Random) -> None:
         if random.random() < 0.7:
             chosen = random.sample(sorted(figures), random.randint(1, len(figures)))
             error["imu"] = {name: near(*figures[name]) for name in chosen}
-        if random.random() < 0.3 and error.get("frame", "scene") == "scene":
+        is_usual = (error.get("frame", "scene"), error.get("distribution", "normal")) == ("scene", "normal")
+        if random.random() < 0.3 and is_usual:
             error["sensor"] = random.choice(("stim300", "hg9900", ["imx6", "mosaic-x5-rtk"]))
         if random.random() < 0.4:
             lasts = f"{10 ** random.uniform(-2, 2):.3g} s"
