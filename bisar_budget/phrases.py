@@ -841,7 +841,7 @@ def shakes_an_oscillator(acceleration: float, phase: float) -> str:
 @phrase
 def no_acceleration() -> str:
     """Said of an oscillator that feels nothing."""
-    return "no vibration at random, no slow one and no turn: no phase"
+    return "no vibration at random, no slow one and no turn, or nothing is left of them: no phase"
 
 
 # ---------------------------------------------------------------------- images

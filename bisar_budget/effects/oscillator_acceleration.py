@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.constants import ROUNDING, SPEED_OF_LIGHT
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.navigation_errors import specific_force
 from bisar_budget.effects.oscillators import left_of_tone
@@ -193,8 +193,9 @@ def turn_courses(state: PlatformState, moments: Floats, interval: Any = None) ->
         offset = interval * start / _STARTS
         before = np.floor((moments - offset) / interval) * interval + offset
         part = (moments - before) / interval
-        joined = gained(before) * (1 - part) + gained(before + interval) * part
-        found.append((gained(moments) - joined) / math.sqrt(_STARTS))
+        whole, joined = gained(moments), gained(before) * (1 - part) + gained(before + interval) * part
+        left = whole - joined  # of a constant acceleration rounding alone
+        found.append(np.where(np.abs(left) > ROUNDING * np.abs(whole).max(), left, 0.0) / math.sqrt(_STARTS))
     return np.concatenate(found)
 
 

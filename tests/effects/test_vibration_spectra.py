@@ -7,6 +7,7 @@ import pytest
 
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.vibration_limits import highest_echo, level_of
+from bisar_budget.budget.check import check_mission
 from bisar_budget.constants import SPEED_OF_LIGHT, STANDARD_GRAVITY
 from bisar_budget.effects.oscillator_acceleration import accelerated_tones, pieces_by_acceleration
 from bisar_budget.effects.random_effect import RandomError
@@ -16,6 +17,7 @@ from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.quantities import with_number
 from bisar_budget.ranges.exact_ranges import FINE, STILL, ExactRanges, Found, aperture_nodes, followed
+from tests.conftest import TODAY, row
 
 G = STANDARD_GRAVITY
 QUALIFICATION = "{spectrum: {20 Hz: 0.04 g^2/Hz, 1 kHz: 0.04 g^2/Hz}}"
@@ -323,6 +325,17 @@ def test_exchanged_pulses_take_a_turn_out() -> None:
     )
     assert held.full.quadratic < 0.01 * free.full.quadratic
     assert held.full.displacement < 0.01 * free.full.displacement
+
+
+def test_exchanged_pulses_take_a_steady_turn_out_whole() -> None:
+    """A constant frequency is a straight line between exchanges: rounding allowed a sensitivity of 460 s²/m."""
+    found = mission(
+        oscillator="acceleration_sensitivity: 1e-9 /g",
+        path="acceleration: [-16.0524 m/s^2, 11.9072 m/s^2, 0.916658 m/s^2]",
+        more="synchronization: {interval: 0.24 s, error: 1 deg}",
+    )
+    one = row(check_mission(found, TODAY), "receiver.oscillator.acceleration")
+    assert (one.allowable, one.qpe_full_rad, one.displacement_m) == (None, 0.0, (0.0, 0.0))
 
 
 def test_of_a_direct_path_what_a_receiver_changes_by_until_the_echo_comes_is_left() -> None:
