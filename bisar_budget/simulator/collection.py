@@ -27,6 +27,7 @@ from bisar_budget.simulator.phase_history import (
     path,
 )
 
+_WIDEST = 1.5  # cells of the bandwidth that a spectrum may be wide: half of what three samples per cell can hold
 OVERSAMPLING = 2.5  # samples of an image per resolution cell
 CELLS = 48  # resolution cells of a cross-range cut; fewer blur the aperture by over 1 % of a phase under a taper
 RANGE_CELLS = 8  # of a chip
@@ -65,12 +66,27 @@ class RangeLines:
 
     def gradients(self, points: Floats) -> tuple[Floats, Floats]:
         """Gradients of the midpoint's range sum and of its change over the aperture, at points (..., 2): (..., 2)."""
+        first, middle, last = self._sums(points)
+        return middle, last - first
+
+    def _sums(self, points: Floats) -> tuple[Floats, Floats, Floats]:
+        """Gradients of the range sum at the beginning, the middle and the end, at points (..., 2): (..., 2)."""
         platforms = np.concatenate((self.transmitter, self.receiver))
         ground = points[..., None, :] - platforms[:, :2]
         square = ground[..., 0] ** 2 + ground[..., 1] ** 2 + platforms[:, 2] ** 2
         directions = ground / np.sqrt(square)[..., None]
         sums = directions[..., :3, :] + directions[..., 3:, :]
-        return sums[..., 1, :], sums[..., 2, :] - sums[..., 0, :]
+        return sums[..., 0, :], sums[..., 1, :], sums[..., 2, :]
+
+    @staticmethod
+    def _column(by_range: Floats, by_doppler: Floats) -> Floats:
+        """Way along equal Doppler on which the range sum grows by 1, at points (..., 2)."""
+        slant = _left(by_doppler)
+        square, slope = _dot(by_range, by_range), _dot(by_range, slant)
+        # Across the lines of equal range instead where that would lead too far.
+        keeps = _dot(slant, slant) * square <= _SLANT**2 * slope**2
+        way: Floats = np.where(keeps, slant / np.where(keeps, slope, 1.0), by_range / square)
+        return way
 
     def range_sum(self, points: Floats) -> Floats:
         """At the midpoint, of ground points (..., 2 or 3), (...). [m]"""
@@ -93,6 +109,18 @@ class RangeLines:
         if not steepness or not along:
             raise ValueError("range or Doppler does not change over the ground there: no image plane")
         return SPEED_OF_LIGHT / (bandwidth_hz * steepness), wavelength_m / along
+
+    def sampled(self, centre: GroundVector, bandwidth_hz: float, wavelength_m: float) -> tuple[float, float]:
+        """Cells for pixels to sample: those of `cells`, or finer ones across the lines. [m]
+
+        Over a long aperture near a platform wavefronts bend: beside a point, along its column, it is out of focus
+        within less than a cell, and the spectrum there is wider than that of the bandwidth.
+        """
+        across, along = self.cells(centre, bandwidth_hz, wavelength_m)
+        first, middle, last = self._sums(np.asarray(centre, dtype=float))
+        column = self._column(middle, last - first) * float(np.hypot(*middle))  # by a metre across the lines
+        wider = abs(float(((first + last) / 2 - middle) @ column)) / wavelength_m
+        return min(across, _WIDEST / (1 / across + wider)), along
 
     def baseband(self, points: Floats, wavelength_m: float) -> Complexes:
         """Phase that takes the range history at the midpoint out of an image of points (..., 3).
@@ -129,12 +157,7 @@ class RangeLines:
 
         def across(points: Floats) -> Floats:
             """To the next line, along equal Doppler."""
-            g, d = self.gradients(points)
-            slant = _left(d)
-            square, slope = _dot(g, g), _dot(g, slant)
-            # Along equal range instead where that would lead too far: |slant/slope| against |g|/square.
-            keeps = _dot(slant, slant) * square <= _SLANT**2 * slope**2
-            return range_step * np.where(keeps, slant / np.where(keeps, slope, 1.0), g / square)
+            return range_step * self._column(*self.gradients(points))
 
         def along(points: Floats) -> Floats:
             """To the next pixel of a line, by an equal step of Doppler; as long as may be where there is none."""

@@ -57,6 +57,10 @@ class ExactRangeFormer:
         """Resolution along x′ and y′, peak to first null. [m]"""
         return self.lines.cells(centre, self.bandwidth, self.wavelength)
 
+    def sampled(self, centre: GroundVector) -> tuple[float, float]:
+        """Cells for pixels to sample, no larger than the resolution. [m]"""
+        return self.lines.sampled(centre, self.bandwidth, self.wavelength)
+
     def look(self, centre: GroundVector) -> Floats:
         """Direction of x′, a unit vector (2,)."""
         by_range = self.lines.gradients(np.asarray(centre))[0]
@@ -139,6 +143,10 @@ class PlaneWaves:
         band = self.center_frequency + np.array([-0.5, 0.0, 0.5]) * self.bandwidth
         along, across = (float(np.ptp(np.outer(band, rotated[:, axis]))) for axis in (0, 1))
         return SPEED_OF_LIGHT / along, SPEED_OF_LIGHT / across
+
+    def sampled(self, centre: GroundVector) -> tuple[float, float]:
+        """Cells for pixels to sample: those of all that was recorded."""
+        return self.cells(centre)
 
     def look(self, centre: GroundVector) -> Floats:
         """Direction of x′, a unit vector (2,)."""

@@ -8,18 +8,23 @@ five widths of the peak and its ISLR within ten, which for a uniform aperture ma
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from bisar_budget.simulator.phase_history import Complexes, Floats
 
 _WHOLE = slice(None), slice(None)
 _UPSAMPLING = 32
+_REACH = 8  # samples on each side from which what lies between is interpolated
+_KAISER = 12.0  # with these a line sampled three times per cell is read to -110 dB
 _CHIP_UPSAMPLING = 8
 _COLUMNS = 512  # interpolated at once
 _ASCENTS = 50  # at most, along x′ and y′ in turn
 _NARROWED = 3  # times: a row is then within some thousandths
+_FOUND = 0.05  # lines from where a response is
 _SETTLED = 1e-4  # samples
 _SEARCH = 8  # towards a pixel's place in a grid
 _CLOSE = 0.02  # pixels: found
@@ -62,17 +67,31 @@ class ImpulseResponse2D:
 
 
 def upsampled(cut: Complexes, factor: int) -> Complexes:
-    """Interpolate cuts, (..., samples), by zero-padding their spectrum; the carrier may sit anywhere in the band."""
+    """Interpolate cuts, (..., samples), each a period of what repeats; the carrier may sit anywhere in the band."""
     count = cut.shape[-1]
-    spectrum = np.fft.fft(cut)
-    centre = _carrier(np.abs(spectrum.reshape(-1, count)) ** 2)
-    spectrum = np.fft.fftshift(np.roll(spectrum, -centre, axis=-1), axes=-1)
-    padded = np.zeros((*cut.shape[:-1], count * factor), dtype=complex)
-    start = count * factor // 2 - count // 2
-    padded[..., start : start + count] = spectrum
-    fine = np.fft.ifft(np.fft.ifftshift(padded, axes=-1)) * factor
-    carrier: Complexes = np.exp(2j * math.pi * centre * np.arange(count * factor) / (count * factor))
+    steps = np.arange(count * factor) / factor
+    carrier: Complexes = np.exp(2j * math.pi / count * _carrier_of(cut) * steps)
+    around = [(0, 0)] * (cut.ndim - 1) + [(_REACH - 1, _REACH)]
+    samples = sliding_window_view(np.pad(cut * carrier[::factor].conj(), around, mode="wrap"), 2 * _REACH, axis=-1)
+    fine: Complexes = (samples @ _kernel(steps[:factor]).T).reshape(*cut.shape[:-1], count * factor)
     return fine * carrier
+
+
+def _kernel(offset: Floats) -> Floats:
+    """Weights (n, taps) of the samples around places so far behind one of them, (n,): a sinc under a Kaiser window.
+
+    A Fourier transform of the whole line would be exact for what does repeat. An image ends amid its sidelobes,
+    and near a platform its band changes along it: then what is far away would spoil what is here.
+    """
+    apart = np.subtract.outer(offset, np.arange(1 - _REACH, _REACH + 1))
+    inside = np.sqrt(np.maximum(1 - (apart / _REACH) ** 2, 0))
+    weights: Floats = np.sinc(apart) * np.i0(_KAISER * inside) / np.i0(_KAISER)
+    return weights
+
+
+def _carrier_of(cut: Complexes) -> int:
+    """Bin at the centre of gravity of the spectra of cuts, (..., samples)."""
+    return _carrier(np.abs(np.fft.fft(cut).reshape(-1, cut.shape[-1])) ** 2)
 
 
 def _carrier(power: Floats) -> int:
@@ -176,13 +195,13 @@ def impulse_response_2d(
             raise ValueError("the peak lies at the edge of the chip: centre it")
     for _ in range(_ASCENTS):
         before = row, column
-        column = _peak(_cut(chip, row))
-        row = _peak(_cut(chip.T, column))
+        column = _peak(line_at(chip, row))
+        row = _peak(line_at(chip.T, column))
         if max(abs(row - before[0]), abs(column - before[1])) < _SETTLED:
             break
     along, across = mask_m or (None, None)
-    range_cut = impulse_response(_cut(chip.T, column), spacing_m[0], along)
-    cross_range_cut = impulse_response(_cut(chip, row), spacing_m[1], across)
+    range_cut = impulse_response(line_at(chip.T, column), spacing_m[0], along)
+    cross_range_cut = impulse_response(line_at(chip, row), spacing_m[1], across)
     magnitude = np.abs(upsampled(upsampled(chip, _CHIP_UPSAMPLING).T, _CHIP_UPSAMPLING).T)
     pair = range_cut, cross_range_cut
     edges = [
@@ -210,20 +229,51 @@ def impulse_response_2d(
     )
 
 
-def line_through_peak(image: Complexes, window: tuple[slice, slice] = _WHOLE) -> tuple[float, Complexes]:
-    """Row of the peak in a window of an image (nx, ny), and the line along y′ there, as long as the window.
+def line_at(chip: Complexes, row: float | Floats) -> Complexes:
+    """Line of a chip along its second axis, at a fraction of a row; lines (n, ny) at rows (n,)."""
+    count = chip.shape[0]
+    turn = 2j * math.pi / count * _carrier_of(chip.T)
+    rows = np.atleast_1d(row)
+    first = np.floor(rows).astype(np.int64)
+    taps = first[:, None] + np.arange(1 - _REACH, _REACH + 1)
+    weights = _kernel(rows - first) * np.exp(turn * (rows[:, None] - taps))
+    lines: Complexes = np.einsum("nt,ntc->nc", weights, chip[taps % count])
+    return lines if np.ndim(row) else lines[0]
 
-    The peak lies between two lines of pixels: a third of a cell apart, the nearer of them may be 0.4 dB below it. The
+
+def lines_through_peak(
+    images: Sequence[Complexes], row: float | None = None, window: tuple[slice, slice] = _WHOLE
+) -> list[tuple[float, Complexes]]:
+    """Row of the peak in a window of images (nx, ny), and the line along y′ there, as long as the window.
+
+    A peak lies between two lines of pixels: a third of a cell apart, the nearer of them may be 0.4 dB below it. An
     image repeats beyond its edges.
+
+    Parameters
+    ----------
+    images : sequence of (nx, ny) ndarray
+        First that without errors.
+    row : float, optional
+        Where exact ranges have the response in the first one. Where it is not found there, columns run together
+        within a few pixels and nothing can be read between lines: all are then taken at this row.
+    window : two of slice
+        Part of the images that a response has for itself.
     """
+    found = [_line_through_peak(image, window) for image in images]
+    if row is None or abs(found[0][0] - row) < _FOUND:
+        return found
+    return [(row, line_at(image[:, window[1]], row)) for image in images]
+
+
+def _line_through_peak(image: Complexes, window: tuple[slice, slice]) -> tuple[float, Complexes]:
     part = np.abs(image[window])
     row = float(np.argmax(part.max(axis=1))) + window[0].indices(image.shape[0])[0]
     columns, step = image[:, window[1]], 0.5
     for _ in range(_NARROWED):
-        lines = upsampled(_cut(columns, row + step * np.arange(-1.0, 2.0)), _UPSAMPLING)
+        lines = upsampled(line_at(columns, row + step * np.arange(-1.0, 2.0)), _UPSAMPLING)
         row += step * min(max(_vertex(np.max(np.abs(lines) ** 2, axis=1), 1), -1.0), 1.0)
         step /= 4
-    return row, _cut(columns, row)
+    return row, line_at(columns, row)
 
 
 def highest(chip: Complexes) -> float:
@@ -238,16 +288,6 @@ def _check(samples: Complexes) -> None:
         raise ValueError("a response is made of finite samples; these hold NaN or infinity")
     if not np.any(samples):
         raise ValueError("the samples are all zero: there is no response to measure")
-
-
-def _cut(chip: Complexes, row: float | Floats) -> Complexes:
-    """Line of a chip along its second axis, at a fraction of a row; lines (n, ny) at rows (n,)."""
-    spectrum = np.fft.fft(chip, axis=0)
-    count = chip.shape[0]
-    centre = _carrier(np.abs(spectrum.T) ** 2)
-    bins = (np.arange(count) - centre + count // 2) % count - count // 2 + centre
-    cut: Complexes = np.exp(2j * math.pi / count * np.multiply.outer(row, bins)) @ spectrum / count
-    return cut
 
 
 def _peak(cut: Complexes) -> float:

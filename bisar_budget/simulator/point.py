@@ -20,7 +20,7 @@ from bisar_budget.simulator.autofocus import ALGORITHMS
 from bisar_budget.simulator.collection import PointCollection, RangeLines
 from bisar_budget.simulator.former import IMAGE_FORMERS, ExactRangeFormer, Former, PlaneWaves
 from bisar_budget.simulator.image_formation import ground_grid
-from bisar_budget.simulator.impulse_response import ImpulseResponse, between, impulse_response, line_through_peak
+from bisar_budget.simulator.impulse_response import ImpulseResponse, between, impulse_response, lines_through_peak
 from bisar_budget.simulator.phase_history import (
     Complexes,
     Errors,
@@ -89,9 +89,9 @@ class PointImages(NamedTuple):
     of the scene centre over `slow_time`; `segments` (3, 2) are its value [m] and slope [m/s] at `segment_times`,
     `points` (3, 2) the ground points (29) of those pieces of the whole range error: the middle one is where (25) puts
     a point at the scene centre; `points_by` says by which gradients (29) has them. `effect` is that of the
-    scene centre, too. `responses` are one for each target, and
-    `response`, `focused_response`, `clean_response` the cuts through the peaks. `outside` says which
-    declared echoes lie beyond the patch.
+    scene centre, too. `responses` are one for each target, and `clean_response`, `response`, `focused_response` the
+    cuts through the peaks of the brightest, which lie in these `rows` of the images. `outside` says which declared
+    echoes lie beyond the patch.
     """
 
     slow_time: Floats
@@ -112,6 +112,7 @@ class PointImages(NamedTuple):
     rotated: Complexes
     focused: Complexes
     error_free: Complexes
+    rows: tuple[float, ...]
     response: ImpulseResponse
     focused_response: ImpulseResponse
     clean_response: ImpulseResponse
@@ -139,13 +140,17 @@ class Patch:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """Patches, samples and memory that the images of a mission take, known before any is formed."""
+    """Patches, samples and memory that the images of a mission take, known before any is formed.
+
+    A range cell has `finer` times as many pixels as one across.
+    """
 
     rotated: Patch
     in_scene: Patch
     pulses: int
     frequencies: int
     own_cells: int
+    finer: float
     outside: str
     bytes_held: float
 
@@ -239,7 +244,7 @@ def simulate_point(
     rng = np.random.default_rng(settings.seed)
     lines = former.grid(_middle(shown), plan.rotated.spacing, plan.rotated.shape)
     scene = ground_grid(_middle(in_scene_shown), 0.0, plan.in_scene.size, plan.in_scene.shape)
-    clutter, clutter_amplitudes = _clutter(targets.clutter_db, lines, settings.seed)
+    clutter, clutter_amplitudes = _clutter(targets.clutter_db, lines, plan.finer, settings.seed)
     amplitudes = np.concatenate(([10 ** (one.level_db / 20) for one in targets.points], clutter_amplitudes))
 
     def history(flight: Flight, places: Floats) -> PhaseHistory:
@@ -274,15 +279,25 @@ def simulate_point(
     except ValueError as error:
         raise SimulationError(f"{image_former.replace('_', ' ')} cannot form this image: {error}") from None
     focused = ALGORITHMS[mission.autofocus.algorithm](rotated).image
+    cells = former.offsets(np.array(shown), _middle(shown))
+    # Plane waves may put a point beside the place that they are asked about.
+    is_exact = isinstance(former, ExactRangeFormer)
+    places = plan.rotated.shape[0] // 2 + _SAMPLES_PER_CELL * plan.finer * cells[:, 0]
+
+    def through_peak_of(index: int, columns: slice | None = None) -> list[tuple[float, Complexes]]:
+        window = _window(plan, cells, index)
+        row = float(places[index]) if is_exact else None
+        return lines_through_peak((error_free, rotated, focused), row, (window[0], columns or window[1]))
+
     across = plan.rotated.spacing[1]
-    clean = _measured(error_free, across, None)
+    brightest = max(range(len(shown)), key=lambda index: targets.points[index].level_db)
+    through_peak = through_peak_of(brightest, slice(None))
+    clean = _measured(through_peak[0][1], across, None)
     # Figure 3 has what is quadratic and higher, from mid-aperture on; (29) all of it, from the displaced point on.
     slope = np.gradient(left, fine)
     bent = left - left[fine.size // 2] - slope[fine.size // 2] * fine
     times = np.array([-T / 3, 0.0, T / 3])  # centres of three sub-apertures
     values, slopes = np.interp(times, fine, left), np.interp(times, fine, slope)
-    cells = former.offsets(np.array(shown), _middle(shown))
-    windows = [_window(plan, cells, index) for index in range(len(shown))]
     pieces = [LinePiece(*map(float, one)) for one in zip(times, values, slopes, strict=True)]
     model = mission.gating_model
     return PointImages(
@@ -305,13 +320,14 @@ def simulate_point(
         rotated=rotated,
         focused=focused,
         error_free=error_free,
-        response=_measured(rotated, across, clean.mask_m),
-        focused_response=_measured(focused, across, clean.mask_m),
+        rows=tuple(row for row, _ in through_peak),
+        response=_measured(through_peak[1][1], across, clean.mask_m),
+        focused_response=_measured(through_peak[2][1], across, clean.mask_m),
         clean_response=clean,
         responses=tuple(
-            Response(target, moved, place, at, *_cuts((error_free, rotated, focused), window, across))
-            for target, moved, place, at, window in zip(
-                targets.points, effects, shown, in_scene_shown, windows, strict=True
+            Response(target, moved, place, at, *_cuts(through_peak_of(index), across))
+            for index, (target, moved, place, at) in enumerate(
+                zip(targets.points, effects, shown, in_scene_shown, strict=True)
             )
         ),
         outside=plan.outside,
@@ -406,7 +422,8 @@ def _plan(
     """
     T, radar = mission.collection.aperture_time, mission.radar
     centre, scene_centre = _middle(shown), _middle(scene_shown)
-    cell, scene_cell = former.cells(centre), scene_former.cells(scene_centre)
+    cell, scene_cell = former.sampled(centre), scene_former.sampled(scene_centre)
+    finer = former.cells(centre)[0] / cell[0]
     # Cycles over the aperture are cells of cross range; what the range error walks, cells of c/B.
     reach = float(np.abs(slope).max()) * T / radar.wavelength
     time = cell_centres(T, left.size)
@@ -421,7 +438,7 @@ def _plan(
         "outside the patch"
     )  # fmt: skip
     reach += max(seen, default=0.0)
-    cells = [2 * math.ceil(extra + _MARGIN_CELLS) for extra in (walk + apart[0], reach + apart[1])]
+    cells = [2 * math.ceil(extra + _MARGIN_CELLS) for extra in (finer * (walk + apart[0]), reach + apart[1])]
     pulses = pulses_for(mission, cells[1])
     rotated = Patch(
         (_SAMPLES_PER_CELL * cells[0], _SAMPLES_PER_CELL * cells[1]),
@@ -440,11 +457,14 @@ def _plan(
     # Twice what keeps a profile from repeating within a patch: over its range cells and what those across walk.
     relative = radar.bandwidth / radar.center_frequency
     diagonal = extent * (cosine + sine)
-    longest = max(cells[0] + cells[1] * relative, diagonal / scene_cell[0] + diagonal / scene_cell[1] * relative)
+    longest = max(
+        cells[0] / finer + cells[1] * relative,
+        diagonal / scene_former.cells(scene_centre)[0] + diagonal / scene_cell[1] * relative,
+    )
     frequencies = max(_MIN_FREQUENCIES, math.ceil(2 * longest))
     own = 2 * math.ceil(reach + _MARGIN_CELLS)
     held = max(former.bytes_held, scene_former.bytes_held)
-    return Plan(rotated, in_scene, pulses, frequencies, own, outside, held)
+    return Plan(rotated, in_scene, pulses, frequencies, own, finer, outside, held)
 
 
 def _flown_lines(mission: Mission) -> list[PathSinusoid]:
@@ -483,14 +503,11 @@ def pulses_for(mission: Mission, cells: int) -> int:
     return given
 
 
-def _measured(
-    image: Complexes, spacing: float, mask_m: float | None, *window: tuple[slice, slice]
-) -> ImpulseResponse:
-    """Measure the cross-range cut through the peak, of a window or of the image, moved to the middle.
+def _measured(cut: Complexes, spacing: float, mask_m: float | None) -> ImpulseResponse:
+    """Measure a cross-range cut through a peak, moved to the middle.
 
     A smear over most of the patch has its peak at one end, and would wrap around; it gets as much room again.
     """
-    _, cut = line_through_peak(image, *window)
     count, column = cut.size, int(np.argmax(np.abs(cut)))
     try:
         return impulse_response(np.roll(cut, count // 2 - column), spacing, mask_m)
@@ -499,7 +516,7 @@ def _measured(
         return impulse_response(np.roll(wide, count - column), spacing, mask_m)
 
 
-def _clutter(level_db: float | None, grid: Floats, seed: int) -> tuple[Floats, Complexes]:
+def _clutter(level_db: float | None, grid: Floats, finer: float, seed: int) -> tuple[Floats, Complexes]:
     """Random scatterers over a patch, (n, 2) [m] and (n,): one for each resolution cell, circular normal.
 
     A cell is as large as the energy of a response of unit peak, so `level_db` is the mean power of a pixel.
@@ -508,7 +525,7 @@ def _clutter(level_db: float | None, grid: Floats, seed: int) -> tuple[Floats, C
         return np.empty((0, 2)), np.empty(0, dtype=complex)
     rng = np.random.default_rng([seed, _CLUTTER_STREAM])
     nx, ny = grid.shape[:2]
-    count = round((nx - 1) * (ny - 1) / _SAMPLES_PER_CELL**2)
+    count = round((nx - 1) * (ny - 1) / (_SAMPLES_PER_CELL**2 * finer))
     row, column = rng.uniform(0, nx - 1, count), rng.uniform(0, ny - 1, count)
     amplitudes = 10 ** (level_db / 20) * (rng.normal(size=count) + 1j * rng.normal(size=count)) / math.sqrt(2)
     return between(grid[..., :2], row, column), amplitudes
@@ -521,21 +538,21 @@ def _window(plan: Plan, cells: Floats, index: int) -> tuple[slice, slice]:
     reach = plan.own_cells // 2 if len(cells) > 1 else plan.rotated.shape[1]
     if beside.size:
         reach = min(reach, max(_NEAREST, int(beside.min() / 2)))
-    rows = math.ceil(_APART) if len(cells) > 1 else plan.rotated.shape[0]
+    rows = math.ceil(plan.finer * _APART) if len(cells) > 1 else plan.rotated.shape[0]
     slices = []
-    for cell, half, count in zip(cells[index], (rows, reach), plan.rotated.shape, strict=True):
+    for cell, half, count in zip(cells[index] * (plan.finer, 1.0), (rows, reach), plan.rotated.shape, strict=True):
         middle = count // 2 + round(_SAMPLES_PER_CELL * float(cell))
         slices.append(slice(max(0, middle - _SAMPLES_PER_CELL * half), middle + _SAMPLES_PER_CELL * half + 1))
     return slices[0], slices[1]
 
 
-def _cuts(images: Sequence[Complexes], window: tuple[slice, slice], spacing: float) -> list[ImpulseResponse | None]:
+def _cuts(lines: Sequence[tuple[float, Complexes]], spacing: float) -> list[ImpulseResponse | None]:
     """Measure a target in the error-free image first, whose mask the others take."""
     found: list[ImpulseResponse | None] = []
     mask = None
-    for image in images:
+    for _, line in lines:
         try:
-            found.append(_measured(image, spacing, mask, window))
+            found.append(_measured(line, spacing, mask))
         except ValueError:  # what stands beside it reaches into its mainlobe
             found.append(None)
         mask = found[0].mask_m if found[0] else None

@@ -23,7 +23,7 @@ import fastsar
 
 import bisar_budget as bb
 from bisar_budget.formats.exporting import export_phase_history
-from bisar_budget.simulator.impulse_response import impulse_response, line_through_peak
+from bisar_budget.simulator.impulse_response import impulse_response, line_at
 from bisar_budget.simulator.point import PointImages
 from bisar_budget.simulator.targets import Targets
 from tests.conftest import ROOT
@@ -136,7 +136,7 @@ def test_perseo_measures_what_simulate_does(formed: Any, name: str) -> None:
     widths = evaluate_irf_resolution(image[:, column]), evaluate_irf_resolution(image[row])
     _, pslr, _ = irf.compute_pslr_2d(image, widths, MaskingMethod.PEAK)
     _, islr, _ = irf.compute_islr_2d(image, widths, MaskingMethod.PEAK)
-    _, line = line_through_peak(one.images.rotated)
+    line = line_at(one.images.rotated, one.images.rows[1])
     line = np.roll(line, line.size // 2 - int(np.argmax(np.abs(line))))
     spacing = one.images.spacing[1]
     here = impulse_response(line, spacing)

@@ -11,7 +11,7 @@ from bisar_budget.simulator.image_formation import taylor_window
 from bisar_budget.simulator.impulse_response import (
     impulse_response,
     impulse_response_2d,
-    line_through_peak,
+    lines_through_peak,
     upsampled,
 )
 from bisar_budget.simulator.phase_history import cell_centres
@@ -236,11 +236,11 @@ class TestChip:
     def test_a_line_goes_through_a_peak_between_lines_of_pixels(self, place) -> None:
         """Half a pixel beside the peak a line of pixels is sinc(0.2), 0.58 dB, too low: `simulate` measured that."""
         image, _ = chip(place, skew=0.5)
-        row, line = line_through_peak(image)
+        ((row, line),) = lines_through_peak([image])
         assert row == pytest.approx(CHIP // 2 + place[0], abs=5e-3)
         assert np.abs(upsampled(line, 32)).max() == pytest.approx(1.0, abs=2e-3)  # a chip does not repeat
         start = CHIP // 2 + round(place[1]) - 12
-        row, part = line_through_peak(image, (slice(None), slice(start, start + 25)))
+        ((row, part),) = lines_through_peak([image], None, (slice(None), slice(start, start + 25)))
         assert row == pytest.approx(CHIP // 2 + place[0], abs=5e-3)
         assert part == pytest.approx(line[start : start + 25], abs=5e-3)
 
@@ -297,7 +297,7 @@ class TestAgainstPerseo:
         _, islr, _ = irf.compute_islr_2d(fine, pixels, mask)
         near, far = (impulse_response(image[CHIP // 2], spacing, reach_m=n * ours.irw_m) for n in (5, 10))
         assert near.pslr_db == pytest.approx(pslr, abs=0.02)
-        assert far.islr_db == pytest.approx(islr, abs=0.05)
+        assert far.islr_db == pytest.approx(islr, abs=0.1)  # one pixel of its mask
 
     @pytest.mark.filterwarnings("ignore")
     def test_uniform_aperture(self) -> None:

@@ -19,7 +19,7 @@ from bisar_budget.report.drawing.evidence_drawings import FOCUSED, WITH_ERRORS, 
 from bisar_budget.report.drawing.figure import drawing_file, figure_file, new_figure, paint
 from bisar_budget.report.drawing.svg import Canvas
 from bisar_budget.report.words.sentences import wrapped
-from bisar_budget.simulator.impulse_response import ImpulseResponse, between, line_through_peak, resampled, upsampled
+from bisar_budget.simulator.impulse_response import ImpulseResponse, between, line_at, resampled, upsampled
 from bisar_budget.simulator.phase_history import Complexes, Floats
 from bisar_budget.simulator.point import PointImages
 from bisar_budget.simulator.realisations import has_unset_clocks
@@ -199,12 +199,13 @@ def _cuts_of(images: PointImages, turned: Floats, part: tuple[slice, slice], pea
     """Lines through the peaks, over y′."""
     columns = np.arange(part[1].start * _FINE_CUT, (part[1].stop - 1) * _FINE_CUT + 1)
     cuts = []
-    for image, label in (
+    shown = (
         (images.error_free, "without error"),
         (images.rotated, "with the declared errors"),
         (images.focused, "after autofocus"),
-    ):
-        row, line = line_through_peak(image)
+    )
+    for row, (image, label) in zip(images.rows, shown, strict=True):
+        line = line_at(image, row)
         place = between(turned, np.full(columns.size, row), columns / _FINE_CUT)[:, 1]
         cuts.append(Cut(label, place, _decibels(upsampled(line, _FINE_CUT)[columns], peak)))
     return tuple(cuts)
