@@ -53,7 +53,8 @@ def errors(tree: Tree) -> Iterator[Tree]:
 def with_instruments(tree: Tree, seed: str) -> Tree:
     """Add sensors, arms, clocks and vibration of sizes that parts have."""
     random = Random(f"instruments {seed}")
-    aperture, wavelength = tree["collection"]["aperture_time"], 3e8 / tree["radar"]["center_frequency"]
+    mission = loaded(tree)
+    aperture, wavelength = mission.collection.aperture_time, mission.radar.wavelength
 
     def near(size: float) -> float:
         return float(f"{size * 10 ** random.uniform(-1, 1):.3g}")
@@ -112,7 +113,8 @@ def of_arms(tree: Tree, arm: Callable[[Vector], Vector], still: Callable[[Vector
     for platform in tree["platforms"].values():
         lever = platform.get("motion_error", {}).get("lever_arm")
         if lever is not None:
-            lever["arm"] = (arm if any(platform["velocity"]) else still)(lever["arm"])
+            moves = any(platform.get("velocity", [platform.get("speed")]))
+            lever["arm"] = (arm if moves else still)(lever["arm"])
 
 
 def turned(tree: Tree) -> Seen:
@@ -310,6 +312,56 @@ def test_a_mission_seen_otherwise_is_the_same(family: str, way: str) -> None:
 @pytest.mark.parametrize("family", FAMILIES)
 def test_so_are_its_sensors_arms_clocks_and_vibration(family: str, way: str) -> None:
     assert differences(with_instruments(tree_of(family, 1), family), WAYS[way]) == []
+
+
+EARTH = """
+schema_version: 1
+name: Over the Earth
+radar: {center_frequency: 1.3 GHz, bandwidth: 80 MHz}
+scene: {latitude: 48.0 deg, longitude: 11.0 deg, height: 500 m, radius: 200 m, height_error: 3 m}
+collection: {aperture_time: 8 s, center_time: 2026-10-10T09:00:00Z}
+platforms:
+  transmitter:
+    {latitude: 48.2 deg, longitude: 11.1 deg, altitude: 9 km, heading: 100 deg, speed: 180 m/s, climb: 2 m/s}
+  receiver: {latitude: 47.9 deg, longitude: 11.2 deg, altitude: 4 km, heading: 60 deg, speed: 90 m/s}
+timing_error: {constant: 1.e-8, linear: 1.e-11}
+propagation: {zenith_delay: 20 mm, zenith_electron_content: 5 TECU}
+requirements: {quadratic_phase_error: 45 deg, cubic_phase_error: 30 deg, location_error: 10 m, islr: -15 dB}
+allocation: {model: full, combine: each, coverage_factor: 2}
+"""
+
+
+def elsewhere(tree: Tree) -> Seen:
+    """At another longitude: the Earth is as flat, as heavy and as fast there."""
+    other = copy.deepcopy(tree)
+    for one in (other["scene"], *other["platforms"].values()):
+        one["longitude"] = f"{float(one['longitude'].split()[0]) + 77} deg"
+    return Seen(other)
+
+
+def on_the_other_hemisphere(tree: Tree) -> Seen:
+    """South for north: the Earth turns the same way. What the air adds has no sign."""
+    other = copy.deepcopy(tree)
+    other.pop("propagation")
+    tree.pop("propagation")
+    for one in (other["scene"], *other["platforms"].values()):
+        one["latitude"] = f"-{one['latitude']}"
+    for platform in other["platforms"].values():
+        platform["heading"] = f"{180 - float(platform['heading'].split()[0])} deg"
+        error = platform["motion_error"]
+        error |= {key: [error[key][0], -error[key][1], error[key][2]] for key in KINDS}
+    of_arms(other, lambda v: [v[0], -v[1], v[2]], lambda v: v)
+    return Seen(other, displacement=lambda d: [d[0], -d[1]])
+
+
+@pytest.mark.parametrize("way", [elsewhere, on_the_other_hemisphere])
+def test_so_is_one_over_the_earth(way: Callable[[Tree], Seen]) -> None:
+    """Specific force, the Earth's rotation and the paths of aircraft: by latitude alone."""
+    tree = yaml.safe_load(EARTH)
+    for platform, frame in zip(tree["platforms"].values(), ("scene", "track"), strict=True):
+        sizes = {"position": [0.5, 0.7, 0.9], "velocity": [0.01, 0.02, 0.03], "acceleration": [1e-3, 2e-3, 1e-3]}
+        platform["motion_error"] = {"frame": frame, **sizes}
+    assert differences(with_instruments(tree, "earth"), way) == []
 
 
 @pytest.mark.parametrize("way", ["turned", "mirrored", "backwards", "exchanged", "larger", "slower"])
