@@ -181,8 +181,10 @@ def _of_instruments(case: Case) -> Iterator[_Warned]:
         yield _Warned(("synchronization", "interval"), exchanges_are_rare(T))
     if sync is not None and sync.is_holdover:
         perfect = [name for name in PLATFORMS if getattr(mission.platforms, name).oscillator is None]
-        if perfect:
-            yield _Warned(("synchronization", "age"), nothing_drifts(perfect))
+        if perfect:  # clocks of which nobody says how they drift were not judged
+            yield _Warned(
+                ("synchronization", "age"), nothing_drifts(perfect), is_doubt=len(perfect) == len(PLATFORMS)
+            )
     for error in case.random:
         if error.noise is not None and error.noise.misfit > POOR_FIT:
             key = f"platforms.{error.owner}.oscillator"

@@ -61,3 +61,13 @@ def test_a_bandwidth_leaves_a_cycle_of_noise_in_an_aperture() -> None:
     mission = bb.loads(mission_text(**CUT))
     statuses = bb.sweep(mission, {"collection.aperture_time": ["5 s", "6 s", "7 s"]}).to_dataframe()["status"]
     assert [one == "error" for one in statuses] == [True, False, False]
+
+
+@pytest.mark.parametrize(
+    ("changes", "is_doubt"), [(HOLDOVER, True), (HOLDOVER | {f"{RECEIVER}oscillator": {"sensor": "bva"}}, False)]
+)
+def test_a_holdover_without_any_oscillator_puts_the_verdict_in_doubt(changes: dict[str, Any], is_doubt: bool) -> None:
+    """One clock may be as good as perfect; of two nobody looked how they drift, and the mission passed."""
+    found = findings(**changes)
+    assert [one.is_doubt for one in found.warnings if DRIFTS in one.message] == [is_doubt]
+    assert not is_doubt or found.status != "pass"
