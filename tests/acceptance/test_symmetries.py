@@ -379,3 +379,69 @@ def test_so_is_its_image(family: str, seed: int, way: str) -> None:
     assert other.displacement is not None
     moved = other.displacement(list(here.effect.displacement))
     assert there.effect.displacement == pytest.approx(moved, rel=1e-6, abs=1e-6)
+
+
+# ---------------------------------------------------------------------- the same error in other words
+SIZES = [1e-3, 2e-3, 3e-3]  # m, m/s², along three axes
+
+
+def with_one_error(family: str, seed: int, **error: Any) -> dict[str, Any]:
+    """Rows of a random mission whose receiver has one error, and nothing else has any."""
+    tree = tree_of(family, seed)
+    for key in ("timing_error", "other_errors", "common_motion_error", "autofocus", "scene"):
+        tree.pop(key, None)
+    tree["platforms"]["transmitter"].pop("motion_error", None)
+    tree["platforms"]["receiver"]["motion_error"] = error
+    tree["allocation"] = {"model": "full", "combine": "each"}
+    tree["requirements"] |= {"cubic_phase_error": "45 deg", "location_error": 10, "islr": "-20 dB"}
+    return {row.id: row for row in bb.check(loaded(tree)).findings.rows if row.declared is not None}
+
+
+def effect_of(rows: dict[str, Any], kind: str) -> tuple[float, float, float]:
+    """What errors of a kind do together: their quadratic phase [rad], and their displacement [m]."""
+    found = [row for row_id, row in rows.items() if f".{kind}" in row_id and row.is_independent]
+    moved = [row.displacement_m or (0.0, 0.0) for row in found]
+    phases = math.hypot(*(row.qpe_full_rad for row in found))
+    return phases, math.hypot(*(east for east, _ in moved)), math.hypot(*(north for _, north in moved))
+
+
+@pytest.mark.parametrize(
+    ("stated", "kind", "error", "as_kind"),
+    [
+        ({"imu": {"accelerometer_bias": SIZES}}, "imu", {"acceleration": SIZES}, "acceleration"),
+        (
+            {"random": [{"name": "GNSS", "sigma": SIZES, "correlation_time": 9e8}]},
+            "random",
+            {"position": SIZES},
+            "position",
+        ),
+        ({"lever_arm": {"uncertainty": SIZES}}, "lever_arm", {"frame": "track", "position": SIZES}, "position"),
+    ],
+    ids=["accelerometer_bias", "random of a long correlation time", "lever_arm of a straight flight"],
+)
+@pytest.mark.parametrize("family", ["satellite_aircraft", "geostationary_drone"])
+def test_an_error_in_other_words_is_the_same(family: str, stated: Tree, kind: str, error: Tree, as_kind: str) -> None:
+    seed = next(seed for seed in range(20) if not any(tree_of(family, seed)["platforms"]["receiver"]["acceleration"]))
+    here = effect_of(with_one_error(family, seed, **stated), kind)
+    there = effect_of(with_one_error(family, seed, **error), as_kind)
+    assert here[0] == pytest.approx(there[0], rel=1e-3, abs=NEAR_RAD)
+    assert here[1:] == pytest.approx(there[1:], rel=1e-3)
+
+
+def test_an_error_of_both_is_that_of_each_added() -> None:
+    sizes = {"position": [1e-3, 2e-3, -1e-3], "velocity": [1e-5, -2e-5, 1e-5], "acceleration": [1e-6, 2e-6, 1e-6]}
+    trees = [tree_of("jets", 1) for _ in range(2)]
+    for tree in trees:
+        for platform in tree["platforms"].values():
+            platform["motion_error"] = copy.deepcopy(sizes)
+        tree["common_motion_error"] = copy.deepcopy(sizes)
+    for platform in trees[0]["platforms"].values():
+        del platform["motion_error"]
+    both, each = ({row.id: row for row in bb.check(loaded(tree)).findings.rows} for tree in trees)
+    for kind in KINDS:
+        for axis in "xyz":
+            one, other = (each[f"{name}.{kind}.{axis}"] for name in ("transmitter", "receiver"))
+            moved = [a + b for a, b in zip(one.displacement_m, other.displacement_m, strict=True)]
+            assert both[f"common.{kind}.{axis}"].displacement_m == pytest.approx(moved, rel=1e-3, abs=1e-7)
+            phase = one.qpe_full_rad + other.qpe_full_rad
+            assert both[f"common.{kind}.{axis}"].qpe_full_rad == pytest.approx(phase, rel=1e-3, abs=NEAR_RAD)
