@@ -225,15 +225,12 @@ def of_other_sign(tree: Tree) -> Seen:
 
 
 def covered(tree: Tree) -> Seen:
-    """Standard deviations, and their multiples as the file declares them."""
+    """Standard deviations, and their multiples as the file declares them; an error of terrain is none of those."""
     for error in errors(tree):
         error.pop("distribution", None)
     factor = tree["allocation"]["coverage_factor"]
     other = seen(tree, lambda v, _: v, lambda v, _, frame: [factor * x for x in v])
-    for section in ("timing_error", "scene"):
-        other[section] = {
-            key: factor * v if key in (*CLOCK, "height_error") else v for key, v in other.get(section, {}).items()
-        }
+    other["timing_error"] = {key: factor * v for key, v in other.get("timing_error", {}).items()}
     other["allocation"]["coverage_factor"] = 1
     return Seen(other)
 
@@ -271,7 +268,10 @@ def differences(tree: Tree, way: Callable[[Tree], Seen]) -> list[Any]:
     for row in here.findings.rows:
         if way is exchanged and row.owner == "clock":
             continue
-        one = rows.pop(other.id(row.id))
+        one = rows.pop(other.id(row.id), None)
+        if one is None:
+            found.append(row)
+            continue
         is_same = row.status == one.status and is_near(row.utilization, one.utilization)
         for name in ("qpe_full_rad", "qpe_published_rad", "cubic_rad"):
             is_same &= is_near(getattr(row, name), getattr(one, name), NEAR_RAD)
@@ -288,7 +288,7 @@ def differences(tree: Tree, way: Callable[[Tree], Seen]) -> list[Any]:
             moved, seen_there = other.displacement(list(row.displacement_m)), list(one.displacement_m)
             if AT_RANDOM.intersection(row.id.split(".")):
                 moved, seen_there = list(map(abs, moved)), list(map(abs, seen_there))
-            is_same &= math.dist(moved, seen_there) <= NEAR * max(math.hypot(*moved), 1e-9)
+            is_same &= math.dist(moved, seen_there) <= max(NEAR * math.hypot(*moved), 2e-5)
         if not is_same:
             found.append((row, one))
     found += [row for row_id, row in rows.items() if not (way is exchanged and row.owner == "clock")]
