@@ -332,7 +332,7 @@ class TestCommand:
     def test_a_response_that_pixels_do_not_sample_is_said_to(
         self, run, tmp_path, family: str, seed: int, is_doubtful: bool
     ) -> None:
-        """Doppler turns along the line of equal range, three pixels beside the point: its peak of 1 is read as 1.09."""
+        """Doppler turns along the line of equal range, three pixels beside the point: a peak of 1 is read as 1.09."""
         (mission := tmp_path / "mission.yaml").write_text(families.mission_text(family, seed), encoding="utf-8")
         said = run("simulate", mission).stdout
         assert ("the error-free response is read 0.8 dB" in said) == is_doubtful
