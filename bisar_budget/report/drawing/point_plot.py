@@ -327,10 +327,8 @@ def summary(images: PointImages, mission: Mission) -> str:
         lines += _doubt(images, mission)
     left = 20 * np.log10(images.focused_response.peak / clean.peak)
     if left < -_RESTORED_DB:
-        lines += [
-            "",
-            f"autofocus does not restore the response: its peak stays {-left:.1f} dB below the error-free one",
-        ]
+        said = f"autofocus does not restore the response: its peak stays {-left:.1f} dB below the error-free one"
+        lines += ["", *wrapped(said, "")]
     return "\n".join(lines) + "\n"
 
 
