@@ -8,7 +8,6 @@ five widths of the peak and its ISLR within ten, which for a uniform aperture ma
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,7 +23,6 @@ _CHIP_UPSAMPLING = 8
 _COLUMNS = 512  # interpolated at once
 _ASCENTS = 50  # at most, along x′ and y′ in turn
 _NARROWED = 3  # times: a row is then within some thousandths
-_FOUND = 0.05  # lines from where a response is
 _SETTLED = 1e-4  # samples
 _SEARCH = 8  # towards a pixel's place in a grid
 _CLOSE = 0.02  # pixels: found
@@ -111,7 +109,7 @@ def impulse_response(
     Parameters
     ----------
     cut : (samples,) ndarray
-        Complex, sampled finer than the band needs.
+        Complex, two samples per resolution cell or more.
     spacing_m : float
         Between samples.
     mask_m : float, optional
@@ -171,7 +169,7 @@ def impulse_response_2d(
     Parameters
     ----------
     chip : (nx, ny) ndarray
-        Complex, sampled finer than the band needs, with the whole response.
+        Complex, two samples per resolution cell or more, with the whole response.
     spacing_m : (2,) float
         Between samples along x′ and y′.
     mask_m : (2,) float, optional
@@ -241,31 +239,11 @@ def line_at(chip: Complexes, row: float | Floats) -> Complexes:
     return lines if np.ndim(row) else lines[0]
 
 
-def lines_through_peak(
-    images: Sequence[Complexes], row: float | None = None, window: tuple[slice, slice] = _WHOLE
-) -> list[tuple[float, Complexes]]:
-    """Row of the peak in a window of images (nx, ny), and the line along y′ there, as long as the window.
+def row_of_peak(image: Complexes, window: tuple[slice, slice] = _WHOLE) -> float:
+    """Row of the peak in a window of an image (nx, ny), which repeats beyond its edges.
 
-    A peak lies between two lines of pixels: a third of a cell apart, the nearer of them may be 0.4 dB below it. An
-    image repeats beyond its edges.
-
-    Parameters
-    ----------
-    images : sequence of (nx, ny) ndarray
-        First that without errors.
-    row : float, optional
-        Where exact ranges have the response in the first one. Where it is not found there, columns run together
-        within a few pixels and nothing can be read between lines: all are then taken at this row.
-    window : two of slice
-        Part of the images that a response has for itself.
+    A peak lies between two lines of pixels: a third of a cell apart, the nearer of them may be 0.4 dB below it.
     """
-    found = [_line_through_peak(image, window) for image in images]
-    if row is None or abs(found[0][0] - row) < _FOUND:
-        return found
-    return [(row, line_at(image[:, window[1]], row)) for image in images]
-
-
-def _line_through_peak(image: Complexes, window: tuple[slice, slice]) -> tuple[float, Complexes]:
     part = np.abs(image[window])
     row = float(np.argmax(part.max(axis=1))) + window[0].indices(image.shape[0])[0]
     columns, step = image[:, window[1]], 0.5
@@ -273,7 +251,7 @@ def _line_through_peak(image: Complexes, window: tuple[slice, slice]) -> tuple[f
         lines = upsampled(line_at(columns, row + step * np.arange(-1.0, 2.0)), _UPSAMPLING)
         row += step * min(max(_vertex(np.max(np.abs(lines) ** 2, axis=1), 1), -1.0), 1.0)
         step /= 4
-    return row, line_at(columns, row)
+    return row
 
 
 def highest(chip: Complexes) -> float:

@@ -20,7 +20,14 @@ from bisar_budget.simulator.autofocus import ALGORITHMS
 from bisar_budget.simulator.collection import PointCollection, RangeLines
 from bisar_budget.simulator.former import IMAGE_FORMERS, ExactRangeFormer, Former, PlaneWaves
 from bisar_budget.simulator.image_formation import ground_grid
-from bisar_budget.simulator.impulse_response import ImpulseResponse, between, impulse_response, lines_through_peak
+from bisar_budget.simulator.impulse_response import (
+    ImpulseResponse,
+    between,
+    impulse_response,
+    line_at,
+    row_of_peak,
+    upsampled,
+)
 from bisar_budget.simulator.phase_history import (
     Complexes,
     Errors,
@@ -48,6 +55,9 @@ _BYTES_PER_ROTATED = 16 * 16  # grid, three images, and what autofocus and inter
 _BYTES_PER_SAMPLE = 16 * 5  # of the phase history; it is a product of terms of its own size
 _APART = 3.0  # range cells: what is nearer in range shares a line with a target's response
 _NEAREST = 6  # cells across that a response takes, at least
+_BLUR = 6  # columns for each line beside a patch of finer pixels, by which a point there is out of focus
+_THERE = 0.5  # of a target's height, at least, that is read at its place; else the patch does not reach there
+_FINE = 16  # samples of a line for each, between which its highest is found to 1e-3 dB
 _CLUTTER_STREAM = 1  # of the file's seed, so that clutter changes no noise
 
 
@@ -90,8 +100,9 @@ class PointImages(NamedTuple):
     `points` (3, 2) the ground points (29) of those pieces of the whole range error: the middle one is where (25) puts
     a point at the scene centre; `points_by` says by which gradients (29) has them. `effect` is that of the
     scene centre, too. `responses` are one for each target, and `clean_response`, `response`, `focused_response` the
-    cuts through the peaks of the brightest, which lie in these `rows` of the images. `outside` says which declared
-    echoes lie beyond the patch.
+    cuts through the peaks of the brightest, which lie in these `rows` of the images. A lone point without errors is
+    read `misread_db` too high where its pixels do not sample it; NaN where that is not known. `outside` says which
+    declared echoes lie beyond the patch.
     """
 
     slow_time: Floats
@@ -113,6 +124,7 @@ class PointImages(NamedTuple):
     focused: Complexes
     error_free: Complexes
     rows: tuple[float, ...]
+    misread_db: float
     response: ImpulseResponse
     focused_response: ImpulseResponse
     clean_response: ImpulseResponse
@@ -280,19 +292,28 @@ def simulate_point(
         raise SimulationError(f"{image_former.replace('_', ' ')} cannot form this image: {error}") from None
     focused = ALGORITHMS[mission.autofocus.algorithm](rotated).image
     cells = former.offsets(np.array(shown), _middle(shown))
-    # Plane waves may put a point beside the place that they are asked about.
-    is_exact = isinstance(former, ExactRangeFormer)
-    places = plan.rotated.shape[0] // 2 + _SAMPLES_PER_CELL * plan.finer * cells[:, 0]
+    formed, windows = (error_free, rotated, focused), [_window(plan, cells, index) for index in range(len(shown))]
 
-    def through_peak_of(index: int, columns: slice | None = None) -> list[tuple[float, Complexes]]:
-        window = _window(plan, cells, index)
-        row = float(places[index]) if is_exact else None
-        return lines_through_peak((error_free, rotated, focused), row, (window[0], columns or window[1]))
+    def rows_of(index: int) -> tuple[float, ...]:
+        """Rows of a target's peaks. Without errors it is at its place; errors are in focus at another range."""
+        found = [row_of_peak(image, windows[index]) for image in formed[1:]]
+        if isinstance(former, ExactRangeFormer):
+            return (plan.rotated.shape[0] // 2 + _SAMPLES_PER_CELL * plan.finer * float(cells[index, 0]), *found)
+        return (row_of_peak(error_free, windows[index]), *found)  # plane waves may put it beside
 
-    across = plan.rotated.spacing[1]
-    brightest = max(range(len(shown)), key=lambda index: targets.points[index].level_db)
-    through_peak = through_peak_of(brightest, slice(None))
-    clean = _measured(through_peak[0][1], across, None)
+    across, heights = plan.rotated.spacing[1], np.abs(amplitudes[: len(shown)])
+    responses = [
+        Response(target, moved, place, at, *_cuts(formed, rows_of(index), windows[index][1], across, heights[index]))
+        for index, (target, moved, place, at) in enumerate(
+            zip(targets.points, effects, shown, in_scene_shown, strict=True)
+        )
+    ]
+    brightest = max(range(len(shown)), key=lambda index: (responses[index].clean is not None, heights[index]))
+    rows = rows_of(brightest)
+    through_peak = [line_at(image, row) for image, row in zip(formed, rows, strict=True)]
+    clean = _measured(through_peak[0], across, None)
+    is_known = isinstance(former, ExactRangeFormer) and len(shown) == 1 and clutter.size == 0
+    read = np.abs(upsampled(line_at(error_free, row_of_peak(error_free)), _FINE)).max()
     # Figure 3 has what is quadratic and higher, from mid-aperture on; (29) all of it, from the displaced point on.
     slope = np.gradient(left, fine)
     bent = left - left[fine.size // 2] - slope[fine.size // 2] * fine
@@ -320,16 +341,12 @@ def simulate_point(
         rotated=rotated,
         focused=focused,
         error_free=error_free,
-        rows=tuple(row for row, _ in through_peak),
-        response=_measured(through_peak[1][1], across, clean.mask_m),
-        focused_response=_measured(through_peak[2][1], across, clean.mask_m),
+        rows=rows,
+        misread_db=20 * math.log10(read / heights[0]) if is_known and settings.noise is None else math.nan,
+        response=_measured(through_peak[1], across, clean.mask_m),
+        focused_response=_measured(through_peak[2], across, clean.mask_m),
         clean_response=clean,
-        responses=tuple(
-            Response(target, moved, place, at, *_cuts(through_peak_of(index), across))
-            for index, (target, moved, place, at) in enumerate(
-                zip(targets.points, effects, shown, in_scene_shown, strict=True)
-            )
-        ),
+        responses=tuple(responses),
         outside=plan.outside,
     )
 
@@ -519,14 +536,21 @@ def _measured(cut: Complexes, spacing: float, mask_m: float | None) -> ImpulseRe
 def _clutter(level_db: float | None, grid: Floats, finer: float, seed: int) -> tuple[Floats, Complexes]:
     """Random scatterers over a patch, (n, 2) [m] and (n,): one for each resolution cell, circular normal.
 
-    A cell is as large as the energy of a response of unit peak, so `level_db` is the mean power of a pixel.
+    A cell is as large as the energy of a response of unit peak, so `level_db` is the mean power of a pixel. A patch
+    of finer pixels is narrower than a range cell is wide: what stands a range cell beside it counts there too, and is
+    out of focus by some cells across for each finer line.
     """
     if level_db is None:
         return np.empty((0, 2)), np.empty(0, dtype=complex)
     rng = np.random.default_rng([seed, _CLUTTER_STREAM])
     nx, ny = grid.shape[:2]
-    count = round((nx - 1) * (ny - 1) / (_SAMPLES_PER_CELL**2 * finer))
-    row, column = rng.uniform(0, nx - 1, count), rng.uniform(0, ny - 1, count)
+    beside = _SAMPLES_PER_CELL * (finer - 1)
+    wide, long = nx - 1 + 2 * beside, ny - 1 + 2 * _BLUR * beside
+    count = round(wide * long / (_SAMPLES_PER_CELL**2 * finer))
+    row, column = (
+        rng.uniform(-beside, wide - beside, count),
+        rng.uniform(-_BLUR * beside, long - _BLUR * beside, count),
+    )
     amplitudes = 10 ** (level_db / 20) * (rng.normal(size=count) + 1j * rng.normal(size=count)) / math.sqrt(2)
     return between(grid[..., :2], row, column), amplitudes
 
@@ -546,14 +570,17 @@ def _window(plan: Plan, cells: Floats, index: int) -> tuple[slice, slice]:
     return slices[0], slices[1]
 
 
-def _cuts(lines: Sequence[tuple[float, Complexes]], spacing: float) -> list[ImpulseResponse | None]:
-    """Measure a target in the error-free image first, whose mask the others take."""
+def _cuts(
+    images: Sequence[Complexes], rows: Sequence[float], columns: slice, spacing: float, amplitude: float
+) -> list[ImpulseResponse | None]:
+    """Measure a target in the error-free image first, whose mask the others take; None where it is not there."""
     found: list[ImpulseResponse | None] = []
     mask = None
-    for _, line in lines:
+    for image, row in zip(images, rows, strict=True):
         try:
-            found.append(_measured(line, spacing, mask))
+            found.append(_measured(line_at(image[:, columns], row), spacing, mask))
         except ValueError:  # what stands beside it reaches into its mainlobe
             found.append(None)
         mask = found[0].mask_m if found[0] else None
-    return found
+    clean = found[0]
+    return found if clean and clean.peak > _THERE * amplitude else [None] * len(found)

@@ -23,7 +23,7 @@ from bisar_budget.findings.images import FLOOR_DB, ImageEvidence, PointImage, Ve
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.simulator.collection import CELLS, OVERSAMPLING, RANGE_CELLS, Chip, PointCollection, pulses_for
-from bisar_budget.simulator.impulse_response import lines_through_peak, upsampled
+from bisar_budget.simulator.impulse_response import line_at, row_of_peak, upsampled
 from bisar_budget.simulator.phase_history import Errors, Floats
 from bisar_budget.verifier import phase_cases
 from bisar_budget.verifier.spread_cases import (
@@ -322,8 +322,8 @@ def _point_image(chip: Chip, reference: Chip, smear_cells: float) -> PointImage:
     half = min(math.ceil(reach * OVERSAMPLING), middle - 1)
     stride = math.ceil(2 * half / _MAX_PIXELS)
     half -= half % stride
-    lines = lines_through_peak((reference.image, chip.image), reference.image.shape[0] // 2)
-    clean, cut = (np.abs(upsampled(line, _FINE)) for _, line in lines)
+    lines = reference.cut, line_at(chip.image, row_of_peak(chip.image))
+    clean, cut = (np.abs(upsampled(line, _FINE)) for line in lines)
     peak = float(clean.max())
     fine = slice(_FINE * (middle - half), _FINE * (middle + half) + 1)
     # A long smear fits into a chip by the brightest of each few samples.

@@ -15,7 +15,7 @@ from bisar_budget.findings.images import Verdict
 from bisar_budget.geometry import GroundVector
 from bisar_budget.phrases import NOTHING, Note
 from bisar_budget.simulator.collection import CELLS, MAX_CELLS, OVERSAMPLING, RANGE_CELLS
-from bisar_budget.simulator.impulse_response import highest, impulse_response, lines_through_peak
+from bisar_budget.simulator.impulse_response import highest, impulse_response, line_at, row_of_peak
 from bisar_budget.simulator.phase_history import Errors, ExactEffect, NoGroundPointError, PathError, PathSinusoid
 from bisar_budget.verifier import reasons
 from bisar_budget.verifier.aperture_reading import READ_CELLS, ApertureReading, measured_shift
@@ -301,8 +301,8 @@ def _of_response(images: Responses, reading: ApertureReading) -> dict[str, Any]:
     except ValueError:
         pass
     try:
-        (_, free), (_, line) = lines_through_peak((reference.image, chip.image), reference.image.shape[0] // 2)
-        clean = impulse_response(free, reference.spacing[1])
+        clean = impulse_response(reference.cut, reference.spacing[1])
+        line = line_at(chip.image, row_of_peak(chip.image))
         response = impulse_response(line, chip.spacing[1], mask_m=clean.mask_m)
     except ValueError:
         return found

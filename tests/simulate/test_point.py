@@ -9,6 +9,7 @@ import pytest
 
 from bisar_budget.effects.effect import gradients_of
 from bisar_budget.mission.load import parse_mission
+from bisar_budget.mission.model import Simulation
 from bisar_budget.simulator import point as point_module
 from bisar_budget.simulator.autofocus import phase_gradient_autofocus
 from bisar_budget.simulator.collection import PointCollection
@@ -16,6 +17,7 @@ from bisar_budget.simulator.image_formation import matched_filter
 from bisar_budget.simulator.impulse_response import line_at, upsampled
 from bisar_budget.simulator.phase_history import cell_centres
 from bisar_budget.simulator.point import SimulationError, declared_errors, simulate_point
+from bisar_budget.simulator.targets import parse_targets
 from tests import families
 from tests.conftest import ROOT, mission_text
 from tests.simulate.conftest import images_of
@@ -228,9 +230,43 @@ class TestLinesOfEqualRangeThatBend:
 
     @pytest.mark.parametrize(("family", "seed"), [("geostationary_drone", 0), ("jets", 22)])
     def test_columns_that_run_together_are_not_read_between_lines(self, family: str, seed: int) -> None:
-        """Lines of equal range and of equal Doppler lie 1.5° and 6° apart: peaks of 1 were read as 1.01 and 1.09."""
-        clean = images_of(families.mission_text(family, seed), rotated_only=True).clean_response
-        assert clean.peak == pytest.approx(1.0, abs=1e-6)
+        """Lines of equal range and of equal Doppler lie 1.5° and 6° apart: peaks of 1 were read as 1.01 and 1.09.
+
+        Errors are in focus at another range; read in the row of the place, those of jets 22 lost 1.5 dB.
+        """
+        images = images_of(families.mission_text(family, seed), rotated_only=True)
+        assert images.clean_response.peak == pytest.approx(1.0, abs=1e-6)
+        assert images.misread_db > 0.05
+        for image, response in ((images.rotated, images.response), (images.focused, images.focused_response)):
+            assert response.peak >= np.abs(image).max() * (1 - 1e-6)
+
+    @pytest.mark.parametrize("more", ["3, 0", "clutter -20 dB"])
+    def test_what_stands_beside_a_target_leaves_its_rows(self, more: str) -> None:
+        """The errors of geostationary_drone 25 are in focus four lines away: a neighbour took 5 dB of their peak."""
+        mission = parse_mission(families.mission_text("geostationary_drone", 25))
+        alone, beside = (
+            simulate_point(mission, targets=parse_targets(text)).responses[0] for text in ("0, 0", f"0, 0; {more}")
+        )
+        losses = [one.smeared.peak / one.clean.peak for one in (alone, beside)]
+        assert losses[1] == pytest.approx(losses[0], rel=0.15)
+
+    def test_a_target_that_the_patch_does_not_reach_is_not_measured(self) -> None:
+        """Doppler turns between drones 43 and 5 m beside it: 0.01 was read for a height of 1, and 10 dB of gain."""
+        mission = parse_mission(families.mission_text("drones", 43))
+        images = simulate_point(mission, targets=parse_targets("0, 5; 0, -5"))
+        assert [one.clean is None for one in images.responses] == [True, False]
+        assert images.clean_response.peak > 0.5
+
+    @pytest.mark.parametrize(("family", "seed"), [("drones", 1), ("jets", 3)])
+    def test_clutter_has_its_level_in_narrow_patches(self, family: str, seed: int) -> None:
+        """Laid within a patch of 2 range cells alone it was 3 dB too weak."""
+        mission = parse_mission(families.mission_text(family, seed))
+        powers = []
+        for random in range(8):
+            again = mission._replace(simulation=Simulation(seed=random))
+            scene = parse_targets("0, 0, -200 dB; clutter 0 dB")
+            powers.append(np.mean(np.abs(simulate_point(again, targets=scene).error_free) ** 2))
+        assert 10 * math.log10(np.mean(powers)) == pytest.approx(0.0, abs=1.2)
 
     def test_pixels_near_a_platform_are_as_fine_as_its_aperture_bends_wavefronts(self) -> None:
         """drones 1 is in focus over 0.9 m of a range cell of 22 m: an aperture of 28° at 100 m, in X-band."""
