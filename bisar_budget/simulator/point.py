@@ -544,13 +544,10 @@ def _clutter(level_db: float | None, grid: Floats, finer: float, seed: int) -> t
         return np.empty((0, 2)), np.empty(0, dtype=complex)
     rng = np.random.default_rng([seed, _CLUTTER_STREAM])
     nx, ny = grid.shape[:2]
-    beside = _SAMPLES_PER_CELL * (finer - 1)
-    wide, long = nx - 1 + 2 * beside, ny - 1 + 2 * _BLUR * beside
-    count = round(wide * long / (_SAMPLES_PER_CELL**2 * finer))
-    row, column = (
-        rng.uniform(-beside, wide - beside, count),
-        rng.uniform(-_BLUR * beside, long - _BLUR * beside, count),
-    )
+    above = min(_SAMPLES_PER_CELL * (finer - 1), 2 * nx)  # farther away, lines do not go on as they do here
+    beside = _BLUR * above
+    count = round((nx - 1 + 2 * above) * (ny - 1 + 2 * beside) / (_SAMPLES_PER_CELL**2 * finer))
+    row, column = rng.uniform(-above, nx - 1 + above, count), rng.uniform(-beside, ny - 1 + beside, count)
     amplitudes = 10 ** (level_db / 20) * (rng.normal(size=count) + 1j * rng.normal(size=count)) / math.sqrt(2)
     return between(grid[..., :2], row, column), amplitudes
 

@@ -364,13 +364,21 @@ class TestCommand:
         said = run("simulate", SECTION_V.with_name(f"{name}.yaml")).stdout
         assert ("autofocus does not restore the response" in said) == fails
 
-    @pytest.mark.parametrize(("family", "seed", "is_doubtful"), [("satellite_fixed", 7, True), ("drones", 1, False)])
+    @pytest.mark.parametrize(
+        ("family", "seed", "more", "is_doubtful"),
+        [
+            ("satellite_fixed", 7, [], True),
+            ("satellite_fixed", 7, ["--targets", "0, 0, -6 dB"], True),
+            ("drones", 1, [], False),
+            ("drones", 1, ["--targets", "0, 0, -6 dB"], False),
+        ],
+    )
     def test_a_response_that_pixels_do_not_sample_is_said_to(
-        self, run, tmp_path, family: str, seed: int, is_doubtful: bool
+        self, run, tmp_path, family: str, seed: int, more: list[str], is_doubtful: bool
     ) -> None:
         """Doppler turns along the line of equal range, three pixels beside the point: a peak of 1 is read as 1.09."""
         (mission := tmp_path / "mission.yaml").write_text(families.mission_text(family, seed), encoding="utf-8")
-        said = run("simulate", mission).stdout
+        said = run("simulate", mission, *more).stdout
         assert ("the error-free response is read 0.8 dB" in said) == is_doubtful
         assert ("are in doubt" in said) == is_doubtful
 
