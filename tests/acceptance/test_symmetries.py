@@ -45,7 +45,7 @@ def tree_of(family: str, seed: int) -> Tree:
 
 
 def errors(tree: Tree) -> Iterator[Tree]:
-    """What is declared of the motion of each platform, and of both."""
+    """Declared errors of the motion of each platform, and of both."""
     holders = [platform.get("motion_error") for platform in tree["platforms"].values()]
     yield from filter(None, [*holders, tree.get("common_motion_error")])
 
@@ -260,7 +260,7 @@ def is_near(one: float | None, other: float | None, absolute: float = 0.0) -> bo
 
 
 def differences(tree: Tree, way: Callable[[Tree], Seen]) -> list[Any]:
-    """What differs between the rows and requirements of a mission and those of the same one seen otherwise."""
+    """Rows and requirements of a mission that differ from those of the same one seen otherwise."""
     other = way(tree)
     here, there = bb.check(loaded(tree)), bb.check(loaded(other.tree))
     rows = {row.id: row for row in there.findings.rows}
@@ -398,7 +398,7 @@ def with_one_error(family: str, seed: int, **error: Any) -> dict[str, Any]:
 
 
 def effect_of(rows: dict[str, Any], kind: str) -> tuple[float, float, float]:
-    """What errors of a kind do together: their quadratic phase [rad], and their displacement [m]."""
+    """Quadratic phase [rad] and displacement [m] of the errors of a kind, together."""
     found = [row for row_id, row in rows.items() if f".{kind}" in row_id and row.is_independent]
     moved = [row.displacement_m or (0.0, 0.0) for row in found]
     phases = math.hypot(*(row.qpe_full_rad for row in found))

@@ -244,6 +244,8 @@ class TestChip:
         start = CHIP // 2 + round(place[1]) - 12
         row = row_of_peak(image, (slice(None), slice(start, start + 25)))
         assert row == pytest.approx(CHIP // 2 + place[0], abs=5e-3)
+        part = line_at(image[:, start : start + 25], row)
+        assert part == pytest.approx(line[start : start + 25], abs=5e-3)
 
     def test_skewed_sidelobes_do_not_move_the_peak(self) -> None:
         image, spacing = chip((0.45, -0.35), skew=0.5)
@@ -285,20 +287,20 @@ class TestAgainstPerseo:
         processing = pytest.importorskip("perseo_quality.core.signal_processing")
         masking = pytest.importorskip("perseo_quality.core.generic_dataclasses")
         image, spacing = chip((0.0, 0.0), quadratic)
-        fine = upsampled(upsampled(image, 16).T, 16).T
+        fine = upsampled(upsampled(image, 32).T, 32).T  # its mask ends at whole pixels, each 0.05 dB of ISLR
         row, column = np.unravel_index(np.argmax(np.abs(fine)), fine.shape)
         pixels = (
             processing.evaluate_irf_resolution(fine[:, column]),
             processing.evaluate_irf_resolution(fine[row]),
         )
         ours = impulse_response(image[CHIP // 2], spacing)
-        assert pixels[1] * spacing / 16 == pytest.approx(ours.irw_m, rel=2e-3)
+        assert pixels[1] * spacing / 32 == pytest.approx(ours.irw_m, rel=2e-3)
         mask = masking.MaskingMethod.PEAK
         _, pslr, _ = irf.compute_pslr_2d(fine, pixels, mask)
         _, islr, _ = irf.compute_islr_2d(fine, pixels, mask)
         near, far = (impulse_response(image[CHIP // 2], spacing, reach_m=n * ours.irw_m) for n in (5, 10))
         assert near.pslr_db == pytest.approx(pslr, abs=0.02)
-        assert far.islr_db == pytest.approx(islr, abs=0.1)  # one pixel of its mask
+        assert far.islr_db == pytest.approx(islr, abs=0.05)
 
     @pytest.mark.filterwarnings("ignore")
     def test_uniform_aperture(self) -> None:
