@@ -302,18 +302,19 @@ def simulate_point(
         return (row_of_peak(error_free, windows[index]), *found)  # plane waves may put it beside
 
     across, heights = plan.rotated.spacing[1], np.abs(amplitudes[: len(shown)])
-    responses = [
-        Response(target, moved, place, at, *_cuts(formed, rows_of(index), windows[index][1], across, heights[index]))
-        for index, (target, moved, place, at) in enumerate(
-            zip(targets.points, effects, shown, in_scene_shown, strict=True)
-        )
+    rows_of_all = [rows_of(index) for index in range(len(shown))]
+    cuts = [
+        _cuts(formed, rows, window[1], across, height)
+        for rows, window, height in zip(rows_of_all, windows, heights, strict=True)
     ]
-    brightest = max(range(len(shown)), key=lambda index: (responses[index].clean is not None, heights[index]))
-    rows = rows_of(brightest)
+    brightest = max(range(len(shown)), key=lambda index: (cuts[index][0] is not None, heights[index]))
+    rows = rows_of_all[brightest]
     through_peak = [line_at(image, row) for image, row in zip(formed, rows, strict=True)]
     clean = _measured(through_peak[0], across, None)
-    is_known = isinstance(former, ExactRangeFormer) and len(shown) == 1 and clutter.size == 0
-    read = np.abs(upsampled(line_at(error_free, row_of_peak(error_free)), _FINE)).max()
+    misread_db, is_alone = math.nan, len(shown) == 1 and targets.clutter_db is None and settings.noise is None
+    if is_alone and isinstance(former, ExactRangeFormer):
+        read = np.abs(upsampled(line_at(error_free, row_of_peak(error_free)), _FINE)).max()
+        misread_db = 20 * math.log10(read / heights[0])
     # Figure 3 has what is quadratic and higher, from mid-aperture on; (29) all of it, from the displaced point on.
     slope = np.gradient(left, fine)
     bent = left - left[fine.size // 2] - slope[fine.size // 2] * fine
@@ -342,11 +343,16 @@ def simulate_point(
         focused=focused,
         error_free=error_free,
         rows=rows,
-        misread_db=20 * math.log10(read / heights[0]) if is_known and settings.noise is None else math.nan,
+        misread_db=misread_db,
         response=_measured(through_peak[1], across, clean.mask_m),
         focused_response=_measured(through_peak[2], across, clean.mask_m),
         clean_response=clean,
-        responses=tuple(responses),
+        responses=tuple(
+            Response(target, moved, place, at, *measured)
+            for target, moved, place, at, measured in zip(
+                targets.points, effects, shown, in_scene_shown, cuts, strict=True
+            )
+        ),
         outside=plan.outside,
     )
 
