@@ -5,13 +5,14 @@
     python -m tests.outputs after && diff -r before after
 
 Each file holds the exit code, both streams and the reports of one command. The day is fixed. Missions are those of
-`specs/missions` and `examples`, and some of each family of `tests.families`. `--images` forms images too, which takes
-minutes.
+`specs/missions` and `examples`, and some of each family of `tests.families`. `--studies` sweeps, solves and allocates
+those of `specs/missions` too, and `--images` forms images of all; both take minutes.
 """
 
 import argparse
 import json
 import os
+import shutil
 from itertools import pairwise
 from pathlib import Path
 
@@ -34,10 +35,11 @@ def missions() -> list[str]:
     texts |= {f"{family}-{seed}": mission_text(family, seed) for family in FAMILIES for seed in range(RANDOM)}
     for name, text in texts.items():
         Path(f"{name}.yaml").write_text(text, encoding="utf-8")
+    shutil.copytree(ROOT / "specs" / "missions" / "paths", "paths")
     return list(texts)
 
 
-def write(folder: Path, images: bool) -> int:
+def write(folder: Path, studies: bool, images: bool) -> int:
     """Write all outputs; return how many commands ran."""
     folder.mkdir(parents=True)
     os.chdir(folder)  # outputs name files as they are given
@@ -65,6 +67,16 @@ def write(folder: Path, images: bool) -> int:
         ids = [row["id"] for mission in found for row in mission.get("rows", ())]
         explained = [run("explained", "check", file, "--explain", row_id) for row_id in ids]
         Path(f"{name}.explain.out").write_text("\n\n".join(explained), encoding="utf-8")
+        if studies and (ROOT / "specs" / "missions" / file).exists():
+            beside = ("--vary", "collection.aperture_time=0.5,1,2 s", "--vary", "radar.bandwidth=100:300MHz:3")
+            run(f"{name}.sweep.out", "sweep", file, *beside)
+            run(f"{name}.sweep-plot.out", "sweep", file, *beside, "--plot", f"{name}.map.svg")
+            run(f"{name}.curve.out", "sweep", file, *beside[:2], "--plot", f"{name}.curve.svg")
+            run(f"{name}.solve.out", "solve", file, "--for", "collection.aperture_time")
+            run(f"{name}.sensitivity.out", "sensitivity", file, "--plot", f"{name}.tornado.svg")
+            for format_name in ("text", "json", "csv", "markdown", "html", "needs", "sdoc"):
+                run(f"{name}.allocate.{format_name}.out", "allocate", file, "--format", format_name)
+            run(f"{name}.passes.out", "passes", file)
         if images:
             run(f"{name}.verify.out", "verify", file)
             run(f"{name}.check-verify.out", "check", file, "--verify", f"--report={name}-v.md")
@@ -82,9 +94,10 @@ def main() -> None:
     """Write the outputs into the folder of the command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path, help="must not exist")
+    parser.add_argument("--studies", action="store_true", help="sweep, solve, sensitivity, allocate and passes too")
     parser.add_argument("--images", action="store_true", help="verify and simulate too")
     asked = parser.parse_args()
-    print(f"{write(asked.folder.absolute(), asked.images)} commands")
+    print(f"{write(asked.folder.absolute(), asked.studies, asked.images)} commands")
 
 
 if __name__ == "__main__":
