@@ -364,6 +364,25 @@ def test_so_is_one_over_the_earth(way: Callable[[Tree], Seen]) -> None:
     assert differences(with_instruments(tree, "earth"), way) == []
 
 
+@pytest.mark.parametrize("way", ["turned", "mirrored", "backwards", "slower"])
+def test_so_are_the_answers_to_questions(way: str) -> None:
+    """The longest aperture, what to order, and how often requirements hold, which is known to 0.004."""
+    tree = tree_of("satellite_aircraft", 3)
+    other, longer = loaded(WAYS[way](tree).tree), 2.0 if way == "slower" else 1.0
+    mission, key = loaded(tree), "collection.aperture_time"
+    here, there = (bb.solve(one, key).found for one in (mission, other))
+    assert there.status == here.status
+    assert here.crossings
+    ends, ends_there = ([one.inside.value for one in found.crossings] for found in (here, there))
+    assert ends_there == pytest.approx([longer * end for end in ends], rel=NEAR)
+    ordered, ordered_there = (bb.allocate(one).found.specifications for one in (mission, other))
+    in_time = {"m": 0, "m/s": 1, "m/s^2": 2, "s/s": 1, "1/s": 2}
+    for one, same in zip(ordered, ordered_there, strict=True):
+        assert same.value == pytest.approx(one.value / longer ** in_time[one.unit], rel=1e-3)
+    odds, odds_there = (bb.monte_carlo(one, draws=20_000).found.probability for one in (mission, other))
+    assert odds_there == pytest.approx(odds, abs=0.02)
+
+
 @pytest.mark.parametrize("way", ["turned", "mirrored", "backwards", "exchanged", "larger", "slower"])
 @pytest.mark.parametrize(("family", "seed"), [("aircraft", 1), ("geostationary_drone", 1)])
 def test_so_is_its_image(family: str, seed: int, way: str) -> None:
