@@ -4,12 +4,14 @@ import os
 import stat
 import sys
 from collections.abc import Callable
+from functools import cache
 from typing import TYPE_CHECKING, Any, BinaryIO, Protocol
 
 if TYPE_CHECKING:
     from pathlib import Path
 
 
+@cache
 def resource(*parts: str) -> "Path":
     """Path of a bundled file: inside an installed package, at the top level of a checkout."""
     from pathlib import Path  # a check does without

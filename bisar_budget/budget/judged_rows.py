@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Sequence
 from enum import IntEnum
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -35,6 +36,7 @@ NUMBERS = (
     *WHOLE[:3],
     "islr_db",
 )  # of columns
+_columns_of_numbers = attrgetter(*NUMBERS)
 _IN_UNIT = ("declared", "allowable", "allowable_published", "allowable_full")  # columns in the unit of their row
 
 
@@ -120,8 +122,8 @@ class Judged(NamedTuple):
 
     def numbers(self, case: int) -> dict[str, float | None]:
         """Its numbers in a case, by the names of the columns; None where there is none."""
-        found = ((name, getattr(self, name).item(case)) for name in NUMBERS)
-        return {name: None if math.isnan(number) else number for name, number in found}
+        found = [column.item(case) for column in _columns_of_numbers(self)]
+        return {name: None if math.isnan(number) else number for name, number in zip(NUMBERS, found, strict=True)}
 
     @property
     def qpe_exact_rad(self) -> Floats:
@@ -247,13 +249,14 @@ def worded(
     fields: dict[str, Any] = numbers | {
         "qpe_exact_rad": full if row.is_of_ranges else None,
         "margin": margin if math.isfinite(margin) else None,
+        "status": status,
         "line": mission.line(path),
         "reason": reason or None,
         "remarks": remarks,
         "equation": equation,
         "requirement_id": mission.requirement_ids.get(row.subject.id),
     }
-    return Row.without_numbers(row.subject, row.metric, unit, status, **(fields | others))
+    return Row(row.subject, row.metric, unit, **(fields | others))
 
 
 def number_of(case: Case, column: Any) -> float | None:

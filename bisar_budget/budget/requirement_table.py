@@ -59,11 +59,11 @@ def _declarations(case: Case, one: Judged) -> Row:
     """The row that says whether all is declared: of kinds, too, that have no row where nothing is declared."""
     mission = case.mission
     missing = missing_declarations(mission)
-    return Row.without_numbers(
+    return Row(
         DECLARATIONS,
         DECLARE,
-        "",
-        _STATUSES[one.status[case.place]],
+        unit="",
+        status=_STATUSES[one.status[case.place]],
         line=mission.line(("requirements", "declare")),
         reason=phrases.declarations_are_missing([one.key for one in missing]) if missing else None,
         equation="requirements.declare",

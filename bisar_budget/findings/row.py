@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from datetime import date
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from bisar_budget import phrases
 from bisar_budget.effects.effect import Subject
@@ -30,18 +30,6 @@ class AppliedWaiver(NamedTuple):
         return phrases.waived(*self)
 
 
-_NUMBERS = (
-    "allowable",
-    "allowable_published",
-    "allowable_full",
-    "qpe_published_rad",
-    "qpe_full_rad",
-    "displacement_m",
-    "utilization",
-    "margin",
-)
-
-
 class Row(NamedTuple):
     """One line of the budget. Numbers in SI and radians; None where a value does not exist.
 
@@ -57,23 +45,23 @@ class Row(NamedTuple):
     subject: Subject
     metric: str
     unit: str
-    declared: float | None
-    allowable: float | None
-    allowable_published: float | None
-    allowable_full: float | None
-    qpe_published_rad: float | None
-    qpe_full_rad: float | None
-    displacement_m: GroundVector | None
-    utilization: float | None
-    margin: float | None
-    status: str
-    line: int | None
-    reason: Note | None
-    remarks: tuple[Note, ...]
-    equation: str
-    requirement_id: str | None
-    evidence: str | None
-    is_independent: bool
+    declared: float | None = None
+    allowable: float | None = None
+    allowable_published: float | None = None
+    allowable_full: float | None = None
+    qpe_published_rad: float | None = None
+    qpe_full_rad: float | None = None
+    displacement_m: GroundVector | None = None
+    utilization: float | None = None
+    margin: float | None = None
+    status: str = "not_declared"
+    line: int | None = None
+    reason: Note | None = None
+    remarks: tuple[Note, ...] = ()
+    equation: str = ""
+    requirement_id: str | None = None
+    evidence: str | None = None
+    is_independent: bool = True
     qpe_exact_rad: float | None = None
     published_margin_db: float | None = None
     binding_requirement: str | None = None
@@ -82,15 +70,6 @@ class Row(NamedTuple):
     model: str | None = None
     waivers: tuple[AppliedWaiver, ...] = ()
     refuted: tuple[Note, ...] = ()
-
-    @classmethod
-    def without_numbers(
-        cls, subject: Subject, metric: str, unit: str, status: str, *, declared: float | None = None, **others: Any
-    ) -> "Row":
-        """A row of which no allowable and no phase is known, or asked; `others` are its other fields."""
-        numbers: dict[str, Any] = dict.fromkeys(_NUMBERS)
-        words: dict[str, Any] = {"reason": None, "remarks": (), "evidence": None, "is_independent": True}
-        return cls(subject, metric, unit, declared, status=status, **(numbers | words | others))
 
     def __repr__(self) -> str:
         """Id, what is declared of what is allowed, and status, on one line."""
