@@ -314,16 +314,9 @@ class Step(NamedTuple):
             yield from (f"    {line}" for line in (part.lines if isinstance(part, WorkedEquation) else (part,)))
 
 
-def step(title: str, *parts: WorkedEquation | str) -> Iterator[Step]:
-    """One step of an explanation, to be yielded from."""
-    yield Step(title, parts)
-
-
-def equation(
-    symbol: str, formula: str, values: Mapping[str, float], result: float, unit: str
-) -> tuple[WorkedEquation]:
-    """Make the one part of a step."""
-    return (WorkedEquation(symbol, formula, values, result, unit),)
+def step(title: str, *parts: WorkedEquation | str) -> Step:
+    """One step of an explanation with what stands under its title."""
+    return Step(title, parts)
 
 
 def filled(formula: str, values: Mapping[str, float]) -> str:
