@@ -27,7 +27,6 @@ from bisar_budget.report.compliance.rows import (
     matrix_table,
     undeclared_table,
 )
-from bisar_budget.report.compliance.specifications import specified
 from bisar_budget.report.drawing.evidence_drawings import (
     chip_caption,
     chip_png,
@@ -39,6 +38,7 @@ from bisar_budget.report.drawing.trade_drawing import trade_drawing
 from bisar_budget.report.drawing.trades import per_word
 from bisar_budget.report.explain.explanation import chain, collection_chain
 from bisar_budget.report.formats import verification
+from bisar_budget.report.formats.specification_sheet import specified
 from bisar_budget.report.words.requirements import held
 from bisar_budget.report.words.sentences import BINDING_WORDS, counted, percent, sentence
 from bisar_budget.units import format_quantity

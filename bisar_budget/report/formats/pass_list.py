@@ -11,13 +11,13 @@ from datetime import UTC, date, datetime
 from typing import Any
 
 from bisar_budget.design.passes import Passes, SatellitePass
-from bisar_budget.faults import changes_words, printable
+from bisar_budget.faults import printable
 from bisar_budget.findings.requirement import NAMES
 from bisar_budget.findings.status import STATUS
 from bisar_budget.paths.instant import DAY, Instant
 from bisar_budget.report import Style
 from bisar_budget.report.words.identity import digest
-from bisar_budget.report.words.requirements import overrides_lines
+from bisar_budget.report.words.requirements import title_lines
 from bisar_budget.report.words.sentences import percent, sentence, spreadsheet_text, wrapped
 from bisar_budget.units import format_quantity
 
@@ -164,13 +164,8 @@ def _seconds(instant: Instant) -> str:
 
 
 def _lines(passes: Passes, style: Style) -> Iterator[str]:
-    first, *rest = wrapped(verdict(passes), "  ")
-    yield f"\x1b[{'32' if passes.complying else '1;31'}m{first}\x1b[0m" if style.color else first
-    yield from rest
-    changed = f" {changes_words(passes.changes)}" if passes.changes else ""
-    yield from wrapped(f"{printable(passes.file)}{changed}, {printable(passes.name)}; {passes.model} model", "  ")
-    yield from overrides_lines(passes)
-    yield ""
+    sgr = "32" if passes.complying else "1;31"
+    yield from title_lines(passes, verdict(passes), sgr, style, remark=f"; {passes.model} model")
     if passes.found:
         yield from _table(passes.found, style)
         yield ""
@@ -187,8 +182,7 @@ def _table(found: Sequence[SatellitePass], style: Style) -> Iterator[str]:
         yield _row(head, widths)
     for one, row in zip(found, cells, strict=True):
         line = _row(row, widths)
-        sgr = STATUS[one.status].sgr
-        yield f"\x1b[{sgr}m{line[:8]}\x1b[0m{line[8:]}" if style.color else line
+        yield style.coloured(line[:8], STATUS[one.status].sgr) + line[8:]
 
 
 def _row(cells: Sequence[str], widths: Sequence[int]) -> str:
