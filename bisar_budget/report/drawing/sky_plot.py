@@ -61,7 +61,7 @@ def sky_plot(passes: Passes, title: str, verdict: str) -> str:
 
 def _style(statuses: Sequence[str], width: float) -> str:
     """Rules for what only these drawings have."""
-    light, dark = svg.colours()
+    light, _ = svg.colours()
     rules = [
         f".track{{fill:none;stroke-width:{width};stroke-linecap:round}}",
         ".dot{fill:var(--ink,#222);stroke:var(--paper,#fff);stroke-width:1.2}",
@@ -78,9 +78,7 @@ def _style(statuses: Sequence[str], width: float) -> str:
         rules.append(f".between.is-{name}{{stroke:{colour}}}")
         rules.append(f".open.is-{name}{{stroke:{colour}}}")
         rules += [f".{kind}.is-{name}{{fill:{colour}}}" for kind in ("dot", "solid", "head")]
-    colours = ";".join(f"--{tone}:{dark[tone]}" for tone in dict.fromkeys(tones))
-    scoped = "".join(f"svg.drawing {rule}" for rule in rules)
-    return f"{scoped}@media (prefers-color-scheme:dark){{svg:root.drawing{{{colours}}}}}" if colours else scoped
+    return svg.style_sheet(rules, tones)
 
 
 # ---------------------------------------------------------------- the sky

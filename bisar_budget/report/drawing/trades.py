@@ -164,6 +164,15 @@ def uses_of_rows(trade: Trade, gathered: Callable[[Sequence[str]], Gathered]) ->
     return {row: values[f"{row}.utilization"] for row in rows}
 
 
+def cell_edges(axis: Axis) -> list[float]:
+    """Ends of the cells around the values; the first and the last end at the values themselves.
+
+    Of words each has its room to both sides.
+    """
+    edges = axis.edges.tolist()
+    return edges if axis.words else [float(axis.values[0]), *edges[1:-1], float(axis.values[-1])]
+
+
 class Run(NamedTuple):
     """Neighbouring values with one status, from edge to edge."""
 
@@ -173,16 +182,11 @@ class Run(NamedTuple):
 
 
 def runs(axis: Axis, statuses: NDArray[Any]) -> Iterator[Run]:
-    """Stretches of one axis with one status each; the first and the last end at the values themselves.
-
-    Of words each has its room to both sides.
-    """
-    edges = axis.edges
-    if not axis.words:
-        edges[0], edges[-1] = axis.values[0], axis.values[-1]
+    """Stretches of one axis with one status each."""
+    edges = cell_edges(axis)
     starts = [0, *(np.flatnonzero(statuses[1:] != statuses[:-1]) + 1).tolist(), statuses.size]
     for start, stop in pairwise(starts):
-        yield Run(str(statuses[start]), float(edges[start]), float(edges[stop]))
+        yield Run(str(statuses[start]), edges[start], edges[stop])
 
 
 class MapRegion(NamedTuple):
