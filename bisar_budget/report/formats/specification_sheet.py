@@ -82,18 +82,7 @@ def _document(answer: Answer) -> dict[str, Any]:
             }
             for one in sheet.specifications
         ],
-        "rows": [
-            {
-                "id": row.id,
-                "requirement": row.requirement,
-                "used": row.used,
-                "allowed": row.allowed,
-                "fixed": row.fixed,
-                "shares": dict(row.shares),
-                "multiplier": row.multiplier,
-            }
-            for row in sheet.rows
-        ],
+        "rows": [row._asdict() for row in sheet.rows],
         "broken": [one._asdict() for one in sheet.broken],
         "notes": list(sheet.notes),
         "offer": None if offer is None else _offer(offer),
