@@ -31,14 +31,7 @@ _DASHES = ("", "6 3", "2 2.5")  # of statuses that share a colour
 def sky_plot(passes: Passes, title: str, verdict: str) -> str:
     """Draw passes as SVG.
 
-    Parameters
-    ----------
-    passes : Passes
-        What was found.
-    title : str
-        What it shows.
-    verdict : str
-        How many comply: stands above it below the name of the mission, and is read to who cannot see it.
+    `verdict` says how many comply: it stands below the name of the mission, and is read to who cannot see the rest.
     """
     canvas = svg.Canvas()
     top = svg.head(canvas, [svg.short(passes.name, _WIDTH), printable(verdict)])

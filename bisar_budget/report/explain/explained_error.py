@@ -401,18 +401,9 @@ def worse(analysis: Analysis, source: ErrorSource, size: float, which: int = _QU
 
 
 def full_chain(analysis: Analysis, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
-    """From a signed error to its phases by the full model.
+    """From the signed size of an error [unit], or one unit of what is not declared, to its phases by the full model.
 
-    Parameters
-    ----------
-    analysis : Analysis
-        Of the mission.
-    source : ErrorSource
-        The error.
-    size : float
-        With its sign; of what is not declared, one unit. [unit]
-    each : str
-        Said of what is not declared.
+    `each` is said of what is not declared.
     """
     each = each.replace(" of ", ", for ")
     if not source.is_heard:
@@ -487,10 +478,15 @@ def end_of_the_image(size: float, unit: str) -> Iterator[Step]:
     )
 
 
+def no_limit(row: Row) -> Step:
+    """The step of a row that nothing limits."""
+    return step("Allowable: no limit", printable(row.reason or "no requirement limits this error"))
+
+
 def smallest_size(row: Row, sizes: Mapping[str, float]) -> Iterator[Step]:
     """The allowable of a row: the smallest of the sizes that its requirements allow, each by its symbol."""
     if row.allowable is None or not sizes:
-        yield step("Allowable: no limit", printable(row.reason or "no requirement limits this error"))
+        yield no_limit(row)
         return
     found = list(sizes.values())
     text = f"min({', '.join(map(number, found))})" if len(found) > 1 else number(found[0])

@@ -21,7 +21,7 @@ from bisar_budget.effects.air_delays import (
     leg_factor,
     metres_per_unit,
 )
-from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
+from bisar_budget.effects.declared import CUBIC, LOCATION
 from bisar_budget.effects.lever_arms import arm_at, body_axes
 from bisar_budget.effects.navigation_errors import TILTS, process_of, specific_force
 from bisar_budget.effects.oscillator_acceleration import accelerated_tones, felt, flies_a_turn, pieces_by_acceleration
@@ -563,16 +563,17 @@ def _allowable(mission: Mission, allocation: Allocation, error: RandomError, row
         yield from limit_steps(allocation, error.owner, limit)
     sizes: dict[str, float] = {}
     required = mission.requirements
+
+    def by(name: str, part: str, allowed: float, per_unit: float, title: str) -> Step:
+        sizes[name] = allowed / per_unit
+        values = {"limit": allowed, part: per_unit}
+        return step(title, WorkedEquation(name, f"limit/({part})", values, sizes[name], _unit(error)))
+
     if effect.quadratic:
-        sizes["by_QPE"] = limit / effect.quadratic
-        values = {"limit": limit, "QPE/unit": effect.quadratic}
-        worked = WorkedEquation("by_QPE", "limit/(QPE/unit)", values, sizes["by_QPE"], _unit(error))
-        yield step(f"Allowable by the {QUADRATIC.replace('_', ' ').removesuffix(' error')}", worked)
+        yield by("by_QPE", "QPE/unit", limit, effect.quadratic, "Allowable by the quadratic phase")
     if effect.cubic and required.cubic_phase_error is not None:
-        sizes["by_cubic"] = required.cubic_phase_error / effect.cubic
-        values = {"limit": required.cubic_phase_error, "cubic/unit": effect.cubic}
-        worked = WorkedEquation("by_cubic", "limit/(cubic/unit)", values, sizes["by_cubic"], _unit(error))
-        yield step(f"Allowable by requirements.{CUBIC}, without share and gain", worked)
+        title = f"Allowable by requirements.{CUBIC}, without share and gain"
+        yield by("by_cubic", "cubic/unit", required.cubic_phase_error, effect.cubic, title)
     if held.spread and required.islr is not None:
         spread = "left/unit"
         if held.spread != effect.spread:
@@ -591,10 +592,8 @@ def _allowable(mission: Mission, allocation: Allocation, error: RandomError, row
         worked = WorkedEquation("by_ISLR", formula, values, sizes["by_ISLR"], _unit(error))
         yield step("Allowable by requirements.islr", worked)
     if effect.displacement > 0 and required.location_error is not None:
-        sizes["by_location"] = required.location_error / effect.displacement
-        values = {"limit": required.location_error, "moved/unit": effect.displacement}
-        worked = WorkedEquation("by_location", "limit/(moved/unit)", values, sizes["by_location"], _unit(error))
-        yield step(f"Allowable by requirements.{LOCATION}, without share and gain", worked)
+        title = f"Allowable by requirements.{LOCATION}, without share and gain"
+        yield by("by_location", "moved/unit", required.location_error, effect.displacement, title)
     yield from smallest_size(row, sizes)
 
 

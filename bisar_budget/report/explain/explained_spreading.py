@@ -19,6 +19,7 @@ from bisar_budget.analysis.spread import (
 from bisar_budget.analysis.vibration_limits import (
     LARGEST_ECHO,
     Echo,
+    VibrationLimits,
     bessel,
     highest_echo,
     quadratures,
@@ -31,7 +32,7 @@ from bisar_budget.effects.oscillators import spurs_of
 from bisar_budget.faults import printable
 from bisar_budget.findings.row import Row
 from bisar_budget.mission.model import Mission
-from bisar_budget.report.explain.explained_error import combined, place, stated
+from bisar_budget.report.explain.explained_error import combined, no_limit, place, stated
 from bisar_budget.report.explain.notation import Step, Sum, WorkedEquation, number, step, with_unit
 
 
@@ -188,15 +189,21 @@ def explained_spur(mission: Mission, allocation: Allocation, row: Row) -> Iterat
     yield step(title, WorkedEquation("declared", formula, values, row.declared or 0.0, "dB"))
     limits = tone_limits(mission, allocation)[1].get(row.owner)
     if limits is None or row.allowable is None:
-        yield step("Allowable: no limit", printable(row.reason or "no requirement limits this error"))
+        yield no_limit(row)
         return
-    values = {"A": limits.by(row.model or "published"), "λ": mission.radar.wavelength}
-    worked = WorkedEquation("φ", "2*π*A/λ", values, 2 * math.pi * values["A"] / values["λ"], "rad")
-    by_power = "" if row.metric == "pslr" else ", √2 times the rms value that ISLR allows"
-    yield step(f"Phase of a vibration at the limit of {row.owner}.vibration.sinusoidal{by_power}", worked)
-    phase = {"φ": 2 * math.pi * values["A"] / values["λ"]}
-    yield step("Its echoes", WorkedEquation("allowable", "20*log(φ/2)/log(10)", phase, row.allowable, "dB"))
+    phase, at_limit = _phase_at_limit(mission, row, limits, "φ")
+    yield at_limit
+    yield step("Its echoes", WorkedEquation("allowable", "20*log(φ/2)/log(10)", {"φ": phase}, row.allowable, "dB"))
     yield from _use_of_amplitudes(row)
+
+
+def _phase_at_limit(mission: Mission, row: Row, limits: VibrationLimits, symbol: str) -> tuple[float, Step]:
+    """Peak phase of a vibration at the limit of the platform of a tone, and how it comes about. [rad]"""
+    values = {"A": float(limits.by(row.model or "published")), "λ": mission.radar.wavelength}
+    phase = 2 * math.pi * values["A"] / values["λ"]
+    by_power = "" if row.metric == "pslr" else ", √2 times the rms value that ISLR allows"
+    title = f"Phase of a vibration at the limit of {row.owner}.vibration.sinusoidal{by_power}"
+    return phase, step(title, WorkedEquation(symbol, "2*π*A/λ", values, phase, "rad"))
 
 
 def explained_tone(mission: Mission, allocation: Allocation, row: Row) -> Iterator[Step]:
@@ -224,13 +231,10 @@ def explained_tone(mission: Mission, allocation: Allocation, row: Row) -> Iterat
         yield step("Its echoes", WorkedEquation("l", "20*log(φ/2)/log(10)", {"φ": one.phase}, level, "dB"))
     limits = tone_limits(mission, allocation)[1].get(name)
     if limits is None or row.allowable is None:
-        yield step("Allowable: no limit", printable(row.reason or "no requirement limits this error"))
+        yield no_limit(row)
         return
-    limit = float(limits.by(row.model or "published"))
-    phase = 2 * math.pi * limit / mission.radar.wavelength
-    by_power = "" if row.metric == "pslr" else ", √2 times the rms value that ISLR allows"
-    worked = WorkedEquation("φ_max", "2*π*A/λ", {"A": limit, "λ": mission.radar.wavelength}, phase, "rad")
-    yield step(f"Phase of a vibration at the limit of {name}.vibration.sinusoidal{by_power}", worked)
+    phase, at_limit = _phase_at_limit(mission, row, limits, "φ_max")
+    yield at_limit
     if one.phase:
         values = {"Γ": one.sensitivity, "φ_max": phase, "φ": one.phase}
         yield step("Allowable", WorkedEquation("allowable", "Γ*φ_max/φ", values, row.allowable, row.unit))
@@ -250,7 +254,7 @@ def explained_power(mission: Mission, allocation: Allocation, row: Row) -> Itera
     formula = "sqrt(ISLR)" if model == "published" else "sqrt(log(1 + ISLR*E))"
     yield step("Rms phase that spreads as much", WorkedEquation("rms", formula, values, rms, "rad"))
     if mission.requirements.islr is None or row.allowable is None:
-        yield step("Allowable: no limit", row.reason or "no requirement limits this error")
+        yield no_limit(row)
         return
     allowed = float(spread_limit(mission, allocation, "mission", model))
     worked = WorkedEquation("allowable", "required", {"required": row.allowable}, row.allowable, "dB")

@@ -67,17 +67,7 @@ _LONGEST_UNIT = 16  # letters, of what may follow a number
 
 
 def explain(mission: Mission, found: MissionFindings, row_id: str) -> str:
-    """Write the chain of equations of one row of a mission, with the numbers put in.
-
-    Parameters
-    ----------
-    mission : Mission
-        As loaded.
-    found : MissionFindings
-        What the check of it found.
-    row_id : str
-        Id of one of its rows.
-    """
+    """Write the chain of equations of one row of a mission, with the numbers put in."""
     row = next(row for row in found.rows if row.id == row_id)
     own_id = f" [{printable(row.requirement_id)}]" if row.requirement_id else ""
     title = f"{STATUS[row.status].text} {printable(row.id)}{own_id}"

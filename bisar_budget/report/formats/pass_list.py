@@ -289,20 +289,10 @@ _OCTETS = 75  # of a line, its end not counted
 
 
 def as_ics(version: str, passes: Passes, stamp: date) -> str:
-    """Write an event for each pass; lines end with a line feed, in whose place a calendar has CR and LF.
+    """Write an event for each pass (RFC 5545), made on the day `stamp` of UTC.
 
-    Parameters
-    ----------
-    version : str
-        Of the tool.
-    passes : Passes
-        What was found.
-    stamp : date
-        Day, of UTC, that the events say they were made on.
-
-    Notes
-    -----
-    RFC 5545. An event keeps its UID with newer elements, as long as the pass stays in its half hour.
+    Lines end with a line feed, in whose place a calendar has CR and LF. An event keeps its UID with newer elements,
+    as long as the pass stays in its half hour.
     """
     lines = ["BEGIN:VCALENDAR", "VERSION:2.0", f"PRODID:-//bisar-budget//passes {version}//EN"]
     seen: Counter[str] = Counter()
