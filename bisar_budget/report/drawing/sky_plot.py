@@ -42,9 +42,9 @@ def sky_plot(passes: Passes, title: str, verdict: str) -> str:
     _resolutions(canvas, frame, passes)
     entries = [svg.line_entry(canvas, svg.status_words(name), f"track is-{name}") for name in statuses]
     entries += [
-        svg.LegendLine("mid-time", lambda at: canvas.circle((at[0] + 13, at[1]), 4, "dot")),
+        svg.circle_entry(canvas, "mid-time", 4, "dot"),
         svg.line_entry(canvas, f"{math.degrees(passes.min_elevation):.4g} deg above the horizon", "thin dashed"),
-        svg.LegendLine("range resolution", lambda at: canvas.circle((at[0] + 13, at[1]), 3.6, "open")),
+        svg.circle_entry(canvas, "range resolution", 3.6, "open"),
         svg.LegendLine("cross-range resolution", lambda at: _square(canvas, (at[0] + 13, at[1]), "solid")),
     ]
     bottom = svg.legend(canvas, middle[1] + _RIM + _BESIDE, _WIDTH, entries)

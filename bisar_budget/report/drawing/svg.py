@@ -452,8 +452,13 @@ class LegendLine(NamedTuple):
 
 
 def line_entry(canvas: Canvas, words: str, style: str) -> LegendLine:
-    """LegendLine of a line of some style."""
+    """Entry for a line of some style."""
     return LegendLine(words, lambda at: canvas.lines([(at, (at[0] + 25, at[1]))], style))
+
+
+def circle_entry(canvas: Canvas, words: str, radius: float, style: str) -> LegendLine:
+    """Entry for a circle of some style. [px]"""
+    return LegendLine(words, lambda at: canvas.circle((at[0] + 13, at[1]), radius, style))
 
 
 def box_entry(canvas: Canvas, words: str, *styles: str) -> LegendLine:

@@ -149,10 +149,6 @@ def _swatches(canvas: svg.Canvas, statuses: Sequence[str]) -> list[svg.LegendLin
     return [svg.box_entry(canvas, svg.status_words(name), f"is-{name}", "frame") for name in statuses]
 
 
-def _mark(canvas: svg.Canvas, words: str = "this mission", style: str = "own") -> svg.LegendLine:
-    return svg.LegendLine(words, lambda at: canvas.circle((at[0] + 13, at[1]), 5 if style == "own" else 3, style))
-
-
 # ---------------------------------------------------------------- one key
 def _curves(
     canvas: svg.Canvas, top: float, trade: Trade, rows: Mapping[str, Floats], by_word: Mapping[str, Trade]
@@ -264,10 +260,10 @@ def _bars(canvas: svg.Canvas, top: float, trade: Trade, rows: Mapping[str, Float
         shown = [(along.at(100 * use), down.at(place)) for place, use in enumerate(uses.tolist()) if use > 0]
         for point in filter(frame.holds, shown):
             canvas.circle(point, 3, f"dot{number}")
-        entries.append(_mark(canvas, row, f"dot{number}"))
+        entries.append(svg.circle_entry(canvas, row, 3, f"dot{number}"))
     if axis.own is not None:
         canvas.circle((frame.left + 9, down.at(axis.own)), 5, "own")
-        entries.append(_mark(canvas))
+        entries.append(svg.circle_entry(canvas, "this mission", 5, "own"))
     svg.outline(canvas, frame, "frame")
     svg.y_axis(canvas, frame, down, "", axis.words)
     bottom = svg.x_axis(canvas, frame, along, trade.heading or "utilization [%]")
@@ -349,7 +345,7 @@ def _map(canvas: svg.Canvas, top: float, trade: Trade, geometry: BistaticGeometr
         entries.insert(0, svg.line_entry(canvas, "utilization 100 %", "border"))
     if all(axis.own is not None and axis.values[0] <= axis.own <= axis.values[-1] for axis in (x, y)):
         canvas.circle(plane.at(plane.across.at(x.own or 0.0), plane.up.at(y.own or 0.0)), 5, "own")
-        entries.append(_mark(canvas))
+        entries.append(svg.circle_entry(canvas, "this mission", 5, "own"))
     if geometry is not None:
         return svg.legend(canvas, frame.bottom + 24, _WIDTH, entries)
     svg.outline(canvas, frame, "frame")

@@ -173,6 +173,11 @@ def cell_edges(axis: Axis) -> list[float]:
     return edges if axis.words else [float(axis.values[0]), *edges[1:-1], float(axis.values[-1])]
 
 
+def stretches(begins: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
+    """Starts and stops of neighbours of one kind; `begins` says of each but the first whether it begins another."""
+    return pairwise([0, *(np.flatnonzero(begins) + 1).tolist(), begins.size + 1])
+
+
 class Run(NamedTuple):
     """Neighbouring values with one status, from edge to edge."""
 
@@ -184,8 +189,7 @@ class Run(NamedTuple):
 def runs(axis: Axis, statuses: NDArray[Any]) -> Iterator[Run]:
     """Stretches of one axis with one status each."""
     edges = cell_edges(axis)
-    starts = [0, *(np.flatnonzero(statuses[1:] != statuses[:-1]) + 1).tolist(), statuses.size]
-    for start, stop in pairwise(starts):
+    for start, stop in stretches(statuses[1:] != statuses[:-1]):
         yield Run(str(statuses[start]), edges[start], edges[stop])
 
 

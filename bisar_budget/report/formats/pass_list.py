@@ -1,7 +1,5 @@
 """Passes of a satellite as text for reading, as `passes/1`, CSV, and as events of a calendar (RFC 5545)."""
 
-import csv
-import io
 import json
 import math
 import re
@@ -16,6 +14,7 @@ from bisar_budget.findings.requirement import NAMES
 from bisar_budget.findings.status import STATUS
 from bisar_budget.paths.instant import DAY, Instant
 from bisar_budget.report import Style
+from bisar_budget.report.formats.csv_table import csv_text
 from bisar_budget.report.words.identity import digest
 from bisar_budget.report.words.requirements import title_lines
 from bisar_budget.report.words.sentences import percent, sentence, spreadsheet_text, wrapped
@@ -94,16 +93,12 @@ def direction(one: SatellitePass) -> str:
 
 def as_csv(passes: Passes) -> str:
     """Write a line for each pass, values in SI and radians, empty where there is none."""
-    items = [_item(one) for one in passes.found]
-    keys = list(_item(_NO_PASS))
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(["file", "name", "platform", *keys])
     whose = [spreadsheet_text(text) for text in (passes.file, passes.name, passes.platform)]
-    for item in items:
-        cells = (spreadsheet_text(value) if isinstance(value, str) else value for value in item.values())
-        writer.writerow([*whose, *cells])
-    return out.getvalue()
+    lines: list[list[object]] = [["file", "name", "platform", *_item(_NO_PASS)]]
+    for one in passes.found:
+        cells = (spreadsheet_text(value) if isinstance(value, str) else value for value in _item(one).values())
+        lines.append([*whose, *cells])
+    return csv_text(lines)
 
 
 _NOWHEN = Instant(0, 0.0)

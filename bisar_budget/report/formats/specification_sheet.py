@@ -3,8 +3,6 @@
 Its specifications are also requirements below those of the mission, for Sphinx-Needs and for StrictDoc.
 """
 
-import csv
-import io
 import json
 import math
 from collections.abc import Iterator, Sequence
@@ -19,6 +17,7 @@ from bisar_budget.mission.changes import parts_of
 from bisar_budget.report import Style
 from bisar_budget.report.compliance import document as doc
 from bisar_budget.report.drawing.share_bars import LIMITS, limiting, share_bars
+from bisar_budget.report.formats.csv_table import csv_text
 from bisar_budget.report.formats.text_table import requirement_table
 from bisar_budget.report.formats.traceability import identifier, needs_document
 from bisar_budget.report.words.identity import Identity, distinct, identities
@@ -101,18 +100,14 @@ def _offer(offer: Offer) -> dict[str, Any]:
 
 def as_csv(answers: Sequence[Answer]) -> str:
     """Write a line for each specification, values in SI; what each takes of a requirement stands behind the rest."""
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
     shares = [key for key in NAMES if any(key in one.shares for sheet, _ in answers for one in sheet.specifications)]
-    writer.writerow([*_COLUMNS, *(f"share of {key}" for key in shares)])
+    lines: list[list[object]] = [[*_COLUMNS, *(f"share of {key}" for key in shares)]]
     for sheet, _ in answers:
         for one in sheet.specifications:
-            numbers = ["" if value is None else repr(value) for value in (one.value, one.ordered)]
-            declared = "" if one.declared is None else repr(one.declared)
-            line = [printable(sheet.file), printable(one.key), *numbers, one.unit, one.text, declared]
+            sizes = (one.value, one.ordered, one.unit, one.text, one.declared, one.weight)
             parts = [f"{one.shares.get(key, 0.0):.6g}" for key in shares]
-            writer.writerow([*line, repr(one.weight), " ".join(one.parts), *parts])
-    return out.getvalue()
+            lines.append([printable(sheet.file), printable(one.key), *sizes, " ".join(one.parts), *parts])
+    return csv_text(lines)
 
 
 # ---------------------------------------------------------------- for a terminal
@@ -266,7 +261,7 @@ def _chapter(answer: Answer, anchor: str) -> doc.Chapter:
     ]
     blocks += [*_required(sheet), *specified(sheet, anchor)]
     if offer is not None:
-        heads = [*doc.heads("Figure"), *doc.numbers("Offered", "Ordered"), *doc.heads("")]
+        heads = doc.heads("Figure", *doc.numbers("Offered", "Ordered"), "")
         lines: list[doc.Line] = [
             [doc.Name(one.key), one.text or "–", one.ordered or "free", _side(one)] for one in offer.figures
         ]
@@ -275,7 +270,7 @@ def _chapter(answer: Answer, anchor: str) -> doc.Chapter:
 
 
 def _required(sheet: SpecificationSheet) -> Iterator[doc.Block]:
-    heads = [*doc.heads("Requirement"), *doc.numbers("Allowed", "Reached", "Use"), *doc.heads("Status", "Decided by")]
+    heads = doc.heads("Requirement", *doc.numbers("Allowed", "Reached", "Use"), "Status", "Decided by")
     if sheet.findings is not None and not sheet.broken:
         rows: list[doc.Line] = [
             [one.name, one.allowed, one.reached, one.use, doc.Badge(one.status), doc.Name(one.decided_by)]
@@ -287,7 +282,7 @@ def _required(sheet: SpecificationSheet) -> Iterator[doc.Block]:
 def specified(sheet: SpecificationSheet, anchor: str) -> Iterator[doc.Block]:
     """The specifications with their shares, and a drawing of what uses up each limit; or why there are none."""
     if sheet.broken:
-        heads = [*doc.heads("Row"), *doc.numbers("Used", "May use"), *doc.heads("")]
+        heads = doc.heads("Row", *doc.numbers("Used", "May use"), "")
         rows: list[doc.Line] = [[doc.Name(name), *cells] for name, *cells in map(_broken_words, sheet.broken)]
         yield doc.TextTable("Rows without room", "Rows in which other errors leave no room", heads, rows)
         yield doc.Paragraph(_way_out(sheet))
@@ -301,23 +296,13 @@ def specified(sheet: SpecificationSheet, anchor: str) -> Iterator[doc.Block]:
 
 def _table(sheet: SpecificationSheet) -> Iterator[doc.Block]:
     keys = [key for key in NAMES if any(key in one.shares for one in sheet.specifications)]
-    heads = [
-        *doc.numbers("No."),
-        *doc.heads("Specification"),
-        *doc.numbers("Ordered", "Found", "Today", *(f"Of {NAMES[key]}" for key in keys)),
-        *doc.heads("Parts"),
-    ]
+    sizes = doc.numbers("Ordered", "Found", "Today", *(f"Of {NAMES[key]}" for key in keys))
+    heads = doc.heads(*doc.numbers("No."), "Specification", *sizes, "Parts")
     rows: list[doc.Line] = []
     for number, one in enumerate(sheet.specifications, 1):
         shares = [percent(one.shares[key]) if one.shares.get(key, 0.0) > LIMITS else "–" for key in keys]
-        cells = [
-            one.text or "free",
-            one.found_text or "–",
-            one.declared_text or "–",
-            *shares,
-            _parts_words(one) or "–",
-        ]
-        rows.append([str(number), doc.Name(one.key), *cells])
+        found = (one.text or "free", one.found_text or "–", one.declared_text or "–")
+        rows.append([str(number), doc.Name(one.key), *found, *shares, _parts_words(one) or "–"])
     caption = "Specifications, rounded down to two digits; shares are those of what a limit may use."
     yield doc.TextTable("Specifications", caption, heads, rows)
 
