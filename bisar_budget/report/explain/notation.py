@@ -369,10 +369,8 @@ def is_formula(equation: WorkedEquation) -> bool:
 
 def as_text(equation: WorkedEquation) -> Typeset:
     """For a reader: · between factors, no carets."""
-    if not equation.formula:
-        return Typeset(readable(equation.lines[0]), "")
-    numbers = f"= {filled(equation.formula, equation.values)} = {with_unit(equation.result, equation.unit)}"
-    return Typeset(readable(f"{equation.symbol} = {equation.formula}"), readable(numbers))
+    formula, *numbers = equation.lines
+    return Typeset(readable(formula), readable("".join(numbers).lstrip()))
 
 
 def readable(text: str) -> str:
