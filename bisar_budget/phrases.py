@@ -1,6 +1,6 @@
 """Every sentence that a row may carry, in one place: a note is data, and its words are written here.
 
-Those of verdicts stand in `verify.reasons`, those of a mission file's warnings in `budget.file_warnings`.
+Those of verdicts stand in `verifier.reasons`, those of a mission file's warnings in `budget.file_warnings`.
 
 A function writes one sentence. Its name is the note's code, its arguments are what the note is made of: numbers in SI
 and radians, ids of rows, names.

@@ -5,6 +5,7 @@ import os
 import sys
 from collections.abc import Iterator, Sequence
 from datetime import datetime
+from functools import partial
 from typing import TYPE_CHECKING
 
 import click
@@ -143,15 +144,11 @@ def _written(answers: "Sequence[Answer]", format_name: str, output: str | None) 
         return sheets.as_text(answers, Style(color=output is None and wants_color()))
     if format_name == "csv":
         return sheets.as_csv(answers)
+    written = getattr(sheets, f"as_{format_name}")
     if format_name in ("needs", "sdoc"):
-        from bisar_budget.report.formats import flow_down
-
         root, is_checkout = root_of_names()
-        requirements: str = getattr(flow_down, f"as_{format_name}")(
-            __version__, answers, Style(root=root, is_checkout=is_checkout)
-        )
-        return requirements
-    text: str = getattr(sheets, f"as_{format_name}")(__version__, answers)
+        written = partial(written, style=Style(root=root, is_checkout=is_checkout))
+    text: str = written(__version__, answers)
     return text
 
 

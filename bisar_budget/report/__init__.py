@@ -74,6 +74,10 @@ class Style(NamedTuple):
     all_rows: bool = False  # of the text: what is neither declared nor limits anything too
     detail: str = "summary"  # of a compliance report; full: formulas and undeclared rows too
 
+    def coloured(self, text: str, sgr: str) -> str:
+        """Text for a terminal with parameters of SGR (ECMA-48), where there is colour."""
+        return f"\x1b[{sgr}m{text}\x1b[0m" if self.color else text
+
 
 def _module(format_name: str) -> Any:
     """Imported when it is asked for, so that none costs the others anything."""

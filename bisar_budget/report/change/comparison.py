@@ -1,7 +1,7 @@
 """Effects of a change on missions: what goes in, what it loosens, how much of each limit it erodes, and a gate."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from fnmatch import fnmatchcase
 from typing import Any, NamedTuple
 
@@ -54,7 +54,9 @@ def moved_inputs(before: Mission, after: Mission) -> Iterator[Moved]:
 
 def written(mission: Mission) -> dict[KeyPath, str]:
     """Values as the file writes them, or a part that it names, by path; a list of plain values is one."""
-    texts = {path: event.value for path, event in mission.places.items() if isinstance(_text(event), str)}
+    texts = {
+        path: event.value for path, event in mission.places.items() if isinstance(getattr(event, "value", None), str)
+    }
     for taken in taken_figures(mission):
         texts[tuple(taken.key.split("."))] = f"{figure_text(taken.value)} (part {taken.part})"
     texts |= dict(_set_values(mission))
@@ -71,10 +73,6 @@ def _set_values(mission: Mission) -> Iterator[tuple[KeyPath, str]]:
     for change in mission.changes:
         parts = parts_of(change.key)
         yield changed.get(".".join(parts), parts), change.text
-
-
-def _text(event: object) -> object:
-    return getattr(event, "value", None)
 
 
 def _value(mission: Mission, path: KeyPath) -> Any:
@@ -487,7 +485,7 @@ class ChangeSet(NamedTuple):
 
 def compare(before: MissionFindings, after: MissionFindings) -> MissionChange:
     """Pair the rows of two findings by id."""
-    old, new = _by_id(before.rows), _by_id(after.rows)
+    old, new = ({row.id: row for row in found.rows} for found in (before, after))
     changes = [Change(row_id, old.get(row_id), new.get(row_id)) for row_id in {**old, **new}]
     changed = [change for change in changes if change.is_change]
     changed.sort(key=lambda change: (not change.is_newly_failing, -change.erosion))
@@ -526,10 +524,6 @@ def _is_near(before: float | None, after: float | None) -> bool:
     if before is None or after is None:
         return before is after
     return abs(after - before) < SMALL * max(abs(before), abs(after)) or before == after
-
-
-def _by_id(rows: Sequence[Row]) -> dict[str, Row]:
-    return {row.id: row for row in rows}
 
 
 def _status(row: Row | None) -> str | None:

@@ -26,8 +26,8 @@ FORMAT = "bisar-budget/diff/1"
 def as_text(comparison: ChangeSet, gate: Gate | None, all_rows: bool = False) -> str:
     """Write what changed, then a table per mission with the largest erosion first, and one summary line each."""
     parts = [_text(mission, gate, all_rows) for mission in comparison.missions]
-    if blocks := list(_blocks(_refused(comparison, gate))):
-        parts.append([line for block in blocks for line in block])
+    if refused := _refused_lines(comparison, gate):
+        parts.append(refused)
     if said := _of_no_mission(comparison, gate):
         parts.append([line for text in said for line in wrapped(printable(text), "  ")])
     return "\n\n".join("\n".join(lines) for lines in parts) + "\n"
@@ -93,6 +93,10 @@ def _blocks(said: Iterable[_Said]) -> Iterator[list[str]]:
             yield [title, *(line for text in texts for line in wrapped(text, "    "))]
 
 
+def _refused_lines(of: MissionChange | ChangeSet, gate: Gate | None) -> list[str]:
+    return [line for block in _blocks(_refused(of, gate)) for line in block]
+
+
 def _items(said: Iterable[_Said]) -> list[str]:
     """The same as a list in Markdown."""
     return [f"- {one.kind} {markdown_text(one.name)}: {_arrows(one.words)}" for one in said]
@@ -113,8 +117,8 @@ def _text(mission: MissionChange, gate: Gate | None, all_rows: bool) -> list[str
             for change in changes
         ]
         lines += [*table([("row", "before", "after", "erosion", "status"), *rows]), ""]
-    if blocks := list(_blocks(_refused(mission, gate))):
-        lines += [*(line for block in blocks for line in block), ""]
+    if refused := _refused_lines(mission, gate):
+        lines += [*refused, ""]
     return [*lines, *wrapped(_summary(mission, gate, all_rows), "  ")]
 
 

@@ -27,7 +27,6 @@ from bisar_budget.report.compliance.rows import (
     matrix_table,
     undeclared_table,
 )
-from bisar_budget.report.compliance.specifications import specified
 from bisar_budget.report.drawing.evidence_drawings import (
     chip_caption,
     chip_png,
@@ -36,9 +35,10 @@ from bisar_budget.report.drawing.evidence_drawings import (
     numbers_in_words,
 )
 from bisar_budget.report.drawing.trade_drawing import trade_drawing
-from bisar_budget.report.drawing.trades import per_word
+from bisar_budget.report.drawing.trades import per_word, stretches
 from bisar_budget.report.explain.explanation import chain, collection_chain
 from bisar_budget.report.formats import verification
+from bisar_budget.report.formats.specification_sheet import specified
 from bisar_budget.report.words.requirements import held
 from bisar_budget.report.words.sentences import BINDING_WORDS, counted, percent, sentence
 from bisar_budget.units import format_quantity
@@ -181,20 +181,16 @@ def _stretches(trade: Trade) -> Iterator[tuple[doc.Line, str]]:
     """
     (axis,) = trade.axes
     status, rows, uses = (trade.values[name] for name in ("status", "worst_row", "utilization"))
-    start, count = 0, len(axis.values)
-    for place in range(1, count + 1):
-        is_same = place < count and not axis.words
-        if is_same and (status[place], rows[place]) == (status[start], rows[start]):
-            continue
-        where = _value(axis, start) + (f" to {_value(axis, place - 1)}" if place - 1 > start else "")
-        row, use, badge = str(rows[start]), _uses(uses[start:place]), doc.Badge(str(status[start]))
+    begins = (status[1:] != status[:-1]) | (rows[1:] != rows[:-1]) | bool(axis.words)
+    for start, stop in stretches(begins):
+        where = _value(axis, start) + (f" to {_value(axis, stop - 1)}" if stop - 1 > start else "")
+        row, use, badge = str(rows[start]), _uses(uses[start:stop]), doc.Badge(str(status[start]))
         name: doc.Text = doc.Name(row) if row else "–"
         binding = str(trade.values["binding_requirement"][start])
         if not row.endswith(binding):
             name = (name, doc.Styled("own-id", BINDING_WORDS.get(binding, binding.replace("_", " "))))
         said = f"{where}: {STATUS[badge.status].words}" + (f", {row} {use}" if row else "")
         yield (where, badge, name, use), said
-        start = place
 
 
 def _uses(uses: NDArray[Any]) -> str:

@@ -219,7 +219,7 @@ def _step(title: str, parts: Iterable[WorkedEquation | str | doc.Equality], styl
 def _equation(part: WorkedEquation | str | doc.Equality) -> Markup:
     """One part of a step: a formula as MathML, words and text as text."""
     if isinstance(part, doc.Equality):
-        sides = (notation.mathml_of(side) for side in (part.left, part.right))
+        sides = (notation.catalogued(side, notation.MATHML) for side in (part.left, part.right))
         formula = notation.math("<mrow>{}<mo>=</mo>{}</mrow>".format(*sides))
         return Markup('<p class="part">{}</p>').format(Markup(formula))
     if not isinstance(part, WorkedEquation):

@@ -171,7 +171,7 @@ def _formulas(parts: Iterable[WorkedEquation | str | doc.Equality]) -> Iterator[
 def _latex(part: WorkedEquation | str | doc.Equality) -> str:
     """A formula as LaTeX; nothing of words and of arithmetic."""
     if isinstance(part, doc.Equality):
-        return f"{notation.latex_of(part.left)} = {notation.latex_of(part.right)}"
+        return " = ".join(notation.catalogued(side, notation.LATEX) for side in (part.left, part.right))
     if isinstance(part, WorkedEquation) and part.formula and notation.is_formula(part):
         return "\\begin{{aligned}}\n{} \\\\\n{}\n\\end{{aligned}}".format(*notation.as_latex(part))
     return ""

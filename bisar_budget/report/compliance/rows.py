@@ -182,15 +182,15 @@ def margin(row: Row) -> str:
     if value >= 1e8:
         return "× > 1e6"
     if value > 1000:
-        return f"× {_down(1 + row.margin, 3):.7g}"
-    down = _down(value, 3) if value else 0.0
+        return f"× {_down(1 + row.margin):.7g}"
+    down = _down(value) if value else 0.0
     text = f"{down:+.0f}" if abs(value) >= 100 else f"{down:+.3g}"
     return ("0" if down == 0 else text).replace("-", "−") + " %"
 
 
-def _down(value: float, digits: int) -> float:
-    """Round to so many digits, never up; one part in 10¹² keeps an exact number what it is."""
-    step = digits - 1 - math.floor(math.log10(abs(value)))
+def _down(value: float) -> float:
+    """Round to three digits, never up; one part in 10¹² keeps an exact number what it is."""
+    step = 2 - math.floor(math.log10(abs(value)))
     return math.floor(value * 10.0**step * (1 + math.copysign(1e-12, value))) / 10.0**step if step < 300 else value
 
 

@@ -24,18 +24,7 @@ class Curve(NamedTuple):
 
 
 def impulse_response_cuts(evidence: ImageEvidence) -> str:
-    """Draw the cross-range cuts of a row at its limit over the error-free one, with autofocus in a second panel.
-
-    Parameters
-    ----------
-    evidence : ImageEvidence
-        Of one row.
-
-    Returns
-    -------
-    str
-        An SVG document, to be inlined or to be a file of its own.
-    """
+    """Cross-range cuts of a row at its limit over the error-free one, with autofocus in a second panel, as SVG."""
     verdict = evidence.verdict
     canvas = svg.Canvas()
     at_limit = evidence.at_limit

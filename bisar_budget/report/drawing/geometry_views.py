@@ -356,8 +356,9 @@ def _draw_panel(canvas: svg.Canvas, panel: _Panel, view: _View, is_detail: bool,
     frame, scene = panel.frame, panel.pixel(_SCENE)
     if view.is_plan:
         if view.radius * panel.scale >= 3:
-            circle = [_on_circle(_SCENE, view.radius, 2 * math.pi * index / 96) for index in range(97)]
-            canvas.polyline([panel.pixel(place) for place in circle], "thin", frame)
+            radius = view.radius * panel.scale
+            circle = [_turned(scene, radius, 2 * math.pi * index / 96) for index in range(97)]
+            canvas.polyline(circle, "thin", frame)
     else:
         ground = [(frame.left, scene[1]), (frame.right, scene[1])]
         canvas.polyline(ground, "line", frame)
@@ -443,10 +444,6 @@ def _directions(canvas: svg.Canvas, panel: _Panel, view: _View) -> Iterator[svg.
 
 def _turned(origin: svg.Point, length: float, azimuth: float) -> svg.Point:
     return (origin[0] + length * math.cos(azimuth), origin[1] - length * math.sin(azimuth))
-
-
-def _on_circle(centre: Place, radius: float, angle: float) -> Place:
-    return (centre[0] + radius * math.cos(angle), centre[1] + radius * math.sin(angle))
 
 
 def _arc(canvas: svg.Canvas, panel: _Panel, platform: _Platform, radius: float) -> None:

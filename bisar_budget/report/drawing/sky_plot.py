@@ -31,14 +31,7 @@ _DASHES = ("", "6 3", "2 2.5")  # of statuses that share a colour
 def sky_plot(passes: Passes, title: str, verdict: str) -> str:
     """Draw passes as SVG.
 
-    Parameters
-    ----------
-    passes : Passes
-        What was found.
-    title : str
-        What it shows.
-    verdict : str
-        How many comply: stands above it below the name of the mission, and is read to who cannot see it.
+    `verdict` says how many comply: it stands below the name of the mission, and is read to who cannot see the rest.
     """
     canvas = svg.Canvas()
     top = svg.head(canvas, [svg.short(passes.name, _WIDTH), printable(verdict)])
@@ -49,9 +42,9 @@ def sky_plot(passes: Passes, title: str, verdict: str) -> str:
     _resolutions(canvas, frame, passes)
     entries = [svg.line_entry(canvas, svg.status_words(name), f"track is-{name}") for name in statuses]
     entries += [
-        svg.LegendLine("mid-time", lambda at: canvas.circle((at[0] + 13, at[1]), 4, "dot")),
+        svg.circle_entry(canvas, "mid-time", 4, "dot"),
         svg.line_entry(canvas, f"{math.degrees(passes.min_elevation):.4g} deg above the horizon", "thin dashed"),
-        svg.LegendLine("range resolution", lambda at: canvas.circle((at[0] + 13, at[1]), 3.6, "open")),
+        svg.circle_entry(canvas, "range resolution", 3.6, "open"),
         svg.LegendLine("cross-range resolution", lambda at: _square(canvas, (at[0] + 13, at[1]), "solid")),
     ]
     bottom = svg.legend(canvas, middle[1] + _RIM + _BESIDE, _WIDTH, entries)
@@ -61,7 +54,7 @@ def sky_plot(passes: Passes, title: str, verdict: str) -> str:
 
 def _style(statuses: Sequence[str], width: float) -> str:
     """Rules for what only these drawings have."""
-    light, dark = svg.colours()
+    light, _ = svg.colours()
     rules = [
         f".track{{fill:none;stroke-width:{width};stroke-linecap:round}}",
         ".dot{fill:var(--ink,#222);stroke:var(--paper,#fff);stroke-width:1.2}",
@@ -78,9 +71,7 @@ def _style(statuses: Sequence[str], width: float) -> str:
         rules.append(f".between.is-{name}{{stroke:{colour}}}")
         rules.append(f".open.is-{name}{{stroke:{colour}}}")
         rules += [f".{kind}.is-{name}{{fill:{colour}}}" for kind in ("dot", "solid", "head")]
-    colours = ";".join(f"--{tone}:{dark[tone]}" for tone in dict.fromkeys(tones))
-    scoped = "".join(f"svg.drawing {rule}" for rule in rules)
-    return f"{scoped}@media (prefers-color-scheme:dark){{svg:root.drawing{{{colours}}}}}" if colours else scoped
+    return svg.style_sheet(rules, tones)
 
 
 # ---------------------------------------------------------------- the sky

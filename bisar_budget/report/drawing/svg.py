@@ -127,16 +127,13 @@ class Canvas:
     ) -> None:
         """Draw a line through points, cut at the edges of a box."""
         for run in _runs(points, within):
-            data = "M" + "L".join(f"{_number(x)} {_number(y)}" for x, y in run)
-            self._elements.append(f'<path class="{style}" d="{data}"/>')
+            self._path(_through(run), style)
             if is_obstacle:
                 self.segments += pairwise(run)
 
     def polygons(self, shapes: Iterable[Sequence[Point]], style: str) -> None:
         """Draw many filled or hollow shapes as one."""
-        data = "".join("M" + "L".join(f"{_number(x)} {_number(y)}" for x, y in points) + "Z" for points in shapes)
-        if data:
-            self._elements.append(f'<path class="{style}" d="{data}"/>')
+        self._path("".join(f"{_through(points)}Z" for points in shapes), style)
 
     def polygon(self, points: Sequence[Point], style: str, is_obstacle: bool = True) -> None:
         """Draw a filled or hollow shape."""
@@ -147,16 +144,15 @@ class Canvas:
 
     def lines(self, lines: Iterable[Segment], style: str) -> None:
         """Draw many lines, each from a point to another, as one."""
-        data = "".join(f"M{_number(x)} {_number(y)}L{_number(u)} {_number(v)}" for (x, y), (u, v) in lines)
-        if data:
-            self._elements.append(f'<path class="{style}" d="{data}"/>')
+        self._path("".join(map(_through, lines)), style)
 
     def boxes(self, boxes: Iterable[Box], style: str) -> None:
         """Fill many rectangles as one."""
-        data = "".join(
-            f"M{_number(box.left)} {_number(box.top)}H{_number(box.right)}V{_number(box.bottom)}H{_number(box.left)}Z"
-            for box in boxes
-        )
+        sides = (tuple(map(_number, box)) for box in boxes)
+        data = "".join(f"M{left} {top}H{right}V{bottom}H{left}Z" for left, top, right, bottom in sides)
+        self._path(data, style)
+
+    def _path(self, data: str, style: str) -> None:
         if data:
             self._elements.append(f'<path class="{style}" d="{data}"/>')
 
@@ -256,6 +252,11 @@ class Canvas:
             f'<desc id="{name}-desc">{xml_text(description)}</desc>\n'
             f"<style>{STYLE}{style}</style>\n{body}\n</svg>\n"
         )
+
+
+def _through(points: Iterable[Point]) -> str:
+    """Data of a path from point to point."""
+    return "M" + "L".join(f"{_number(x)} {_number(y)}" for x, y in points)
 
 
 def text_width(line: str) -> float:
@@ -451,8 +452,13 @@ class LegendLine(NamedTuple):
 
 
 def line_entry(canvas: Canvas, words: str, style: str) -> LegendLine:
-    """LegendLine of a line of some style."""
+    """Entry for a line of some style."""
     return LegendLine(words, lambda at: canvas.lines([(at, (at[0] + 25, at[1]))], style))
+
+
+def circle_entry(canvas: Canvas, words: str, radius: float, style: str) -> LegendLine:
+    """Entry for a circle of some style. [px]"""
+    return LegendLine(words, lambda at: canvas.circle((at[0] + 13, at[1]), radius, style))
 
 
 def box_entry(canvas: Canvas, words: str, *styles: str) -> LegendLine:
@@ -492,6 +498,14 @@ def colours() -> tuple[Mapping[str, str], Mapping[str, str]]:
     blocks = sheet.split("}", 2)[:2]
     light, dark = (dict(re.findall(r"--([\w-]+): (#[0-9a-f]{3,6})", block)) for block in blocks)
     return light, dark
+
+
+def style_sheet(rules: Iterable[str], tones: Iterable[str]) -> str:
+    """Rules of one kind of drawing, with colours that a drawing has on a dark screen if it is a file of its own."""
+    _, dark = colours()
+    scoped = "".join(f"svg.drawing {rule}" for rule in rules)
+    own = ";".join(f"--{tone}:{dark[tone]}" for tone in dict.fromkeys(tones))
+    return f"{scoped}@media (prefers-color-scheme:dark){{svg:root.drawing{{{own}}}}}" if own else scoped
 
 
 def has_no_mission(status: str) -> bool:

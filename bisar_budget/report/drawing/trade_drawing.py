@@ -7,6 +7,7 @@ and dark. A polar map is one seen from above: azimuth from east, counter-clockwi
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
+from operator import itemgetter
 from textwrap import wrap
 from typing import Any, NamedTuple
 
@@ -19,7 +20,7 @@ from bisar_budget.findings.trade import Axis, Trade
 from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.model import Mission
 from bisar_budget.report.drawing import svg
-from bisar_budget.report.drawing.trades import borders, level_lines, per_word, regions, runs, thinned
+from bisar_budget.report.drawing.trades import borders, cell_edges, level_lines, per_word, regions, runs, thinned
 from bisar_budget.report.words.sentences import percent
 
 _WIDTH, _HEIGHT = 560.0, 270.0  # of a drawing, of its frame [px]
@@ -96,7 +97,7 @@ def head_of(trade: Trade, mission: Mission, *, is_polar: bool) -> list[str]:
 
 def _style(trade: Trade) -> str:
     """Rules for what only these drawings have."""
-    light, dark = svg.colours()
+    light, _ = svg.colours()
     rules = []
     for place, (name, dashes) in enumerate(zip(svg.ROWS, _DASHES, strict=True)):
         rules.append(f".row{place}{{fill:none;stroke:var(--{name},{light[name]});stroke-width:1.8")
@@ -121,10 +122,7 @@ def _style(trade: Trade) -> str:
     rules.append(".own{fill:var(--paper,#fff);stroke:var(--ink,#222);stroke-width:1.6}")
     rules.append(".frame{fill:none;stroke:var(--muted,#595f66);stroke-width:1}")
     rules.append(".at{fill:none;stroke:var(--ink,#222);stroke-width:1.1;stroke-dasharray:1.5 3}")
-    names = dict.fromkeys((*svg.ROWS, "fail"))
-    colours = ";".join(f"--{name}:{dark[name]}" for name in names if name not in ("transmitter", "receiver"))
-    scoped = "".join(f"svg.drawing {rule}" for rule in rules)
-    return f"{scoped}@media (prefers-color-scheme:dark){{svg:root.drawing{{{colours}}}}}"
+    return svg.style_sheet(rules, [name for name in (*svg.ROWS, "fail") if name not in ("transmitter", "receiver")])
 
 
 def _heat_colour(part: float) -> str:
@@ -149,10 +147,6 @@ def _value_scale(values: Floats, start: float, end: float, *, is_use: bool) -> s
 
 def _swatches(canvas: svg.Canvas, statuses: Sequence[str]) -> list[svg.LegendLine]:
     return [svg.box_entry(canvas, svg.status_words(name), f"is-{name}", "frame") for name in statuses]
-
-
-def _mark(canvas: svg.Canvas, words: str = "this mission", style: str = "own") -> svg.LegendLine:
-    return svg.LegendLine(words, lambda at: canvas.circle((at[0] + 13, at[1]), 5 if style == "own" else 3, style))
 
 
 # ---------------------------------------------------------------- one key
@@ -223,19 +217,16 @@ def _curve(
 
 def _seen(points: Sequence[svg.Point]) -> list[svg.Point]:
     """The visible points of a curve of many: the first, lowest, highest and last of each half pixel."""
+    height = itemgetter(1)
     kept: list[svg.Point] = []
     column: list[svg.Point] = []
     for point in (*points, (math.inf, 0.0)):
         if column and point[0] - column[0][0] > 0.5:
-            ends = (column[0], *sorted((min(column, key=_height), max(column, key=_height))), column[-1])
+            ends = (column[0], *sorted((min(column, key=height), max(column, key=height))), column[-1])
             kept += dict.fromkeys(ends)
             column = []
         column.append(point)
     return kept
-
-
-def _height(point: svg.Point) -> float:
-    return point[1]
 
 
 def _bars(canvas: svg.Canvas, top: float, trade: Trade, rows: Mapping[str, Floats]) -> float:
@@ -269,10 +260,10 @@ def _bars(canvas: svg.Canvas, top: float, trade: Trade, rows: Mapping[str, Float
         shown = [(along.at(100 * use), down.at(place)) for place, use in enumerate(uses.tolist()) if use > 0]
         for point in filter(frame.holds, shown):
             canvas.circle(point, 3, f"dot{number}")
-        entries.append(_mark(canvas, row, f"dot{number}"))
+        entries.append(svg.circle_entry(canvas, row, 3, f"dot{number}"))
     if axis.own is not None:
         canvas.circle((frame.left + 9, down.at(axis.own)), 5, "own")
-        entries.append(_mark(canvas))
+        entries.append(svg.circle_entry(canvas, "this mission", 5, "own"))
     svg.outline(canvas, frame, "frame")
     svg.y_axis(canvas, frame, down, "", axis.words)
     bottom = svg.x_axis(canvas, frame, along, trade.heading or "utilization [%]")
@@ -330,7 +321,8 @@ def _map(canvas: svg.Canvas, top: float, trade: Trade, geometry: BistaticGeometr
     else:
         plane = _from_above(x, y, frame)
         frame = frame._replace(top=frame.top + 24, bottom=frame.top + 24 + 2 * _RIM)
-    columns, lines = _cuts(x, plane.across), _cuts(y, plane.up)
+    columns = [plane.across.at(edge) for edge in cell_edges(x)]
+    lines = [plane.up.at(edge) for edge in cell_edges(y)]
     statuses = [name for name in trade.statuses if not trade.column or svg.has_no_mission(name)]
     entries = _swatches(canvas, statuses)
     for name in statuses:
@@ -353,20 +345,12 @@ def _map(canvas: svg.Canvas, top: float, trade: Trade, geometry: BistaticGeometr
         entries.insert(0, svg.line_entry(canvas, "utilization 100 %", "border"))
     if all(axis.own is not None and axis.values[0] <= axis.own <= axis.values[-1] for axis in (x, y)):
         canvas.circle(plane.at(plane.across.at(x.own or 0.0), plane.up.at(y.own or 0.0)), 5, "own")
-        entries.append(_mark(canvas))
+        entries.append(svg.circle_entry(canvas, "this mission", 5, "own"))
     if geometry is not None:
         return svg.legend(canvas, frame.bottom + 24, _WIDTH, entries)
     svg.outline(canvas, frame, "frame")
     svg.y_axis(canvas, frame, plane.up, y.label, y.words)
     return svg.legend(canvas, svg.x_axis(canvas, frame, plane.across, x.label, x.words), _WIDTH, entries)
-
-
-def _cuts(axis: Axis, scale: svg.Scale) -> list[float]:
-    """Places of the edges of the cells; the first and the last end at the values themselves."""
-    edges = axis.edges
-    if not axis.words:
-        edges[0], edges[-1] = axis.values[0], axis.values[-1]
-    return [scale.at(edge) for edge in edges.tolist()]
 
 
 def _cells(mask: NDArray[np.bool_], columns: Sequence[float], lines: Sequence[float]) -> Iterator[svg.Box]:

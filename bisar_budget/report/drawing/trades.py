@@ -164,6 +164,20 @@ def uses_of_rows(trade: Trade, gathered: Callable[[Sequence[str]], Gathered]) ->
     return {row: values[f"{row}.utilization"] for row in rows}
 
 
+def cell_edges(axis: Axis) -> list[float]:
+    """Ends of the cells around the values; the first and the last end at the values themselves.
+
+    Of words each has its room to both sides.
+    """
+    edges = axis.edges.tolist()
+    return edges if axis.words else [float(axis.values[0]), *edges[1:-1], float(axis.values[-1])]
+
+
+def stretches(begins: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
+    """Starts and stops of neighbours of one kind; `begins` says of each but the first whether it begins another."""
+    return pairwise([0, *(np.flatnonzero(begins) + 1).tolist(), begins.size + 1])
+
+
 class Run(NamedTuple):
     """Neighbouring values with one status, from edge to edge."""
 
@@ -173,16 +187,10 @@ class Run(NamedTuple):
 
 
 def runs(axis: Axis, statuses: NDArray[Any]) -> Iterator[Run]:
-    """Stretches of one axis with one status each; the first and the last end at the values themselves.
-
-    Of words each has its room to both sides.
-    """
-    edges = axis.edges
-    if not axis.words:
-        edges[0], edges[-1] = axis.values[0], axis.values[-1]
-    starts = [0, *(np.flatnonzero(statuses[1:] != statuses[:-1]) + 1).tolist(), statuses.size]
-    for start, stop in pairwise(starts):
-        yield Run(str(statuses[start]), float(edges[start]), float(edges[stop]))
+    """Stretches of one axis with one status each."""
+    edges = cell_edges(axis)
+    for start, stop in stretches(statuses[1:] != statuses[:-1]):
+        yield Run(str(statuses[start]), edges[start], edges[stop])
 
 
 class MapRegion(NamedTuple):

@@ -7,15 +7,14 @@ from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.constants import ROUNDING, SPEED_OF_LIGHT
 from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
-from bisar_budget.effects.effect import CLOCK_UNITS, MOTION_UNITS, PLATFORMS, ErrorSource, Subject, subject
+from bisar_budget.effects.effect import CLOCK_UNITS, MOTION_UNITS, PLATFORMS, ErrorSource, subject
 from bisar_budget.faults import KeyPath, printable
-from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import FRAME_AXES, GroundVector, PlatformState
 from bisar_budget.mission.model import Mission
 from bisar_budget.ranges.exact_ranges import ExactRanges
 from bisar_budget.report.explain import notation
-from bisar_budget.report.explain.notation import Step, Sum, WorkedEquation, equation, number, step, with_unit
+from bisar_budget.report.explain.notation import Step, Sum, WorkedEquation, number, step, with_unit
 from bisar_budget.report.words.sentences import dotted
 
 
@@ -38,14 +37,14 @@ def declaration(mission: Mission, source: ErrorSource) -> Iterator[Step]:
             yield from _turned(mission, source, axis)
             return
         if error.covariance is not None and error.covariance.is_matrix and kind != "acceleration":
-            yield from step("One sigma is the root of the variance")
+            yield step("One sigma is the root of the variance")
         own = values[FRAME_AXES[error.frame].index(axis)]
     elif source.is_common:
         own = getattr(mission.common_motion_error, kind)[FRAME_AXES[source.subject.frame].index(axis)]
     else:
         return  # an error of nobody's: no coverage factor
-    lines = equation("declared", "k*|value|", {"k": k, "value": own}, abs(source.declared), source.unit)
-    yield from step("Coverage factor allocation.coverage_factor", *lines)
+    worked = WorkedEquation("declared", "k*|value|", {"k": k, "value": own}, abs(source.declared), source.unit)
+    yield step("Coverage factor allocation.coverage_factor", worked)
 
 
 def _turned(mission: Mission, source: ErrorSource, axis: str) -> Iterator[Step]:
@@ -71,7 +70,7 @@ def _turned(mission: Mission, source: ErrorSource, axis: str) -> Iterator[Step]:
     title = f"Along {axis} from the {error.frame} frame ({', '.join(FRAME_AXES[error.frame])}): {how}"
     size = Sum(f"declared = {text} = {with_unit(abs(source.declared or 0.0), source.unit)}")
     sign = ("from here on with the sign of the parts’ sum",) if (source.declared or 0.0) < 0 else ()
-    yield from step(title, size, *sign)
+    yield step(title, size, *sign)
 
 
 def _quadratic_form(parts: Sequence[str], correlation: Sequence[Sequence[float]]) -> str:
@@ -86,10 +85,8 @@ def _quadratic_form(parts: Sequence[str], correlation: Sequence[Sequence[float]]
     return "sqrt(" + " + ".join(terms) + ")"
 
 
-def effect(analysis: Analysis, found: MissionFindings, source: ErrorSource, model: str | None) -> Iterator[Step]:
+def effect(analysis: Analysis, source: ErrorSource, model: str | None) -> Iterator[Step]:
     """From `declared` to the quadratic phase error; for one unit where nothing is declared."""
-    mission = analysis.mission
-    sources = {one.subject: one for one in analysis.sources}
     size = 1.0 if source.declared is None else abs(source.declared)
     each = " of one unit" if source.declared is None else ""
     signed = math.copysign(size, source.declared or 1.0)
@@ -97,32 +94,31 @@ def effect(analysis: Analysis, found: MissionFindings, source: ErrorSource, mode
     platform, kind, axis = source.owner, source.subject.kind, source.subject.axis
     gates_by_full = model == "full"
     if gates_by_full and source.is_motion and (source.owner != "mission" or kind == "time_tag"):
-        unaware = ", which does not know the direct path" if mission.has_direct_path else ""
-        yield from step(f"The published model, for comparison{unaware}; what gates, the full model, comes after it")
+        unaware = ", which does not know the direct path" if analysis.mission.has_direct_path else ""
+        yield step(f"The published model, for comparison{unaware}; what gates, the full model, comes after it")
     if not source.is_motion:
-        yield from step("Quadratic phase error, as declared", f"QPE = {size:.6g} rad")
+        yield step("Quadratic phase error, as declared", f"QPE = {size:.6g} rad")
     elif kind == "time_tag":
-        yield from _time_tag_effect(found, source, size, each)
+        yield from _time_tag_effect(analysis, source, size, each)
     elif source.is_common and source.subject.frame != "scene":
-        yield from _common_projected_effect(found, source, sources, size, each)
+        yield from _common_projected_effect(analysis, source, size, each)
     elif source.is_common:
-        yield from _common_effect(mission, found, source, sources, signed, each)
+        yield from _common_effect(analysis, source, signed, each)
     elif source.owner == "mission":
-        yield from step("Published model: a height error moves the image, no quadratic term")
+        yield step("Published model: a height error moves the image, no quadratic term")
     elif source.clock is not None:
-        yield from _clock_effect(mission, source, signed, each)
+        yield from _clock_effect(analysis.mission, source, signed, each)
     elif axis in notation.AXES:
-        state = getattr(found.geometry, platform)
-        values = _motion_values(mission, state, platform, kind, axis, signed)
+        values = _motion_values(analysis, platform, kind, axis, signed)
         for order, formula in notation.motion_coefficients(kind, axis, platform).items():
-            result = signed * _coefficient(mission, source, order)
+            result = signed * _coefficient(analysis.mission, source, order)
             title = f"{_table_i(kind, axis)}{each}"
-            yield from step(title, *equation(f"β̃_{order}", formula, values, result, RATES[order]))
+            yield step(title, WorkedEquation(f"β̃_{order}", formula, values, result, RATES[order]))
         phase = notation.motion_phase(kind, axis, platform)
         if phase is not None:
-            yield from step(f"{source.equation}{each}", *equation("QPE", phase, values, qpe, "rad"))
+            yield step(f"{source.equation}{each}", WorkedEquation("QPE", phase, values, qpe, "rad"))
     else:
-        yield from _projected_effect(mission, found, source, sources, size, each)
+        yield from _projected_effect(analysis, source, size, each)
     if not source.is_motion:
         return
     if gates_by_full:
@@ -140,13 +136,12 @@ def _coefficient(mission: Mission, source: ErrorSource, order: int) -> float:
     return phase * mission.radar.wavelength / (2 * math.pi * (mission.collection.aperture_time / 2) ** order)
 
 
-def _motion_values(
-    mission: Mission, state: PlatformState, platform: str, kind: str, axis: str, size: float
-) -> dict[str, float]:
+def _motion_values(analysis: Analysis, platform: str, kind: str, axis: str, size: float) -> dict[str, float]:
+    state: PlatformState = getattr(analysis.geometry, platform)
     index, s = notation.AXES.index(axis), platform[0]
     return {
-        "T": mission.collection.aperture_time,
-        "λ": mission.radar.wavelength,
+        "T": analysis.mission.collection.aperture_time,
+        "λ": analysis.mission.radar.wavelength,
         f"R_{s}": state.slant_range,
         f"{axis}_{s}": state.position[index],
         f"v_{axis}{s}": state.velocity[index],
@@ -186,55 +181,55 @@ def _clock_effect(mission: Mission, source: ErrorSource, size: float, each: str)
                 title += f", H = {with_unit(age, 's')} after the clocks were set"
             symbol, formulas = _OF_SETTING[kind]
             for order, term in terms.items():
-                lines += equation(f"t̃_{order}", formulas[order], {symbol: size, "H": age}, term, _TERM_UNITS[order])
-        yield from step(f"{title}{each}", *lines)
+                lines.append(
+                    WorkedEquation(f"t̃_{order}", formulas[order], {symbol: size, "H": age}, term, _TERM_UNITS[order])
+                )
+        yield step(f"{title}{each}", *lines)
     for order, term in terms.items():
         known, result = {**values, f"t̃_{order}": term}, SPEED_OF_LIGHT * term
         formula = notation.clock_coefficient(order)
-        yield from step(f"Table I row 1{each}", *equation(f"β̃_{order}", formula, known, result, RATES[order]))
+        yield step(f"Table I row 1{each}", WorkedEquation(f"β̃_{order}", formula, known, result, RATES[order]))
         if order == 2:
             qpe = abs(source.effect.qpe * size)
             title = "Table I row 1, step of Table II"
-            yield from step(f"{title}{each}", *equation("QPE", notation.CLOCK_PHASE, known, qpe, "rad"))
+            yield step(f"{title}{each}", WorkedEquation("QPE", notation.CLOCK_PHASE, known, qpe, "rad"))
 
 
 def _table_i(kind: str, axis: str) -> str:
     return f"Table I row {2 + 3 * notation.AXES.index(axis) + list(MOTION_UNITS).index(kind)}"
 
 
-def _common_effect(
-    mission: Mission,
-    found: MissionFindings,
-    source: ErrorSource,
-    sources: Mapping[Subject, ErrorSource],
-    size: float,
-    each: str,
-) -> Iterator[Step]:
+def _source_of(analysis: Analysis, platform: str, kind: str, axis: str) -> ErrorSource:
+    wanted = subject(platform, kind, axis)
+    return next(one for one in analysis.sources if one.subject == wanted)
+
+
+def _common_effect(analysis: Analysis, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
     """The effects of both platforms, added with their signs."""
     _, _, kind, axis, *_ = source.subject
     values = {}
     for platform in PLATFORMS:
-        leg, phase = sources[subject(platform, kind, axis)], f"φ_{platform[0]}"
+        leg, phase = _source_of(analysis, platform, kind, axis), f"φ_{platform[0]}"
         values[phase] = leg.effect.qpe * size
-        known = _motion_values(mission, getattr(found.geometry, platform), platform, kind, axis, size)
+        known = _motion_values(analysis, platform, kind, axis, size)
         for order, formula in notation.motion_coefficients(kind, axis, platform).items():
-            known[f"β̃_{order}"] = result = size * _coefficient(mission, leg, order)
+            known[f"β̃_{order}"] = result = size * _coefficient(analysis.mission, leg, order)
             title = f"{_table_i(kind, axis)}, {platform}{each}"
-            yield from step(title, *equation(f"β̃_{order}", formula, known, result, RATES[order]))
+            yield step(title, WorkedEquation(f"β̃_{order}", formula, known, result, RATES[order]))
         if kind != "position":
             title = f"Its phase at the aperture edge, {platform}"
-            yield from step(title, *equation(phase, notation.EDGE_PHASE, known, values[phase], "rad"))
+            yield step(title, WorkedEquation(phase, notation.EDGE_PHASE, known, values[phase], "rad"))
     if kind == "position":
-        yield from step(f"Table I: a position error moves the image, no quadratic term{each}")
+        yield step(f"Table I: a position error moves the image, no quadratic term{each}")
         return
     qpe = abs(source.effect.qpe * size)
-    yield from step(f"{source.equation}{each}, signed", *equation("QPE", "|φ_t + φ_r|", values, qpe, "rad"))
+    yield step(f"{source.equation}{each}, signed", WorkedEquation("QPE", "|φ_t + φ_r|", values, qpe, "rad"))
 
 
-def _time_tag_effect(found: MissionFindings, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
+def _time_tag_effect(analysis: Analysis, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
     """Velocity times the time tag, and by its rates what the published model has of it."""
     for name in (PLATFORMS[place] for place in source.platforms):
-        state: PlatformState = getattr(found.geometry, name)
+        state: PlatformState = getattr(analysis.geometry, name)
         values = {"δt": size}
         lines: list[str | WorkedEquation | Sum] = []
         for symbol, vector, unit in (("v", state.velocity, "m/s"), ("a", state.acceleration, "m/s^2")):
@@ -243,71 +238,63 @@ def _time_tag_effect(found: MissionFindings, source: ErrorSource, size: float, e
             speed = math.sqrt(math.fsum(part * part for part in vector))
             if speed:
                 per = {"v": "m", "a": "m/s"}[symbol]
-                lines += equation(f"|{symbol}|*δt", f"{symbol}*δt", {symbol: speed, **values}, speed * size, per)
-        yield from step(
-            f"p(τ + δt) − p(τ): a position error v·δt at mid-aperture, a velocity error a·δt{each}", *lines
-        )
+                lines.append(
+                    WorkedEquation(f"|{symbol}|*δt", f"{symbol}*δt", {symbol: speed, **values}, speed * size, per)
+                )
+        yield step(f"p(τ + δt) − p(τ): a position error v·δt at mid-aperture, a velocity error a·δt{each}", *lines)
     unit = f"rad per {source.unit}"
-    yield from step(
+    yield step(
         f"{source.equation}: Table II times v, a and the jerk, added",
         f"QPE/unit = {with_unit(source.effect.qpe, unit)}",
     )
+    yield _times_declared(source, size, each)
+
+
+def _times_declared(source: ErrorSource, size: float, each: str) -> Step:
+    """The effect of one unit times what is declared."""
     values = {"QPE/unit": abs(source.effect.qpe), "declared": size}
     qpe = abs(source.effect.qpe) * size
-    yield from step(f"Quadratic phase error{each}", *equation("QPE", "QPE/unit*declared", values, qpe, "rad"))
+    return step(f"Quadratic phase error{each}", WorkedEquation("QPE", "QPE/unit*declared", values, qpe, "rad"))
 
 
-def _common_projected_effect(
-    found: MissionFindings,
-    source: ErrorSource,
-    sources: Mapping[Subject, ErrorSource],
-    size: float,
-    each: str,
-) -> Iterator[Step]:
-    """The same components in each platform's own axes: projections of both, added with their signs."""
+def _projected(analysis: Analysis, source: ErrorSource, platform: str) -> tuple[str, float]:
+    """Effects along the axes of the scene, projected on the axis of the error: the sum written out, and its value."""
     _, _, kind, axis, frame, _ = source.subject
+    state: PlatformState = getattr(analysis.geometry, platform)
+    direction = state.frame(frame)[FRAME_AXES[frame].index(axis)]
+    effects = [_source_of(analysis, platform, kind, letter).effect.qpe for letter in notation.AXES]
+    pairs = list(zip(effects, direction, strict=True))
+    return " + ".join(f"{number(q)}*{number(d)}" for q, d in pairs), math.fsum(q * d for q, d in pairs)
+
+
+def _common_projected_effect(analysis: Analysis, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
+    """The same components in each platform's own axes: projections of both, added with their signs."""
+    axis, frame = source.subject.axis, source.subject.frame
     unit, values = f"rad per {source.unit}", dict[str, float]()
     for platform in PLATFORMS:
-        state: PlatformState = getattr(found.geometry, platform)
-        direction = state.frame(frame)[FRAME_AXES[frame].index(axis)]
-        along = [sources[subject(platform, kind, letter)].effect.qpe for letter in notation.AXES]
-        terms = " + ".join(f"{number(q)}*{number(d)}" for q, d in zip(along, direction, strict=True))
-        leg = math.fsum(q * d for q, d in zip(along, direction, strict=True))
+        terms, leg = _projected(analysis, source, platform)
         symbol = f"φ_{platform[0]}/unit"
         values[symbol] = leg
-        yield from step(
+        yield step(
             f"{source.equation.removesuffix(', both platforms')}, {unit.replace('^2', '²')} along x, y, z of the "
             f"{platform}, times the {axis} axis of its {frame} frame",
             Sum(f"{symbol} = {terms} = {with_unit(leg, unit)}"),
         )
     values["declared"] = size
     qpe = abs(source.effect.qpe) * size
-    lines = equation("QPE", "|φ_t/unit + φ_r/unit|*declared", values, qpe, "rad")
-    yield from step(f"{source.equation}{each}, signed", *lines)
+    worked = WorkedEquation("QPE", "|φ_t/unit + φ_r/unit|*declared", values, qpe, "rad")
+    yield step(f"{source.equation}{each}, signed", worked)
 
 
-def _projected_effect(
-    mission: Mission,
-    found: MissionFindings,
-    source: ErrorSource,
-    sources: Mapping[Subject, ErrorSource],
-    size: float,
-    each: str,
-) -> Iterator[Step]:
+def _projected_effect(analysis: Analysis, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
     """Along an axis of another frame: the projection of the effects along the axes of the scene."""
-    _, platform, kind, axis, frame, _ = source.subject
-    state: PlatformState = getattr(found.geometry, platform)
-    direction = state.frame(frame)[FRAME_AXES[frame].index(axis)]
-    along = [sources[subject(platform, kind, letter)].effect.qpe for letter in notation.AXES]
-    terms = " + ".join(f"{number(q)}*{number(d)}" for q, d in zip(along, direction, strict=True))
+    terms, _ = _projected(analysis, source, source.owner)
     unit = f"rad per {source.unit}"
-    yield from step(
-        f"{source.equation}, {unit.replace('^2', '²')} along x, y, z times the {axis} axis",
+    yield step(
+        f"{source.equation}, {unit.replace('^2', '²')} along x, y, z times the {source.subject.axis} axis",
         Sum(f"QPE/unit = |{terms}| = {with_unit(abs(source.effect.qpe), unit)}"),
     )
-    values = {"QPE/unit": abs(source.effect.qpe), "declared": size}
-    qpe = abs(source.effect.qpe) * size
-    yield from step(f"Quadratic phase error{each}", *equation("QPE", "QPE/unit*declared", values, qpe, "rad"))
+    yield _times_declared(source, size, each)
 
 
 def _displacement(analysis: Analysis, source: ErrorSource) -> Iterator[Step]:
@@ -326,8 +313,8 @@ def _displacement(analysis: Analysis, source: ErrorSource) -> Iterator[Step]:
     lines: list[WorkedEquation] = []
     for symbol, (first, second), result in zip(("x̃", "ỹ"), published.plane.adjugate, moved, strict=True):
         entries = {"adj_0": first, "adj_1": second}
-        lines += equation(symbol, "(adj_0*β̃_0 + adj_1*β̃_1)/(det Q)", values | entries, result, "m")
-    yield from step("(25), (30): the image moves east, north by", *lines)
+        lines.append(WorkedEquation(symbol, "(adj_0*β̃_0 + adj_1*β̃_1)/(det Q)", values | entries, result, "m"))
+    yield step("(25), (30): the image moves east, north by", *lines)
 
 
 def place(mission: Mission, path: KeyPath) -> str:
@@ -340,11 +327,11 @@ def place(mission: Mission, path: KeyPath) -> str:
 def stated(mission: Mission, path: KeyPath, declared: float | None, evidence: str | None) -> Iterator[Step]:
     """Where a value stands in the file and what shows it; else that the file is silent."""
     if declared is None:
-        yield Step(missing(mission, path))
+        yield step(missing(mission, path))
         return
-    yield from step(f"Declared in {place(mission, path)}", as_written(mission, path))
+    yield step(f"Declared in {place(mission, path)}", as_written(mission, path))
     if evidence:
-        yield from step("Evidence", printable(evidence))
+        yield step("Evidence", printable(evidence))
 
 
 def missing(mission: Mission, path: KeyPath) -> str:
@@ -414,44 +401,35 @@ def worse(analysis: Analysis, source: ErrorSource, size: float, which: int = _QU
 
 
 def full_chain(analysis: Analysis, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
-    """From a signed error to its phases by the full model.
+    """From the signed size of an error [unit], or one unit of what is not declared, to its phases by the full model.
 
-    Parameters
-    ----------
-    analysis : Analysis
-        Of the mission.
-    source : ErrorSource
-        The error.
-    size : float
-        With its sign; of what is not declared, one unit. [unit]
-    each : str
-        Said of what is not declared.
+    `each` is said of what is not declared.
     """
     each = each.replace(" of ", ", for ")
     if not source.is_heard:
-        yield from step(f"Full model{each}: {analysis.full.no_limit(source)}")
+        yield step(f"Full model{each}: {analysis.full.no_limit(source)}")
         return
     left = worse(analysis, source, size)
     if not left.ranges:
-        yield from step(f"Full model{each}: no ground point has the range history that this error leaves")
+        yield step(f"Full model{each}: no ground point has the range history that this error leaves")
         return
     sign = "" if left.is_small or left.size == size else ", with the other sign, which leaves more"
-    yield from step(
+    yield step(
         f"Full model{each}{sign}: the ground point at which nothing is left of P₀ and P₁ over the aperture",
         *_placed(left),
     )
     times = analysis.exact.times[:, 0].tolist()
-    yield from step(
+    yield step(
         f"Range error left there, {_left_of(analysis.exact)}, at the nodes of the fit",
         *(f"{time:+.6g} s: {metres:.6g} m" for time, metres in zip(times, left.ranges, strict=True)),
     )
-    yield from step(
+    yield step(
         "Quadratic phase at the aperture edge, 3/2 of P₂: weights of the fit times what is left",
         left.sum("QPE_full", _QUADRATIC),
     )
     if source.is_motion and analysis.mission.requirements.cubic_phase_error is not None:
         by_cubic = worse(analysis, source, size, _CUBIC)
-        yield from step("Cubic phase there, 5/2 of P₃", by_cubic.sum("cubic_full", _CUBIC))
+        yield step("Cubic phase there, 5/2 of P₃", by_cubic.sum("cubic_full", _CUBIC))
 
 
 def _left_of(exact: ExactRanges) -> str:
@@ -464,9 +442,9 @@ def for_comparison(analysis: Analysis, source: ErrorSource, size: float, each: s
     """The result of the full model for an error that the published one judges."""
     left = worse(analysis, source, size)
     if not left.ranges:
-        yield from step(f"Full model{each}, for comparison: no ground point has the range history")
+        yield step(f"Full model{each}, for comparison: no ground point has the range history")
         return
-    yield from step(
+    yield step(
         f"Full model{each}, for comparison: weights of the fit times the range error left (--model full lists it)",
         left.sum("QPE_full", _QUADRATIC),
     )
@@ -488,34 +466,39 @@ def at_the_allowable(
         left = max(sizes, key=lambda one: abs(one.phase(which)))
         moved = left.sum(symbol, which)
     size = f"{number(left.size)} {source.unit.replace('^2', '²')}"
-    yield from step(f"At {size}, the smallest size of either sign that reaches the limit, exact ranges give", moved)
+    yield step(f"At {size}, the smallest size of either sign that reaches the limit, exact ranges give", moved)
 
 
 def end_of_the_image(size: float, unit: str) -> Iterator[Step]:
     """Say what it means that an image ends."""
-    yield from step(
+    yield step(
         "End of the image: no ground point has the range history of a larger error, of one sign or the other",
         "The point is followed as the error grows, to where range and Doppler gradients become parallel there",
         f"by_image = {with_unit(size, unit)}, a limit whatever phase or displacement is allowed",
     )
 
 
+def no_limit(row: Row) -> Step:
+    """The step of a row that nothing limits."""
+    return step("Allowable: no limit", printable(row.reason or "no requirement limits this error"))
+
+
 def smallest_size(row: Row, sizes: Mapping[str, float]) -> Iterator[Step]:
     """The allowable of a row: the smallest of the sizes that its requirements allow, each by its symbol."""
     if row.allowable is None or not sizes:
-        yield from step("Allowable: no limit", printable(row.reason or "no requirement limits this error"))
+        yield no_limit(row)
         return
     found = list(sizes.values())
     text = f"min({', '.join(map(number, found))})" if len(found) > 1 else number(found[0])
     title = f"Allowable: the smallest, by {', '.join(sizes)}"
     if row.unit != "dB":
-        yield from step(title, Sum(f"allowable = {text} = {with_unit(row.allowable, row.unit)}"))
+        yield step(title, Sum(f"allowable = {text} = {with_unit(row.allowable, row.unit)}"))
         return
     factor = min(found)
-    yield from step(f"{title}: a factor of the noise's amplitude", Sum(f"factor = {text} = {with_unit(factor, '')}"))
-    lines = equation("allowable", "20*log(factor)/log(10)", {"factor": factor}, row.allowable, "dB")
-    yield from step("As a level, against the noise that is declared: it may rise by that much", *lines)
-    yield from step("Utilization", *equation("utilization", "1/factor", {"factor": factor}, 1 / factor, ""))
+    yield step(f"{title}: a factor of the noise's amplitude", Sum(f"factor = {text} = {with_unit(factor, '')}"))
+    worked = WorkedEquation("allowable", "20*log(factor)/log(10)", {"factor": factor}, row.allowable, "dB")
+    yield step("As a level, against the noise that is declared: it may rise by that much", worked)
+    yield step("Utilization", WorkedEquation("utilization", "1/factor", {"factor": factor}, 1 / factor, ""))
 
 
 def _placed(left: Left) -> Sequence[str]:
@@ -538,21 +521,21 @@ def limit_steps(allocation: Allocation, owner: str, limit: float) -> Iterator[St
     yield from autofocus_gain(allocation)
     values = {"total": total, "share": share, "gain": gain}
     title = f"Budget requirements.quadratic_phase_error, {whose.get(owner, f'the {owner}’s share')}"
-    yield from step(title, *equation("limit", "total*share*gain", values, limit, "rad"))
+    yield step(title, WorkedEquation("limit", "total*share*gain", values, limit, "rad"))
 
 
 def autofocus_gain(allocation: Allocation) -> Iterator[Step]:
     """The steps to the gain, the factor by which autofocus multiplies limits."""
     if allocation.n_pull is None:
-        yield from step("No autofocus (autofocus.n_pull): gain = 1")
+        yield step("No autofocus (autofocus.n_pull): gain = 1")
         return
     if allocation.n_pull_stated != allocation.n_pull:
         title = f"autofocus.n_pull of {allocation.n_pull_stated:g} counts up to half a range cell of range walk, f0/B"
-        yield from step(title, f"N_pull = {allocation.n_pull:.6g}")
+        yield step(title, f"N_pull = {allocation.n_pull:.6g}")
     values = {"N_pull": allocation.n_pull, "q": allocation.qpe_total}
     raw = math.pi * allocation.n_pull / allocation.qpe_total
-    lines = equation("gain", notation.AUTOFOCUS_GAIN, values, raw, "")
-    yield from step("Autofocus, Section VI" + (", never below 1" if raw < 1 else ""), *lines)
+    worked = WorkedEquation("gain", notation.AUTOFOCUS_GAIN, values, raw, "")
+    yield step("Autofocus, Section VI" + (", never below 1" if raw < 1 else ""), worked)
 
 
 def combined(
@@ -572,7 +555,7 @@ def combined(
     width = max((len(name) for name, _ in members), default=0)
     listed = [f"{printable(name):<{width}}  {size:.6g} {unit}" for name, size in members if size] or ["none"]
     if total is None or not members:
-        yield from step(title, *listed)
+        yield step(title, *listed)
         return
     sizes = [number(size) for _, size in members if size] or ["0"]
     if rule == "sum":
@@ -581,4 +564,4 @@ def combined(
         text = "sqrt(" + " + ".join(f"{size}^2" for size in sizes) + ")"
     else:
         text = f"max(0, {', '.join(sizes)})"
-    yield from step(title, *listed, Sum(f"{symbol} = {text} = {total:.6g} {unit}"))
+    yield step(title, *listed, Sum(f"{symbol} = {text} = {total:.6g} {unit}"))

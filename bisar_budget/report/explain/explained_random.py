@@ -1,28 +1,30 @@
-"""How a sensor, a clock or the air comes to its phases: figures, line of sight, spectra and integrals."""
+"""How a sensor, a clock, the air or a vibration comes to its phases: figures, line of sight, spectra, integrals."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from bisar_budget import evaluators
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.analysis.spread import Tone, declared_powers, mainlobe_energy, spread_phase, tones
-from bisar_budget.analysis.vibration_limits import (
-    LARGEST_ECHO,
-    Echo,
-    bessel,
-    highest_echo,
-    quadratures,
-    tone_limits,
-)
+from bisar_budget.analysis.spread import mainlobe_energy, spread_phase
 from bisar_budget.budget.random_rows import held_effect, no_effect
-from bisar_budget.constants import SPEED_OF_LIGHT
-from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
-from bisar_budget.effects.effect import subject
+from bisar_budget.constants import EARTH_RADIUS, SPEED_OF_LIGHT, STANDARD_GRAVITY
+from bisar_budget.effects.air_delays import (
+    CONTENT,
+    DELAY,
+    ELECTRONS,
+    IONOSPHERE,
+    TROPOSPHERE,
+    group_delay,
+    leg_factor,
+    metres_per_unit,
+)
+from bisar_budget.effects.declared import CUBIC, LOCATION
 from bisar_budget.effects.lever_arms import arm_at, body_axes
 from bisar_budget.effects.navigation_errors import TILTS, process_of, specific_force
-from bisar_budget.effects.oscillators import spurs_of
+from bisar_budget.effects.oscillator_acceleration import accelerated_tones, felt, flies_a_turn, pieces_by_acceleration
 from bisar_budget.effects.random_effect import RandomEffect, RandomError
 from bisar_budget.effects.random_errors import random_errors
 from bisar_budget.effects.spectra import (
@@ -32,19 +34,22 @@ from bisar_budget.effects.spectra import (
     parts,
     set_parts,
     synchronized_parts,
+    tone,
 )
-from bisar_budget.faults import printable
+from bisar_budget.effects.vibration import SLOWEST, counted
+from bisar_budget.effects.vibration_spectra import displacement_rms, pieces_of_vibration, power_of
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import PlatformState
 from bisar_budget.mission.instruments import Synchronization
 from bisar_budget.mission.model import Mission
-from bisar_budget.report.explain.explained_air import delay_on_a_leg, effect_from_elsewhere
-from bisar_budget.report.explain.explained_error import combined, limit_steps, place, smallest_size, stated
+from bisar_budget.mission.propagation import ABOVE_THE_AIR, height_of
+from bisar_budget.mission.vibrations import FeltVibration, Spectrum, Vibration
+from bisar_budget.report.explain.explained_error import limit_steps, smallest_size, stated
+from bisar_budget.report.explain.explained_spreading import allowed_variance, effect_from_elsewhere
 from bisar_budget.report.explain.notation import (
     Step,
     Sum,
     WorkedEquation,
-    equation,
     inertial_phases,
     number,
     step,
@@ -60,6 +65,8 @@ _SYMBOLS = {
     "angle_random_walk": "N_g",
 }
 _PARTS = ("QPE", "cubic", "left")
+_PER_SENSITIVITY = "rad per s²/m"
+_MOMENTS = (-1.0, -0.5, 0.0, 0.5, 1.0)  # of half an aperture
 _WHAT = ("quadratic phase at the aperture edge", "cubic phase there", "what is left after the cubic, rms")
 
 
@@ -75,16 +82,16 @@ def explained_random(analysis: Analysis, allocation: Allocation, error: RandomEr
         yield from _lever_arm(analysis, error)
     elif kind == "random":
         yield from _position(analysis, error)
-    elif kind == "vibration" or error.subject.axis == "acceleration":
-        from bisar_budget.report.explain.explained_shaking import explained_shaking
-
-        yield from explained_shaking(mission, error)
+    elif kind == "vibration":
+        yield from _spectrum(mission, error)
+    elif error.subject.axis == "acceleration":
+        yield from _acceleration(mission, error)
     elif kind == "oscillator":
         yield from _oscillator(mission, error)
     elif kind == "propagation":
-        yield from delay_on_a_leg(analysis, error)
+        yield from _delay_on_a_leg(analysis, error)
     elif kind == "other":
-        yield from effect_from_elsewhere()
+        yield effect_from_elsewhere()
     else:
         yield from _link(mission, error)
     if model == "full":
@@ -100,9 +107,11 @@ def _declared(mission: Mission, error: RandomError, row: Row) -> Iterator[Step]:
         return
     k = mission.allocation.coverage_factor
     if error.unit != "dB" and error.is_covered:
-        lines = equation("declared", "k*|value|", {"k": k, "value": error.declared / k}, error.declared, error.unit)
+        worked = WorkedEquation(
+            "declared", "k*|value|", {"k": k, "value": error.declared / k}, error.declared, error.unit
+        )
         of_axes = "; of three axes the largest value" if error.subject.kind in ("imu", "random") else ""
-        yield from step(f"Coverage factor allocation.coverage_factor{of_axes}", *lines)
+        yield step(f"Coverage factor allocation.coverage_factor{of_axes}", worked)
 
 
 def _imu(analysis: Analysis, error: RandomError) -> Iterator[Step]:
@@ -123,19 +132,19 @@ def _imu(analysis: Analysis, error: RandomError) -> Iterator[Step]:
     else:
         state: PlatformState = getattr(mission.platforms, error.owner).state
         east, north, up = (with_unit(one + 0.0, "m/s^2") for one in specific_force(mission, state))
-        yield from step("Specific force f = a − g, which accelerometers measure", f"f = [{east}, {north}, {up}]")
+        yield step("Specific force f = a − g, which accelerometers measure", f"f = [{east}, {north}, {up}]")
         name = (
             "what a tilt turns of it into the line of sight, f_u = |u × f|"
             if part == "f_u"
             else "what scale factors have of it along the line of sight, f_s"
         )
-    yield from step(f"Through {name}, at mid-aperture; of three values the root-sum-square of what each has")
+    yield step(f"Through {name}, at mid-aperture; of three values the root-sum-square of what each has")
     for index, formula in enumerate(formulas):
         if formula:
             k = mission.allocation.coverage_factor if index == 2 else 1.0  # a mean power has no coverage factor
             result = unit[index] * k
-            yield from step(
-                f"Derived: {_WHAT[index]}, of one unit", *equation(_PARTS[index], formula, values, result, "rad")
+            yield step(
+                f"Derived: {_WHAT[index]}, of one unit", WorkedEquation(_PARTS[index], formula, values, result, "rad")
             )
 
 
@@ -156,7 +165,7 @@ def _with_arm(analysis: Analysis, error: RandomError) -> Iterator[Step]:
         return
     yield from _arm(analysis, error)
     unit = _per_unit("rad", error)
-    yield from step(
+    yield step(
         "Published model: both together, the line of sight held",
         *(
             f"{part}/unit = {with_unit(value, unit)}"
@@ -177,7 +186,7 @@ def _arm(analysis: Analysis, error: RandomError) -> Iterator[Step]:
     figure = error.subject.axis
     arm = arm_at(state, motion.lever_arm.arm, np.zeros(1))[:, 0]
     tilt = _GROWS[figure]
-    yield from step(
+    yield step(
         f"The arm l at mid-aperture along the axes of the scene; a tilt swings it by {tilt} × R(τ)·l as it turns",
         f"l = [{', '.join(with_unit(float(part) + 0.0, 'm') for part in arm)}]",
     )
@@ -186,9 +195,9 @@ def _arm(analysis: Analysis, error: RandomError) -> Iterator[Step]:
     seen = [float(look @ np.cross(axis, arm)) * size + 0.0 for axis, size in zip(axes, sizes, strict=True)]
     values = dict(zip(("l_1", "l_2", "l_3"), seen, strict=True))
     total = math.sqrt(math.fsum(one * one for one in seen))
-    lines = equation("l_u", "sqrt(l_1^2 + l_2^2 + l_3^2)", values, total, "m per rad")
-    yield from step(
-        "Along the line of sight, u·(ψ × l) about each axis, and of all at their sizes over the largest", *lines
+    worked = WorkedEquation("l_u", "sqrt(l_1^2 + l_2^2 + l_3^2)", values, total, "m per rad")
+    yield step(
+        "Along the line of sight, u·(ψ × l) about each axis, and of all at their sizes over the largest", worked
     )
 
 
@@ -207,22 +216,20 @@ def _lever_arm(analysis: Analysis, error: RandomError) -> Iterator[Step]:
         seen = [float(look @ axis) * size + 0.0 for axis, size in zip(axes, sizes, strict=True)]
         values = dict(zip(("u_along", "u_cross", "u_up"), seen, strict=True))
         total = math.sqrt(math.fsum(one * one for one in seen))
-        lines = equation("u_l", "sqrt(u_along^2 + u_cross^2 + u_up^2)", values, total, "")
+        worked = WorkedEquation("u_l", "sqrt(u_along^2 + u_cross^2 + u_up^2)", values, total, "")
         title = (
             "R(τ)·δl along the line of sight at mid-aperture: of each axis of the body, at its size over the largest"
         )
-        yield from step(title, *lines)
-    rate = (
-        "Tables I and II: a position error that turns with the body; its quadratic and cubic part over the aperture"
+        yield step(title, worked)
+    yield step(
+        "Tables I and II: a position error that turns with the body; its quadratic and cubic part over the aperture",
+        *_by_unit(error.published[:2], _per_unit("rad", error)),
     )
-    unit = _per_unit("rad", error)
-    yield from step(
-        rate,
-        *(
-            f"{part}/unit = {with_unit(value, unit)}"
-            for part, value in zip(_PARTS[:2], error.published[:2], strict=True)
-        ),
-    )
+
+
+def _by_unit(values: Sequence[float], unit: str) -> list[str]:
+    """Quadratic phase, cubic phase and what is left, as far as they are given, by a unit of an error."""
+    return [f"{part}/unit = {with_unit(value, unit)}" for part, value in zip(_PARTS, values, strict=False)]
 
 
 def _by_exact_ranges(mission: Mission, error: RandomError) -> Iterator[Step]:
@@ -238,7 +245,7 @@ def _by_exact_ranges(mission: Mission, error: RandomError) -> Iterator[Step]:
         for part, value, factor in zip(_PARTS[:count], full[:count], factors, strict=False)
         if value
     ]
-    yield from step(
+    yield step(
         "Full model: the same over exact ranges, the line of sight turning, displacement of the image included",
         *lines,
     )
@@ -252,10 +259,10 @@ def _moved(error: RandomError, model: str) -> Iterator[Step]:
     values, unit = {"east/unit": effect.east, "north/unit": effect.north}, _per_unit("m", error)
     by = "(25)" if model == "published" else "exact ranges"
     title = f"Orders 0 and 1 displace the image, by {by}; rms length"
-    yield from step(
+    yield step(
         title if error.is_covered else "In whatever direction: half of its square east, half of it north",
         *(f"{symbol} = {with_unit(value, unit)}" for symbol, value in values.items()),
-        *equation("moved/unit", "sqrt((east/unit)^2 + (north/unit)^2)", values, effect.displacement, unit),
+        WorkedEquation("moved/unit", "sqrt((east/unit)^2 + (north/unit)^2)", values, effect.displacement, unit),
     )
 
 
@@ -266,8 +273,6 @@ def _per_unit(unit: str, error: RandomError) -> str:
 
 def _of_one(kind: str, which: int, wavelength: float, T: float) -> float:
     """Effect of one unit along a whole line of sight."""
-    from bisar_budget import evaluators
-
     row = evaluators.inertial_phases(1.0, 1.0, 1.0, wavelength, T)[list(_SYMBOLS).index(kind)]
     return row[which]
 
@@ -276,21 +281,21 @@ def _position(analysis: Analysis, error: RandomError) -> Iterator[Step]:
     mission, effect = analysis.mission, error.published
     process = process_of(mission, error)
     T, tau = mission.collection.aperture_time, process.correlation_time
-    yield from step(
+    yield step(
         "Half the aperture over the correlation time",
-        *equation("a", "T/(2*τ_c)", {"T": T, "τ_c": tau}, T / (2 * tau), ""),
+        WorkedEquation("a", "T/(2*τ_c)", {"T": T, "τ_c": tau}, T / (2 * tau), ""),
     )
     found = gauss_markov(T, tau)
     words = ("quadratic", "cubic", "left after the cubic", "constant", "linear")
-    yield from step(
+    yield step(
         "Mean squares of a process of variance 1 with the spectrum 4·τ_c/(1 + (2πf·τ_c)²)",
         *(f"{word} = {number(value)}" for word, value in zip(words, found, strict=False)),
     )
     k = 2 * math.pi / mission.radar.wavelength
     values = {"λ": mission.radar.wavelength, "u": effect.quadratic / (k * math.sqrt(found.quadratic)),
               "q": found.quadratic}  # fmt: skip
-    lines = equation("QPE/unit", "2*π*u*sqrt(q)/λ", values, effect.quadratic, "rad per m")
-    yield from step("Along the line of sight at mid-aperture, u; of three values the root-sum-square of each", *lines)
+    worked = WorkedEquation("QPE/unit", "2*π*u*sqrt(q)/λ", values, effect.quadratic, "rad per m")
+    yield step("Along the line of sight at mid-aperture, u; of three values the root-sum-square of each", worked)
 
 
 def _oscillator(mission: Mission, error: RandomError) -> Iterator[Step]:
@@ -298,22 +303,23 @@ def _oscillator(mission: Mission, error: RandomError) -> Iterator[Step]:
     sync = mission.synchronization
     pieces = () if error.noise is None else error.noise.pieces
     spectrum = "S = f_0²·S_y(f)/f²" if oscillator.phase_noise is None else "S = 2·L(f)·(f_0/f_osc)²"
-    yield from step(
+    yield step(
         f"One-sided spectrum of phase at {mission.radar.center_frequency:.6g} Hz, {spectrum} [rad²/Hz]",
-        *(
-            f"{piece.low:.6g} Hz to {piece.high:.6g} Hz: {piece.density:.6g} * f^-{piece.slope:.6g}"
-            for piece in pieces
-        ),
+        *_written(pieces),
     )
     if not error.published.quadratic:
-        yield Step(no_effect(mission, error))
+        yield step(no_effect(mission, error))
         return
-    yield from integrals(pieces, mission, sync)
+    yield from _integrals(pieces, mission, sync)
     if sync is not None and sync.is_holdover:
         yield from _setting(pieces, mission, sync)
     k = mission.allocation.coverage_factor
     if k != 1:
-        yield from step(f"Phases times the coverage factor {number(k)}; what is left is a mean power and has none")
+        yield step(f"Phases times the coverage factor {number(k)}; what is left is a mean power and has none")
+
+
+def _written(pieces: Sequence[PowerLawPiece]) -> list[str]:
+    return [f"{one.low:.6g} Hz to {one.high:.6g} Hz: {one.density:.6g} * f^-{one.slope:.6g}" for one in pieces]
 
 
 def _setting(pieces: Sequence[PowerLawPiece], mission: Mission, sync: Synchronization) -> Iterator[Step]:
@@ -325,7 +331,7 @@ def _setting(pieces: Sequence[PowerLawPiece], mission: Mission, sync: Synchroniz
     per_phase = mission.radar.wavelength / (2 * math.pi)
     c_0, c_1 = per_phase * math.sqrt(found.constant[0]), per_phase * math.sqrt(found.linear[0]) * 2 / float(T[0])
     known = float(found.constant_linear[0] / math.sqrt(found.constant[0] * found.linear[0])) if c_0 else 0.0
-    yield from step(
+    yield step(
         "Orders 0 and 1 of a tone that are left of a clock set by a line: ∫ S·(λ/2π)²·A_m·A_n* df of each pair",
         "A₀ = j₀(πfT) − e^(−2πifH)·[j₀(πft_c) + H·(6i/t_c)·j₁(πft_c)]",
         "A₁ = (6i/T)·j₁(πfT) − e^(−2πifH)·(6i/t_c)·j₁(πft_c)",
@@ -337,7 +343,7 @@ def _setting(pieces: Sequence[PowerLawPiece], mission: Mission, sync: Synchroniz
     )
 
 
-def integrals(
+def _integrals(
     pieces: Sequence[PowerLawPiece], mission: Mission, sync: Synchronization | None, unit: str = "rad"
 ) -> Iterator[Step]:
     """The parts that each piece of a spectrum adds to the mean squares."""
@@ -347,15 +353,15 @@ def integrals(
         ways = [float(path.slant_range) for path in (*geometry.both, geometry.apart)]
         each, density = [heard_parts((piece,), T, delay) for piece in pieces], "S_left"
         values = dict(zip(("R_t", "R_r", "b"), ways, strict=True)) | {"c": SPEED_OF_LIGHT}
-        yield from step(
+        yield step(
             "Heard over the baseline b, and a delay Δt later by the echo: S_left = S·4·sin²(πf·Δt)",
-            *equation("delay", "(R_t + R_r - b)/c", values, delay, "s"),
+            WorkedEquation("delay", "(R_t + R_r - b)/c", values, delay, "s"),
         )
     elif interval is None:
         each, density = [parts((piece,), T) for piece in pieces], "S"
     else:
         each, density = [synchronized_parts((piece,), T, interval) for piece in pieces], "S_left"
-        yield from step(
+        yield step(
             f"Exchanges each T_s = {interval:.6g} s, straight lines between: "
             "S_left = S·(1 − sinc²(f·T_s))² + sinc⁴(f·T_s)·Σ S(|f + m/T_s|), m ≠ 0"
         )
@@ -372,25 +378,145 @@ def integrals(
         total = factor * math.sqrt(math.fsum(terms))
         text = " + ".join(number(term) for term in terms)
         text = f"sqrt({text})" if factor == 1 else f"{number(factor)}*sqrt({text})"
-        yield from step(
-            f"∫ {density}·{transfer} df of each piece", Sum(f"{symbol} = {text} = {with_unit(total, unit)}")
-        )
+        yield step(f"∫ {density}·{transfer} df of each piece", Sum(f"{symbol} = {text} = {with_unit(total, unit)}"))
 
 
 def _link(mission: Mission, error: RandomError) -> Iterator[Step]:
     sync = mission.synchronization
     if sync is None or sync.interval is None:
-        yield from step("Another error for each pulse: all of it spreads, none of it is a quadratic phase")
+        yield step("Another error for each pulse: all of it spreads, none of it is a quadratic phase")
         return
-    yield from step(
+    yield step(
         "Errors of each exchange, joined by straight lines: S = 2·σ²·T_s·sinc(f·T_s)⁴, two thirds of σ² in all",
         f"T_s = {with_unit(sync.interval, 's')}",
     )
     effect = error.published
-    k = mission.allocation.coverage_factor
-    lines = [f"{part}/unit = {with_unit(value * (k if part == 'left' else 1.0), 'rad per rad')}"
-             for part, value in zip(_PARTS, effect[:3], strict=True)]  # fmt: skip
-    yield from step("Integrated with the squares of 7.5·j₂(πfT), of 17.5·j₃(πfT), and 1 − Σ(2n+1)·jₙ²(πfT)", *lines)
+    lines = _by_unit((*effect[:2], effect.spread * mission.allocation.coverage_factor), "rad per rad")
+    yield step("Integrated with the squares of 7.5·j₂(πfT), of 17.5·j₃(πfT), and 1 − Σ(2n+1)·jₙ²(πfT)", *lines)
+
+
+def _stated(vibration: Vibration | FeltVibration, spectrum: Spectrum) -> Iterator[Step]:
+    """The spectrum of acceleration, or of displacement, as pieces, with its level."""
+    what, unit = ("acceleration", "g²/Hz") if spectrum.is_accelerated else ("displacement", "m²/Hz")
+    scale = STANDARD_GRAVITY**2 if spectrum.is_accelerated else 1.0
+    points = [f"{f:.6g} Hz: {density / scale:.6g} {unit}" for f, density in spectrum.points]
+    yield step(f"One-sided spectrum of {what}, straight over logarithms, nothing beside its points", *points)
+    if vibration.spectrum_level:
+        power = float(power_of(vibration))
+        worked = WorkedEquation("p", "10^(L/10)", {"L": vibration.spectrum_level}, power, "")
+        yield step("Shifted by spectrum_level, a factor of power", worked)
+
+
+def _spectrum(mission: Mission, error: RandomError) -> Iterator[Step]:
+    name = error.owner
+    vibration: Vibration = getattr(mission.platforms, name).motion_error.vibration
+    spectrum = vibration.spectrum
+    if spectrum is None:
+        return
+    yield from _stated(vibration, spectrum)
+    rms = displacement_rms(spectrum, float(power_of(vibration)))
+    yield step(
+        "Root mean square of the displacement, S_x = S_a/(2πf)^4, all frequencies",
+        f"x = {with_unit(rms, 'm')}",
+        WorkedEquation(
+            "φ",
+            "2*π*x/λ",
+            {"x": rms, "λ": mission.radar.wavelength},
+            2 * math.pi * rms / mission.radar.wavelength,
+            "rad",
+        ),
+    )
+    along = float(counted(mission, name, 1.0, "islr"))
+    if along != 1:
+        yield step(f"Of it {number(along)} lies in the range less the direct path")
+    pieces = pieces_of_vibration(mission, name)
+    yield step(
+        "One-sided spectrum of phase along the line of sight, one way, S = S_x·(2π/λ)² [rad²/Hz]",
+        *_written(pieces),
+    )
+    if not error.published.spread and not error.published.quadratic:
+        yield step(no_effect(mission, error))
+        return
+    yield from _integrals(pieces, mission, None)
+
+
+def _acceleration(mission: Mission, error: RandomError) -> Iterator[Step]:
+    """Random vibration of an oscillator, its slow tones, and the turn of its platform."""
+    name, f_0, sync = error.owner, mission.radar.center_frequency, mission.synchronization
+    one = felt(mission, name)
+    if one is None or not any(error.published[:3]):
+        yield step(no_effect(mission, error))
+        return
+    yield step("Fractional frequency y = Γ·a, with Γ and the acceleration as they point at their worst")
+    pieces = pieces_by_acceleration(mission, name)
+    if pieces and one.vibration.spectrum is not None:
+        yield from _stated(one.vibration, one.vibration.spectrum)
+        yield step(
+            f"One-sided spectrum of phase at {f_0:.6g} Hz by a unit of Γ, S = (f_0/f)²·S_a [rad²/Hz]",
+            *_written(pieces),
+        )
+        yield from _integrals(pieces, mission, sync, _PER_SENSITIVITY)
+    for line in accelerated_tones(mission):
+        cycles = line.frequency * mission.collection.aperture_time
+        if line.name == name and cycles < SLOWEST:
+            quadratic, cubic = (float(part) * line.per_unit for part in tone(math.pi * cycles)[:2])
+            yield step(
+                f"Vibration at {line.frequency:.6g} Hz, {cycles:.3g} cycles per aperture, in its worst phase",
+                *_by_unit((abs(quadratic), abs(cubic)), _PER_SENSITIVITY),
+            )
+    if flies_a_turn(mission, name):
+        state: PlatformState = getattr(mission.platforms, name).state
+        acceleration = float(np.linalg.norm(state.acceleration))
+        values = {"c": SPEED_OF_LIGHT, "a": acceleration}
+        yield step(
+            "Turn: the range error is c·Γ·(v(τ) − v(0)); the acceleration at mid-aperture is a frequency, which "
+            "displaces, and its change bends. Of three axes the root-sum-square is the most that a Γ does",
+            WorkedEquation("drift/unit", "c*a", values, SPEED_OF_LIGHT * acceleration, "m/s per s²/m"),
+        )
+    left = error.published.spread * mission.allocation.coverage_factor
+    yield step(
+        "Together, by a unit of Γ: independent parts add as squares",
+        *_by_unit((*error.published[:2], left), _PER_SENSITIVITY),
+    )
+
+
+def _delay_on_a_leg(analysis: Analysis, error: RandomError) -> Iterator[Step]:
+    """From the delay of the zenith to that of the leg over the aperture, of a unit."""
+    mission, delay = analysis.mission, error.subject.axis
+    path: PlatformState = getattr(analysis.geometry, error.owner)
+    (x, y, z), height = path.position, float(height_of(path.position))
+    if delay == CONTENT and height < ABOVE_THE_AIR:
+        yield step(f"The {error.owner} flies at {height:.6g} m, below the ionosphere: no electrons on its leg")
+        return
+    values = {"R": path.slant_range, "z": z}
+    if height < ABOVE_THE_AIR:
+        title, formula = "Within the air, over a flat Earth: 1 over the sine of the elevation", "R/z"
+    else:
+        shell = TROPOSPHERE if delay == DELAY else min(IONOSPHERE, height)
+        values = {"p": (x * x + y * y) ** 0.5, "R": path.slant_range, "h": shell, "R_E": EARTH_RADIUS}
+        title = "Above the air, through a spherical shell at height h; p is the distance along the ground's plane"
+        formula = "1/sqrt(1 - (p/R)^2/(1 + h/R_E)^2)"
+    factor = float(leg_factor(delay, path.position, path.position))
+    yield step(f"{title}; at mid-aperture", WorkedEquation("m", formula, values, factor, ""))
+    scale = float(metres_per_unit(mission, delay))
+    if delay == CONTENT:
+        values = {"m": factor, "f_0": mission.radar.center_frequency}
+        worked = WorkedEquation("g", f"{ELECTRONS:g}*m/f_0^2", values, factor * scale, "m per 1/m^2")
+        yield step("Group delay by a unit; the phase at the centre frequency is advanced by as much", worked)
+    half = mission.collection.aperture_time / 2
+    times = [half * moment for moment in _MOMENTS]
+    yield step(
+        "Delay by a unit as the elevation changes over the aperture",
+        *(
+            f"{time:+.6g} s: {with_unit(float(group_delay(mission, path, delay, time)), _per_unit('m', error))}"
+            for time in times
+        ),
+    )
+    if delay == CONTENT:
+        yield step(
+            "Range error in the image: its constant part is that of the group, ḡ; its slope and what bends are those "
+            "of the phase, which has the other sign: 2·ḡ − g"
+        )
 
 
 def _phases(mission: Mission, error: RandomError, model: str) -> Iterator[Step]:
@@ -412,16 +538,16 @@ def _phases(mission: Mission, error: RandomError, model: str) -> Iterator[Step]:
                 values |= {"left/unit": per_unit * k, "k": k}
                 formula += "/k"
             marked = symbol if symbol == "left" and is_left_same else f"{symbol}{mark}"
-            lines += equation(marked, formula, values, result, "rad")
+            lines.append(WorkedEquation(marked, formula, values, result, "rad"))
             if symbol == "QPE" and is_same:
-                lines += equation("QPE_full", "QPE", {"QPE": result}, result, "rad")
+                lines.append(WorkedEquation("QPE_full", "QPE", {"QPE": result}, result, "rad"))
         by = "both models" if is_same else f"the {name} model{'' if name == model else ', for comparison'}"
         if effect.displacement > 0:
             values = {"moved/unit": effect.displacement, "declared": error.declared}
             result = effect.displacement * error.declared
-            lines += equation(f"moved{mark}", "moved/unit*declared", values, result, "m")
+            lines.append(WorkedEquation(f"moved{mark}", "moved/unit*declared", values, result, "m"))
         if lines:
-            yield from step(f"Of what is declared, by {by}", *lines)
+            yield step(f"Of what is declared, by {by}", *lines)
 
 
 def _covered(mission: Mission, error: RandomError) -> float:
@@ -437,16 +563,17 @@ def _allowable(mission: Mission, allocation: Allocation, error: RandomError, row
         yield from limit_steps(allocation, error.owner, limit)
     sizes: dict[str, float] = {}
     required = mission.requirements
+
+    def by(name: str, part: str, allowed: float, per_unit: float, title: str) -> Step:
+        sizes[name] = allowed / per_unit
+        values = {"limit": allowed, part: per_unit}
+        return step(title, WorkedEquation(name, f"limit/({part})", values, sizes[name], _unit(error)))
+
     if effect.quadratic:
-        sizes["by_QPE"] = limit / effect.quadratic
-        values = {"limit": limit, "QPE/unit": effect.quadratic}
-        lines = equation("by_QPE", "limit/(QPE/unit)", values, sizes["by_QPE"], _unit(error))
-        yield from step(f"Allowable by the {QUADRATIC.replace('_', ' ').removesuffix(' error')}", *lines)
+        yield by("by_QPE", "QPE/unit", limit, effect.quadratic, "Allowable by the quadratic phase")
     if effect.cubic and required.cubic_phase_error is not None:
-        sizes["by_cubic"] = required.cubic_phase_error / effect.cubic
-        values = {"limit": required.cubic_phase_error, "cubic/unit": effect.cubic}
-        lines = equation("by_cubic", "limit/(cubic/unit)", values, sizes["by_cubic"], _unit(error))
-        yield from step(f"Allowable by requirements.{CUBIC}, without share and gain", *lines)
+        title = f"Allowable by requirements.{CUBIC}, without share and gain"
+        yield by("by_cubic", "cubic/unit", required.cubic_phase_error, effect.cubic, title)
     if held.spread and required.islr is not None:
         spread = "left/unit"
         if held.spread != effect.spread:
@@ -454,23 +581,19 @@ def _allowable(mission: Mission, allocation: Allocation, error: RandomError, row
             yield from _with_cubic(mission, error, effect, held)
         power, share = 10 ** (required.islr / 10), allocation.islr.of(error.owner)
         energy = mainlobe_energy(mission)
-        rule, values = _allowed_variance(model, power, energy)
+        rule, values = allowed_variance(model, power, energy)
         rms = spread_phase(power, model, energy) * math.sqrt(share)
-        lines = equation("rms", f"sqrt({rule})*sqrt(s)", {**values, "s": share}, rms, "rad")
-        yield from step(
-            f"Phase that may be left, requirements.islr {required.islr:g} dB, share s of its power", *lines
-        )
+        worked = WorkedEquation("rms", f"sqrt({rule})*sqrt(s)", {**values, "s": share}, rms, "rad")
+        yield step(f"Phase that may be left, requirements.islr {required.islr:g} dB, share s of its power", worked)
         sizes["by_ISLR"] = rms / held.spread
         k = _covered(mission, error)
         values = {"rms": rms, spread: held.spread * k, "k": k}
         formula = f"rms/({spread})" if k == 1 else f"k*rms/({spread})"
-        lines = equation("by_ISLR", formula, values, sizes["by_ISLR"], _unit(error))
-        yield from step("Allowable by requirements.islr", *lines)
+        worked = WorkedEquation("by_ISLR", formula, values, sizes["by_ISLR"], _unit(error))
+        yield step("Allowable by requirements.islr", worked)
     if effect.displacement > 0 and required.location_error is not None:
-        sizes["by_location"] = required.location_error / effect.displacement
-        values = {"limit": required.location_error, "moved/unit": effect.displacement}
-        lines = equation("by_location", "limit/(moved/unit)", values, sizes["by_location"], _unit(error))
-        yield from step(f"Allowable by requirements.{LOCATION}, without share and gain", *lines)
+        title = f"Allowable by requirements.{LOCATION}, without share and gain"
+        yield by("by_location", "moved/unit", required.location_error, effect.displacement, title)
     yield from smallest_size(row, sizes)
 
 
@@ -481,176 +604,12 @@ def _with_cubic(mission: Mission, error: RandomError, effect: RandomEffect, held
     # What is left is shown of one sigma, the cubic phase with the factor of what is declared or without it.
     formula = "4*(cubic/unit)^2/175" if k == factor else "4*(cubic/unit/k)^2/175"
     formula = f"sqrt((left/unit)^2 + {formula})" if effect.spread else f"sqrt({formula})"
-    lines = equation(
+    worked = WorkedEquation(
         "spread/unit", formula, values, held.spread * k, f"rad{f' per {_unit(error)}' * bool(_unit(error))}"
     )
     title = "No requirements.cubic_phase_error: ISLR holds the power of the cubic phase too, without coverage factor"
-    yield from step(title, *lines)
+    yield step(title, worked)
 
 
 def _unit(error: RandomError) -> str:
     return "" if error.unit == "dB" else error.unit
-
-
-def _allowed_variance(model: str, power: float, energy: float) -> tuple[str, dict[str, float]]:
-    """Formula of the variance that an ISLR allows by a model, and its values."""
-    if model == "published":
-        return "ISLR", {"ISLR": power}
-    return "log(E*ISLR + 1)", {"ISLR": power, "E": energy}
-
-
-def _level(model: str, variance: str) -> str:
-    """Formula of the ISLR of a variance by a model. [dB]"""
-    ratio = variance if model == "published" else f"(e^{variance} - 1)/E"
-    return f"10*log({ratio})/log(10)"
-
-
-def explained_islr(analysis: Analysis, allocation: Allocation, row: Row) -> Iterator[Step]:
-    """Powers of everything that spreads, together."""
-    mission, model, owner = analysis.mission, row.model or "published", row.owner
-    members = {one.row_id: one.variance for one in declared_powers(analysis, owner, model)}
-    total, energy = math.fsum(members.values()), mainlobe_energy(mission)
-    known: dict[str, float] = {}
-    rule = "the published rule takes the variance for it"
-    if model != "published":
-        known = {"e": math.e, "E": energy}
-        rule = "a phase of variance v leaves e^-v of the response, of which a share E lies within its first nulls"
-    if row.declared is None:
-        yield from step("Nothing that spreads is declared")
-    else:
-        yield from _tones_and_cubic(analysis, allocation, owner, model, members)
-        width = max(len(name) for name in members)
-        listed = [f"{printable(name):<{width}}  {power:.6g} rad²" for name, power in members.items()]
-        terms = " + ".join(number(power) for power in members.values())
-        title = "Squares of the rms phases that spread: independent, so they add"
-        yield from step(title, *listed, Sum(f"v = {terms} = {with_unit(total, 'rad²')}"))
-        lines = equation("declared", _level(model, "v"), {"v": total, **known}, row.declared, "dB")
-        yield from step(f"As ISLR: {rule}", *lines)
-    if row.allowable is None:
-        return
-    power, share = 10 ** ((mission.requirements.islr or 0.0) / 10), allocation.islr.of(owner)
-    formula, values = _allowed_variance(model, power, energy)
-    limit = spread_phase(power, model, energy) ** 2 * share
-    lines = equation("v_max", f"{formula}*s", {**values, "s": share}, limit, "rad²")
-    yield from step("Variance that requirements.islr allows, share s of the power", *lines)
-    lines = equation("allowable", _level(model, "v_max"), {"v_max": limit, **known}, row.allowable, "dB")
-    yield from step("As ISLR", *lines)
-    if row.utilization is not None:
-        values = {"v": total, "v_max": limit}
-        lines = equation("utilization", "sqrt(v/v_max)", values, row.utilization, "")
-        yield from step("Utilization, of amplitudes", *lines)
-
-
-def _tones_and_cubic(
-    analysis: Analysis, allocation: Allocation, owner: str, model: str, members: Mapping[str, float]
-) -> Iterator[Step]:
-    """Powers of what is no noise: tones and the cubic phase, where no requirement of their own takes them."""
-    powers = [
-        Sum(f"{one.subject.id} = {number(one.phase)}^2/2 = {with_unit(members[one.subject.id], 'rad²')}")
-        for one in tones(analysis.mission)
-        if one.subject.id in members
-    ]
-    if powers:
-        yield from step("No requirements.pslr: a tone spreads half the square of its peak phase", *powers)
-    cubic_row = subject("mission", CUBIC).id
-    if cubic_row not in members:
-        return
-    together = analysis.together("full" if model == "full" else "published")
-    cubic = float(together.cubic_without_coverage(allocation.islr, owner)[0])
-    parts = together.phase_parts(together.cubics_without_coverage(allocation.islr, owner), together.rule_of_all)
-    title = "Cubic phase of the declared errors, without coverage factor"
-    yield from combined(title, together.rule_of_all, parts, cubic, symbol="φ_3")
-    lines = equation("v_3", "4*φ_3^2/175", {"φ_3": cubic}, members[cubic_row], "rad²")
-    yield from step("No requirements.cubic_phase_error: its mean square after the fit of a line spreads", *lines)
-
-
-def explained_pslr(mission: Mission, row: Row) -> Iterator[Step]:
-    """From all tones to the highest echo that they make in the worst of their phases."""
-    found = tones(mission)
-    echo = highest_echo(found)
-    if echo is None:
-        yield from step("No tone is declared: no vibration from one cycle per aperture on, no spur")
-    else:
-        width = max(len(one.subject.id) for one in found)
-        listed = [f"{one.subject.id:<{width}}  {one.phase:.6g} rad, {one.cycles:.6g} cells" for one in found]
-        yield from step("Tones: peak phase, and distance of their echoes from the response", *listed)
-        together = [one for one, is_in in zip(found, echo.is_of, strict=True) if is_in]
-        pairs = {together[other].subject.id: together[one] for one, other in quadratures(together)}
-        apart = {one.subject.id for one in pairs.values()}
-        terms = " + ".join(
-            f"{_with_its_pair(one, pairs.get(one.subject.id))}*{number(abs(np.sinc(echo.cycles - one.cycles)))}"
-            for one in together
-            if one.subject.id not in apart
-        )
-        title = (
-            f"Highest echo: at x = {number(echo.cycles)} cells, of {', '.join(one.subject.id for one in together)}"
-        )
-        if pairs:
-            title += "; motion and oscillator are a quarter of a turn apart, so that squares of the two add"
-        if len(together) - len(pairs) > 1:
-            title += ", each φ·|sinc(x − f·T)| in the worst phases, sinc(x) = sin(πx)/(πx)"
-        yield from step(title, Sum(f"φ = {terms} = {with_unit(echo.phase, 'rad')}"))
-        yield from _echo_level(echo)
-        if row.declared is not None:
-            lines = equation("declared", "20*log(l)/log(10)", {"l": echo.level}, row.declared, "dB")
-            yield from step("As a level", *lines)
-    if row.allowable is None:
-        return
-    lines = equation("allowable", "required", {"required": row.allowable}, row.allowable, "dB")
-    yield from step(f"requirements.pslr, all of it, {place(mission, ('requirements', 'pslr'))}", *lines)
-    yield from _use_of_amplitudes(row)
-
-
-def _with_its_pair(one: Tone, other: Tone | None) -> str:
-    """Peak phase of a tone, or with that of one a quarter of a turn away."""
-    return number(one.phase) if other is None else f"sqrt({number(one.phase)}^2 + {number(other.phase)}^2)"
-
-
-def _echo_level(echo: Echo) -> Iterator[Step]:
-    if echo.phase > LARGEST_ECHO:
-        lines = equation("l", "φ/2", {"φ": echo.phase}, echo.level, "")
-        yield from step(f"Amplitude over that of the response; above {LARGEST_ECHO:g} rad half the phase", *lines)
-        return
-    j0, j1 = bessel(echo.phase)
-    yield from step(
-        "Amplitude over that of the response, J₁(φ)/J₀(φ)",
-        *equation("J_0", "", {}, j0, ""),
-        *equation("J_1", "", {}, j1, ""),
-        *equation("l", "J_1/J_0", {"J_0": j0, "J_1": j1}, echo.level, ""),
-    )
-
-
-def _use_of_amplitudes(row: Row) -> Iterator[Step]:
-    if row.utilization is None or row.declared is None or row.allowable is None:
-        return
-    values = {"declared": row.declared, "allowable": row.allowable}
-    lines = equation("utilization", "10^((declared - allowable)/20)", values, row.utilization, "")
-    yield from step("Utilization, of amplitudes", *lines)
-
-
-def explained_spur(mission: Mission, allocation: Allocation, row: Row) -> Iterator[Step]:
-    """From the tone of an oscillator to its paired echoes, and to what the platform's share allows."""
-    oscillator = getattr(mission.platforms, row.owner).oscillator
-    path = ("platforms", row.owner, "oscillator", "spurs")
-    entry = row.subject.entry or 0
-    frequency, level = oscillator.spurs[entry]
-    yield from step(f"Declared in {place(mission, path)}", f"{frequency:.6g} Hz: {level:.6g} dBc")
-    f_0 = mission.radar.center_frequency
-    values, formula = {"L": level, "f_0": f_0, "f_osc": oscillator.frequency or f_0}, "L + 20*log(f_0/f_osc)/log(10)"
-    left = next(one.left for one in spurs_of(mission) if (one.name, one.entry) == (row.owner, entry))
-    title = "At the centre frequency; an echo has the amplitude of the sideband"
-    if left != 1:
-        values, formula = {**values, "left": left}, f"{formula} + 20*log(left)/log(10)"
-        title += ", times what the synchronization leaves of it"
-    yield from step(title, *equation("declared", formula, values, row.declared or 0.0, "dB"))
-    limits = tone_limits(mission, allocation)[1].get(row.owner)
-    if limits is None or row.allowable is None:
-        yield from step("Allowable: no limit", printable(row.reason or "no requirement limits this error"))
-        return
-    values = {"A": limits.by(row.model or "published"), "λ": mission.radar.wavelength}
-    lines = equation("φ", "2*π*A/λ", values, 2 * math.pi * values["A"] / values["λ"], "rad")
-    by_power = "" if row.metric == "pslr" else ", √2 times the rms value that ISLR allows"
-    yield from step(f"Phase of a vibration at the limit of {row.owner}.vibration.sinusoidal{by_power}", *lines)
-    phase = {"φ": 2 * math.pi * values["A"] / values["λ"]}
-    yield from step("Its echoes", *equation("allowable", "20*log(φ/2)/log(10)", phase, row.allowable, "dB"))
-    yield from _use_of_amplitudes(row)

@@ -50,7 +50,15 @@ from bisar_budget.report.explain.explained_error import (
     place,
     smallest_size,
 )
-from bisar_budget.report.explain.notation import Step, Sum, WorkedEquation, equation, number, step, with_unit
+from bisar_budget.report.explain.explained_random import explained_random
+from bisar_budget.report.explain.explained_spreading import (
+    explained_islr,
+    explained_power,
+    explained_pslr,
+    explained_spur,
+    explained_tone,
+)
+from bisar_budget.report.explain.notation import Step, Sum, WorkedEquation, number, step, with_unit
 from bisar_budget.report.words.requirements import requirement_finding, requirement_id
 from bisar_budget.report.words.sentences import percent, row_limit, row_size, wrapped
 
@@ -59,17 +67,7 @@ _LONGEST_UNIT = 16  # letters, of what may follow a number
 
 
 def explain(mission: Mission, found: MissionFindings, row_id: str) -> str:
-    """Write the chain of equations of one row of a mission, with the numbers put in.
-
-    Parameters
-    ----------
-    mission : Mission
-        As loaded.
-    found : MissionFindings
-        What the check of it found.
-    row_id : str
-        Id of one of its rows.
-    """
+    """Write the chain of equations of one row of a mission, with the numbers put in."""
     row = next(row for row in found.rows if row.id == row_id)
     own_id = f" [{printable(row.requirement_id)}]" if row.requirement_id else ""
     title = f"{STATUS[row.status].text} {printable(row.id)}{own_id}"
@@ -118,31 +116,19 @@ def _to_utilization(mission: Mission, found: MissionFindings, row: Row) -> Itera
     source = next((source for source in analysis.sources if source.id == row.id), None)
     if source is not None:
         yield from declaration(mission, source)
-        yield from effect(analysis, found, source, row.model)
+        yield from effect(analysis, source, row.model)
         yield from _budget(analysis, source, row)
     elif (random := next((one for one in analysis.random if one.id == row.id), None)) is not None:
-        from bisar_budget.report.explain.explained_random import explained_random
-
         yield from explained_random(analysis, found.allocation, random, row)
     elif row.subject.kind == "oscillator" and row.subject.axis == "acceleration":
-        from bisar_budget.report.explain.explained_shaking import explained_tone
-
         yield from explained_tone(mission, found.allocation, row)
     elif row.subject.axis == "spur":
-        from bisar_budget.report.explain.explained_random import explained_spur
-
         yield from explained_spur(mission, found.allocation, row)
     elif row.subject.kind == "other":
-        from bisar_budget.report.explain.explained_air import explained_power
-
         yield from explained_power(mission, found.allocation, row)
     elif row.subject.kind == "pslr":
-        from bisar_budget.report.explain.explained_random import explained_pslr
-
         yield from explained_pslr(mission, row)
     elif row.subject.kind == "islr":
-        from bisar_budget.report.explain.explained_random import explained_islr
-
         yield from explained_islr(analysis, found.allocation, row)
     elif row.subject.kind == "vibration":
         yield from _vibration_in_its_unit(mission, found.allocation, row)
@@ -157,14 +143,14 @@ def _to_utilization(mission: Mission, found: MissionFindings, row: Row) -> Itera
     elif row.metric == SPECIFICATION:
         key = next(key for key in mission.specifications if name_of_error(key) == row.subject.axis)
         path = ("specifications", key)
-        yield from step(f"Specified in {place(mission, path)}", as_written(mission, path))
+        yield step(f"Specified in {place(mission, path)}", as_written(mission, path))
         if row.declared is not None:
-            yield from step("Declared, of three axes the largest", f"{key} = {row_size(row.declared, row, found)}")
+            yield step("Declared, of three axes the largest", f"{key} = {row_size(row.declared, row, found)}")
     elif row.metric == DECLARE:
         yield from declarations(mission)
     if row.declared is not None and row.allowable is not None and row.utilization is not None and row.unit != "dB":
         values = {"declared": row.declared, "allowable": row.allowable}
-        yield from step("Utilization", *equation("utilization", "declared/allowable", values, row.utilization, ""))
+        yield step("Utilization", WorkedEquation("utilization", "declared/allowable", values, row.utilization, ""))
 
 
 def collection_chain(found: MissionFindings) -> Iterator[Step]:
@@ -175,15 +161,15 @@ def collection_chain(found: MissionFindings) -> Iterator[Step]:
         values |= {f"φ̄_{name}": state.azimuth, f"θ̄_{name}": state.elevation, f"R_{name}": state.slant_range}
         values |= {f"x_{name}": x, f"y_{name}": y, f"v_x{name}": v_x, f"v_y{name}": v_y}
     look, s = found.geometry.look_azimuth, found.geometry.range_gradient
-    yield from step("(11), bistatic look direction", *equation("φ_b", notation.LOOK_AZIMUTH, values, look, "rad"))
+    yield step("(11), bistatic look direction", WorkedEquation("φ_b", notation.LOOK_AZIMUTH, values, look, "rad"))
     east, north = notation.SMEAR
-    yield from step(
+    yield step(
         "(31), smear direction",
-        *equation("east", east, values, s[1], ""),
-        *equation("north", north, values, -s[0], ""),
+        WorkedEquation("east", east, values, s[1], ""),
+        WorkedEquation("north", north, values, -s[0], ""),
     )
     determinant = found.analysed().published.plane.determinant
-    yield from step("(30), range held constant", *equation("det Q", notation.DETERMINANT, values, determinant, "1/s"))
+    yield step("(30), range held constant", WorkedEquation("det Q", notation.DETERMINANT, values, determinant, "1/s"))
 
 
 def _budget(analysis: Analysis, source: ErrorSource, row: Row) -> Iterator[Step]:
@@ -202,9 +188,9 @@ def _budget(analysis: Analysis, source: ErrorSource, row: Row) -> Iterator[Step]
             yield from at_the_allowable(analysis, source, by_quadratic)
         else:
             values = {"limit": limit, "QPE/unit": abs(model.effect(source).qpe)}
-            yield from step(
+            yield step(
                 "Allowable by the quadratic phase",
-                *equation("by_QPE", "limit/(QPE/unit)", values, by_quadratic, row.unit),
+                WorkedEquation("by_QPE", "limit/(QPE/unit)", values, by_quadratic, row.unit),
             )
     others = (
         (CUBIC, "by_cubic", requirements.cubic_phase_error, "rad"),
@@ -222,11 +208,11 @@ def _budget(analysis: Analysis, source: ErrorSource, row: Row) -> Iterator[Step]
         sizes[symbol] = size
         title = f"Allowable by requirements.{name}, {with_unit(required, unit)}, without share and gain"
         if row.model == "full" and not analysis.full.is_linear_at(source, name, required):
-            yield from step(title, f"{symbol} = {with_unit(size, row.unit)}")
+            yield step(title, f"{symbol} = {with_unit(size, row.unit)}")
             yield from at_the_allowable(analysis, source, size, name)
         else:
             values = {"limit": required, "effect/unit": required / model.small(source, name, required)}
-            yield from step(title, *equation(symbol, "limit/(effect/unit)", values, size, row.unit))
+            yield step(title, WorkedEquation(symbol, "limit/(effect/unit)", values, size, row.unit))
     if "by_image" in sizes:
         yield from end_of_the_image(sizes["by_image"], row.unit)
     yield from smallest_size(row, sizes)
@@ -246,7 +232,7 @@ def _vibration_in_its_unit(mission: Mission, allocation: Allocation, row: Row) -
     for name in ("declared", "allowable"):
         if (size := getattr(row, name)) is not None:
             values = {"A": metres[name], "f": line.frequency}
-            yield from step(f"As an acceleration, {name}", *equation(name, "A*(2*π*f)^2", values, size, row.unit))
+            yield step(f"As an acceleration, {name}", WorkedEquation(name, "A*(2*π*f)^2", values, size, row.unit))
 
 
 def _vibration(mission: Mission, allocation: Allocation, row: Row) -> Iterator[Step]:
@@ -255,17 +241,17 @@ def _vibration(mission: Mission, allocation: Allocation, row: Row) -> Iterator[S
     is_sinusoid, is_sum = row.subject.axis != "wideband", row.subject.axis == "sinusoidal.sum"
     path: KeyPath = ("platforms", platform, "motion_error", "vibration", "sinusoidal" if is_sinusoid else "wideband")
     if row.declared is None:
-        yield Step(missing(mission, path))
+        yield step(missing(mission, path))
     elif is_sum:
         yield from _near_lines(mission, platform, entry, row.declared)
     else:
         path = (*path, entry, "amplitude") if is_sinusoid else (*path, "rms")
-        yield from step(f"Declared in {place(mission, path)}", as_written(mission, path))
+        yield step(f"Declared in {place(mission, path)}", as_written(mission, path))
         if is_sinusoid:
             yield from _displacement(mission, platform, entry)
         yield from _line_of_sight(mission, platform, is_sinusoid, entry, row.declared)
     if row.evidence:
-        yield from step("Evidence", printable(row.evidence))
+        yield step("Evidence", printable(row.evidence))
     wavelength = mission.radar.wavelength
     if row.qpe_full_rad is not None and row.declared is not None:
         line = lines_of(mission, platform)[entry]
@@ -274,10 +260,10 @@ def _vibration(mission: Mission, allocation: Allocation, row: Row) -> Iterator[S
             "λ": wavelength,
             "q": quadratic_part(line.frequency * mission.collection.aperture_time),
         }
-        lines = equation("QPE_full", "2*π*A*q/λ", values, row.qpe_full_rad, "rad")
+        worked = WorkedEquation("QPE_full", "2*π*A*q/λ", values, row.qpe_full_rad, "rad")
         if row.metric == QUADRATIC:  # the same by both models
-            yield from step("By either model", *equation("QPE", "2*π*A*q/λ", values, row.qpe_full_rad, "rad"))
-        yield from step("Quadratic phase in the worst phase, q = 7.5·j₂(π·f·T)", *lines)
+            yield step("By either model", WorkedEquation("QPE", "2*π*A*q/λ", values, row.qpe_full_rad, "rad"))
+        yield step("Quadratic phase in the worst phase, q = 7.5·j₂(π·f·T)", worked)
         if row.metric == QUADRATIC:
             yield from _slow_vibration(mission, allocation, row, line.frequency * mission.collection.aperture_time)
             return
@@ -287,9 +273,9 @@ def _vibration(mission: Mission, allocation: Allocation, row: Row) -> Iterator[S
         return
     name = row.metric.upper()
     ratio = 10 ** (requirement / 10)
-    yield from step(
+    yield step(
         f"requirements.{row.metric} as a power ratio",
-        *equation(name, "10^(dB/10)", {"dB": requirement}, ratio, ""),
+        WorkedEquation(name, "10^(dB/10)", {"dB": requirement}, ratio, ""),
     )
     split = allocation.pslr if by_echoes else allocation.islr
     share = split.of(platform)
@@ -297,16 +283,16 @@ def _vibration(mission: Mission, allocation: Allocation, row: Row) -> Iterator[S
     is_power = is_sinusoid and not by_echoes
     published = notation.VIBRATION[row.metric]
     kind = "sinusoidal" if by_echoes else "wideband"
-    yield from step(
+    yield step(
         f"Section V, {kind}, s is the {platform}’s share of power",
         *_limit("published", published, values, row.allowable_published, is_power=is_power),
     )
     if by_echoes:
         part = amplitude_share(split, platform)
         shares = {"s_t": split.transmitter, "s_r": split.receiver}
-        yield from step(
+        yield step(
             "Both platforms at one frequency: echoes add in amplitude, its part a",
-            *equation("a", notation.amplitude_share(platform), shares, part, ""),
+            WorkedEquation("a", notation.amplitude_share(platform), shares, part, ""),
         )
         level = math.sqrt(ratio * (split.transmitter + split.receiver))
         values = {
@@ -325,12 +311,12 @@ def _vibration(mission: Mission, allocation: Allocation, row: Row) -> Iterator[S
         values = {**values, "E": mainlobe_energy(mission)}
         known = []
     full = notation.FULL_VIBRATION[row.metric]
-    yield from step(title, *known, *_limit("full", full, values, row.allowable_full, is_power=is_power))
+    yield step(title, *known, *_limit("full", full, values, row.allowable_full, is_power=is_power))
     limits = {"published": row.allowable_published, "full": row.allowable_full}
     model = mission.gating_model
     chosen = "min(published, full)" if model == "strictest" else model
-    yield from step(
-        f"Allowable, allocation.model {model}", *equation("allowable", chosen, limits, row.allowable or 0.0, "m")
+    yield step(
+        f"Allowable, allocation.model {model}", WorkedEquation("allowable", chosen, limits, row.allowable or 0.0, "m")
     )
 
 
@@ -339,33 +325,33 @@ def _limit(
 ) -> Iterator[WorkedEquation]:
     """Limit of a vibration by a model; of a line that ISLR holds by its power, the amplitude of that rms value."""
     if not is_power:
-        yield from equation(model, formula, values, result, "m")
+        yield WorkedEquation(model, formula, values, result, "m")
         return
     rms = result / math.sqrt(2)
-    yield from equation(f"σ_{model}", formula, values, rms, "m")
-    yield from equation(model, "sqrt(2)*σ", {"σ": rms}, result, "m")
+    yield WorkedEquation(f"σ_{model}", formula, values, rms, "m")
+    yield WorkedEquation(model, "sqrt(2)*σ", {"σ": rms}, result, "m")
 
 
 def _slow_vibration(mission: Mission, allocation: Allocation, row: Row, cycles: float) -> Iterator[Step]:
     """From the phases of a vibration below one cycle per aperture to the amplitude that they allow."""
     platform, wavelength = row.owner, mission.radar.wavelength
     values = {"A": row.declared or 0.0, "λ": wavelength, "c": cubic_part(cycles)}
-    lines = equation("cubic", "2*π*A*c/λ", values, row.cubic_rad or 0.0, "rad")
-    yield from step("Cubic phase in the worst phase, c = 17.5·j₃(π·f·T)", *lines)
+    worked = WorkedEquation("cubic", "2*π*A*c/λ", values, row.cubic_rad or 0.0, "rad")
+    yield step("Cubic phase in the worst phase, c = 17.5·j₃(π·f·T)", worked)
     limit = allocation.qpe_limit(platform) * allocation.autofocus_gain
     yield from limit_steps(allocation, platform, limit)
     limits, required = slow_limits(mission, allocation, platform, cycles), mission.requirements.cubic_phase_error
     values = {"limit": limit, "λ": wavelength, "q": quadratic_part(cycles)}
-    lines = equation("by_QPE", "limit*λ/(2*π*q)", values, limits.quadratic, "m")
-    yield from step("Allowable by the quadratic phase", *lines)
+    worked = WorkedEquation("by_QPE", "limit*λ/(2*π*q)", values, limits.quadratic, "m")
+    yield step("Allowable by the quadratic phase", worked)
     sizes = {"by_QPE": limits.quadratic}
     if required is not None and limits.cubic is not None:
         values = {"required": required, "λ": wavelength, "c": cubic_part(cycles)}
-        lines = equation("by_cubic", "required*λ/(2*π*c)", values, limits.cubic, "m")
-        yield from step("Allowable by requirements.cubic_phase_error", *lines)
+        worked = WorkedEquation("by_cubic", "required*λ/(2*π*c)", values, limits.cubic, "m")
+        yield step("Allowable by requirements.cubic_phase_error", worked)
         sizes["by_cubic"] = limits.cubic
     smallest = "by_cubic" if limits.is_cubic else "by_QPE"
-    yield from step("Allowable, the smallest", *equation("allowable", smallest, sizes, limits.smallest, "m"))
+    yield step("Allowable, the smallest", WorkedEquation("allowable", smallest, sizes, limits.smallest, "m"))
 
 
 def _displacement(mission: Mission, platform: str, entry: int) -> Iterator[Step]:
@@ -378,7 +364,7 @@ def _displacement(mission: Mission, platform: str, entry: int) -> Iterator[Step]
     )
     for amplitude, displacement in both:
         values = {"a": amplitude, "f": line.frequency}
-        yield from step("As a displacement", *equation("A", "a/(2*π*f)^2", values, displacement, "m"))
+        yield step("As a displacement", WorkedEquation("A", "a/(2*π*f)^2", values, displacement, "m"))
 
 
 def _line_of_sight(mission: Mission, platform: str, is_sinusoid: bool, entry: int, declared: float) -> Iterator[Step]:
@@ -392,7 +378,7 @@ def _line_of_sight(mission: Mission, platform: str, is_sinusoid: bool, entry: in
     if not isinstance(value, tuple):
         if mission.has_direct_path:
             text = f"{number(value)}*{number(abs(dot(body.state.look, sight)))}"
-            yield from step(whither, Sum(f"declared = {text} = {with_unit(declared, 'm')}"))
+            yield step(whither, Sum(f"declared = {text} = {with_unit(declared, 'm')}"))
         return
     u, v, w = (dot(axis, sight) for axis in body.state.frame(body.motion_error.frame))
     axes = without_rounding((u, v, w))
@@ -401,7 +387,7 @@ def _line_of_sight(mission: Mission, platform: str, is_sinusoid: bool, entry: in
         text, how = " + ".join(f"|{part}|" for part in parts), "axes may vibrate in any phase: projections add"
     else:
         text, how = "sqrt(" + " + ".join(f"({part})^2" for part in parts) + ")", "independent axes: squares add"
-    yield from step(f"{whither}, {how}", Sum(f"declared = {text} = {with_unit(declared, 'm')}"))
+    yield step(f"{whither}, {how}", Sum(f"declared = {text} = {with_unit(declared, 'm')}"))
 
 
 def _near_lines(mission: Mission, platform: str, index: int, total: float) -> Iterator[Step]:
@@ -418,7 +404,7 @@ def _near_lines(mission: Mission, platform: str, index: int, total: float) -> It
         f"Entries {entries} lie near each other: at x = {number(worst.cycles)} cells each adds A·|sinc(x − f·T)|, "
         "sinc(x) = sin(πx)/(πx), in the worst phases"
     )
-    yield from step(title, f"declared = {sizes} = {total:.6g} m")
+    yield step(title, f"declared = {sizes} = {total:.6g} m")
 
 
 def _phase_aggregate(together: Together, found: MissionFindings, row: Row) -> Iterator[Step]:
@@ -428,8 +414,8 @@ def _phase_aggregate(together: Together, found: MissionFindings, row: Row) -> It
     yield from combined("QPE of the declared errors", rule, parts, row.declared)
     if is_pull_in:
         values = {"N_pull": found.allocation.n_pull or 0.0}
-        lines = equation("allowable", "π*N_pull", values, row.allowable or 0.0, "rad")
-        yield from step("What autofocus corrects, Section VI", *lines)
+        worked = WorkedEquation("allowable", "π*N_pull", values, row.allowable or 0.0, "rad")
+        yield step("What autofocus corrects, Section VI", worked)
     else:
         yield from limit_steps(found.allocation, owner, row.allowable or 0.0)
 
@@ -438,7 +424,7 @@ def _cubic_aggregate(together: Together, found: MissionFindings, row: Row) -> It
     parts = together.phase_parts(cubics(together.phases))
     yield from combined("Cubic phase of the declared errors", found.combine, parts, row.declared)
     if row.allowable is not None:
-        yield from step("Allowable", f"requirements.cubic_phase_error = {row.allowable:.6g} rad")
+        yield step("Allowable", f"requirements.cubic_phase_error = {row.allowable:.6g} rad")
 
 
 def _spatial_variance(analysis: Analysis, found: MissionFindings, row: Row) -> Iterator[Step]:
@@ -448,11 +434,11 @@ def _spatial_variance(analysis: Analysis, found: MissionFindings, row: Row) -> I
         return
     east, north = at(scene.radius, scene.azimuth)
     parts = phase_parts(differences_at(analysis.errors, scene.radius, scene.azimuth), found.combine, analysis.groups)
-    yield from step(
+    yield step(
         f"Full model at the scene’s edge, {east:.6g} m east, {north:.6g} m north of the centre, less at the centre"
     )
     yield from combined("Difference of QPE of the declared errors", found.combine, parts, row.declared)
-    yield from step("Budget of what one autofocus correction leaves", f"total = {found.allocation.qpe_total:.6g} rad")
+    yield step("Budget of what one autofocus correction leaves", f"total = {found.allocation.qpe_total:.6g} rad")
 
 
 def _location_aggregate(mission: Mission, together: Together, found: MissionFindings, row: Row) -> Iterator[Step]:
@@ -468,14 +454,14 @@ def _location_aggregate(mission: Mission, together: Together, found: MissionFind
             for name, (x, y) in parts
         ]
         longest = [] if row.declared is None else [f"combined = {row.declared:.6g} m"]
-        yield from step(f"{title}: displacements, {rule}", *(vectors or ["none"]), *longest)
+        yield step(f"{title}: displacements, {rule}", *(vectors or ["none"]), *longest)
     else:
         lengths = [(name, math.hypot(*move)) for name, move in parts]
         title = f"{title}: displacement of the declared errors"
         yield from combined(title, found.combine, lengths, row.declared, unit="m")
     if row.allowable is not None:
         where = place(mission, ("requirements", "location_error"))
-        yield from step("Allowable", f"requirements.location_error = {row.allowable:.6g} m, {where}")
+        yield step("Allowable", f"requirements.location_error = {row.allowable:.6g} m, {where}")
 
 
 def _verdict(row: Row, found: MissionFindings) -> Iterator[str]:
@@ -496,9 +482,9 @@ def finding_of(mission: Mission, found: MissionFindings, one: JudgedRequirement)
     if one.key == DECLARE:
         yield from _asked_for(mission)
     elif one.is_default:
-        yield from step("The file does not state it: the default")
+        yield step("The file does not state it: the default")
     else:
-        yield from step(f"Required in {place(mission, path)}", as_written(mission, path))
+        yield step(f"Required in {place(mission, path)}", as_written(mission, path))
     judging = [row for row in found.rows if row.id in one.rows]
     width = max((len(row.id) for row in judging), default=0)
     listed = [
@@ -506,19 +492,19 @@ def finding_of(mission: Mission, found: MissionFindings, one: JudgedRequirement)
         + ("" if row.utilization is None else f", {percent(row.utilization)}")
         for row in judging
     ]
-    yield from step("Rows that judge it", *(listed or ["none"]))
+    yield step("Rows that judge it", *(listed or ["none"]))
 
 
 def declarations(mission: Mission) -> Iterator[Step]:
     """The errors that must be declared, and those of them that the file lacks."""
     yield from _asked_for(mission)
     missing = [one.key for one in missing_declarations(mission)]
-    yield from step("Not in the file", *(missing or ["nothing: all of it is declared"]))
+    yield step("Not in the file", *(missing or ["nothing: all of it is declared"]))
 
 
 def _asked_for(mission: Mission) -> Iterator[Step]:
     asked = ", ".join(mission.requirements.declare)
-    yield from step(f"Required in {place(mission, ('requirements', 'declare'))}", f"requirements.declare: [{asked}]")
+    yield step(f"Required in {place(mission, ('requirements', 'declare'))}", f"requirements.declare: [{asked}]")
 
 
 def not_judged(found: MissionFindings, row: Row) -> Iterator[Step]:
@@ -564,18 +550,20 @@ def _untaken(analysis: Analysis, row: Row, one: UntakenEffect) -> Iterator[Step]
     required = analysis.mission.requirements.quadratic_phase_error
     values = {"required": required}
     level = min(TENTH * required, SMALL_RAD)
-    lines = equation("negligible", f"min({TENTH:g}*required, {SMALL_RAD:g})", values, level, "rad")
-    yield from step(
-        "Below a tenth of requirements.quadratic_phase_error and below 0.08 rad it would be negligible", *lines
+    worked = WorkedEquation("negligible", f"min({TENTH:g}*required, {SMALL_RAD:g})", values, level, "rad")
+    yield step(
+        "Below a tenth of requirements.quadratic_phase_error and below 0.08 rad it would be negligible", worked
     )
     largest, own = max(float(size[0]) for size in one.parts.values()), float(one.parts[row.id][0])
     count = sum(float(size[0]) > 0 for size in one.parts.values())
     values = {"largest": largest, "negligible": level}
-    lines = equation("least", f"min({MAKES_UP:g}*largest, negligible/{count})", values, float(one.least[0]), "rad")
+    worked = WorkedEquation(
+        "least", f"min({MAKES_UP:g}*largest, negligible/{count})", values, float(one.least[0]), "rad"
+    )
     title = (
         "Parts of at least a tenth of the largest make it up, and smaller ones that together would not be negligible"
     )
-    yield from step(f"{title}; this row’s is {with_unit(own, 'rad')}", *lines)
+    yield step(f"{title}; this row’s is {with_unit(own, 'rad')}", worked)
 
 
 def _path_in_doubt(mission: Mission, row: Row) -> Iterator[Step]:
@@ -586,15 +574,15 @@ def _path_in_doubt(mission: Mission, row: Row) -> Iterator[Step]:
         platform: Platform = getattr(mission.platforms, one.owner)
         error, path = platform.motion_error, platform.path
         said = f": {printable(path.doubt_of)}" if path is not None and path.doubt_of else ""
-        yield from step(f"How far the {one.owner}’s path may be off{said}", f"doubt = {with_unit(one.doubt, 'm')}")
+        yield step(f"How far the {one.owner}’s path may be off{said}", f"doubt = {with_unit(one.doubt, 'm')}")
         declared = declared_position_error(error)
         if declared is None:
-            yield from step("It declares no position error")
+            yield step("It declares no position error")
             continue
         sizes = [*(error.stated("position") or ()), *(sigma for process in error.random for sigma in process.sigma)]
         terms = " + ".join(f"{number(size)}^2" for size in sizes)
         line = Sum(f"stated = sqrt({terms}) = {with_unit(declared, 'm')}")
-        yield from step("Position errors that it declares, without coverage factor: less than the doubt", line)
+        yield step("Position errors that it declares, without coverage factor: less than the doubt", line)
 
 
 def _displacing(analysis: Analysis, row: Row, reason: Note) -> Iterator[Step]:
@@ -607,4 +595,4 @@ def _displacing(analysis: Analysis, row: Row, reason: Note) -> Iterator[Step]:
         if one.row_id in names:
             qpe, cubic = (with_unit(float(phase[0]), "rad") for phase in (one.qpe_rad, one.cubic_rad))
             lines.append(f"{printable(one.row_id)}: QPE {qpe}, cubic {cubic}")
-    yield from step("Not in the displacement, by an amount that is not computed", *lines)
+    yield step("Not in the displacement, by an amount that is not computed", *lines)

@@ -38,9 +38,12 @@ class Node(NamedTuple):
 
 
 class Language(NamedTuple):
-    """How to write each operation; `%s` stands for its parts."""
+    """How to write each operation; `%s` stands for its parts. `place` is where the catalogue has this language."""
 
+    place: int
     number: str
+    negative: str
+    power_of_ten: str
     fraction: str
     power: str
     sqrt: str
@@ -55,7 +58,10 @@ class Language(NamedTuple):
 
 
 MATHML = Language(
+    place=1,
     number="<mn>%s</mn>",
+    negative="<mrow><mo>−</mo>%s</mrow>",
+    power_of_ten="<mrow>%s<mo>·</mo><msup><mn>10</mn>%s</msup></mrow>",
     fraction="<mfrac><mrow>%s</mrow><mrow>%s</mrow></mfrac>",
     power="<msup><mrow>%s</mrow><mrow>%s</mrow></msup>",
     sqrt="<msqrt>%s</msqrt>",
@@ -69,7 +75,10 @@ MATHML = Language(
     minus="−",
 )
 LATEX = Language(
+    place=0,
     number="%s",
+    negative="-%s",
+    power_of_ten=r"%s \cdot 10^{%s}",
     fraction=r"\frac{%s}{%s}",
     power="%s^{%s}",
     sqrt=r"\sqrt{%s}",
@@ -147,7 +156,7 @@ def written(formula: str, language: Language, numbers: Mapping[str, str] | None 
 def symbol(name: str, language: Language) -> str:
     """Set a symbol: its letter with what stands above it, and its subscript."""
     if name in SYMBOLS:
-        return SYMBOLS[name][language is MATHML]
+        return SYMBOLS[name][language.place]
     head, _, below = name.partition("_")
     spelled = normalize("NFD", head)
     letter, *accents = tuple(spelled) if len(normalize("NFC", head)) == 1 or combining(spelled[1]) else (head,)
@@ -314,16 +323,9 @@ class Step(NamedTuple):
             yield from (f"    {line}" for line in (part.lines if isinstance(part, WorkedEquation) else (part,)))
 
 
-def step(title: str, *parts: WorkedEquation | str) -> Iterator[Step]:
-    """One step of an explanation, to be yielded from."""
-    yield Step(title, parts)
-
-
-def equation(
-    symbol: str, formula: str, values: Mapping[str, float], result: float, unit: str
-) -> tuple[WorkedEquation]:
-    """Make the one part of a step."""
-    return (WorkedEquation(symbol, formula, values, result, unit),)
+def step(title: str, *parts: WorkedEquation | str) -> Step:
+    """One step of an explanation with what stands under its title."""
+    return Step(title, parts)
 
 
 def filled(formula: str, values: Mapping[str, float]) -> str:
@@ -350,7 +352,6 @@ def with_unit(value: float, unit: str) -> str:
     return f"{six_digits(value)} {'' if unit == '1' else unit.replace('^2', '²')}".rstrip()
 
 
-_LATEX, _MATHML = 0, 1
 _MINUS = re.compile("(?<!e)-")  # not the one of a power of ten
 
 
@@ -368,10 +369,8 @@ def is_formula(equation: WorkedEquation) -> bool:
 
 def as_text(equation: WorkedEquation) -> Typeset:
     """For a reader: · between factors, no carets."""
-    if not equation.formula:
-        return Typeset(readable(equation.lines[0]), "")
-    numbers = f"= {filled(equation.formula, equation.values)} = {with_unit(equation.result, equation.unit)}"
-    return Typeset(readable(f"{equation.symbol} = {equation.formula}"), readable(numbers))
+    formula, *numbers = equation.lines
+    return Typeset(readable(formula), readable("".join(numbers).lstrip()))
 
 
 def readable(text: str) -> str:
@@ -381,22 +380,37 @@ def readable(text: str) -> str:
 
 def as_mathml(equation: WorkedEquation) -> Typeset:
     """Three `math` elements, so that a narrow page can break between them."""
-    result = f"<mrow>{mathml_number(equation.result)}{_mathml_unit(equation.unit)}</mrow>"
+    unit = ""
+    if equation.unit:
+        unit = f'<mspace width="0.25em"/><mtext>{xml_text(equation.unit.replace("^2", "²"))}</mtext>'
+    result = f"<mrow>{_number_in(MATHML, equation.result)}{unit}</mrow>"
     left = symbol(equation.symbol, MATHML)
     if not equation.formula:
         return Typeset(math(f"<mrow>{left}<mo>=</mo>{result}</mrow>"), "")
-    if equation.formula in FORMULAS:
-        formula = FORMULAS[equation.formula][_MATHML]
-        values = {SYMBOLS[name][_MATHML]: value for name, value in equation.values.items() if name in SYMBOLS}
-        numbers = _mathml_filled(formula, values)
-    else:
-        formula = written(equation.formula, MATHML)
-        cells = {name: (mathml_number(value), value) for name, value in equation.values.items()}
-        numbers = written(equation.formula, MATHML, _bracketed(cells, MATHML))
+    formula, numbers = _in_letters_and_numbers(equation, MATHML)
     return Typeset(
         math(f"<mrow>{left}<mo>=</mo>{formula}</mrow>"),
         f"{math(f'<mrow><mo>=</mo>{numbers}</mrow>')} {math(f'<mrow><mo>=</mo>{result}</mrow>')}",
     )
+
+
+def as_latex(equation: WorkedEquation) -> Typeset:
+    """Without delimiters; both parts are aligned at their first `=`."""
+    unit = rf"\,\mathrm{{{equation.unit.replace('^2', '^{2}')}}}" if equation.unit else ""
+    result = f"{_number_in(LATEX, equation.result)}{unit}"
+    formula, numbers = _in_letters_and_numbers(equation, LATEX)
+    return Typeset(f"{symbol(equation.symbol, LATEX)} &= {formula}", f"&= {numbers} = {result}")
+
+
+def _in_letters_and_numbers(equation: WorkedEquation, language: Language) -> tuple[str, str]:
+    """The formula of an equation, and the same with numbers put in, negative ones in brackets."""
+    if equation.formula in FORMULAS:
+        formula = FORMULAS[equation.formula][language.place]
+        known = {SYMBOLS[name][language.place]: value for name, value in equation.values.items() if name in SYMBOLS}
+        return formula, (_mathml_filled if language is MATHML else _latex_filled)(formula, known)
+    numbers = {name: _number_in(language, value) for name, value in equation.values.items()}
+    numbers |= {name: language.brackets % numbers[name] for name, value in equation.values.items() if value < 0}
+    return written(equation.formula, language), written(equation.formula, language, numbers)
 
 
 def math(content: str) -> str:
@@ -404,14 +418,9 @@ def math(content: str) -> str:
     return f'<math displaystyle="true">{content}</math>'
 
 
-def mathml_of(formula: str) -> str:
-    """MathML of a formula or symbol of the catalogue, without numbers and without the element around it."""
-    return (FORMULAS.get(formula) or SYMBOLS[formula])[_MATHML]
-
-
-def latex_of(formula: str) -> str:
-    """LaTeX of a formula or symbol of the catalogue."""
-    return (FORMULAS.get(formula) or SYMBOLS[formula])[_LATEX]
+def catalogued(formula: str, language: Language) -> str:
+    """A formula or symbol of the catalogue in a language, without numbers and without the element around it."""
+    return (FORMULAS.get(formula) or SYMBOLS[formula])[language.place]
 
 
 def _mathml_filled(formula: str, values: Mapping[str, float]) -> str:
@@ -419,7 +428,7 @@ def _mathml_filled(formula: str, values: Mapping[str, float]) -> str:
 
     def written(match: re.Match[str]) -> str:
         value = values[match[2]]
-        bare = mathml_number(value)
+        bare = _number_in(MATHML, value)
         needs_brackets = value < 0 or (match[1] and "<msup>" in bare)
         return match[1] + (f"<mrow><mo>(</mo>{bare}<mo>)</mo></mrow>" if needs_brackets else bare)
 
@@ -428,46 +437,10 @@ def _mathml_filled(formula: str, values: Mapping[str, float]) -> str:
     return text.replace("<mo>\u2062</mo>", "<mo>·</mo>")
 
 
-def mathml_number(value: float) -> str:
-    """Six digits as one element; large and small ones as a power of ten."""
-    is_negative, digits, exponent = _parts(value)
-    number = f"<mn>{digits}</mn>"
-    if exponent:
-        power = f"<mn>{exponent}</mn>" if exponent > 0 else f"<mrow><mo>−</mo><mn>{-exponent}</mn></mrow>"
-        number = f"<mrow>{number}<mo>·</mo><msup><mn>10</mn>{power}</msup></mrow>"
-    return f"<mrow><mo>−</mo>{number}</mrow>" if is_negative else number
-
-
-def _mathml_unit(unit: str) -> str:
-    if not unit:
-        return ""
-    return f'<mspace width="0.25em"/><mtext>{xml_text(unit.replace("^2", "²"))}</mtext>'
-
-
-def as_latex(equation: WorkedEquation) -> Typeset:
-    """Without delimiters; both parts are aligned at their first `=`."""
-    unit = rf"\,\mathrm{{{equation.unit.replace('^2', '^{2}')}}}" if equation.unit else ""
-    result = f"{latex_number(equation.result)}{unit}"
-    if equation.formula in FORMULAS:
-        formula = FORMULAS[equation.formula][_LATEX]
-        values = {SYMBOLS[name][_LATEX]: value for name, value in equation.values.items() if name in SYMBOLS}
-        numbers = _latex_filled(formula, values)
-    else:
-        formula = written(equation.formula, LATEX)
-        cells = {name: (latex_number(value), value) for name, value in equation.values.items()}
-        numbers = written(equation.formula, LATEX, _bracketed(cells, LATEX))
-    return Typeset(f"{symbol(equation.symbol, LATEX)} &= {formula}", f"&= {numbers} = {result}")
-
-
-def _bracketed(cells: Mapping[str, tuple[str, float]], language: Language) -> dict[str, str]:
-    """Numbers in their language, negative ones in brackets."""
-    return {name: language.brackets % text if value < 0 else text for name, (text, value) in cells.items()}
-
-
 def _latex_filled(formula: str, values: Mapping[str, float]) -> str:
     def written(match: re.Match[str]) -> str:
         value = values[match[0]]
-        bare = latex_number(value)
+        bare = _number_in(LATEX, value)
         is_base = formula[match.end() : match.end() + 1] == "^"
         needs_brackets = value < 0 or (is_base and "cdot" in bare)
         return rf"\left({bare}\right)" if needs_brackets else bare
@@ -483,15 +456,10 @@ def _latex_symbols(values: Mapping[str, float]) -> re.Pattern[str]:
     return re.compile(rf"(?<![A-Za-z\\])(?:{longest_first})(?![A-Za-z])")
 
 
-def latex_number(value: float) -> str:
+def _number_in(language: Language, value: float) -> str:
     """Six digits; large and small ones as a power of ten."""
-    is_negative, digits, exponent = _parts(value)
-    number = rf"{digits} \cdot 10^{{{exponent}}}" if exponent else digits
-    return f"-{number}" if is_negative else number
-
-
-def _parts(value: float) -> tuple[bool, str, int]:
-    """Sign, digits and power of ten."""
-    text = six_digits(value)
-    digits, _, exponent = text.removeprefix("-").partition("e")
-    return text.startswith("-"), digits, int(exponent or 0)
+    digits, _, exponent = six_digits(abs(value)).partition("e")
+    number = language.number % digits
+    if exponent:
+        number = language.power_of_ten % (number, _number_in(language, int(exponent)))
+    return language.negative % number if value < 0 else number

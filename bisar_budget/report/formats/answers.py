@@ -9,12 +9,12 @@ from typing import Any
 from bisar_budget.design.compare import Comparison, PartState
 from bisar_budget.design.sensitivity import LITTLE, Relaxed, Sensitivity, Slope
 from bisar_budget.design.solve import Crossing, Imaged, Solution, State
-from bisar_budget.faults import changes_words, printable
+from bisar_budget.faults import printable
 from bisar_budget.findings.requirement import NAMES
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
 from bisar_budget.report.formats.json_document import verdict_item
-from bisar_budget.report.words.requirements import overrides_lines
+from bisar_budget.report.words.requirements import title_lines
 from bisar_budget.report.words.sentences import BINDING_WORDS, counted, percent, table, wrapped
 from bisar_budget.units import format_quantity
 
@@ -58,18 +58,6 @@ def _lines(found: Answer, style: Style) -> Iterator[str]:
     if isinstance(found, Sensitivity):
         return _lines_of_numbers(found, style)
     return _lines_of_crossings(found, style) if isinstance(found, Solution) else _lines_of_parts(found, style)
-
-
-def _title(found: Answer, said: str, sgr: str, remark: str, style: Style, *more: str) -> Iterator[str]:
-    """The answer in a sentence, coloured on a terminal, and of which mission it is."""
-    first, *rest = wrapped(said, "  ")
-    yield f"\x1b[{sgr}m{first}\x1b[0m" if style.color else first
-    yield from rest
-    changed = f" {changes_words(found.changes)}" if found.changes else ""
-    named = f"{printable(found.file)}{changed}, {printable(found.name)}{remark}"
-    yield from (line for text in (*more, named) for line in wrapped(text, "  "))
-    yield from overrides_lines(found)
-    yield ""
 
 
 def _solved(solution: Solution) -> dict[str, Any]:
@@ -175,7 +163,7 @@ def _lines_of_parts(found: Comparison, style: Style) -> Iterator[str]:
     what = f"row {printable(found.row)} complies" if found.row else "the mission complies"
     said = f"{what} with {count} of {total} parts" if count else f"{what} with none of {total} parts"
     remark = f"; {found.model} model{', neither fails nor warns' if found.target == 'warn' else ''}"
-    yield from _title(found, f"{printable(found.key)}: {said}", _SGR[found.status], remark, style)
+    yield from title_lines(found, f"{printable(found.key)}: {said}", _SGR[found.status], style, remark=remark)
     is_mixed = len({part.kind for part in found.parts}) > 1
     rows = [["part", *(["kind"] if is_mixed else []), "status", "use", ""]]
     for part in found.parts:
@@ -201,7 +189,7 @@ def _lines_of_parts(found: Comparison, style: Style) -> Iterator[str]:
 
 def _lines_of_crossings(solution: Solution, style: Style) -> Iterator[str]:
     said = f"{_subject(solution)}: {_answer(solution)}"
-    yield from _title(solution, said, _SGR[solution.status], "", style)
+    yield from title_lines(solution, said, _SGR[solution.status], style)
     for name, text in _facts(solution):
         yield from wrapped(f"{name:<12} {text}", " " * 13)
 
@@ -372,7 +360,8 @@ def _lines_of_numbers(found: Sensitivity, style: Style) -> Iterator[str]:
     row = []
     if found.row is not None and found.row_utilization is not None:
         row = [f"row {printable(found.row)}: {percent(found.row_utilization)}"]
-    yield from _title(found, said, status.sgr, f": {status.text}, {found.model} model", style, *row)
+    remark = f": {status.text}, {found.model} model"
+    yield from title_lines(found, said, status.sgr, style, more=row, remark=remark)
     yield from _table(found)
     yield from _notes(found)
     if found.is_balanced:

@@ -62,15 +62,16 @@ _values_of = attrgetter(*_OF_ROW)
 
 def piece(mission: MissionFindings | UnusableMission, style: Style) -> str:
     """Write every requirement and row of a mission; of an unusable file a line per fault, with the status `error`."""
-    return _written(_faults(mission) if isinstance(mission, UnusableMission) else _rows(mission))
+    return csv_text(_faults(mission) if isinstance(mission, UnusableMission) else _rows(mission))
 
 
 def joined(pieces: Sequence[Piece], version: str, style: Style) -> str:
     """Write them below their header."""
-    return _written([COLUMNS]) + "".join(piece.text for piece in pieces)
+    return csv_text([COLUMNS]) + "".join(piece.text for piece in pieces)
 
 
-def _written(rows: Iterable[Sequence[object]]) -> str:
+def csv_text(rows: Iterable[Sequence[object]]) -> str:
+    """Write rows as lines of CSV; None is an empty cell, a number has all digits that it needs to be read back."""
     output = io.StringIO()
     csv.writer(output, lineterminator="\n").writerows(rows)
     return output.getvalue()

@@ -1,7 +1,5 @@
 """Passes of a satellite as text for reading, as `passes/1`, CSV, and as events of a calendar (RFC 5545)."""
 
-import csv
-import io
 import json
 import math
 import re
@@ -11,13 +9,14 @@ from datetime import UTC, date, datetime
 from typing import Any
 
 from bisar_budget.design.passes import Passes, SatellitePass
-from bisar_budget.faults import changes_words, printable
+from bisar_budget.faults import printable
 from bisar_budget.findings.requirement import NAMES
 from bisar_budget.findings.status import STATUS
 from bisar_budget.paths.instant import DAY, Instant
 from bisar_budget.report import Style
+from bisar_budget.report.formats.csv_table import csv_text
 from bisar_budget.report.words.identity import digest
-from bisar_budget.report.words.requirements import overrides_lines
+from bisar_budget.report.words.requirements import title_lines
 from bisar_budget.report.words.sentences import percent, sentence, spreadsheet_text, wrapped
 from bisar_budget.units import format_quantity
 
@@ -94,16 +93,12 @@ def direction(one: SatellitePass) -> str:
 
 def as_csv(passes: Passes) -> str:
     """Write a line for each pass, values in SI and radians, empty where there is none."""
-    items = [_item(one) for one in passes.found]
-    keys = list(_item(_NO_PASS))
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(["file", "name", "platform", *keys])
     whose = [spreadsheet_text(text) for text in (passes.file, passes.name, passes.platform)]
-    for item in items:
-        cells = (spreadsheet_text(value) if isinstance(value, str) else value for value in item.values())
-        writer.writerow([*whose, *cells])
-    return out.getvalue()
+    lines: list[list[object]] = [["file", "name", "platform", *_item(_NO_PASS)]]
+    for one in passes.found:
+        cells = (spreadsheet_text(value) if isinstance(value, str) else value for value in _item(one).values())
+        lines.append([*whose, *cells])
+    return csv_text(lines)
 
 
 _NOWHEN = Instant(0, 0.0)
@@ -164,13 +159,8 @@ def _seconds(instant: Instant) -> str:
 
 
 def _lines(passes: Passes, style: Style) -> Iterator[str]:
-    first, *rest = wrapped(verdict(passes), "  ")
-    yield f"\x1b[{'32' if passes.complying else '1;31'}m{first}\x1b[0m" if style.color else first
-    yield from rest
-    changed = f" {changes_words(passes.changes)}" if passes.changes else ""
-    yield from wrapped(f"{printable(passes.file)}{changed}, {printable(passes.name)}; {passes.model} model", "  ")
-    yield from overrides_lines(passes)
-    yield ""
+    sgr = "32" if passes.complying else "1;31"
+    yield from title_lines(passes, verdict(passes), sgr, style, remark=f"; {passes.model} model")
     if passes.found:
         yield from _table(passes.found, style)
         yield ""
@@ -187,8 +177,7 @@ def _table(found: Sequence[SatellitePass], style: Style) -> Iterator[str]:
         yield _row(head, widths)
     for one, row in zip(found, cells, strict=True):
         line = _row(row, widths)
-        sgr = STATUS[one.status].sgr
-        yield f"\x1b[{sgr}m{line[:8]}\x1b[0m{line[8:]}" if style.color else line
+        yield style.coloured(line[:8], STATUS[one.status].sgr) + line[8:]
 
 
 def _row(cells: Sequence[str], widths: Sequence[int]) -> str:
@@ -295,20 +284,10 @@ _OCTETS = 75  # of a line, its end not counted
 
 
 def as_ics(version: str, passes: Passes, stamp: date) -> str:
-    """Write an event for each pass; lines end with a line feed, in whose place a calendar has CR and LF.
+    """Write an event for each pass (RFC 5545), made on the day `stamp` of UTC.
 
-    Parameters
-    ----------
-    version : str
-        Of the tool.
-    passes : Passes
-        What was found.
-    stamp : date
-        Day, of UTC, that the events say they were made on.
-
-    Notes
-    -----
-    RFC 5545. An event keeps its UID with newer elements, as long as the pass stays in its half hour.
+    Lines end with a line feed, in whose place a calendar has CR and LF. An event keeps its UID with newer elements,
+    as long as the pass stays in its half hour.
     """
     lines = ["BEGIN:VCALENDAR", "VERSION:2.0", f"PRODID:-//bisar-budget//passes {version}//EN"]
     seen: Counter[str] = Counter()

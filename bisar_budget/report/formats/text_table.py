@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from functools import cache
 
 from bisar_budget.effects.declared import END_OF_IMAGE
-from bisar_budget.faults import changes_words, printable
+from bisar_budget.faults import printable
 from bisar_budget.findings.mission import MissionFindings, UnusableMission
 from bisar_budget.findings.row import Row, worst_first
 from bisar_budget.findings.status import STATUS, worst
@@ -17,6 +17,7 @@ from bisar_budget.report.words.requirements import (
     COLUMNS,
     RequirementLine,
     declared_words,
+    file_words,
     is_said_with_the_table,
     overrides_lines,
     overrides_words,
@@ -28,6 +29,7 @@ from bisar_budget.report.words.requirements import (
 )
 from bisar_budget.report.words.sentences import (
     WIDTH,
+    aligned,
     allowable_words,
     binding_words,
     counted,
@@ -112,7 +114,7 @@ def requirement_table(mission: MissionFindings, style: Style) -> Iterator[str]:
     cells = [COLUMNS[:4], *((one.name, one.allowed, one.reached, one.use) for one in found)]
     widths = [max(len(line[column]) for line in cells) for column in range(4)]
     numbers = (f"{COLUMNS[0]:<{widths[0]}}", *_right(COLUMNS[1:4], widths[1:]))
-    yield f"{' '.join(numbers)} {COLUMNS[4]:<8} {COLUMNS[5]}"
+    yield f"{' '.join(numbers)} {COLUMNS[4]:<{_STATUS}} {COLUMNS[5]}"
     for one in found:
         yield from _requirement(one, widths, style)
 
@@ -131,7 +133,7 @@ def _requirement(one: RequirementLine, widths: Sequence[int], style: Style) -> I
     start = " ".join((f"{one.name:<{widths[0]}}", *_right((one.allowed, one.reached, one.use), widths[1:])))
     decided = ", ".join(filter(None, (one.decided_by, one.remark)))
     if len(start) + 10 + len(decided) <= WIDTH:
-        yield f"{start} {_word(one.status, style, 8)} {decided}"
+        yield f"{start} {_word(one.status, style, _STATUS)} {decided}"
     else:
         yield f"{start} {_word(one.status, style)}"
         yield from wrapped(f"    {decided}", "    ")
@@ -159,7 +161,8 @@ def _after(mission: MissionFindings, style: Style) -> Iterator[str]:
         yield from ("", "Images with each error at its limit", "", *evidence(mission.verdicts, style))
 
 
-_HEADER = ("status", "row", "declared", "allowable", "use", "by")
+_STATUS = 8  # columns of a status, the same in every table: the eye and scripts look there
+_HEADER = (f"{'status':<{_STATUS}} row", "declared", "allowable", "use", "by")
 
 
 def _table(mission: MissionFindings, style: Style, room: int) -> Iterator[str]:
@@ -192,20 +195,13 @@ def _table(mission: MissionFindings, style: Style, room: int) -> Iterator[str]:
 
 
 def _lines(rows: Sequence[Row], cells: Sequence[Sequence[str]], style: Style) -> Iterator[str]:
-    widths = [max(len(line[column]) for line in (_HEADER, *cells)) for column in range(len(_HEADER))]
-    widths[0] = 8  # the same in every table: the eye and scripts look there
-    names = [len(line[1]) for line in (_HEADER, *cells)]
-    room = WIDTH - sum(widths) + widths[1] - len(_HEADER) + 1
-    widths[1] = max(name for name in names if name <= max(room, len("row")))
-    yield _line(_HEADER, widths)
-    for row, line in zip(rows, cells, strict=True):
-        if len(line[1]) > widths[1]:  # an id that would take its line beyond 80 columns stands above its numbers
-            yield f"{_word(row.status, style, widths[0])} {line[1]}"
-            yield _line(("", "", *line[2:]), widths)
-        else:
-            yield _word(row.status, style, widths[0]) + _line(line, widths)[widths[0] :]
+    head, *found = aligned([_HEADER, *cells])
+    yield from head
+    for row, (first, *rest) in zip(rows, found, strict=True):
+        yield _word(row.status, style, _STATUS) + first[_STATUS:]
+        yield from rest
         if row.requirement_id and (not STATUS[row.status].is_explained and style.verbosity < 1):
-            yield f"{'':<{widths[0]}} [{row.requirement_id}]"  # the others have it with their reason
+            yield f"{'':<{_STATUS}} [{row.requirement_id}]"  # the others have it with their reason
 
 
 def _table_key(rows: Sequence[Row], hidden: Sequence[Row]) -> str:
@@ -223,18 +219,12 @@ def _table_key(rows: Sequence[Row], hidden: Sequence[Row]) -> str:
     return f"{key}. Not shown (--all): {others}." if others else f"{key}."
 
 
-def _line(cells: Sequence[str], widths: Sequence[int]) -> str:
-    """One line of the table: names to the left, numbers to the right, the last column to the left."""
-    status, name, *numbers, last = cells
-    right = " ".join(cell.rjust(width) for cell, width in zip(numbers, widths[2:-1], strict=True))
-    return f"{status:<{widths[0]}} {name:<{widths[1]}} {right} {last}".rstrip()
-
-
 def _row(row: Row, mission: MissionFindings) -> tuple[str, ...]:
     size = "-" if row.declared is None else row_size(row.declared, row, mission)
     use = shown_use(row)
     used = "-" if use is None else percent(use)
-    return STATUS[row.status].text, row.id, size, allowable_words(row, mission), used, _limited_by(row)
+    name = f"{STATUS[row.status].text:<{_STATUS}} {row.id}"
+    return name, size, allowable_words(row, mission), used, _limited_by(row)
 
 
 def _limited_by(row: Row) -> str:
@@ -303,8 +293,7 @@ def _asides(mission: MissionFindings, style: Style) -> Iterator[str]:
 
 
 def _summary(mission: MissionFindings, *, is_brief: bool = False) -> str:
-    changed = f" {changes_words(mission.changes)}" if mission.changes else ""
-    return f"{STATUS[mission.status].text} {printable(mission.file)}{changed}: {verdict(mission, is_brief=is_brief)}"
+    return f"{STATUS[mission.status].text} {file_words(mission)}: {verdict(mission, is_brief=is_brief)}"
 
 
 def _overall(statuses: Sequence[str], style: Style) -> str:
@@ -318,5 +307,4 @@ def _lead(line: str, status: str, style: Style) -> str:
 
 
 def _word(status: str, style: Style, width: int = 0) -> str:
-    word = f"{STATUS[status].text:<{width}}"
-    return f"\x1b[{STATUS[status].sgr}m{word}\x1b[0m" if style.color else word
+    return style.coloured(f"{STATUS[status].text:<{width}}", STATUS[status].sgr)

@@ -4,11 +4,11 @@ import json
 import math
 from collections.abc import Iterator, Sequence
 
-from bisar_budget.faults import changes_words, printable
+from bisar_budget.faults import printable
 from bisar_budget.findings.images import Verdict, VerifiedMission
 from bisar_budget.report import Style
 from bisar_budget.report.formats.json_document import verdict_item
-from bisar_budget.report.words.requirements import overrides_lines
+from bisar_budget.report.words.requirements import file_words, overrides_lines
 from bisar_budget.report.words.sentences import table, wrapped, wrapped_counts
 from bisar_budget.units import format_limit, format_quantity
 
@@ -55,8 +55,7 @@ def _mission(mission: VerifiedMission, style: Style) -> list[str]:
     counts = ", ".join(f"{found.count(verdict)} {word}" for verdict, word in WORDS.items() if verdict in found)
     refuted = sum(row.verdict_autofocus == "optimistic" for row in mission.rows)
     counts += f"; {refuted} optimistic with autofocus" if refuted else ""  # they decide the exit code too
-    changed = f" {changes_words(mission.changes)}" if mission.changes else ""
-    summary = f"{printable(mission.file)}{changed}: {counts or 'no row has a limit here'}"
+    summary = f"{file_words(mission)}: {counts or 'no row has a limit here'}"
     conditions = wrapped(f"Images: {mission.conditions}.", "  ") if mission.conditions else []
     return [
         *wrapped(printable(mission.name), "  "),
@@ -176,7 +175,7 @@ def _decibel(value: float | None) -> str:
 
 def _coloured(line: str, style: Style) -> str:
     """Colour the verdict that ends a line."""
-    for verdict, word in WORDS.items() if style.color else ():
+    for verdict, word in WORDS.items():
         if line.endswith(f" {word}"):
-            return f"{line.removesuffix(word)}\x1b[{_ANSI[verdict]}m{word}\x1b[0m"
+            return line.removesuffix(word) + style.coloured(word, _ANSI[verdict])
     return line

@@ -19,7 +19,7 @@ from bisar_budget.mission.model import Document
 from bisar_budget.mission.platforms import FlownPath
 from bisar_budget.report import Style
 from bisar_budget.report.words.requirements import RULES
-from bisar_budget.report.words.sentences import phase_limit
+from bisar_budget.report.words.sentences import phase_limit, sentence
 from bisar_budget.units import format_quantity
 
 _STANDARD_INPUT = "standard input"
@@ -214,7 +214,7 @@ def narrow_gradients(geometry: BistaticGeometry) -> str:
 def doubtful_model(mission: MissionFindings) -> str:
     """Say where the published model judges and does not hold, as a sentence; nothing if it does hold."""
     said = mission.model_doubt
-    return f"{said[0].upper()}{said[1:]}." if said else ""
+    return f"{sentence(said)}." if said else ""
 
 
 def head(mission: MissionFindings) -> Iterator[tuple[str, str]]:

@@ -3,7 +3,7 @@
 import math
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from bisar_budget.faults import KeyPath, Place, printable
 from bisar_budget.findings.mission import MissionFindings
@@ -183,19 +183,22 @@ def wrapped_counts(text: str) -> list[str]:
 
 
 def table(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Align rows of cells, the header first: names to the left, numbers to the right, the last column to the left.
+    """Align rows of cells, the header first."""
+    return [line for lines in aligned(rows) for line in lines]
+
+
+def aligned(rows: Sequence[Sequence[str]]) -> Iterator[list[str]]:
+    """Lines of each row of a table: names to the left, numbers to the right, the last column to the left.
 
     A name that would take its line beyond 80 columns gets a line of its own, above its numbers.
     """
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
     room = WIDTH - sum(widths[1:]) - len(widths) + 1
     first = max((len(row[0]) for row in rows if len(row[0]) <= room), default=0)
-    lines = []
     for name, *cells in rows:
         numbers = " ".join(cell.rjust(width) for cell, width in zip(cells[:-1], widths[1:-1], strict=True))
         rest = f"{numbers} {cells[-1]}".rstrip()
-        lines += [f"{name:<{first}} {rest}"] if len(name) <= first else [name, f"{'':<{first}} {rest}"]
-    return lines
+        yield [f"{name:<{first}} {rest}"] if len(name) <= first else [name, f"{'':<{first}} {rest}"]
 
 
 _XML = {"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;", "'": "&apos;"}

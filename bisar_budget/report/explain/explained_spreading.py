@@ -1,0 +1,269 @@
+"""How tones come to their echoes, and noise to the power that spreads: one by one, and all together."""
+
+import math
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from bisar_budget.analysis.allocation import Allocation
+from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.analysis.spread import (
+    Tone,
+    declared_powers,
+    mainlobe_energy,
+    spread_limit,
+    spread_phase,
+    stated_powers,
+    tones,
+)
+from bisar_budget.analysis.vibration_limits import (
+    LARGEST_ECHO,
+    Echo,
+    VibrationLimits,
+    bessel,
+    highest_echo,
+    quadratures,
+    tone_limits,
+)
+from bisar_budget.effects.declared import CUBIC
+from bisar_budget.effects.effect import subject
+from bisar_budget.effects.oscillator_acceleration import accelerated_tones, felt
+from bisar_budget.effects.oscillators import spurs_of
+from bisar_budget.faults import printable
+from bisar_budget.findings.row import Row
+from bisar_budget.mission.model import Mission
+from bisar_budget.report.explain.explained_error import combined, no_limit, place, stated
+from bisar_budget.report.explain.notation import Step, Sum, WorkedEquation, number, step, with_unit
+
+
+def allowed_variance(model: str, power: float, energy: float) -> tuple[str, dict[str, float]]:
+    """Formula of the variance that an ISLR allows by a model, and its values."""
+    if model == "published":
+        return "ISLR", {"ISLR": power}
+    return "log(E*ISLR + 1)", {"ISLR": power, "E": energy}
+
+
+def _level(model: str, variance: str) -> str:
+    """Formula of the ISLR of a variance by a model. [dB]"""
+    ratio = variance if model == "published" else f"(e^{variance} - 1)/E"
+    return f"10*log({ratio})/log(10)"
+
+
+def explained_islr(analysis: Analysis, allocation: Allocation, row: Row) -> Iterator[Step]:
+    """Powers of everything that spreads, together."""
+    mission, model, owner = analysis.mission, row.model or "published", row.owner
+    members = {one.row_id: one.variance for one in declared_powers(analysis, owner, model)}
+    total, energy = math.fsum(members.values()), mainlobe_energy(mission)
+    known: dict[str, float] = {}
+    rule = "the published rule takes the variance for it"
+    if model != "published":
+        known = {"e": math.e, "E": energy}
+        rule = "a phase of variance v leaves e^-v of the response, of which a share E lies within its first nulls"
+    if row.declared is None:
+        yield step("Nothing that spreads is declared")
+    else:
+        yield from _tones_and_cubic(analysis, allocation, owner, model, members)
+        width = max(len(name) for name in members)
+        listed = [f"{printable(name):<{width}}  {power:.6g} rad²" for name, power in members.items()]
+        terms = " + ".join(number(power) for power in members.values())
+        title = "Squares of the rms phases that spread: independent, so they add"
+        yield step(title, *listed, Sum(f"v = {terms} = {with_unit(total, 'rad²')}"))
+        worked = WorkedEquation("declared", _level(model, "v"), {"v": total, **known}, row.declared, "dB")
+        yield step(f"As ISLR: {rule}", worked)
+    if row.allowable is None:
+        return
+    power, share = 10 ** ((mission.requirements.islr or 0.0) / 10), allocation.islr.of(owner)
+    formula, values = allowed_variance(model, power, energy)
+    limit = spread_phase(power, model, energy) ** 2 * share
+    worked = WorkedEquation("v_max", f"{formula}*s", {**values, "s": share}, limit, "rad²")
+    yield step("Variance that requirements.islr allows, share s of the power", worked)
+    worked = WorkedEquation("allowable", _level(model, "v_max"), {"v_max": limit, **known}, row.allowable, "dB")
+    yield step("As ISLR", worked)
+    if row.utilization is not None:
+        values = {"v": total, "v_max": limit}
+        worked = WorkedEquation("utilization", "sqrt(v/v_max)", values, row.utilization, "")
+        yield step("Utilization, of amplitudes", worked)
+
+
+def _tones_and_cubic(
+    analysis: Analysis, allocation: Allocation, owner: str, model: str, members: Mapping[str, float]
+) -> Iterator[Step]:
+    """Powers of what is no noise: tones and the cubic phase, where no requirement of their own takes them."""
+    powers = [
+        Sum(f"{one.subject.id} = {number(one.phase)}^2/2 = {with_unit(members[one.subject.id], 'rad²')}")
+        for one in tones(analysis.mission)
+        if one.subject.id in members
+    ]
+    if powers:
+        yield step("No requirements.pslr: a tone spreads half the square of its peak phase", *powers)
+    cubic_row = subject("mission", CUBIC).id
+    if cubic_row not in members:
+        return
+    together = analysis.together("full" if model == "full" else "published")
+    cubic = float(together.cubic_without_coverage(allocation.islr, owner)[0])
+    parts = together.phase_parts(together.cubics_without_coverage(allocation.islr, owner), together.rule_of_all)
+    title = "Cubic phase of the declared errors, without coverage factor"
+    yield from combined(title, together.rule_of_all, parts, cubic, symbol="φ_3")
+    worked = WorkedEquation("v_3", "4*φ_3^2/175", {"φ_3": cubic}, members[cubic_row], "rad²")
+    yield step("No requirements.cubic_phase_error: its mean square after the fit of a line spreads", worked)
+
+
+def explained_pslr(mission: Mission, row: Row) -> Iterator[Step]:
+    """From all tones to the highest echo that they make in the worst of their phases."""
+    found = tones(mission)
+    echo = highest_echo(found)
+    if echo is None:
+        yield step("No tone is declared: no vibration from one cycle per aperture on, no spur")
+    else:
+        width = max(len(one.subject.id) for one in found)
+        listed = [f"{one.subject.id:<{width}}  {one.phase:.6g} rad, {one.cycles:.6g} cells" for one in found]
+        yield step("Tones: peak phase, and distance of their echoes from the response", *listed)
+        together = [one for one, is_in in zip(found, echo.is_of, strict=True) if is_in]
+        pairs = {together[other].subject.id: together[one] for one, other in quadratures(together)}
+        apart = {one.subject.id for one in pairs.values()}
+        terms = " + ".join(
+            f"{_with_its_pair(one, pairs.get(one.subject.id))}*{number(abs(np.sinc(echo.cycles - one.cycles)))}"
+            for one in together
+            if one.subject.id not in apart
+        )
+        title = (
+            f"Highest echo: at x = {number(echo.cycles)} cells, of {', '.join(one.subject.id for one in together)}"
+        )
+        if pairs:
+            title += "; motion and oscillator are a quarter of a turn apart, so that squares of the two add"
+        if len(together) - len(pairs) > 1:
+            title += ", each φ·|sinc(x − f·T)| in the worst phases, sinc(x) = sin(πx)/(πx)"
+        yield step(title, Sum(f"φ = {terms} = {with_unit(echo.phase, 'rad')}"))
+        yield from _echo_level(echo)
+        if row.declared is not None:
+            worked = WorkedEquation("declared", "20*log(l)/log(10)", {"l": echo.level}, row.declared, "dB")
+            yield step("As a level", worked)
+    if row.allowable is None:
+        return
+    worked = WorkedEquation("allowable", "required", {"required": row.allowable}, row.allowable, "dB")
+    yield step(f"requirements.pslr, all of it, {place(mission, ('requirements', 'pslr'))}", worked)
+    yield from _use_of_amplitudes(row)
+
+
+def _with_its_pair(one: Tone, other: Tone | None) -> str:
+    """Peak phase of a tone, or with that of one a quarter of a turn away."""
+    return number(one.phase) if other is None else f"sqrt({number(one.phase)}^2 + {number(other.phase)}^2)"
+
+
+def _echo_level(echo: Echo) -> Iterator[Step]:
+    if echo.phase > LARGEST_ECHO:
+        worked = WorkedEquation("l", "φ/2", {"φ": echo.phase}, echo.level, "")
+        yield step(f"Amplitude over that of the response; above {LARGEST_ECHO:g} rad half the phase", worked)
+        return
+    j0, j1 = bessel(echo.phase)
+    yield step(
+        "Amplitude over that of the response, J₁(φ)/J₀(φ)",
+        WorkedEquation("J_0", "", {}, j0, ""),
+        WorkedEquation("J_1", "", {}, j1, ""),
+        WorkedEquation("l", "J_1/J_0", {"J_0": j0, "J_1": j1}, echo.level, ""),
+    )
+
+
+def _use_of_amplitudes(row: Row) -> Iterator[Step]:
+    if row.utilization is None or row.declared is None or row.allowable is None:
+        return
+    values = {"declared": row.declared, "allowable": row.allowable}
+    worked = WorkedEquation("utilization", "10^((declared - allowable)/20)", values, row.utilization, "")
+    yield step("Utilization, of amplitudes", worked)
+
+
+def explained_spur(mission: Mission, allocation: Allocation, row: Row) -> Iterator[Step]:
+    """From the tone of an oscillator to its paired echoes, and to what the platform's share allows."""
+    oscillator = getattr(mission.platforms, row.owner).oscillator
+    path = ("platforms", row.owner, "oscillator", "spurs")
+    entry = row.subject.entry or 0
+    frequency, level = oscillator.spurs[entry]
+    yield step(f"Declared in {place(mission, path)}", f"{frequency:.6g} Hz: {level:.6g} dBc")
+    f_0 = mission.radar.center_frequency
+    values, formula = {"L": level, "f_0": f_0, "f_osc": oscillator.frequency or f_0}, "L + 20*log(f_0/f_osc)/log(10)"
+    left = next(one.left for one in spurs_of(mission) if (one.name, one.entry) == (row.owner, entry))
+    title = "At the centre frequency; an echo has the amplitude of the sideband"
+    if left != 1:
+        values, formula = {**values, "left": left}, f"{formula} + 20*log(left)/log(10)"
+        title += ", times what the synchronization leaves of it"
+    yield step(title, WorkedEquation("declared", formula, values, row.declared or 0.0, "dB"))
+    limits = tone_limits(mission, allocation)[1].get(row.owner)
+    if limits is None or row.allowable is None:
+        yield no_limit(row)
+        return
+    phase, at_limit = _phase_at_limit(mission, row, limits, "φ")
+    yield at_limit
+    yield step("Its echoes", WorkedEquation("allowable", "20*log(φ/2)/log(10)", {"φ": phase}, row.allowable, "dB"))
+    yield from _use_of_amplitudes(row)
+
+
+def _phase_at_limit(mission: Mission, row: Row, limits: VibrationLimits, symbol: str) -> tuple[float, Step]:
+    """Peak phase of a vibration at the limit of the platform of a tone, and how it comes about. [rad]"""
+    values = {"A": float(limits.by(row.model or "published")), "λ": mission.radar.wavelength}
+    phase = 2 * math.pi * values["A"] / values["λ"]
+    by_power = "" if row.metric == "pslr" else ", √2 times the rms value that ISLR allows"
+    title = f"Phase of a vibration at the limit of {row.owner}.vibration.sinusoidal{by_power}"
+    return phase, step(title, WorkedEquation(symbol, "2*π*A/λ", values, phase, "rad"))
+
+
+def explained_tone(mission: Mission, allocation: Allocation, row: Row) -> Iterator[Step]:
+    """From a vibration of an oscillator to its paired echoes, and to the sensitivity that the share allows."""
+    name, entry = row.owner, row.subject.entry or 0
+    one = next(one for one in accelerated_tones(mission) if (one.name, one.entry) == (name, entry))
+    felt_one, f_0 = felt(mission, name), mission.radar.center_frequency
+    is_own = felt_one is not None and felt_one.is_own
+    section = ("oscillator",) if is_own else ("motion_error",)
+    path = ("platforms", name, *section, "vibration", "sinusoidal", entry, "amplitude")
+    a = float(one.acceleration)
+    gamma = ("platforms", name, "oscillator", "acceleration_sensitivity")
+    yield step(f"Γ, declared in {place(mission, gamma)}", f"Γ = {with_unit(one.sensitivity, 's^2/m')}")
+    if row.evidence:
+        yield step("Evidence", printable(row.evidence))
+    yield step(f"Acceleration of the vibration, declared in {place(mission, path)}", f"a = {with_unit(a, 'm/s^2')}")
+    values, formula = {"f_0": f_0, "Γ": one.sensitivity, "a": a, "f": one.frequency}, "f_0*Γ*a/f"
+    title = "Derived: peak phase of the tone, a quarter of a turn from the motion itself"
+    if one.left != 1:
+        values, formula = {**values, "left": one.left}, f"{formula}*left"
+        title += ", times what the synchronization leaves of it"
+    yield step(title, WorkedEquation("φ", formula, values, one.phase, "rad"))
+    if one.phase:
+        level = 20 * math.log10(one.phase / 2)
+        yield step("Its echoes", WorkedEquation("l", "20*log(φ/2)/log(10)", {"φ": one.phase}, level, "dB"))
+    limits = tone_limits(mission, allocation)[1].get(name)
+    if limits is None or row.allowable is None:
+        yield no_limit(row)
+        return
+    phase, at_limit = _phase_at_limit(mission, row, limits, "φ_max")
+    yield at_limit
+    if one.phase:
+        values = {"Γ": one.sensitivity, "φ_max": phase, "φ": one.phase}
+        yield step("Allowable", WorkedEquation("allowable", "Γ*φ_max/φ", values, row.allowable, row.unit))
+    else:
+        yield step("Allowable", Sum(f"allowable = {with_unit(row.allowable, row.unit)}"))
+
+
+def explained_power(mission: Mission, allocation: Allocation, row: Row) -> Iterator[Step]:
+    """From a stated ISLR to the phase that spreads as much, and to what is required."""
+    index, model = row.subject.entry or 0, row.model or "full"
+    power = next(one for one in stated_powers(mission) if one.subject == row.subject)
+    yield from stated(mission, ("other_errors", index, "islr"), row.declared, row.evidence)
+    yield effect_from_elsewhere()
+    ratio, energy = 10 ** (power.islr / 10), mainlobe_energy(mission)
+    rms = float(power.rms(model, energy))
+    values = {"ISLR": ratio} if model == "published" else {"ISLR": ratio, "E": energy}
+    formula = "sqrt(ISLR)" if model == "published" else "sqrt(log(1 + ISLR*E))"
+    yield step("Rms phase that spreads as much", WorkedEquation("rms", formula, values, rms, "rad"))
+    if mission.requirements.islr is None or row.allowable is None:
+        yield no_limit(row)
+        return
+    allowed = float(spread_limit(mission, allocation, "mission", model))
+    worked = WorkedEquation("allowable", "required", {"required": row.allowable}, row.allowable, "dB")
+    yield step("requirements.islr, all of it: it belongs to no platform", worked)
+    if row.utilization is not None:
+        worked = WorkedEquation("utilization", "rms/limit", {"rms": rms, "limit": allowed}, row.utilization, "")
+        yield step(f"Utilization, of rms phases; the limit is {with_unit(allowed, 'rad')}", worked)
+
+
+def effect_from_elsewhere() -> Step:
+    """The step of what is stated as an effect."""
+    return step("Stated by its effect on the image, whatever makes it; it has no coverage factor")
