@@ -8,17 +8,18 @@ Numbers of a mission may be arrays (cases,); its geometry then is that of these 
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bisar_budget.constants import ROUNDING
 from bisar_budget.effects.declared import ImagePlane, published_planes
 from bisar_budget.effects.effect import PLATFORMS, Subject, plain
 from bisar_budget.effects.oscillators import Noise
-from bisar_budget.effects.spectra import Floats
+from bisar_budget.effects.spectra import Floats, Parts
 from bisar_budget.faults import KeyPath
 from bisar_budget.geometry import BistaticGeometry, PlatformState
 from bisar_budget.mission.model import Mission
@@ -222,17 +223,54 @@ class SensorCases:
             for a, b in self.plane.adjugate
         ]
 
-    def of_orders(self, covariance: Floats, along: Any = 1.0) -> Floats:
-        """Covariance (4, 4, cases) of phases and displacement by orders 0 to 3 of independent range errors.
+    def of_orders(self, covariance: Floats, along: Any = 1.0) -> tuple[Floats, Floats]:
+        """`sigmas` of phases and displacement by orders 0 to 3 of independent range errors.
 
-        `covariance` (4, 4, cases) is that of each at the aperture edge [m²], `along` (errors, nodes, cases) what a
+        `covariance` (4, 4, ...) is that of each at the aperture edge [m²], `along` (errors, nodes, cases) what a
         metre of it does to the range; higher orders defocus and displace in second order of a turning line of sight.
         """
+        whole = covariance if covariance.ndim == 3 else covariance[..., None]
+        whole = np.broadcast_to(whole, (*whole.shape[:2], self.cases))
         places = self.exact.sampling.places
         orders = np.polynomial.legendre.legvander(places, len(_LEADING) - 1) / _LEADING
         seen = np.broadcast_to(along, (np.shape(along)[0] if np.ndim(along) else 1, places.size, self.cases))
         effects = np.einsum("fnc,anc,no->afoc", self.weights, seen, orders)
-        return np.asarray(np.einsum("afoc,opc,agpc->fgc", effects, covariance, effects))
+        found = np.asarray(np.einsum("afoc,opc,agpc->fgc", effects, whole, effects))
+        return sigmas(found, np.einsum("ffc->fc", found))
+
+    def of_parts(self, found: Parts, along: Any = 1.0) -> tuple["RandomEffect", "RandomEffect"]:
+        """The same of a range error with these parts [m²]; `along` is what data have of a metre of it."""
+        k = 2 * math.pi / np.asarray(self.mission.radar.wavelength)
+        quadratic, cubic, left = (k * np.sqrt(part) for part in found[:3])
+        published = RandomEffect(quadratic, cubic, left, *self.moved(found.constant, found.linear))
+        (quadratic, cubic, east, north), covariance = self.of_orders(found.times(np.square(along)).covariance)
+        return published, RandomEffect(quadratic, cubic, left * along, east, north, covariance)
+
+    def alike(self, value: Any) -> Iterator[tuple[Any, NDArray[np.intp]]]:
+        """Tell apart cases in which a value, or what is in it, differs: the value of each group, and its cases."""
+        arrays = list(_arrays_in(value))
+        if not arrays:
+            yield value, np.arange(self.cases)
+            return
+        rows, group = np.unique(np.stack(arrays, axis=1), axis=0, return_inverse=True)
+        for place, row in enumerate(rows.tolist()):
+            yield _with_numbers(value, iter(row)), np.flatnonzero(group.ravel() == place)
+
+
+def _arrays_in(value: Any) -> Iterator[Floats]:
+    if isinstance(value, tuple):
+        for part in value:
+            yield from _arrays_in(part)
+    elif isinstance(value, np.ndarray):
+        yield value
+
+
+def _with_numbers(value: Any, numbers: Iterator[float]) -> Any:
+    """The same with numbers in the places of its arrays."""
+    if isinstance(value, tuple):
+        parts = [_with_numbers(part, numbers) for part in value]
+        return value._make(parts) if hasattr(value, "_make") else tuple(parts)
+    return next(numbers) if isinstance(value, np.ndarray) else value
 
 
 def _length_along(sight: Floats, directions: Floats) -> Floats:
@@ -254,9 +292,3 @@ def sigmas(covariance: Floats, sizes: Floats) -> tuple[Floats, Floats]:
     squares = np.einsum("ffc->fc", covariance)
     is_real = squares > _CANCELS * sizes
     return np.sqrt(np.where(is_real, squares, 0.0)), np.where(is_real & is_real[:, None], covariance, 0.0)
-
-
-def of_cases(covariance: Floats, cases: int) -> Floats:
-    """The same as (4, 4, cases)."""
-    whole = covariance if covariance.ndim == 3 else covariance[..., None]
-    return np.broadcast_to(whole, (*whole.shape[:2], cases))

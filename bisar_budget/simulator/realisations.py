@@ -15,8 +15,14 @@ from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.air_delays import CONTENT, DELAY, group_delay
 from bisar_budget.effects.effect import PLATFORMS
-from bisar_budget.effects.lever_arms import arm_at, body_axes
-from bisar_budget.effects.navigation_errors import TILTS, acceleration_errors, process_of, specific_force
+from bisar_budget.effects.navigation_errors import (
+    TILTS,
+    acceleration_errors,
+    arm_at,
+    body_axes,
+    process_of,
+    specific_force,
+)
 from bisar_budget.effects.oscillator_acceleration import (
     accelerated_tones,
     flies_a_turn,
@@ -27,8 +33,7 @@ from bisar_budget.effects.oscillators import noise_of
 from bisar_budget.effects.random_effect import RandomError
 from bisar_budget.effects.random_errors import random_errors
 from bisar_budget.effects.spectra import PowerLawPiece, density
-from bisar_budget.effects.vibration import SLOWEST, counted
-from bisar_budget.effects.vibration_spectra import pieces_of_vibration
+from bisar_budget.effects.vibration import SLOWEST, counted, pieces_of_vibration
 from bisar_budget.geometry import PlatformState
 from bisar_budget.mission.instruments import GaussMarkov
 from bisar_budget.mission.model import Mission, Simulation

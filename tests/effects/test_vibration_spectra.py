@@ -12,7 +12,7 @@ from bisar_budget.constants import SPEED_OF_LIGHT, STANDARD_GRAVITY
 from bisar_budget.effects.oscillator_acceleration import accelerated_tones, pieces_by_acceleration
 from bisar_budget.effects.random_effect import RandomError
 from bisar_budget.effects.random_errors import random_errors
-from bisar_budget.effects.vibration_spectra import displacement_rms
+from bisar_budget.effects.vibration import displacement_rms
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.quantities import with_number

@@ -20,8 +20,7 @@ from bisar_budget.budget.random_rows import held_effect, no_effect
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.effect import subject
-from bisar_budget.effects.lever_arms import arm_at, body_axes
-from bisar_budget.effects.navigation_errors import TILTS, process_of, specific_force
+from bisar_budget.effects.navigation_errors import TILTS, arm_at, body_axes, process_of, specific_force
 from bisar_budget.effects.oscillators import spurs_of
 from bisar_budget.effects.random_effect import RandomEffect, RandomError
 from bisar_budget.effects.random_errors import random_errors

@@ -12,8 +12,7 @@ from bisar_budget.constants import SPEED_OF_LIGHT, STANDARD_GRAVITY
 from bisar_budget.effects.oscillator_acceleration import accelerated_tones, felt, flies_a_turn, pieces_by_acceleration
 from bisar_budget.effects.random_effect import RandomError
 from bisar_budget.effects.spectra import tone
-from bisar_budget.effects.vibration import SLOWEST, counted
-from bisar_budget.effects.vibration_spectra import displacement_rms, pieces_of_vibration, power_of
+from bisar_budget.effects.vibration import SLOWEST, counted, displacement_rms, pieces_of_vibration, power_of
 from bisar_budget.faults import printable
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import PlatformState
