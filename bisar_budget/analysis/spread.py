@@ -100,11 +100,6 @@ def islr_of(mission: Mission, variance: Any) -> Any:
         return np.where(variance > 0, islr_db(variance, "full", mainlobe_energy(mission)), math.nan)
 
 
-def shown_islr_db(mission: Mission, variance: float) -> float | None:
-    """The same of one number; None where there is none. [dB]"""
-    return float(islr_of(mission, variance)) if variance else None
-
-
 def spread_limit(mission: Mission, allocation: Allocation, owner: str, model: str) -> Any:
     """Rms phase that an owner may spread, by the paper's rule or as an image shows it. [rad]"""
     if mission.requirements.islr is None:

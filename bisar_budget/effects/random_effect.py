@@ -19,6 +19,7 @@ from bisar_budget.constants import ROUNDING
 from bisar_budget.effects.declared import ImagePlane, published_planes
 from bisar_budget.effects.effect import PLATFORMS, Subject, plain
 from bisar_budget.effects.oscillators import Noise
+from bisar_budget.effects.sources import exact_ranges
 from bisar_budget.effects.spectra import Floats, Parts
 from bisar_budget.faults import KeyPath
 from bisar_budget.geometry import BistaticGeometry, PlatformState
@@ -160,15 +161,7 @@ class SensorCases:
     @cached_property
     def exact(self) -> ExactRanges:
         """Exact ranges at as many nodes as walks need."""
-        mission = self.mission
-        return ExactRanges.of(
-            self.geometry.both,
-            mission.radar.wavelength,
-            mission.collection.aperture_time,
-            NODES,
-            self.cases,
-            has_direct_path=mission.has_direct_path,
-        )
+        return exact_ranges(self.mission, self.geometry, NODES, self.cases)
 
     @cached_property
     def weights(self) -> Floats:

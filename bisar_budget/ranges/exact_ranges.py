@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from bisar_budget.constants import ROUNDING, SPEED_OF_LIGHT
 from bisar_budget.evaluators import LEGENDRE_FITS, full_ground_inverse
-from bisar_budget.geometry import BistaticGeometry, PlatformState, Vectors, dot, norm
+from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState, Vectors, dot, norm
 
 Floats = NDArray[np.float64]
 Places = NDArray[np.intp]
@@ -67,9 +67,9 @@ def nodes(count: int) -> Sampling:
     return Sampling(np.array(places), np.array(fit))
 
 
-def aperture_nodes(aperture_time_s: float, count: int = FINE) -> Floats:
-    """Slow times of the nodes of an aperture, (count,). [s]"""
-    return nodes(count).places * (aperture_time_s / 2)
+def aperture_nodes(aperture_time_s: float) -> Floats:
+    """Slow times of the nodes of an aperture for courses that are not smooth, (FINE,). [s]"""
+    return nodes(FINE).places * (aperture_time_s / 2)
 
 
 def nodes_for(geometry: BistaticGeometry, aperture_time_s: Any, *, has_direct_path: bool = False) -> Any:
@@ -229,6 +229,22 @@ class Found(NamedTuple):
     quadratic: Floats
     cubic: Floats
     turn: Floats
+
+
+@dataclass(frozen=True)
+class ExactEffect:
+    """Effect of one error by exact ranges, in plain numbers.
+
+    Displacement (east, north) [m]; phases at the aperture edge, signed like the range error [rad].
+    """
+
+    displacement: GroundVector
+    quadratic: float
+    cubic: float
+
+    def moved(self, by: GroundVector) -> GroundVector:
+        """The displacement and another one together."""
+        return self.displacement[0] + by[0], self.displacement[1] + by[1]
 
 
 class ExactRanges:
@@ -448,15 +464,6 @@ class ExactRanges:
             np.where(np.abs(linear) * self.half <= ROUNDING * size / self.k, 0.0, linear),
             np.where(np.abs(qpe) <= ROUNDING * seen, 0.0, qpe),
             np.where(np.abs(cubic) <= ROUNDING * seen_cubic, 0.0, cubic),
-        )
-
-    def displacement(self, effect: Effect, size: Any) -> tuple[Any, Any]:
-        """Displacement on the ground by so many units. [m]"""
-        scale = size / self.determinant
-        (a, b), (c, d) = self.adjugate
-        return (
-            (a * effect.constant + b * effect.linear) * scale,
-            (c * effect.constant + d * effect.linear) * scale,
         )
 
     # ------------------------------------------------------------------ errors of any size

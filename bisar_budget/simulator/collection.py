@@ -11,12 +11,11 @@ from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.air_delays import CONTENT, seen_course
 from bisar_budget.geometry import BistaticGeometry, GroundVector
 from bisar_budget.mission.model import Mission, Simulation
-from bisar_budget.ranges.exact_ranges import aperture_nodes
+from bisar_budget.ranges.exact_ranges import ExactEffect, aperture_nodes
 from bisar_budget.simulator.image_formation import backprojection, bytes_held, kernel_within, taylor_window
 from bisar_budget.simulator.phase_history import (
     Complexes,
     Errors,
-    ExactEffect,
     Flight,
     Floats,
     PhaseHistory,

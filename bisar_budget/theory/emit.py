@@ -51,7 +51,7 @@ a total and an effect per unit; of two shares one must be.
 
 @dataclass(frozen=True)
 class Evaluator:
-    """One function to emit: its arguments in order and its rows of results.
+    """One function to emit: its arguments in order and its rows of results, named where they are several.
 
     `quotients` names negated quotients -numerator/denominator to write the rest in. Where they are results
     themselves, arrays are divided once and no intermediate array stays alive.
@@ -62,7 +62,7 @@ class Evaluator:
     details: str
     arguments: tuple[tuple[Symbol, str], ...]
     rows: tuple[tuple[Expr, ...], ...]
-    row_names: tuple[str, ...]
+    row_names: tuple[str, ...] = ()
     quotients: tuple[tuple[str, Symbol, Symbol], ...] = ()
 
 
@@ -173,7 +173,6 @@ def evaluators() -> tuple[Evaluator, ...]:
             details="4·n_pull for a total of π/4 rad. Source: Rigling & Moses, Section VI.",
             arguments=((n_pull, "n_pull"), (total_qpe, "total_qpe")),
             rows=((published.pull_in_factor(),),),
-            row_names=("",),
         ),
         Evaluator(
             name="vibration_limit",
@@ -184,7 +183,6 @@ def evaluators() -> tuple[Evaluator, ...]:
             ),
             arguments=((wavelength, "wavelength"), (power, "power"), (share, "share")),
             rows=((vibration_row.cells[1].subs(pslr, power),),),
-            row_names=("",),
         ),
         Evaluator(
             name="motion_of_phase",
@@ -192,7 +190,6 @@ def evaluators() -> tuple[Evaluator, ...]:
             details="Derived here.",
             arguments=((wavelength, "wavelength"), (phase, "phase")),
             rows=((full.motion_of_phase(phase),),),
-            row_names=("",),
         ),
         Evaluator(
             name="amplitude_share",
@@ -200,7 +197,6 @@ def evaluators() -> tuple[Evaluator, ...]:
             details="In the ratio of the roots of power, the parts of both sum to 1. Derived here.",
             arguments=((share, "share"), (other, "other_share")),
             rows=((full.amplitude_share(share, other),),),
-            row_names=("",),
         ),
         *_of_random_errors(),
     )
