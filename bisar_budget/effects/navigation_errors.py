@@ -146,8 +146,7 @@ def _over_aperture(seen: SensorCases, place: int, kind: str, directions: Floats)
     And their covariance, (4, 4, cases). That over the aperture is that over an aperture of 2 s, times a power of half
     the aperture time.
     """
-    x, y, z = np.moveaxis(directions, 1, 0)[:, :, None]
-    moved = seen.weights[:, None] * seen.exact.along(place, (x, y, z))  # (4, axes, nodes, cases)
+    moved = seen.weights[:, None] * seen.range_errors(place, directions[:, :, None])  # (4, axes, nodes, cases)
     of_unit, scale = _covariance_at_nodes(kind), seen.exact.half ** _GROWS[kind]
     covariance = np.einsum("fanc,ganc->fgc", moved, of_unit @ moved)
     sizes = np.square((np.abs(moved) * np.sqrt(np.diagonal(of_unit))[:, None]).sum(axis=2)).sum(axis=1)
@@ -248,9 +247,7 @@ def _with_arm(
         grows = times**order / math.factorial(order)
         return seen.of_motion(place, directions[:, :, None] * grows + swings * times ** (order - 2))
     # The tilt walks, and twice integrated it is a position: two walks, of which each axis has its own.
-    x, y, z = np.moveaxis(directions, 1, 0)[:, :, None]
-    u, v, w = np.moveaxis(swings, 1, 0)
-    moves = (seen.exact.along(place, (x, y, z)), seen.exact.along(place, (u, v, w)))
+    moves = (seen.range_errors(place, one) for one in (directions[:, :, None], swings))
     moved = [seen.weights[:, None] * one for one in moves]  # (4, axes, nodes, cases)
     stated = seen.error(PLATFORMS[place]).lever_arm
     assert stated is not None
@@ -340,8 +337,7 @@ def _noise(
         place, directions = PLATFORMS.index(name), of_platform * sizes[:, None]
         for kept, sight in ((sighted, seen.geometry.both[place].look), (heard, seen.sights[place])):
             kept.append((directions * seen.vector(sight)).sum(axis=1))
-        x, y, z = np.moveaxis(directions, 1, 0)[:, :, None]
-        moved.append(seen.exact.along(place, (x, y, z)))
+        moved.append(seen.range_errors(place, directions[:, :, None]))
     along, along_heard = (np.sqrt(np.square(sum(one)).sum(axis=0)) for one in (sighted, heard))
     (own, own_cubic, east, north), covariance = seen.of_orders(found.covariance, sum(moved))
     quadratic, cubic, left = (np.sqrt(one) for one in found[:3])

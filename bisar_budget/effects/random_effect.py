@@ -200,8 +200,12 @@ class SensorCases:
     def of_motion(self, place: int, moved: Floats) -> tuple["RandomEffect", "RandomEffect"]:
         """The same of independent position errors of a platform, (errors, 3, nodes, cases). [m/unit]"""
         look = self.vector(self.geometry.both[place].look)
+        return self.of_courses(self.range_errors(place, moved), -np.einsum("ac,eanc->enc", look, moved))
+
+    def range_errors(self, place: int, moved: Floats) -> Floats:
+        """Range errors at the nodes by small position errors of a platform, (errors, 3, nodes or 1, cases). [m]"""
         x, y, z = np.moveaxis(moved, 1, 0)
-        return self.of_courses(self.exact.along(place, (x, y, z)), -np.einsum("ac,eanc->enc", look, moved))
+        return self.exact.along(place, (x, y, z))
 
     def moved(self, constant: Any, linear: Any, both: Any = 0.0) -> list[Any]:
         """Sigmas of the displacement by (25). [m]

@@ -192,8 +192,9 @@ class Sums:
     def clear(self) -> None:
         """Begin another block."""
         every: list[Mapping[Any, Floats]] = [self.phases, self.totals, self.motion, self.clock, self.alone]
-        for one in (one for kept in every for one in kept.values()):
-            one.fill(0.0)
+        for kept in every:
+            for one in kept.values():
+                one.fill(0.0)
         self._exact.clear()
 
     def add(self, variable: Variable, drawn: Floats) -> None:

@@ -93,9 +93,6 @@ class Study:
         kind = source.subject.kind
         if source.clock is not None:
             return Errors(clock=tuple(size * term for term in source.clock))
-        if kind == "terrain":  # a scene that is higher: both platforms measured too high
-            up = PathError(position=(0.0, 0.0, size))
-            return Errors(transmitter=up, receiver=up)
         found = Errors()
         for place in source.platforms:
             error = PathError(time_tag=size)
@@ -103,6 +100,7 @@ class Study:
                 x, y, z = (size * component for component in source.direction_of(place))
                 error = {
                     "position": PathError(position=(x, y, z)),
+                    "terrain": PathError(position=(x, y, z)),  # a higher scene: both platforms measured too high
                     "velocity": PathError(velocity=(x, y, z)),
                     "acceleration": PathError(acceleration=(x, y, z)),
                 }[kind]
