@@ -134,26 +134,20 @@ def tones(mission: Mission, geometry: Any = None) -> list[Tone]:
     return found
 
 
-def wideband_noise(mission: Mission, geometry: Any = None) -> list[SpreadPhase]:
-    """List what wideband vibration spreads."""
-    found = []
+def noise(analysis: "Analysis", model: str) -> list[SpreadPhase]:
+    """List what spreads beyond the cubic: wideband vibration, noise of sensors, phase noise, links, powers stated."""
+    mission, found = analysis.mission, []
     for name in PLATFORMS:
         wideband = getattr(mission.platforms, name).motion_error.vibration.wideband
         if wideband is not None:
-            rms = counted(mission, name, wideband.rms, "islr", geometry)
+            rms = counted(mission, name, wideband.rms, "islr", analysis.geometry)
             variance = (2 * math.pi * rms / mission.radar.wavelength) ** 2
             found.append(SpreadPhase(subject(name, "vibration", "wideband").id, name, variance))
-    return found
-
-
-def noise(analysis: "Analysis", model: str) -> list[SpreadPhase]:
-    """List what spreads beyond the cubic: wideband vibration, noise of sensors, phase noise, links, powers stated."""
-    found = wideband_noise(analysis.mission, analysis.geometry)
     for one in analysis.random:
         if one.declared is not None and one.spreads:
             found.append(SpreadPhase(one.id, one.owner, (one.effect(model).spread * one.declared) ** 2))
-    energy = mainlobe_energy(analysis.mission)
-    for power in stated_powers(analysis.mission):
+    energy = mainlobe_energy(mission)
+    for power in stated_powers(mission):
         found.append(SpreadPhase(power.subject.id, power.subject.owner, power.rms(model, energy) ** 2))
     return found
 

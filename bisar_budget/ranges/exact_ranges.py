@@ -541,12 +541,14 @@ class ExactRanges:
                 moved = [[along if along.shape[-1] == 1 else along[:, some] for along in one] for one in shifts]
                 measured = self._measured(clock[:, some], moved, case[some], room)
                 given = [case[some], *(one[some] for one in start), *measured]
-                for settle, is_for in ((_Search.near, is_close[some]), (_Search.anywhere, np.True_)):
+                for settle, is_for in ((_PointSearch.near, is_close[some]), (_PointSearch.anywhere, np.True_)):
                     alive = np.flatnonzero(is_for & ~here.is_found)
                     if alive.size:
                         kept: list[Any] = given if alive.size == here.east.size else _some(given, alive)
                         of, east, north, *left = kept
-                        settle(_Search(self, here, alive, of, east, north, left, room[MEASURED:, :, : alive.size]))
+                        settle(
+                            _PointSearch(self, here, alive, of, east, north, left, room[MEASURED:, :, : alive.size])
+                        )
         return found
 
     def _room(self, lanes: int) -> Floats:
@@ -584,7 +586,7 @@ class ExactRanges:
         return found
 
 
-class _Search:
+class _PointSearch:
     """Newton's method for the points of lanes, those that have settled left out: `alive` are their places in `found`.
 
     With them their cases, the points so far [m], and what is measured, in some room.
