@@ -65,7 +65,6 @@ def _left_at_1_hz(seen: SensorCases, name: str, oscillator: Oscillator) -> Float
     the clocks were set, or what a receiver that hears the transmitter has between direct path and echo.
     """
     sync, times = seen.mission.synchronization, seen.aperture_time
-    each = [np.broadcast_to(np.asarray(one), (seen.cases,)) for one in _kept_by(seen)]
     found = np.zeros((len(Parts._fields), seen.cases))
     if sync is not None and sync.is_direct_path and name == "transmitter":
         return found
@@ -75,26 +74,25 @@ def _left_at_1_hz(seen: SensorCases, name: str, oscillator: Oscillator) -> Float
         for place in places.tolist():  # an Allan deviation may be fitted otherwise over another aperture
             spectra.setdefault(noise_of(alike, 1.0, float(times[place])).pieces, []).append(place)
         for pieces, some in spectra.items():
-            found[:, some] = _left_of(pieces, exchanged, times[some], *(one[some] for one in each)).rows
+            found[:, some] = _left_of(pieces, exchanged, seen, some).rows
     return found
 
 
-def _kept_by(seen: SensorCases) -> tuple[Any, ...]:
-    """Times that say what setting the clocks, or hearing them, leaves: age and averaging, or the echo's delay. [s]"""
-    sync = seen.mission.synchronization
-    if sync is None or sync.interval is not None:
-        return ()
-    return (sync.age, sync.averaging) if sync.is_holdover else (seen.geometry.echo_delay,)
-
-
-def _left_of(pieces: Sequence[PowerLawPiece], interval: float | None, aperture_time: Floats, *kept: Floats) -> Parts:
-    """Parts of what is left of a spectrum over apertures (cases,)."""
-    if not kept:
+def _left_of(
+    pieces: Sequence[PowerLawPiece], interval: float | None, seen: SensorCases, some: Sequence[int]
+) -> Parts:
+    """Parts of what is left of a spectrum in some cases, (some,)."""
+    sync, aperture_time = seen.mission.synchronization, seen.aperture_time[some]
+    if sync is None or interval is not None:
         return left_parts(pieces, aperture_time, interval)
-    if len(kept) == 2:
-        return set_parts(pieces, aperture_time, *kept)
+
+    def of_some(value: Any) -> Floats:
+        return np.broadcast_to(np.asarray(value), (seen.cases,))[some]
+
+    if sync.is_holdover:
+        return set_parts(pieces, aperture_time, of_some(sync.age), of_some(sync.averaging))
     # The constant phase between direct path and echo moves nothing.
-    return heard_parts(pieces, aperture_time, *kept).without_constant()
+    return heard_parts(pieces, aperture_time, of_some(seen.geometry.echo_delay)).without_constant()
 
 
 def link_noise(seen: SensorCases) -> Iterator[RandomError]:

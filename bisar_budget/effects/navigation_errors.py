@@ -106,9 +106,7 @@ def inertial_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
             declared, sizes = parts_of_largest(seen.vector(values))
             directions, about = directions * sizes[:, None], axes * sizes[:, None]
         along, along_heard = seen.along(name, directions)
-        row = heard = _at_mid_aperture(seen.mission, index, along)
-        if along_heard is not along:
-            heard = _at_mid_aperture(seen.mission, index, along_heard)
+        row, heard = (_at_mid_aperture(seen.mission, index, one) for one in (along, along_heard))
         if arm is not None and kind in TILTS:
             published, full = _with_arm(seen, place, kind, directions, about, arm)
         else:

@@ -154,9 +154,10 @@ class SensorCases:
 
     def along(self, name: str, directions: Floats) -> tuple[Floats, Floats]:
         """Root-sum-square of what directions (axes, 3, cases) have of the line of sight, and of what data hear."""
-        look, sight = getattr(self.geometry, name).look, self.sights[PLATFORMS.index(name)]
-        seen = _length_along(self.vector(look), directions)
-        return seen, seen if sight is look else _length_along(self.vector(sight), directions)
+        sights = (getattr(self.geometry, name).look, self.sights[PLATFORMS.index(name)])
+        parts = ((directions * self.vector(sight)).sum(axis=1) for sight in sights)
+        seen, heard = (np.asarray(np.sqrt(np.square(one).sum(axis=0))) for one in parts)
+        return seen, heard
 
     @cached_property
     def exact(self) -> ExactRanges:
@@ -268,10 +269,6 @@ def _with_numbers(value: Any, numbers: Iterator[float]) -> Any:
         parts = [_with_numbers(part, numbers) for part in value]
         return value._make(parts) if hasattr(value, "_make") else tuple(parts)
     return next(numbers) if isinstance(value, np.ndarray) else value
-
-
-def _length_along(sight: Floats, directions: Floats) -> Floats:
-    return np.asarray(np.sqrt(np.square((directions * sight).sum(axis=1)).sum(axis=0)))
 
 
 def parts_of_largest(values: Floats) -> tuple[Floats, Floats]:

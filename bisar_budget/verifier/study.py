@@ -63,8 +63,7 @@ class Study:
     @property
     def models(self) -> tuple[Model, ...]:
         """Models that gate: under `strictest` both."""
-        full, published = self.analysis.models("full")
-        return {"full": (full,), "published": (published,)}.get(self.model, (published, full))
+        return tuple(getattr(self.analysis, name) for name in self.analysis.gates)
 
     @property
     def declared(self) -> list[ErrorSource]:
