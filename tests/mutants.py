@@ -66,22 +66,22 @@ MUTANTS = (
     Mutant(
         "(31): sign",
         _DERIVED,
-        "in_angles(adjugate[:, 1], platforms)",
-        "in_angles(-adjugate[:, 1], platforms)",
+        "in_angles(adjugate[:, 1])",
+        "in_angles(-adjugate[:, 1])",
         (_SMEAR_DIRECTION,),
     ),
     Mutant(
         "(31): turned by 90°",
         _DERIVED,
-        "in_angles(adjugate[:, 1], platforms)",
-        "in_angles(Matrix([adjugate[1, 1], -adjugate[0, 1]]), platforms)",
+        "in_angles(adjugate[:, 1])",
+        "in_angles(Matrix([adjugate[1, 1], -adjugate[0, 1]]))",
         (_SMEAR_DIRECTION,),
     ),
     Mutant(
         "(31): the first column of Q⁻¹",
         _DERIVED,
-        "in_angles(adjugate[:, 1], platforms)",
-        "in_angles(adjugate[:, 0], platforms)",
+        "in_angles(adjugate[:, 1])",
+        "in_angles(adjugate[:, 0])",
         (_SMEAR_DIRECTION,),
     ),
     Mutant(

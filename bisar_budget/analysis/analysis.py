@@ -80,6 +80,7 @@ class Analysis:
         self.is_of_sums = is_of_sums and mission.allocation.combine != "each"
         self.is_by_itself, self.is_whole = geometry is None, is_whole
         self.geometry = mission.geometry if geometry is None else geometry
+        self._together: dict[str, Together] = {}
 
     @cached_property
     def exact(self) -> ExactRanges:
@@ -118,10 +119,6 @@ class Analysis:
         if model not in self._together:
             self._together[model] = Together(self.errors, model, self.slow, self.random, self.groups)
         return self._together[model]
-
-    @cached_property
-    def _together(self) -> dict[str, Together]:
-        return {}
 
     @cached_property
     def stated(self) -> list[ErrorSource]:

@@ -100,11 +100,6 @@ def islr_of(mission: Mission, variance: Any) -> Any:
         return np.where(variance > 0, islr_db(variance, "full", mainlobe_energy(mission)), math.nan)
 
 
-def shown_islr_db(mission: Mission, variance: float) -> float | None:
-    """The same of one number; None where there is none. [dB]"""
-    return float(islr_of(mission, variance)) if variance else None
-
-
 def spread_limit(mission: Mission, allocation: Allocation, owner: str, model: str) -> Any:
     """Rms phase that an owner may spread, by the paper's rule or as an image shows it. [rad]"""
     if mission.requirements.islr is None:
@@ -139,26 +134,20 @@ def tones(mission: Mission, geometry: Any = None) -> list[Tone]:
     return found
 
 
-def wideband_noise(mission: Mission, geometry: Any = None) -> list[SpreadPhase]:
-    """List what wideband vibration spreads."""
-    found = []
+def noise(analysis: "Analysis", model: str) -> list[SpreadPhase]:
+    """List what spreads beyond the cubic: wideband vibration, noise of sensors, phase noise, links, powers stated."""
+    mission, found = analysis.mission, []
     for name in PLATFORMS:
         wideband = getattr(mission.platforms, name).motion_error.vibration.wideband
         if wideband is not None:
-            rms = counted(mission, name, wideband.rms, "islr", geometry)
+            rms = counted(mission, name, wideband.rms, "islr", analysis.geometry)
             variance = (2 * math.pi * rms / mission.radar.wavelength) ** 2
             found.append(SpreadPhase(subject(name, "vibration", "wideband").id, name, variance))
-    return found
-
-
-def noise(analysis: "Analysis", model: str) -> list[SpreadPhase]:
-    """List what spreads beyond the cubic: wideband vibration, noise of sensors, phase noise, links, powers stated."""
-    found = wideband_noise(analysis.mission, analysis.geometry)
     for one in analysis.random:
         if one.declared is not None and one.spreads:
             found.append(SpreadPhase(one.id, one.owner, (one.effect(model).spread * one.declared) ** 2))
-    energy = mainlobe_energy(analysis.mission)
-    for power in stated_powers(analysis.mission):
+    energy = mainlobe_energy(mission)
+    for power in stated_powers(mission):
         found.append(SpreadPhase(power.subject.id, power.subject.owner, power.rms(model, energy) ** 2))
     return found
 

@@ -137,23 +137,19 @@ def echo_phase(level: Any) -> Any:
 
 def vibration_limits(mission: Mission, allocation: Allocation, metric: str) -> dict[str, VibrationLimits]:
     """Limits of each platform for `pslr` or `islr`; empty without a requirement."""
-    requirement_db = mission.requirements.pslr if metric == "pslr" else mission.requirements.islr
+    requirement_db, split = getattr(mission.requirements, metric), getattr(allocation, metric)
     if requirement_db is None:
         return {}
     power: Any = 10 ** (requirement_db / 10)  # -30 dB is 10⁻³: PSLR and ISLR are power ratios
-    split = allocation.pslr if metric == "pslr" else allocation.islr
-    wavelength = mission.radar.wavelength
-
     if metric == "pslr":
         all_of_it, part = echo_phase(np.sqrt(power * (split.transmitter + split.receiver))), amplitude_share
     else:
         all_of_it, part = spread_phase(power, "full", mainlobe_energy(mission)), power_share
-    found = {}
+    wavelength, found = mission.radar.wavelength, {}
     for name in PLATFORMS:
         published = evaluators.vibration_limit(wavelength, power, split.of(name))
-        found[name] = VibrationLimits(
-            published, evaluators.motion_of_phase(wavelength, all_of_it * part(split, name))
-        )
+        full = evaluators.motion_of_phase(wavelength, all_of_it * part(split, name))
+        found[name] = VibrationLimits(published, full)
     return found
 
 

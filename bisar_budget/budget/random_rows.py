@@ -35,8 +35,7 @@ from bisar_budget.effects.effect import PLATFORMS, override_notes, subject
 from bisar_budget.effects.navigation_errors import process_of
 from bisar_budget.effects.oscillators import POOR_FIT
 from bisar_budget.effects.random_effect import RandomEffect, RandomError
-from bisar_budget.effects.vibration import counted, projected
-from bisar_budget.effects.vibration_spectra import displacement_rms, power_of
+from bisar_budget.effects.vibration import counted, displacement_rms, power_of, projected
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import GroundVector
 from bisar_budget.mission.curves import SortedPoints

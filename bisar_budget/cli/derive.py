@@ -54,17 +54,17 @@ def derive(table: str, number: int | None, format_name: str, check_only: bool, w
 def _generated(write: bool) -> None:
     import difflib
 
-    from bisar_budget.theory import emit, emit_catalogue
+    from bisar_budget.theory import emit
 
     derived_with = f"(SymPy {emit.SYMPY_VERSION})"
     is_current = True
-    for generated in (emit, emit_catalogue):
-        name, today = generated.TARGET.name, generated.source()
+    for path, module in emit.GENERATED.items():
+        name, today = path.name, module()
         if write:
-            write_file(str(generated.TARGET), today)
+            write_file(str(path), today)
             deliver(f"Wrote {name} {derived_with}.\n")
             continue
-        committed = generated.TARGET.read_text(encoding="utf-8")
+        committed = path.read_text(encoding="utf-8")
         if committed == today:
             deliver(f"{name} is what the derivation gives {derived_with}.\n")
             continue

@@ -6,7 +6,6 @@ __all__ = [
     "combined",
     "declared",
     "effect",
-    "lever_arms",
     "navigation_errors",
     "oscillator_acceleration",
     "oscillators",
@@ -15,5 +14,4 @@ __all__ = [
     "sources",
     "spectra",
     "vibration",
-    "vibration_spectra",
 ]

@@ -24,7 +24,7 @@ from bisar_budget.effects.sources import ErrorListing
 from bisar_budget.geometry import BistaticGeometry, GroundVector, angle_between_lines, norm
 from bisar_budget.mission.model import Mission
 from bisar_budget.phrases import NOTHING, Note
-from bisar_budget.ranges.exact_ranges import Effect, ExactRanges, Floats, Lanes, Places, Truths
+from bisar_budget.ranges.exact_ranges import Effect, ExactEffect, ExactRanges, Floats, Lanes, Places, Truths
 from bisar_budget.ranges.point_paths import Held, PointPaths, is_few
 
 QUADRATIC, CUBIC, LOCATION = "quadratic_phase_error", "cubic_phase_error", "location_error"
@@ -155,10 +155,8 @@ class ErrorBlock:
                 published[part, place], full[part, place] = numbers
         self.effects = {"published": Effect(*published), "full": Effect(*full)}
         self.is_motion = np.array([[source.is_motion] for source in sources])
-        self.moves = [place for place, source in enumerate(sources) if table.displaces(source)]
-        self._place_of = {place: order for order, place in enumerate(self.moves)}
+        self.moves = [place for place, source in enumerate(sources) if source.displaces]
         self._per_unit: dict[str, Floats] = {}
-        self._quadratics: Floats | None = None
         self._follows: PointPaths | None = None
 
     # ---------------------------------------------------------------- small errors
@@ -271,17 +269,17 @@ class ErrorBlock:
         """Let go of the ways: they are large."""
         self._follows = None
 
+    @cached_property
     def quadratic_by_sign(self) -> Floats:
         """Quadratic phases of the declared errors of each sign, positive first, where they are large. [rad]
 
         (2, errors, cases), not a number where they leave no image.
         """
-        if self._quadratics is None:
-            self._quadratics = np.full((2, *self.declared.shape), math.nan)
-            is_large = self.is_declared_large
-            if is_large.any():
-                self._quadratics[:, is_large] = self.followed(is_large, np.abs(self.declared[is_large]))[:, 3]
-        return self._quadratics
+        found = np.full((2, *self.declared.shape), math.nan)
+        is_large = self.is_declared_large
+        if is_large.any():
+            found[:, is_large] = self.followed(is_large, np.abs(self.declared[is_large]))[:, 3]
+        return found
 
     # ---------------------------------------------------------------- how large they may be
     @cached_property
@@ -436,10 +434,6 @@ class DeclaredErrors:
         """One number for each case."""
         return np.full(self.cases, value, dtype=float)
 
-    def displaces(self, error: ErrorSource) -> bool:
-        """Whether an error moves platforms or a clock that is listened to: what only is a phase displaces nothing."""
-        return error.is_motion and error.is_heard
-
     def lanes(self, *errors: ErrorSource, signs: Sequence[float] = (1.0,)) -> Lanes:
         """A unit of errors, of each sign, in each case; by error, sign and case."""
         moved = [error.platforms for error in errors]
@@ -516,7 +510,7 @@ class DeclaredErrors:
         Not a number where it leaves no image.
         """
         block, place = self.block_of(error)
-        return block.quadratic_by_sign()[:, place]
+        return block.quadratic_by_sign[:, place]
 
     def doubts(self, model: str, is_over: Any) -> Any:
         """Where a model that does not gate casts a doubt; the published one does not know a direct path."""
@@ -528,18 +522,6 @@ class DeclaredErrors:
         if model == "full" or degrees >= MIN_GRADIENT_ANGLE_DEG:
             return NOTHING
         return phrases.no_displacement(degrees)
-
-
-class ExactPhases(NamedTuple):
-    """Displacement east, north [m]; quadratic and cubic phase at the aperture edge, signed like β̃. [rad]
-
-    `turn` is what range and Doppler gradients span there, over what they span at the centre.
-    """
-
-    displacement: GroundVector
-    quadratic: float
-    cubic: float
-    turn: float
 
 
 class Model:
@@ -619,7 +601,7 @@ class Model:
         with np.errstate(all="ignore"):
             first = np.minimum(np.where(per_unit > 0, limit / per_unit, math.inf), block.farthest)
             adds = self.errors.per_metre[which] * block.grows(first)
-        return self.is_published or not self.errors.displaces(source) or bool(adds[place, 0] <= SHARE * limit)
+        return self.is_published or not source.displaces or bool(adds[place, 0] <= SHARE * limit)
 
     # ---------------------------------------------------------------- by exact ranges
     def is_small(self, source: ErrorSource, size: float) -> bool:
@@ -627,14 +609,14 @@ class Model:
         block, place = self.errors.block_of(source)
         return not block.is_large(np.full(block.declared.shape, size))[place, 0]
 
-    def at(self, source: ErrorSource, size: float) -> ExactPhases | None:
+    def at(self, source: ErrorSource, size: float) -> ExactEffect | None:
         """Phases and displacement of an error of a size, with its sign, by exact ranges; None: no ground point."""
         block, place = self.errors.block_of(source)
         some = np.zeros(block.declared.shape, dtype=bool)
         some[place] = True
         known = block.followed(some, np.array([abs(size)]))[0 if size > 0 else 1]
-        _, east, north, quadratic, cubic, turn = known[:, 0].tolist()
-        return None if math.isnan(east) else ExactPhases((east, north), quadratic, cubic, turn)
+        _, east, north, quadratic, cubic, _ = known[:, 0].tolist()
+        return None if math.isnan(east) else ExactEffect((east, north), quadratic, cubic)
 
     def largest_range_error(self, source: ErrorSource) -> float:
         """Largest range error at the nodes of a small unit of an error, before it displaces anything. [m/unit]"""

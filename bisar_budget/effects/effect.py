@@ -6,6 +6,7 @@ counts what the displacement of the image adds (`ranges.exact_ranges`).
 
 import math
 from collections.abc import Sequence
+from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -18,8 +19,6 @@ from bisar_budget.ranges.exact_ranges import Effect
 
 if TYPE_CHECKING:
     from bisar_budget.mission.instruments import Overridden
-
-from functools import cache
 
 MOTION = ("position", "velocity", "acceleration")  # kinds of error that a platform's measured path can have
 
@@ -152,23 +151,25 @@ class ErrorSource(NamedTuple):
         return self.clock is None or any(map(np.any, self.clock))
 
     @property
+    def displaces(self) -> bool:
+        """Whether it moves platforms, or a clock that is listened to."""
+        return self.is_motion and self.is_heard
+
+    @property
     def is_position(self) -> bool:
         """Whether it is an error of a platform's measured path, or of both."""
         return self.is_motion and self.clock is None
 
     @property
     def platforms(self) -> tuple[int, ...]:
-        """Places of the platforms whose position it is an error of."""
-        return tuple(place for place, name in enumerate(PLATFORMS) if self.is_position and self.moves(name))
+        """Places of the platforms whose position it is an error of; one of the mission's own is of both."""
+        owners = (self.owner,) if self.owner in PLATFORMS else PLATFORMS
+        return tuple(map(PLATFORMS.index, owners)) if self.is_position else ()
 
     @property
     def is_common(self) -> bool:
         """Whether it is one error of the paths of both platforms."""
         return self.owner == "mission" and self.subject.kind in (*MOTION, "time_tag")
-
-    def moves(self, platform: str) -> bool:
-        """Whether it is an error of a platform's position; one of the mission's own is of both."""
-        return self.owner in (platform, "mission")
 
 
 # ---------------------------------------------------------------------- pieces of a range error, (26) to (29)

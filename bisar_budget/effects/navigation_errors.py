@@ -1,8 +1,18 @@
-"""Errors of navigation at random: figures of inertial sensors, and noise of a position.
+"""Errors of navigation at random: figures of inertial sensors, lever arms, and noise of a position.
 
 Biases of an inertial sensor are one error over the aperture, noise is another at every moment; both count from
 mid-aperture on: position and velocity there are what aiding leaves, and the mission declares them. What tilts also
 swings a lever arm, where the file states one, and an error of the attitude at mid-aperture does so there already.
+
+A lever arm leads from the navigation's reference to the antenna's phase centre, in axes that turn with the body.
+These are along, cross and up of the velocity, at every moment of the aperture; those of a platform that stands still
+are the scene's. The antenna's position is the navigation's plus R(τ)·l. An error δl of the arm is carried along,
+R(τ)·δl: a displacement, and as the body turns a defocus. An attitude error ψ swings the arm, ψ × R(τ)·l. It keeps its
+direction in space, as that of a strapdown navigation with perfect gyros does, and as it does where it turns the
+specific force. A gyro's bias ε lets it grow, ψ = ε·τ, its noise lets it walk.
+
+The same ψ acts through the specific force and through the arm. So a figure of an inertial sensor has both in its own
+row, and what attitude does through the arm alone is a row that counts nowhere again. Derived here.
 """
 
 import math
@@ -15,20 +25,18 @@ import numpy as np
 
 from bisar_budget import evaluators
 from bisar_budget.effects.effect import PLATFORMS, subject
-from bisar_budget.effects.lever_arms import arm_at, swung
 from bisar_budget.effects.random_effect import (
     NODES,
     RandomEffect,
     RandomError,
     SensorCases,
-    of_cases,
     parts_of_largest,
     sigmas,
 )
 from bisar_budget.effects.spectra import Floats, gauss_markov
 from bisar_budget.faults import KeyPath
-from bisar_budget.geometry import PlatformState, Vector
-from bisar_budget.mission.instruments import IMU_KINDS, GaussMarkov
+from bisar_budget.geometry import PlatformState, Vector, cross, unit, without_rounding
+from bisar_budget.mission.instruments import IMU_KINDS, GaussMarkov, LeverArm
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import CommonMotionError, MotionError
 
@@ -90,7 +98,7 @@ def inertial_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
     stated = None if error.lever_arm is None else error.lever_arm.arm
     arm = None if stated is None else arm_at(state, stated, seen.exact.times)
     force = seen.vector(specific_force(seen.mission, state))
-    for index, (kind, unit) in enumerate(_IMU_UNITS.items()):
+    for index, (kind, unit_of_figure) in enumerate(_IMU_UNITS.items()):
         values, key = getattr(error.imu, kind), error.key_of(kind)
         declared, about = None, axes
         directions = acceleration_errors(kind, axes, force)
@@ -98,9 +106,7 @@ def inertial_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
             declared, sizes = parts_of_largest(seen.vector(values))
             directions, about = directions * sizes[:, None], axes * sizes[:, None]
         along, along_heard = seen.along(name, directions)
-        row = heard = _at_mid_aperture(seen.mission, index, along)
-        if along_heard is not along:
-            heard = _at_mid_aperture(seen.mission, index, along_heard)
+        row, heard = (_at_mid_aperture(seen.mission, index, one) for one in (along, along_heard))
         if arm is not None and kind in TILTS:
             published, full = _with_arm(seen, place, kind, directions, about, arm)
         else:
@@ -109,7 +115,7 @@ def inertial_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
             full = RandomEffect(quadratic, cubic, heard[2] / seen.factor, east, north, covariance)
         yield RandomError(
             subject=subject(name, "imu", kind),
-            unit=unit,
+            unit=unit_of_figure,
             declared=None if declared is None else declared * seen.factor,
             path=("platforms", name, "motion_error", *(("imu", kind) if key == kind else (key,))),
             published=published,
@@ -138,8 +144,7 @@ def _over_aperture(seen: SensorCases, place: int, kind: str, directions: Floats)
     And their covariance, (4, 4, cases). That over the aperture is that over an aperture of 2 s, times a power of half
     the aperture time.
     """
-    x, y, z = np.moveaxis(directions, 1, 0)[:, :, None]
-    moved = seen.weights[:, None] * seen.exact.along(place, (x, y, z))  # (4, axes, nodes, cases)
+    moved = seen.weights[:, None] * seen.range_errors(place, directions[:, :, None])  # (4, axes, nodes, cases)
     of_unit, scale = _covariance_at_nodes(kind), seen.exact.half ** _GROWS[kind]
     covariance = np.einsum("fanc,ganc->fgc", moved, of_unit @ moved)
     sizes = np.square((np.abs(moved) * np.sqrt(np.diagonal(of_unit))[:, None]).sum(axis=2)).sum(axis=1)
@@ -172,7 +177,60 @@ def _angle_walk(early: float, late: float) -> float:
     return (early**5 / 5 + lag * early**4 / 2 + lag**2 * early**3 / 3) / 4
 
 
-# ---------------------------------------------------------------------- tilts that swing a lever arm
+# ---------------------------------------------------------------------- lever arms
+def body_axes(state: PlatformState, times: Floats) -> Floats:
+    """Axes of a platform's body, along, cross and up of its velocity at slow times [s], (axes, 3, *times.shape)."""
+    u, v, w = (np.broadcast_to(part, times.shape) for part in state.at(times)[1])
+    if np.any(state.is_still):
+        u, v, w = (np.where(state.is_still, *both) for both in ((1.0, u), (0.0, v), (0.0, w)))
+    with np.errstate(all="ignore"):
+        along = without_rounding(unit((u, v, w)))
+        left = without_rounding(unit((-v, u, 0.0 * w)))
+    return np.array((along, left, cross(along, left)))
+
+
+def arm_at(state: PlatformState, arm: Any, times: Floats) -> Floats:
+    """The arm at slow times [s] along the axes of the scene, (3, *times.shape). [m]"""
+    return np.asarray(sum(length * axis for length, axis in zip(arm, body_axes(state, times), strict=True)))
+
+
+def swung(axes: Floats, arm: Floats) -> Floats:
+    """Displacement of an arm by a unit of tilt about each of some axes, (axes, 3, times, cases). [m/rad]
+
+    The arm is (3, times, cases) [m], the axes are (axes, 3, cases).
+    """
+    about = (axes[:, 0, None], axes[:, 1, None], axes[:, 2, None])
+    return np.stack(cross(about, (arm[0], arm[1], arm[2])), axis=1)
+
+
+def lever_arm_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
+    """Errors that attitude makes through a platform's arm, declared or not, and errors of the arm itself."""
+    error = seen.error(name)
+    lever: LeverArm | None = error.lever_arm
+    if lever is None:
+        return
+    place, state, times = PLATFORMS.index(name), getattr(seen.geometry, name), seen.exact.times
+    key = ("platforms", name, "motion_error")
+    if lever.arm is not None:
+        declared, axes = None, seen.axes(name)
+        attitude = None if error.imu is None else error.imu.attitude
+        if attitude is not None:
+            declared, sizes = parts_of_largest(seen.vector(attitude))
+            declared, axes = declared * seen.factor, axes * sizes[:, None]
+        published, full = seen.of_motion(place, swung(axes, arm_at(state, lever.arm, times)))
+        is_of_part = error.key_of("attitude") != "attitude"
+        path: KeyPath = (*key, "sensor") if is_of_part else (*key, "imu", "attitude")
+        what = subject(name, "lever_arm", "attitude")
+        counted = subject(name, "imu", "attitude").id
+        yield RandomError(what, "rad", declared, path, published, full, spreads=False, counted_in=counted)
+    if lever.uncertainty is not None:
+        declared, sizes = parts_of_largest(seen.vector(lever.uncertainty))
+        published, full = seen.of_motion(place, body_axes(state, times) * sizes[:, None, None])
+        what = subject(name, "lever_arm", "uncertainty")
+        path = (*key, "lever_arm", "uncertainty")
+        yield RandomError(what, "m", declared * seen.factor, path, published, full, spreads=False)
+
+
 def _with_arm(
     seen: SensorCases, place: int, kind: str, directions: Floats, about: Floats, arm: Floats
 ) -> tuple[RandomEffect, RandomEffect]:
@@ -187,9 +245,7 @@ def _with_arm(
         grows = times**order / math.factorial(order)
         return seen.of_motion(place, directions[:, :, None] * grows + swings * times ** (order - 2))
     # The tilt walks, and twice integrated it is a position: two walks, of which each axis has its own.
-    x, y, z = np.moveaxis(directions, 1, 0)[:, :, None]
-    u, v, w = np.moveaxis(swings, 1, 0)
-    moves = (seen.exact.along(place, (x, y, z)), seen.exact.along(place, (u, v, w)))
+    moves = (seen.range_errors(place, one) for one in (directions[:, :, None], swings))
     moved = [seen.weights[:, None] * one for one in moves]  # (4, axes, nodes, cases)
     stated = seen.error(PLATFORMS[place]).lever_arm
     assert stated is not None
@@ -279,12 +335,10 @@ def _noise(
         place, directions = PLATFORMS.index(name), of_platform * sizes[:, None]
         for kept, sight in ((sighted, seen.geometry.both[place].look), (heard, seen.sights[place])):
             kept.append((directions * seen.vector(sight)).sum(axis=1))
-        x, y, z = np.moveaxis(directions, 1, 0)[:, :, None]
-        moved.append(seen.exact.along(place, (x, y, z)))
+        moved.append(seen.range_errors(place, directions[:, :, None]))
     along, along_heard = (np.sqrt(np.square(sum(one)).sum(axis=0)) for one in (sighted, heard))
-    covariance = seen.of_orders(of_cases(found.covariance, seen.cases), sum(moved))
+    (own, own_cubic, east, north), covariance = seen.of_orders(found.covariance, sum(moved))
     quadratic, cubic, left = (np.sqrt(one) for one in found[:3])
-    (own, own_cubic, east, north), covariance = sigmas(covariance, np.einsum("ffc->fc", covariance))
     return RandomError(
         subject=subject(owner, "random", process.name),
         unit="m",

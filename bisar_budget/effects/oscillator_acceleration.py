@@ -23,16 +23,8 @@ from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.navigation_errors import specific_force
 from bisar_budget.effects.oscillators import left_of_tone
 from bisar_budget.effects.random_effect import RandomEffect, RandomError, SensorCases
-from bisar_budget.effects.spectra import Floats, Parts, PowerLawPiece, tone
-from bisar_budget.effects.vibration import SLOWEST
-from bisar_budget.effects.vibration_spectra import (
-    added,
-    effects_of,
-    power_of,
-    spectrum_parts,
-    spectrum_pieces,
-    times,
-)
+from bisar_budget.effects.spectra import Floats, Parts, PowerLawPiece, squares
+from bisar_budget.effects.vibration import SLOWEST, power_of, spectrum_parts, spectrum_pieces
 from bisar_budget.geometry import BistaticGeometry, PlatformState, norm
 from bisar_budget.mission.instruments import Oscillator
 from bisar_budget.mission.model import Mission
@@ -124,12 +116,9 @@ def oscillator_acceleration(seen: SensorCases, name: str) -> Iterator[RandomErro
     one = felt(seen.mission, name)
     if one is None:
         return
-    found, turn = Parts(*np.zeros((len(Parts._fields), seen.cases))), None
-    if not seen.mission.has_direct_path or name == "receiver":  # else it drops out
-        found = _vibrating(seen, name, one)
-    if not seen.mission.has_direct_path:  # from direct path to echo a turn changes next to nothing
-        turn = _turning(seen, name)
-    published, full = effects_of(seen, found)
+    published, full = seen.of_parts(_vibrating(seen, name, one))
+    # From direct path to echo a turn changes next to nothing.
+    turn = None if seen.mission.has_direct_path else _turning(seen, name)
     if turn is not None:
         published, full = _together(published, turn[0]), _together(full, turn[1])
     published, full = (effect._replace(spread=effect.spread / seen.factor) for effect in (published, full))
@@ -140,26 +129,21 @@ def oscillator_acceleration(seen: SensorCases, name: str) -> Iterator[RandomErro
 
 def _vibrating(seen: SensorCases, name: str, one: Felt) -> Parts:
     """Parts of the range error by a unit of Γ: of a spectrum, and of slow tones in their worst phases. [m²/unit²]"""
-    mission, found = seen.mission, [Parts(*np.zeros((len(Parts._fields), seen.cases)))]
+    mission, total = seen.mission, np.zeros((len(Parts._fields), seen.cases))
+    if mission.has_direct_path and name == "transmitter":  # it drops out
+        return Parts(*total)
     sync, vibration = mission.synchronization, one.vibration
     if vibration.spectrum is not None:
         interval = None if sync is None else sync.interval
         delay = seen.geometry.echo_delay if mission.has_direct_path else None
-        random = spectrum_parts(vibration.spectrum, PHASE, seen.aperture_time, interval, delay)
-        found.append(times(random, power_of(vibration) * np.square(mission.radar.center_frequency)))
+        random = spectrum_parts(seen, vibration.spectrum, PHASE, interval, delay)
+        total += random.rows * (power_of(vibration) * np.square(mission.radar.center_frequency))
     for line in accelerated_tones(mission, seen.geometry):
         cycles = line.frequency * seen.aperture_time
         if line.name == name and np.any(cycles < SLOWEST):
             power = np.where(cycles < SLOWEST, np.square(line.per_unit), 0.0)
-            found.append(times(_worst(tone(math.pi * cycles)), power))
-    return times(added(found), np.square(mission.radar.wavelength) / (4 * math.pi**2))
-
-
-def _worst(parts: Floats) -> Parts:
-    """Parts of a tone of amplitude 1, each in the phase where it is largest; orders n and n + 2 have other signs."""
-    quadratic, cubic, left, constant, linear = parts
-    both = -constant * quadratic, -linear * cubic
-    return Parts(quadratic**2, cubic**2, left, constant**2, linear**2, *both)
+            total += Parts(*squares(math.pi * cycles)).rows * power
+    return Parts(*total).times(np.square(mission.radar.wavelength) / (4 * math.pi**2))
 
 
 def _turning(seen: SensorCases, name: str) -> tuple[RandomEffect, RandomEffect] | None:

@@ -41,7 +41,7 @@ def noise_of(oscillator: Oscillator, center_frequency: float, aperture_time: flo
     if oscillator.power_law is not None:
         return Noise(_of_power_law(oscillator.power_law, center_frequency, bandwidth))
     points = oscillator.allan_deviation or ()
-    law, misfit = fitted(points, bandwidth, aperture_time)
+    misfit, law = fitted(points, bandwidth, aperture_time)
     notes, beyond, last = [], NOTHING, points[-1][0]
     if len(points) == 1:
         notes.append(phrases.one_point_of_allan_deviation())
@@ -108,8 +108,8 @@ class Fit(NamedTuple):
     law: PowerLaw
 
 
-def fitted(points: Points, bandwidth: float, aperture_time: float) -> tuple[PowerLaw, float]:
-    """Fit h₋₂ … h₁, none negative, to an Allan deviation; and the largest misfit, of a deviation.
+def fitted(points: Points, bandwidth: float, aperture_time: float) -> Fit:
+    """Fit h₋₂ … h₁, none negative, to an Allan deviation.
 
     Least squares of relative variances, of as few terms as describe the points. Of terms that do it equally well
     those with the largest quadratic phase over the aperture.
@@ -125,7 +125,7 @@ def fitted(points: Points, bandwidth: float, aperture_time: float) -> tuple[Powe
         fits = max((fit for fit in found if fit.misfit <= 1.1 * least), key=phase)
         if fits.misfit < 0.9 * best.misfit and best.misfit > _DESCRIBES:
             best = fits
-    return best.law, best.misfit
+    return best
 
 
 @lru_cache(maxsize=64)

@@ -8,17 +8,19 @@ Numbers of a mission may be arrays (cases,); its geometry then is that of these 
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bisar_budget.constants import ROUNDING
 from bisar_budget.effects.declared import ImagePlane, published_planes
 from bisar_budget.effects.effect import PLATFORMS, Subject, plain
 from bisar_budget.effects.oscillators import Noise
-from bisar_budget.effects.spectra import Floats
+from bisar_budget.effects.sources import exact_ranges
+from bisar_budget.effects.spectra import Floats, Parts
 from bisar_budget.faults import KeyPath
 from bisar_budget.geometry import BistaticGeometry, PlatformState
 from bisar_budget.mission.model import Mission
@@ -152,22 +154,15 @@ class SensorCases:
 
     def along(self, name: str, directions: Floats) -> tuple[Floats, Floats]:
         """Root-sum-square of what directions (axes, 3, cases) have of the line of sight, and of what data hear."""
-        look, sight = getattr(self.geometry, name).look, self.sights[PLATFORMS.index(name)]
-        seen = _length_along(self.vector(look), directions)
-        return seen, seen if sight is look else _length_along(self.vector(sight), directions)
+        sights = (getattr(self.geometry, name).look, self.sights[PLATFORMS.index(name)])
+        parts = ((directions * self.vector(sight)).sum(axis=1) for sight in sights)
+        seen, heard = (np.asarray(np.sqrt(np.square(one).sum(axis=0))) for one in parts)
+        return seen, heard
 
     @cached_property
     def exact(self) -> ExactRanges:
         """Exact ranges at as many nodes as walks need."""
-        mission = self.mission
-        return ExactRanges.of(
-            self.geometry.both,
-            mission.radar.wavelength,
-            mission.collection.aperture_time,
-            NODES,
-            self.cases,
-            has_direct_path=mission.has_direct_path,
-        )
+        return exact_ranges(self.mission, self.geometry, NODES, self.cases)
 
     @cached_property
     def weights(self) -> Floats:
@@ -206,8 +201,12 @@ class SensorCases:
     def of_motion(self, place: int, moved: Floats) -> tuple["RandomEffect", "RandomEffect"]:
         """The same of independent position errors of a platform, (errors, 3, nodes, cases). [m/unit]"""
         look = self.vector(self.geometry.both[place].look)
+        return self.of_courses(self.range_errors(place, moved), -np.einsum("ac,eanc->enc", look, moved))
+
+    def range_errors(self, place: int, moved: Floats) -> Floats:
+        """Range errors at the nodes by small position errors of a platform, (errors, 3, nodes or 1, cases). [m]"""
         x, y, z = np.moveaxis(moved, 1, 0)
-        return self.of_courses(self.exact.along(place, (x, y, z)), -np.einsum("ac,eanc->enc", look, moved))
+        return self.exact.along(place, (x, y, z))
 
     def moved(self, constant: Any, linear: Any, both: Any = 0.0) -> list[Any]:
         """Sigmas of the displacement by (25). [m]
@@ -222,21 +221,54 @@ class SensorCases:
             for a, b in self.plane.adjugate
         ]
 
-    def of_orders(self, covariance: Floats, along: Any = 1.0) -> Floats:
-        """Covariance (4, 4, cases) of phases and displacement by orders 0 to 3 of independent range errors.
+    def of_orders(self, covariance: Floats, along: Any = 1.0) -> tuple[Floats, Floats]:
+        """`sigmas` of phases and displacement by orders 0 to 3 of independent range errors.
 
-        `covariance` (4, 4, cases) is that of each at the aperture edge [m²], `along` (errors, nodes, cases) what a
+        `covariance` (4, 4, ...) is that of each at the aperture edge [m²], `along` (errors, nodes, cases) what a
         metre of it does to the range; higher orders defocus and displace in second order of a turning line of sight.
         """
+        whole = covariance if covariance.ndim == 3 else covariance[..., None]
+        whole = np.broadcast_to(whole, (*whole.shape[:2], self.cases))
         places = self.exact.sampling.places
         orders = np.polynomial.legendre.legvander(places, len(_LEADING) - 1) / _LEADING
         seen = np.broadcast_to(along, (np.shape(along)[0] if np.ndim(along) else 1, places.size, self.cases))
         effects = np.einsum("fnc,anc,no->afoc", self.weights, seen, orders)
-        return np.asarray(np.einsum("afoc,opc,agpc->fgc", effects, covariance, effects))
+        found = np.asarray(np.einsum("afoc,opc,agpc->fgc", effects, whole, effects))
+        return sigmas(found, np.einsum("ffc->fc", found))
+
+    def of_parts(self, found: Parts, along: Any = 1.0) -> tuple["RandomEffect", "RandomEffect"]:
+        """The same of a range error with these parts [m²]; `along` is what data have of a metre of it."""
+        k = 2 * math.pi / np.asarray(self.mission.radar.wavelength)
+        quadratic, cubic, left = (k * np.sqrt(part) for part in found[:3])
+        published = RandomEffect(quadratic, cubic, left, *self.moved(found.constant, found.linear))
+        (quadratic, cubic, east, north), covariance = self.of_orders(found.times(np.square(along)).covariance)
+        return published, RandomEffect(quadratic, cubic, left * along, east, north, covariance)
+
+    def alike(self, value: Any) -> Iterator[tuple[Any, NDArray[np.intp]]]:
+        """Tell apart cases in which a value, or what is in it, differs: the value of each group, and its cases."""
+        arrays = list(_arrays_in(value))
+        if not arrays:
+            yield value, np.arange(self.cases)
+            return
+        rows, group = np.unique(np.stack(arrays, axis=1), axis=0, return_inverse=True)
+        for place, row in enumerate(rows.tolist()):
+            yield _with_numbers(value, iter(row)), np.flatnonzero(group.ravel() == place)
 
 
-def _length_along(sight: Floats, directions: Floats) -> Floats:
-    return np.asarray(np.sqrt(np.square((directions * sight).sum(axis=1)).sum(axis=0)))
+def _arrays_in(value: Any) -> Iterator[Floats]:
+    if isinstance(value, tuple):
+        for part in value:
+            yield from _arrays_in(part)
+    elif isinstance(value, np.ndarray):
+        yield value
+
+
+def _with_numbers(value: Any, numbers: Iterator[float]) -> Any:
+    """The same with numbers in the places of its arrays."""
+    if isinstance(value, tuple):
+        parts = [_with_numbers(part, numbers) for part in value]
+        return value._make(parts) if hasattr(value, "_make") else tuple(parts)
+    return next(numbers) if isinstance(value, np.ndarray) else value
 
 
 def parts_of_largest(values: Floats) -> tuple[Floats, Floats]:
@@ -254,9 +286,3 @@ def sigmas(covariance: Floats, sizes: Floats) -> tuple[Floats, Floats]:
     squares = np.einsum("ffc->fc", covariance)
     is_real = squares > _CANCELS * sizes
     return np.sqrt(np.where(is_real, squares, 0.0)), np.where(is_real & is_real[:, None], covariance, 0.0)
-
-
-def of_cases(covariance: Floats, cases: int) -> Floats:
-    """The same as (4, 4, cases)."""
-    whole = covariance if covariance.ndim == 3 else covariance[..., None]
-    return np.broadcast_to(whole, (*whole.shape[:2], cases))

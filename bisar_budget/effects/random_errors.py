@@ -1,18 +1,31 @@
-"""Every random error of sensors, clocks and the air that a mission names, in one case or in many."""
+"""Every random error of sensors, clocks and the air that a mission names, in one case or in many.
+
+With them go errors from elsewhere that the file states by what they do to the image: a cubic phase, a displacement.
+Neither has a sign, and a displacement no direction: each way it has half of its square. A quadratic phase, which has
+a sign, is listed in `sources`, and power that is spread in `analysis.spread`.
+"""
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
 
 from bisar_budget.effects.air_delays import delay_errors
 from bisar_budget.effects.clock_errors import link_noise, oscillator_noise
-from bisar_budget.effects.effect import PLATFORMS, plain
-from bisar_budget.effects.lever_arms import lever_arm_errors
-from bisar_budget.effects.navigation_errors import common_noise, inertial_errors, position_noise
+from bisar_budget.effects.effect import PLATFORMS, plain, subject
+from bisar_budget.effects.navigation_errors import common_noise, inertial_errors, lever_arm_errors, position_noise
 from bisar_budget.effects.oscillator_acceleration import oscillator_acceleration
 from bisar_budget.effects.oscillators import noise_of
-from bisar_budget.effects.other_errors import stated_effects
-from bisar_budget.effects.random_effect import RandomError, SensorCases
-from bisar_budget.effects.vibration_spectra import vibration_spectrum
+from bisar_budget.effects.random_effect import RandomEffect, RandomError, SensorCases
+from bisar_budget.effects.vibration import vibration_spectrum
 from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.instruments import Oscillator
 from bisar_budget.mission.model import Mission
+
+# Effect of a unit, whichever model: of 1 rad, and of 1 m.
+_CUBIC = RandomEffect(0.0, 1.0, 0.0, 0.0, 0.0, np.diag([0.0, 1.0, 0.0, 0.0])[..., None])
+_PLACE = RandomEffect(0.0, 0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5), np.diag([0.0, 0.0, 0.5, 0.5])[..., None])
+_EFFECTS = {"cubic_phase_error": ("rad", _CUBIC), "location_error": ("m", _PLACE)}
 
 
 def random_errors(mission: Mission, geometry: BistaticGeometry | None = None, cases: int = 1) -> list[RandomError]:
@@ -32,8 +45,20 @@ def random_errors(mission: Mission, geometry: BistaticGeometry | None = None, ca
     found += [error for name in PLATFORMS for error in oscillator_acceleration(seen, name)]
     found += link_noise(seen)
     found += [error for name in PLATFORMS for error in delay_errors(seen, name)]
-    found += stated_effects(mission)
+    found += _stated_effects(mission)
     return [in_one_case(mission, error) for error in found] if geometry is None else found
+
+
+def _stated_effects(mission: Mission) -> Iterator[RandomError]:
+    """Cubic phases and displacements from elsewhere, those that the file states."""
+    for index, other in enumerate(mission.other_errors):
+        for key, (unit, effect) in _EFFECTS.items():
+            size = getattr(other, key)
+            if size is not None:
+                what = subject("mission", "other", f"{other.name}.{key}", entry=index)
+                yield RandomError(
+                    what, unit, np.abs(size), ("other_errors", index, key), effect, effect, spreads=False
+                )
 
 
 def in_one_case(mission: Mission, error: RandomError, case: int = 0) -> RandomError:

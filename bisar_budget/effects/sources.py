@@ -47,19 +47,7 @@ def exact_ranges(
 
 
 class ErrorListing:
-    """The errors of cases of one mission, as their file states them.
-
-    Parameters
-    ----------
-    mission : Mission
-        Some of its numbers may be arrays (cases,).
-    geometry : BistaticGeometry
-        Of the cases.
-    exact : ExactRanges
-        Of the cases.
-    shown : container of str, optional
-        Ids of rows: of what is not declared, nothing else is listed; omitted: everything is.
-    """
+    """The errors of cases of one mission, as their file states them. Parameters are those of `DeclaredErrors`."""
 
     def __init__(
         self, mission: Mission, geometry: BistaticGeometry, exact: ExactRanges, shown: Container[str] | None = None

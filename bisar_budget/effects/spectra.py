@@ -56,6 +56,20 @@ class Parts(NamedTuple):
             [to_cubic, self.linear_cubic, zero, self.cubic],
         ])  # fmt: skip
 
+    @property
+    def rows(self) -> Floats:
+        """All of them, (parts, ...)."""
+        return np.array(np.broadcast_arrays(*self))
+
+    def times(self, power: Any) -> "Parts":
+        """Those of a phase of so many times the power."""
+        return Parts(*(part * power for part in self))
+
+    def without_constant(self) -> "Parts":
+        """Those of a phase whose constant part moves nothing."""
+        nothing = 0.0 * self.quadratic
+        return self._replace(constant=nothing, constant_quadratic=nothing)
+
 
 def gauss_markov(aperture_time: Any, correlation_time: Any) -> Parts:
     """Parts of a stationary process of variance 1 and correlation exp(−|t|/τ_c)."""
@@ -120,25 +134,22 @@ class PowerLawPiece(NamedTuple):
     density: float
     slope: float
 
-    def at(self, f: float) -> float:
-        """Density at a frequency. [rad²/Hz]"""
-        return float(self.density * f**-self.slope)
+    def at(self, f: Any) -> Any:
+        """Density at frequencies, 0 beside it. [rad²/Hz]"""
+        is_in = (self.low <= f) & (f < self.high)
+        return np.where(is_in, self.density * np.where(is_in, f, 1.0) ** -self.slope, 0.0)
 
-    def integral(self, low: float, high: float, power: float = 0.0) -> float:
-        """Integral of the spectrum times f^power between two frequencies; `low` may be zero where it converges."""
-        exponent = power - self.slope + 1
+    def integral(self, low: float, high: float) -> float:
+        """Integral of the spectrum between two frequencies; `low` may be zero where it converges."""
+        exponent = 1 - self.slope
         if abs(exponent) < 1e-9:
             return self.density * math.log(high / low)
         return float(self.density * (high**exponent - (low**exponent if low else 0.0)) / exponent)
 
 
 def density(pieces: Sequence[PowerLawPiece], frequency: Floats) -> Floats:
-    """Density of a spectrum at frequencies, (n,) in Hz; 0 where no piece is."""
-    found = np.zeros(frequency.size)
-    for piece in pieces:
-        inside = (frequency >= piece.low) & (frequency < piece.high)
-        found[inside] += piece.density * frequency[inside] ** -piece.slope
-    return found
+    """Density of a spectrum at frequencies [Hz]; 0 where no piece is. [rad²/Hz]"""
+    return sum((piece.at(frequency) for piece in pieces), np.zeros_like(frequency))
 
 
 def parts(pieces: Sequence[PowerLawPiece], aperture_time: Any, above: Any = 0.0) -> Parts:
@@ -160,6 +171,13 @@ def parts(pieces: Sequence[PowerLawPiece], aperture_time: Any, above: Any = 0.0)
         low = np.minimum(np.maximum(piece.low, above), piece.high)
         total += to_angle * _of_power_law(piece.slope, low * scale, piece.high * scale)
     return _like(total, aperture_time)
+
+
+def left_parts(pieces: Sequence[PowerLawPiece], aperture_time: Floats, interval: float | None) -> Parts:
+    """Parts over apertures (cases,): of a spectrum, or of what pulses leave of it that are exchanged so often."""
+    times, place = np.unique(aperture_time, return_inverse=True)
+    found = parts(pieces, times) if interval is None else synchronized_parts(pieces, times, interval)
+    return Parts(*found.rows[:, place])
 
 
 def _like(total: Floats, aperture_time: Any) -> Parts:
@@ -225,13 +243,14 @@ def _power_panels(slope: float, low: Floats, high: Floats) -> Floats:
     span = np.log(high / low)
     x = low * np.exp(span * _NODES)
     power = x**-slope * x * span * _WEIGHTS
-    return np.asarray((power * _squares(x)).sum(axis=1))
+    return np.asarray((power * squares(x)).sum(axis=1))
 
 
-def _squares(angle: Floats) -> Floats:
-    """Mean squares of a tone's parts, the share of its power that is left, and mean products, (parts, …).
+def squares(angle: Floats) -> Floats:
+    """Squares of a tone's parts, the share of its power that is left, and products of parts, as `Parts` has them.
 
-    Order n of a tone turns by n quarters: those that are two apart have opposite signs.
+    They are means of a tone of power 1; of one of amplitude 1, each part in the phase where it is largest. Order n of
+    a tone turns by n quarters: those that are two apart have opposite signs.
     """
     quadratic, cubic, left, constant, linear = tone(angle)
     both = -constant * quadratic, -linear * cubic
@@ -277,7 +296,7 @@ def set_parts(pieces: Sequence[PowerLawPiece], aperture_time: Floats, age: Float
     edges = np.sort(np.concatenate((_AGES[:, None] + 0.0 * age, np.clip(ends, _AGES[0], _RESOLVED))), axis=0) / age
     span = np.log(edges[1:] / edges[:-1])
     f = edges[:-1] * np.exp(span * _NODES[:, None])  # (nodes, panels, cases)
-    weight = sum(_at(piece, f) for piece in pieces) * f * span * _WEIGHTS[:, None]
+    weight = density(pieces, f) * f * span * _WEIGHTS[:, None]
     for place, square in enumerate(_squares_of_set(f, aperture_time, age, averaging)):
         together[place] = together[place] + (weight * square).sum(axis=(0, 1))
     constant, linear, both, even, to_cubic, to_quadratic, odd = together
@@ -321,17 +340,12 @@ def heard_parts(pieces: Sequence[PowerLawPiece], aperture_time: Any, delay: Any)
         for T, gap in zip(times.tolist(), delays.tolist(), strict=True)
     ]
 
-    def density(f: Floats, cases: NDArray[np.intp]) -> Floats:
-        of_all = sum((_at(piece, f) for piece in pieces), np.zeros_like(f))
-        return np.asarray(of_all * 4 * np.sin(math.pi * f * delays[cases]) ** 2)
+    def heard(f: Floats, cases: NDArray[np.intp]) -> Floats:
+        return np.asarray(density(pieces, f) * 4 * np.sin(math.pi * f * delays[cases]) ** 2)
 
     scale = math.pi * times
-    total = _over_panels(density, edges, last, scale)
-    for piece in pieces:  # where it turns within the delay so often that its mean counts
-        to_angle = 2 * piece.density * scale ** (piece.slope - 1)
-        low, high = np.maximum(piece.low, last) * scale, piece.high * scale
-        some = piece.high > last
-        total[:, some] += to_angle[some] * _fast(piece.slope, low[some], high[some])
+    total = _over_panels(heard, edges, last, scale)
+    _add_fast(total, pieces, last, scale, 2.0)  # it turns within the delay so often that its mean counts
     return _like(total, aperture_time)
 
 
@@ -348,11 +362,7 @@ def synchronized_parts(pieces: Sequence[PowerLawPiece], aperture_time: Any, inte
     last = np.maximum(_FOLDED * rate, _FAST / scale)
     edges = [[*_exchange_edges(T, rate), *_image_edges(pieces, rate)] for T in times.tolist()]
     total = _over_panels(lambda f, cases: _left(pieces, beyond, f, rate), edges, last, scale)
-    for piece in pieces:  # where straight lines pass nothing any more
-        to_angle = piece.density * scale ** (piece.slope - 1)
-        low, high = np.maximum(piece.low, last) * scale, piece.high * scale
-        some = piece.high > last
-        total[:, some] += to_angle[some] * _fast(piece.slope, low[some], high[some])
+    _add_fast(total, pieces, last, scale, 1.0)  # straight lines pass nothing any more
     return _like(total, aperture_time)
 
 
@@ -361,11 +371,9 @@ def link_parts(aperture_time: Any, interval: float) -> Parts:
     rate, times = 1 / interval, np.atleast_1d(aperture_time)
     edges = [_exchange_edges(T, rate) for T in times.tolist()]
     last = np.full(times.shape, _FOLDED * rate)
-
-    def density(f: Floats, cases: NDArray[np.intp]) -> Floats:
-        return np.asarray(2 * interval * held(2 * math.pi * f * interval))
-
-    total = _over_panels(density, edges, last, math.pi * times)
+    total = _over_panels(
+        lambda f, cases: 2 * interval * held(2 * math.pi * f * interval), edges, last, math.pi * times
+    )
     return _like(total, aperture_time)
 
 
@@ -392,6 +400,15 @@ def _over_panels(
     return total
 
 
+def _add_fast(total: Floats, pieces: Sequence[PowerLawPiece], last: Floats, scale: Floats, times: float) -> None:
+    """Add what a spectrum, so many times, has beyond the last frequencies, where what turns is averaged."""
+    for piece in pieces:
+        to_angle = times * piece.density * scale ** (piece.slope - 1)
+        low, high = np.maximum(piece.low, last) * scale, piece.high * scale
+        some = piece.high > last
+        total[:, some] += to_angle[some] * _fast(piece.slope, low[some], high[some])
+
+
 def _panels_of(density: Callable[[Floats], Floats], low: Floats, high: Floats, scale: Floats) -> Floats:
     """Parts of panels (n,)."""
     low = np.where(low > 0, low, high * _NOTHING)
@@ -399,8 +416,8 @@ def _panels_of(density: Callable[[Floats], Floats], low: Floats, high: Floats, s
     f = low * np.exp(span * _NODES)
     angle = f * scale
     fast = np.array(*evaluators.tone_parts_fast(1.0, *(angle**-power for power in (2, 4, 6, 8))))  # type: ignore[arg-type]
-    squares = np.where(low * scale >= _FAST / _SAME, fast, _squares(angle))
-    return np.asarray((density(f) * f * span * _WEIGHTS * squares).sum(axis=1))
+    of_tone = np.where(low * scale >= _FAST / _SAME, fast, squares(angle))
+    return np.asarray((density(f) * f * span * _WEIGHTS * of_tone).sum(axis=1))
 
 
 def _left(pieces: Sequence[PowerLawPiece], beyond: Sequence[float], f: Floats, rate: float) -> Floats:
@@ -411,18 +428,12 @@ def _left(pieces: Sequence[PowerLawPiece], beyond: Sequence[float], f: Floats, r
     for piece, far in zip(pieces, beyond, strict=True):
         own, aliases = np.zeros_like(f), np.full_like(f, far)
         for n in range(-_ALIASES, _ALIASES + 1):
-            density = _at(piece, np.abs(start + n * rate))
-            own = np.where(nearest == n, density, own)
-            aliases = aliases + np.where(nearest == n, 0.0, density)
-        own = np.where(np.abs(nearest) > _ALIASES, _at(piece, f), own)
+            folded = piece.at(np.abs(start + n * rate))
+            own = np.where(nearest == n, folded, own)
+            aliases = aliases + np.where(nearest == n, 0.0, folded)
+        own = np.where(np.abs(nearest) > _ALIASES, piece.at(f), own)
         total += own * (1 - np.sqrt(passed)) ** 2 + passed * aliases
     return total
-
-
-def _at(piece: PowerLawPiece, f: Floats) -> Floats:
-    """Density of a piece, 0 beside it. [rad²/Hz]"""
-    is_in: NDArray[Any] = (piece.low <= f) & (f < piece.high)
-    return np.where(is_in, piece.density * np.where(is_in, f, 1.0) ** -piece.slope, 0.0)
 
 
 def _folded_from_beyond(piece: PowerLawPiece, rate: float) -> float:
@@ -430,7 +441,7 @@ def _folded_from_beyond(piece: PowerLawPiece, rate: float) -> float:
     low = max(piece.low, (_ALIASES + 0.5) * rate)
     if low >= piece.high:
         return 0.0
-    rise = -piece.slope * piece.at(low) / low  # of the spectrum, at the integral's beginning
+    rise = -piece.slope * float(piece.at(low)) / low  # of the spectrum, at the integral's beginning
     return 2 * (piece.integral(low, piece.high) / rate + rise * rate / 24)
 
 

@@ -1,4 +1,4 @@
-"""Declared vibrations as they count: along the line of sight, as paired echoes, and as phases where they are slow.
+"""Declared vibrations as they count: along the line of sight, as paired echoes, as phases where they are slow.
 
 Of a receiver that hears the transmitter data hold ranges less the direct path: there a vibration counts as what it
 changes of that.
@@ -15,11 +15,15 @@ transforms of the phasor in the worst of its phases, from three cycles per apert
 (`tests/effects/test_echoes.py`). The echoes at −n_k are left out: they add up to 0.3 dB at three cycles, and less
 beyond.
 
+Acceleration of a spectrum S_a is displacement of S_x = S_a/(2πf)⁴. Its quadratic and cubic phase, what spreads and
+what displaces are the integrals of `spectra`, so that what is slower than the aperture counts as what it is.
+
 Numbers of a mission may be arrays (cases,); its geometry then is that of these cases, else the mission's own.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,11 +32,12 @@ from numpy.typing import NDArray
 from bisar_budget import phrases
 from bisar_budget.constants import ROUNDING
 from bisar_budget.effects.effect import PLATFORMS, subject
-from bisar_budget.effects.spectra import SLOW, tone
+from bisar_budget.effects.random_effect import RandomError, SensorCases
+from bisar_budget.effects.spectra import SLOW, Floats, Parts, PowerLawPiece, heard_parts, left_parts, tone
 from bisar_budget.geometry import FRAME_AXES, Vector, dot
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
-from bisar_budget.mission.vibrations import AcceleratedSinusoid
+from bisar_budget.mission.vibrations import AcceleratedSinusoid, FeltVibration, Spectrum, Vibration
 from bisar_budget.phrases import Note
 from bisar_budget.units import format_quantity
 
@@ -44,7 +49,10 @@ _REACH = np.arange(-6, 7)[:, None, None]
 _SEARCHED = 16  # places around which it looks
 _MOST = 200_000  # echoes that are looked at together
 
-Floats = NDArray[np.float64]
+DISPLACED = ((2 * math.pi) ** -4, 4.0)  # S_x = S_a/(2πf)⁴
+_STEEP = 20.0  # slope of a density beyond which its powers would overflow
+_PARTS = 16  # by which such a piece is taken instead: it is narrow, or nearly nothing at one of its ends
+
 Truths = NDArray[np.bool_]
 
 
@@ -315,3 +323,83 @@ def _largest_displacement(mission: Mission, name: str, index: int, line: Line, g
 
 def _length(vector: Vector) -> Any:
     return np.sqrt(dot(vector, vector))
+
+
+# ---------------------------------------------------------------------- by a spectrum
+def power_of(vibration: Vibration | FeltVibration) -> Any:
+    """Factor of power by which `spectrum_level` shifts a spectrum."""
+    return 1.0 if vibration.spectrum_level is None else 10 ** (np.asarray(vibration.spectrum_level) / 10)
+
+
+def spectrum_pieces(spectrum: Spectrum, law: tuple[float, float] = (1.0, 0.0)) -> tuple[PowerLawPiece, ...]:
+    """A spectrum of acceleration [(m/s²)²/Hz] as pieces of power laws, times factor·f^(−slope) of a law.
+
+    One of displacement is that of its acceleration, (2πf)⁴ times as large. Numbers only.
+    """
+    factor, slope = law
+    if not spectrum.is_accelerated:
+        factor, slope = factor / DISPLACED[0], slope - DISPLACED[1]
+    found = []
+    for (f, density), (g, last) in pairwise(spectrum.points):
+        if not (density and last):  # made so small that nothing is left, of which there is no logarithm
+            continue
+        own = math.log(density / last) / math.log(g / f)
+        if abs(own) <= _STEEP:
+            found.append(PowerLawPiece(f, g, factor * density * f**own, own + slope))
+            continue
+        ends = np.geomspace(f, g, _PARTS + 1).tolist()
+        for low, high in pairwise(ends):
+            at_ends = (density * (low / f) ** -own, density * (high / f) ** -own)
+            found.append(PowerLawPiece(low, high, factor * _mean(own, low, high, *at_ends), slope))
+    return tuple(found)
+
+
+def _mean(slope: float, low: float, high: float, at_low: float, at_high: float) -> float:
+    """Mean density of a steep power law between two frequencies."""
+    return (at_high * high - at_low * low) / ((1 - slope) * (high - low))
+
+
+def spectrum_parts(
+    seen: SensorCases, spectrum: Spectrum, law: tuple[float, float], interval: Any = None, delay: Any = None
+) -> Parts:
+    """Parts over the aperture of a spectrum times a law, (cases,) each, see `spectrum_pieces`.
+
+    `interval` is that of exchanged pulses, of which then counts what they leave, `delay` that between two times of
+    which only the difference counts. Densities, intervals and delays may differ from case to case.
+    """
+    found = np.zeros((len(Parts._fields), seen.cases))
+    for (of_group, exchanged), some in seen.alike((spectrum, interval)):
+        pieces, times = spectrum_pieces(of_group, law), seen.aperture_time[some]
+        if delay is None:
+            of_pieces = left_parts(pieces, times, exchanged)
+        else:
+            of_pieces = heard_parts(pieces, times, np.broadcast_to(delay, (seen.cases,))[some])
+        found[:, some] = of_pieces.rows
+    return Parts(*found)
+
+
+def vibration_spectrum(seen: SensorCases, name: str) -> Iterator[RandomError]:
+    """Vibration of a platform by its spectrum: its unit is that of noise, a factor of amplitude, declared 1."""
+    vibration = seen.error(name).vibration
+    if vibration.spectrum is None:
+        return
+    found = spectrum_parts(seen, vibration.spectrum, DISPLACED)
+    along = counted(seen.mission, name, 1.0, "islr", seen.geometry)
+    published, full = seen.of_parts(found.times(power_of(vibration)), along)
+    path = ("platforms", name, "motion_error", "vibration", "spectrum")
+    what = subject(name, "vibration", "spectrum")
+    yield RandomError(what, "dB", 1.0, path, published.times(seen.factor), full.times(seen.factor))
+
+
+def displacement_rms(spectrum: Spectrum, power: float = 1.0) -> float:
+    """Root mean square of the displacement, all frequencies together. [m]"""
+    pieces = spectrum_pieces(spectrum, DISPLACED)
+    return math.sqrt(power * math.fsum(piece.integral(piece.low, piece.high) for piece in pieces))
+
+
+def pieces_of_vibration(mission: Mission, name: str) -> tuple[PowerLawPiece, ...]:
+    """Spectrum of a platform's vibration as phase along the line of sight, one way. [rad²/Hz]"""
+    vibration = getattr(mission.platforms, name).motion_error.vibration
+    k = 2 * math.pi / mission.radar.wavelength * float(counted(mission, name, 1.0, "islr"))
+    factor, slope = DISPLACED
+    return spectrum_pieces(vibration.spectrum, (factor * k**2 * float(power_of(vibration)), slope))

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from bisar_budget.constants import ROUNDING, SPEED_OF_LIGHT
 from bisar_budget.evaluators import LEGENDRE_FITS, full_ground_inverse
-from bisar_budget.geometry import BistaticGeometry, PlatformState, Vectors, dot, norm
+from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState, Vectors, dot, norm
 
 Floats = NDArray[np.float64]
 Places = NDArray[np.intp]
@@ -67,9 +67,9 @@ def nodes(count: int) -> Sampling:
     return Sampling(np.array(places), np.array(fit))
 
 
-def aperture_nodes(aperture_time_s: float, count: int = FINE) -> Floats:
-    """Slow times of the nodes of an aperture, (count,). [s]"""
-    return nodes(count).places * (aperture_time_s / 2)
+def aperture_nodes(aperture_time_s: float) -> Floats:
+    """Slow times of the nodes of an aperture for courses that are not smooth, (FINE,). [s]"""
+    return nodes(FINE).places * (aperture_time_s / 2)
 
 
 def nodes_for(geometry: BistaticGeometry, aperture_time_s: Any, *, has_direct_path: bool = False) -> Any:
@@ -229,6 +229,22 @@ class Found(NamedTuple):
     quadratic: Floats
     cubic: Floats
     turn: Floats
+
+
+@dataclass(frozen=True)
+class ExactEffect:
+    """Effect of one error by exact ranges, in plain numbers.
+
+    Displacement (east, north) [m]; phases at the aperture edge, signed like the range error [rad].
+    """
+
+    displacement: GroundVector
+    quadratic: float
+    cubic: float
+
+    def moved(self, by: GroundVector) -> GroundVector:
+        """The displacement and another one together."""
+        return self.displacement[0] + by[0], self.displacement[1] + by[1]
 
 
 class ExactRanges:
@@ -450,15 +466,6 @@ class ExactRanges:
             np.where(np.abs(cubic) <= ROUNDING * seen_cubic, 0.0, cubic),
         )
 
-    def displacement(self, effect: Effect, size: Any) -> tuple[Any, Any]:
-        """Displacement on the ground by so many units. [m]"""
-        scale = size / self.determinant
-        (a, b), (c, d) = self.adjugate
-        return (
-            (a * effect.constant + b * effect.linear) * scale,
-            (c * effect.constant + d * effect.linear) * scale,
-        )
-
     # ------------------------------------------------------------------ errors of any size
     def phases(self, lanes: Lanes, size: Floats, near: tuple[Any, Any]) -> Found:
         """Find where errors of given sizes move a point at the centre, and what defocuses there.
@@ -534,12 +541,14 @@ class ExactRanges:
                 moved = [[along if along.shape[-1] == 1 else along[:, some] for along in one] for one in shifts]
                 measured = self._measured(clock[:, some], moved, case[some], room)
                 given = [case[some], *(one[some] for one in start), *measured]
-                for search, is_for in ((self._settle_near, is_close[some]), (self._settle, np.True_)):
+                for settle, is_for in ((_PointSearch.near, is_close[some]), (_PointSearch.anywhere, np.True_)):
                     alive = np.flatnonzero(is_for & ~here.is_found)
                     if alive.size:
                         kept: list[Any] = given if alive.size == here.east.size else _some(given, alive)
                         of, east, north, *left = kept
-                        search(here, alive, of, east, north, left, room[MEASURED:, :, : alive.size])
+                        settle(
+                            _PointSearch(self, here, alive, of, east, north, left, room[MEASURED:, :, : alive.size])
+                        )
         return found
 
     def _room(self, lanes: int) -> Floats:
@@ -576,8 +585,16 @@ class ExactRanges:
             found += [u, v, R, p, whole]
         return found
 
-    def _settle_near(
+
+class _PointSearch:
+    """Newton's method for the points of lanes, those that have settled left out: `alive` are their places in `found`.
+
+    With them their cases, the points so far [m], and what is measured, in some room.
+    """
+
+    def __init__(
         self,
+        exact: ExactRanges,
         found: Found,
         alive: Places,
         of: Places,
@@ -586,67 +603,58 @@ class ExactRanges:
         measured: list[Floats],
         room: Floats,
     ) -> None:
-        """Search with the slopes of the centre: a third of the work, where it settles in a few steps."""
-        gradient = _of(self.gradient, of)
+        self.exact, self.found, self.alive, self.of = exact, found, alive, of
+        self.east, self.north, self.measured, self.room = east, north, measured, room
+
+    def near(self) -> None:
+        """With the slopes of the centre: a third of the work, where it settles in a few steps."""
+        exact, gradient = self.exact, _of(self.exact.gradient, self.of)
         for _ in range(FEW):
-            left = self.fit @ _left(measured, east, north, room)
+            left = exact.fit @ _left(self.measured, self.east, self.north, self.room)
             _, step_east, step_north, phases = _newton_step(left, *gradient)
-            east, north = east + step_east, north + step_north
-            (k,) = _of([self.k], of)
+            self.east, self.north = self.east + step_east, self.north + step_north
+            (k,) = _of([exact.k], self.of)
             is_done = k * (np.abs(step_east) + np.abs(step_north)) < UNSEEN_RAD / NEAR
-            self._keep(found, alive, of, is_done, east, north, phases, np.ones(alive.size))
+            self._keep(is_done, phases, np.ones(self.alive.size))
             going = np.flatnonzero(~is_done)
             if not going.size:
                 return
-            alive, of, east, north = alive[going], of[going], east[going], north[going]
-            gradient, measured, room = _some(gradient, going), _some(measured, going), room[..., : going.size]
+            self._go_on(going)
+            gradient = _some(gradient, going)
 
-    def _settle(
-        self,
-        found: Found,
-        alive: Places,
-        of: Places,
-        east: Floats,
-        north: Floats,
-        measured: list[Floats],
-        room: Floats,
-    ) -> None:
-        before = np.full(alive.size, math.inf)
+    def anywhere(self) -> None:
+        """With the slopes of each point."""
+        exact, before = self.exact, np.full(self.alive.size, math.inf)
         for _ in range(ITERATIONS):
-            seen, nearest = _seen(measured, east, north, room)
-            determinant, step_east, step_north, phases = _newton_step(*np.matmul(self.fit, seen))
-            east, north = east + step_east, north + step_north
+            seen, nearest = _seen(self.measured, self.east, self.north, self.room)
+            determinant, step_east, step_north, phases = _newton_step(*np.matmul(exact.fit, seen))
+            self.east, self.north = self.east + step_east, self.north + step_north
             step = step_east * step_east + step_north * step_north
-            k, meets, at_centre, half = _of([self.k, self.nearest, self.determinant, self.half], of)
+            k, meets, at_centre, half = _of([exact.k, exact.nearest, exact.determinant, exact.half], self.of)
             is_apart = nearest >= MEETS * meets
             is_done = is_apart & (k * step < UNSEEN_RAD * nearest)
-            is_right = is_done & (determinant * at_centre > 0)
-            turn = determinant / (at_centre * half)
-            self._keep(found, alive, of, is_right, east, north, phases, turn)
+            self._keep(is_done & (determinant * at_centre > 0), phases, determinant / (at_centre * half))
             going = np.flatnonzero(~is_done & (step < SHRINKS * before) & is_apart)
             if not going.size:
                 return
             before = step
-            if going.size < alive.size:
-                alive, of, east, north, before = alive[going], of[going], east[going], north[going], step[going]
-                measured, room = _some(measured, going), room[..., : going.size]
+            if going.size < self.alive.size:
+                before = step[going]
+                self._go_on(going)
 
-    def _keep(
-        self,
-        found: Found,
-        alive: Places,
-        of: Places,
-        is_done: Truths,
-        east: Floats,
-        north: Floats,
-        phases: tuple[Floats, Floats],
-        turn: Floats,
-    ) -> None:
+    def _go_on(self, going: Places) -> None:
+        """Go on with some of the lanes."""
+        self.alive, self.of = self.alive[going], self.of[going]
+        self.east, self.north = self.east[going], self.north[going]
+        self.measured, self.room = _some(self.measured, going), self.room[..., : going.size]
+
+    def _keep(self, is_done: Truths, phases: tuple[Floats, Floats], turn: Floats) -> None:
         """Note the lanes that have settled, phases in metres; what is less than rounding leaves is none."""
-        places = alive[is_done]
+        found, places = self.found, self.alive[is_done]
         found.is_found[places] = True
-        found.east[places], found.north[places], found.turn[places] = east[is_done], north[is_done], turn[is_done]
-        k, rounding = _of([self.k, self.rounding], of[is_done])
+        for kept, one in ((found.east, self.east), (found.north, self.north), (found.turn, turn)):
+            kept[places] = one[is_done]
+        k, rounding = _of([self.exact.k, self.exact.rounding], self.of[is_done])
         for kept, phase in zip((found.quadratic, found.cubic), phases, strict=True):
             one = k * phase[is_done]
             kept[places] = np.where(np.abs(one) > rounding, one, 0.0)

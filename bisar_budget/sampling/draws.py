@@ -192,8 +192,9 @@ class Sums:
     def clear(self) -> None:
         """Begin another block."""
         every: list[Mapping[Any, Floats]] = [self.phases, self.totals, self.motion, self.clock, self.alone]
-        for one in (one for kept in every for one in kept.values()):
-            one.fill(0.0)
+        for kept in every:
+            for one in kept.values():
+                one.fill(0.0)
         self._exact.clear()
 
     def add(self, variable: Variable, drawn: Floats) -> None:
@@ -254,15 +255,9 @@ class Sums:
         owners = judged.owners
         if owners not in self._exact:
             self._exact[owners] = self._by_exact_ranges(owners)
-        found = self._exact[owners]
-        quadratic, cubic, east, north = _sum(self.alone, owners, np.zeros((4, 1)))
-        if judged.columns == (0,):
-            square: Floats = (found.quadratic + quadratic) ** 2
-        elif judged.columns == (1,):
-            square = (found.cubic + cubic) ** 2
-        else:
-            square = (found.east + east) ** 2 + (found.north + north) ** 2
-        return square
+        found, alone = self._exact[owners], _sum(self.alone, owners, np.zeros((4, 1)))
+        by_ranges = (found.quadratic, found.cubic, found.east, found.north)
+        return np.asarray(sum((by_ranges[column] + alone[column]) ** 2 for column in judged.columns))
 
     def _by_exact_ranges(self, owners: tuple[str, ...]) -> Found:
         times = self.exact.times[:, 0]

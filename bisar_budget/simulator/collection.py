@@ -11,12 +11,11 @@ from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.air_delays import CONTENT, seen_course
 from bisar_budget.geometry import BistaticGeometry, GroundVector
 from bisar_budget.mission.model import Mission, Simulation
-from bisar_budget.ranges.exact_ranges import aperture_nodes
+from bisar_budget.ranges.exact_ranges import ExactEffect, aperture_nodes
 from bisar_budget.simulator.image_formation import backprojection, bytes_held, kernel_within, taylor_window
 from bisar_budget.simulator.phase_history import (
     Complexes,
     Errors,
-    ExactEffect,
     Flight,
     Floats,
     PhaseHistory,
@@ -43,10 +42,6 @@ _SLANT = 60.0  # of the way from line to line, at most: where equal Doppler runs
 _CORRECTIONS = 3  # of each pixel's range sum
 _BLOCK = 1 << 14  # pixels corrected at once
 _PULSES_PER_CELL, _LARGE_CELLS = 4, 128  # a response repeats after as many cells as there are pulses
-
-
-class MemoryLimitError(ValueError):
-    """An image beyond `simulation.memory_limit`."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -324,9 +319,8 @@ class PointCollection:
         Raises
         ------
         ValueError
-            The patch aliases with the mission's pulses, or is too large to be formed.
-        MemoryLimitError
-            Forming or reading it takes more than `memory_limit`. No data are formed before that is known.
+            The patch aliases with the mission's pulses, or is too large to be formed; or forming or reading it takes
+            more than `memory_limit`. No data are formed before that is known.
         """
         grid, spacing = self._grid(centre, errors, cells, range_cells)
         slow_time = cell_centres(self.aperture_time, pulses_for(cells))
@@ -398,7 +392,7 @@ class PointCollection:
         reading = _BYTES_PER_CONTRIBUTION * min(pulses * pixels, 2 * CONTRIBUTIONS) + bytes_held("numpy")
         needed = pixels * _BYTES_PER_PIXEL + max(forming, reading)
         if needed > self.memory_limit:
-            raise MemoryLimitError(
+            raise ValueError(
                 f"an image of {pixels} pixels from {pulses} pulses of {frequencies} frequencies needs about "
                 f"{needed / 1e6:.4g} MB, simulation.memory_limit is {self.memory_limit / 1e6:.4g} MB: raise it"
             )

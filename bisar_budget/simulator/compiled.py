@@ -242,9 +242,7 @@ def _profile_blocks(history: PhaseHistory, needed: _Needed, spline: Spline) -> I
     reference = _reference(history)
     first, count = needed
     pulses = min(history.slow_time.size, max(1, int(_BLOCK_BYTES / (8 * count * factor + PROFILE_BYTES * length))))
-    room = np.empty(
-        (pulses, 2 * count * factor), dtype=np.float32
-    )  # for every block: it is read before the next is made
+    room = np.empty((pulses, 2 * count * factor), dtype=np.float32)  # of every block: read before the next is made
     for start in range(0, history.slow_time.size, pulses):
         part = slice(start, start + pulses)
         profiles = range_profiles(history, length, transform, part)

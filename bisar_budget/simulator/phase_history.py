@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState, Vectors
-from bisar_budget.ranges.exact_ranges import ExactRanges, Sampling, followed
+from bisar_budget.ranges.exact_ranges import ExactEffect, ExactRanges, Sampling, followed
 
 _HELD = 1 << 18  # complex numbers held at once
 _NO_SIGHT = 1e-20  # square of what a metre of a platform changes; less is rounding
@@ -431,19 +431,6 @@ class NoGroundPointError(ValueError):
     """No ground point has the recorded range history: the point has no image."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class ExactEffect:
-    """Displacement (east, north) [m]; phases at the aperture edge, signed like the range error [rad]."""
-
-    displacement: GroundVector
-    quadratic: float
-    cubic: float
-
-    def moved(self, by: GroundVector) -> GroundVector:
-        """The displacement and another one together."""
-        return self.displacement[0] + by[0], self.displacement[1] + by[1]
-
-
 def exact_effect(
     slow_time: Floats,
     transmitter: Path,
@@ -473,7 +460,7 @@ def exact_effect(
     if not found.is_found[0]:
         raise NoGroundPointError("no ground point has the recorded range history")
     east, north, quadratic, cubic = (float(one[0]) for one in found[1:5])
-    return ExactEffect(displacement=(east, north), quadratic=quadratic, cubic=cubic)
+    return ExactEffect((east, north), quadratic, cubic)
 
 
 def _columns(positions: Floats) -> Vectors:

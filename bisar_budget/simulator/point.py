@@ -16,6 +16,7 @@ from bisar_budget.effects.vibration import counted, lines_of
 from bisar_budget.geometry import GroundVector, Vector
 from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.mission.platforms import MotionError as DeclaredError
+from bisar_budget.ranges.exact_ranges import ExactEffect
 from bisar_budget.simulator.autofocus import ALGORITHMS
 from bisar_budget.simulator.collection import PointCollection, RangeLines
 from bisar_budget.simulator.former import IMAGE_FORMERS, ExactRangeFormer, Former, PlaneWaves
@@ -31,7 +32,6 @@ from bisar_budget.simulator.impulse_response import (
 from bisar_budget.simulator.phase_history import (
     Complexes,
     Errors,
-    ExactEffect,
     Flight,
     Floats,
     PathError,

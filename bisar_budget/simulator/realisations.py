@@ -15,8 +15,14 @@ from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.air_delays import CONTENT, DELAY, group_delay
 from bisar_budget.effects.effect import PLATFORMS
-from bisar_budget.effects.lever_arms import arm_at, body_axes
-from bisar_budget.effects.navigation_errors import TILTS, acceleration_errors, process_of, specific_force
+from bisar_budget.effects.navigation_errors import (
+    TILTS,
+    acceleration_errors,
+    arm_at,
+    body_axes,
+    process_of,
+    specific_force,
+)
 from bisar_budget.effects.oscillator_acceleration import (
     accelerated_tones,
     flies_a_turn,
@@ -24,11 +30,10 @@ from bisar_budget.effects.oscillator_acceleration import (
     turn_courses,
 )
 from bisar_budget.effects.oscillators import noise_of
-from bisar_budget.effects.random_effect import RandomError
+from bisar_budget.effects.random_effect import RandomError, parts_of_largest
 from bisar_budget.effects.random_errors import random_errors
 from bisar_budget.effects.spectra import PowerLawPiece, density
-from bisar_budget.effects.vibration import SLOWEST, counted
-from bisar_budget.effects.vibration_spectra import pieces_of_vibration
+from bisar_budget.effects.vibration import SLOWEST, counted, pieces_of_vibration
 from bisar_budget.geometry import PlatformState
 from bisar_budget.mission.instruments import GaussMarkov
 from bisar_budget.mission.model import Mission, Simulation
@@ -93,7 +98,7 @@ def _drawn_parts(
     kind, figure = error.subject.kind, error.subject.axis
     if kind == "random":
         process = process_of(mission, error)
-        sizes = _of_largest(process.sigma)
+        _, sizes = parts_of_largest(np.array(process.sigma))
         of_axis = [(axis, size * _correlated(process, times, draws, rng)) for axis, size in enumerate(sizes) if size]
         common, names = mission.common_motion_error, [error.owner]
         if error.owner not in PLATFORMS and common is not None:
@@ -106,12 +111,13 @@ def _drawn_parts(
     motion = _motion(mission, error.owner)
     lever, axes_now = motion.lever_arm, np.asarray(state.frame(motion.frame), float)
     if kind == "lever_arm" and figure == "uncertainty":
-        sizes = _of_largest(lever.uncertainty if lever is not None and lever.uncertainty else (1.0, 1.0, 1.0))
+        stated = lever.uncertainty if lever is not None else None
+        _, sizes = parts_of_largest(np.array(stated or (1.0, 1.0, 1.0)))
         body = np.moveaxis(body_axes(state, times), 1, 2)
         drawn = [size * rng.standard_normal((draws, 1)) * np.ones(times.size) for size in sizes]
         return {error.owner: list(zip(drawn, body, strict=True))}
     figure = "attitude" if kind == "lever_arm" else figure
-    sizes = _of_largest(getattr(motion.imu, figure, None) or (1.0, 1.0, 1.0))
+    _, sizes = parts_of_largest(np.array(getattr(motion.imu, figure, None) or (1.0, 1.0, 1.0)))
     pushes = acceleration_errors(figure, axes_now, np.array(specific_force(mission, state)))
     swings = None
     if lever is not None and lever.arm is not None and figure in TILTS:
@@ -132,12 +138,6 @@ def _drawn_parts(
 def _motion(mission: Mission, name: str) -> MotionError:
     found: MotionError = getattr(mission.platforms, name).motion_error
     return found
-
-
-def _of_largest(values: Sequence[float]) -> Floats:
-    """Sizes over the largest; 1 where there is none."""
-    largest: Floats = np.array(values) / max(values) if max(values) else np.ones(3)
-    return largest
 
 
 def delay_courses(
@@ -521,21 +521,15 @@ class _Tones:
         if slow is None:
             slow = np.geomspace(_SLOWEST / aperture_time, fine / 2, _SLOW_TONES + 1)
         self.slow: Floats = (slow[1:] + slow[:-1]) / 2
-        widths: Floats = slow[1:] - slow[:-1]
-        self.slow_size = self._size(pieces, self.slow, widths)
+        # Sigma of what a tone has of cosine, and of sine: √(S·Δf).
+        self.slow_size: Floats = np.sqrt(density(pieces, self.slow) * (slow[1:] - slow[:-1]))
         pieces = _above(pieces, float(slow[-1]))
         count = min(_MAX_TONES, max(1, math.ceil(high / fine)))
         self.fast: Floats = fine * np.arange(1.0, count + 1)
-        self.fast_size = self._size(pieces, self.fast, np.full(count, fine))
+        self.fast_size: Floats = np.sqrt(density(pieces, self.fast) * fine)
         top = float(self.fast[-1]) + fine / 2
         beyond = [piece.integral(max(piece.low, top), piece.high) for piece in pieces if piece.high > top]
         self.rest = math.sqrt(math.fsum(beyond))
-
-    @staticmethod
-    def _size(pieces: tuple[PowerLawPiece, ...], frequency: Floats, width: Floats) -> Floats:
-        """Sigma of what a tone has of cosine, and of sine: √(S·Δf)."""
-        found: Floats = np.sqrt(density(pieces, frequency) * width)
-        return found
 
     def draw_slow(self, draws: int, rng: np.random.Generator) -> Floats:
         """Random sizes of cosine and sine of the slow tones, (2, draws, tones)."""

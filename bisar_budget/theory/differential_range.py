@@ -58,33 +58,33 @@ def measured_error(platform: PlatformSymbols) -> Matrix:
     return ImmutableMatrix([real(f"{axis}tilde_{platform.subscript}") for axis in AXES])
 
 
-def direct_path_clock(platforms: tuple[PlatformSymbols, ...] = PLATFORMS) -> Expr:
+def direct_path_clock() -> Expr:
     """The c·t̃ of (1) for a receiver that hears the transmitter: measured less actual distance of both. [m]
 
     Its clock is the direct signal, which is late by the actual distance; the processor takes the measured one off.
     """
-    transmitter, receiver = (platform.position + measured_error(platform) for platform in platforms)
-    actual = distance(*(platform.position for platform in platforms))
+    transmitter, receiver = (platform.position + measured_error(platform) for platform in PLATFORMS)
+    actual = distance(*(platform.position for platform in PLATFORMS))
     return distance(transmitter, receiver) - actual
 
 
-def exact_differential_range(platforms: tuple[PlatformSymbols, ...] = PLATFORMS) -> Expr:
+def exact_differential_range() -> Expr:
     """Differential range of a point (x, y, z) without errors: (1) with r̃ = 0 and t̃ = 0. [m]"""
-    free = dict.fromkeys((e for platform in platforms for e in measured_error(platform)), 0)
-    exact = observed_differential_range(platforms).subs(Function("ttilde")(tau), 0).subs(free)
+    free = dict.fromkeys((e for platform in PLATFORMS for e in measured_error(platform)), 0)
+    exact = observed_differential_range().subs(Function("ttilde")(tau), 0).subs(free)
     return exact.subs(dict(zip(scatterer, point, strict=True)))
 
 
-def far_field_differential_range(platforms: tuple[PlatformSymbols, ...] = PLATFORMS) -> Expr:
+def far_field_differential_range() -> Expr:
     """Return (5): the first-order Taylor expansion of (1) about the scene centre. [m]"""
-    exact = exact_differential_range(platforms)
+    exact = exact_differential_range()
     at_origin = dict.fromkeys(point, 0)
     return sum(x * diff(exact, x).subs(at_origin) for x in point)
 
 
-def in_angles(expression: Expr, platforms: tuple[PlatformSymbols, ...] = PLATFORMS) -> Expr:
+def in_angles(expression: Expr) -> Expr:
     """Write positions by slant range, azimuth and elevation, as (6) does."""
-    for platform in platforms:
+    for platform in PLATFORMS:
         R, phi, theta = platform.slant_range, platform.azimuth, platform.elevation
         spherical = (R * cos(phi) * cos(theta), R * sin(phi) * cos(theta), R * sin(theta))
         expression = expression.subs(dict(zip(platform.position, spherical, strict=True)))
@@ -92,38 +92,38 @@ def in_angles(expression: Expr, platforms: tuple[PlatformSymbols, ...] = PLATFOR
 
 
 @cache
-def far_field_in_angles(platforms: tuple[PlatformSymbols, ...] = PLATFORMS) -> Expr:
+def far_field_in_angles() -> Expr:
     """Return (6): (5) in azimuth and elevation. [m]"""
-    return in_angles(far_field_differential_range(platforms), platforms)
+    return in_angles(far_field_differential_range())
 
 
-def hold_range_constant(expression: Expr, platforms: tuple[PlatformSymbols, ...] = PLATFORMS) -> Expr:
+def hold_range_constant(expression: Expr) -> Expr:
     """Put R_k for |r_k| and r_k + v_k·τ for r_k: the motion model of (17).
 
     This is the paper's key approximation: numerators move, ranges do not. The full model drops it.
     """
-    for platform in platforms:
+    for platform in PLATFORMS:
         expression = expression.subs(platform.exact_slant_range(), platform.slant_range)
         moving = platform.position + platform.velocity * tau
         expression = expression.subs(dict(zip(platform.position, moving, strict=True)))
     return expand(expression)
 
 
-def linear_differential_range(platforms: tuple[PlatformSymbols, ...] = PLATFORMS) -> tuple[Expr, Expr]:
+def linear_differential_range() -> tuple[Expr, Expr]:
     """Return β₀, β₁ of (17). [m], [m/s]
 
     The print lost the + between its two brackets.
     """
-    beta_0, beta_1 = coefficients(hold_range_constant(far_field_differential_range(platforms), platforms))[:2]
+    beta_0, beta_1 = coefficients(hold_range_constant(far_field_differential_range()))[:2]
     return beta_0, beta_1
 
 
-def coefficients(expression: Expr, order: int = 3) -> tuple[Expr, ...]:
-    """Collect a polynomial in slow time: (order + 1) coefficients, constant first."""
+def coefficients(expression: Expr) -> tuple[Expr, ...]:
+    """Collect a cubic in slow time: four coefficients, constant first."""
     polynomial = Poly(expand(expression), tau)
-    if polynomial.degree() > order:
-        raise ValueError(f"degree {polynomial.degree()} in slow time, at most {order} expected")
-    return tuple(expand(polynomial.coeff_monomial(tau**n)) for n in range(order + 1))
+    if polynomial.degree() > 3:
+        raise ValueError(f"degree {polynomial.degree()} in slow time, at most 3 expected")
+    return tuple(expand(polynomial.coeff_monomial(tau**n)) for n in range(4))
 
 
 def error_polynomial(platform: PlatformSymbols) -> Matrix:
@@ -148,85 +148,79 @@ def error_track(platform: PlatformSymbols) -> Matrix:
 
 def _first_order(platform: PlatformSymbols) -> Expr:
     """Part of a platform in (1) for a scatterer at the scene centre, to first order in its error. [m]"""
-    return _grown(observed_differential_range((platform,)).subs(dict.fromkeys(scatterer, 0)), (platform,))
+    return _grown(observed_differential_range((platform,)).subs(dict.fromkeys(scatterer, 0)))
 
 
-def _grown(expression: Expr, platforms: tuple[PlatformSymbols, ...]) -> Expr:
-    """First order of an expression in the errors of platforms, as functions of slow time."""
-    for platform in platforms:
+def _grown(expression: Expr) -> Expr:
+    """First order of an expression in the errors of both platforms, as functions of slow time."""
+    for platform in PLATFORMS:
         grown = zip(measured_error(platform), _EPSILON * error_track(platform), strict=True)
         expression = expression.subs(dict(grown))
     return diff(expression, _EPSILON).subs(_EPSILON, 0)
 
 
 @cache
-def direct_path_range_error(platforms: tuple[PlatformSymbols, ...] = PLATFORMS) -> Expr:
+def direct_path_range_error() -> Expr:
     """First order of (1) for the scene centre where the direct path is the clock, errors of any course. [m]
 
     Slant ranges and the distance of the platforms are written R_t, R_r and D.
     """
-    observed = observed_differential_range(platforms).subs(dict.fromkeys(scatterer, 0))
-    total = _grown(observed.subs(c * Function("ttilde")(tau), direct_path_clock(platforms)), platforms)
-    total = total.subs(distance(*(platform.position for platform in platforms)), baseline)
-    for platform in platforms:
+    observed = observed_differential_range().subs(dict.fromkeys(scatterer, 0))
+    total = _grown(observed.subs(c * Function("ttilde")(tau), direct_path_clock()))
+    total = total.subs(distance(*(platform.position for platform in PLATFORMS)), baseline)
+    for platform in PLATFORMS:
         total = total.subs(platform.exact_slant_range(), platform.slant_range)
     return expand(total)
 
 
 @cache
-def range_error_of_tracks(platforms: tuple[PlatformSymbols, ...] = PLATFORMS) -> Expr:
+def range_error_of_tracks() -> Expr:
     """Return (23): error of the differential range for errors of any course. [m]
 
     The processor subtracts the measured distance |r + r̃| where the data hold |r|, so (1) leaves
     |r| − |r + r̃| for each platform. First order in r̃, then the motion model of (17).
     """
     total = c * Function("ttilde")(tau)
-    for platform in platforms:
-        total += hold_range_constant(_first_order(platform), (platform,))
+    for platform in PLATFORMS:
+        total += hold_range_constant(_first_order(platform))
     return total
 
 
 @cache
-def range_error(platforms: tuple[PlatformSymbols, ...] = PLATFORMS) -> Expr:
+def range_error() -> Expr:
     """Return (23) with (22) put in, a cubic in slow time. [m]"""
-    total = range_error_of_tracks(platforms).subs(Function("ttilde")(tau), clock_polynomial())
-    for platform in platforms:
+    total = range_error_of_tracks().subs(Function("ttilde")(tau), clock_polynomial())
+    for platform in PLATFORMS:
         total = total.subs(dict(zip(error_track(platform), error_polynomial(platform), strict=True)))
     return expand(total)
 
 
-def ground_matrix(platforms: tuple[PlatformSymbols, ...] = PLATFORMS) -> Matrix:
+def ground_matrix() -> Matrix:
     """Q of (19), (2, 2): takes a ground point (x, y) to (β₀, β₁). [-], [1/s]"""
     ground = Matrix(point[:2])
-    return Matrix(linear_differential_range(platforms)).subs(point[2], 0).jacobian(ground)
+    return Matrix(linear_differential_range()).subs(point[2], 0).jacobian(ground)
 
 
-def ground_inverse(platforms: tuple[PlatformSymbols, ...] = PLATFORMS) -> tuple[Matrix, Expr]:
+def ground_inverse() -> tuple[Matrix, Expr]:
     """Adjugate (2, 2) and determinant of Q, so that Q⁻¹ of (30) is their quotient."""
-    Q = ground_matrix(platforms)
+    Q = ground_matrix()
     return Q.adjugate(), Q[0, 0] * Q[1, 1] - Q[0, 1] * Q[1, 0]
 
 
-def displacement(beta_0: Expr, beta_1: Expr, platforms: tuple[PlatformSymbols, ...] = PLATFORMS) -> Matrix:
-    """Return (x̃, ỹ) of (25), (2,): where constant and linear range errors move a response. [m]"""
-    adjugate, determinant = ground_inverse(platforms)
-    return adjugate * Matrix([beta_0, beta_1]) / determinant
-
-
 @cache
-def look_vector(platforms: tuple[PlatformSymbols, ...] = PLATFORMS) -> Matrix:
+def look_vector() -> Matrix:
     """Sum of the unit vectors to the platforms on the ground, (2,): (8) without f/2. [-]"""
-    return ImmutableMatrix([-diff(far_field_in_angles(platforms), x) for x in point[:2]])
+    return ImmutableMatrix([-diff(far_field_in_angles(), x) for x in point[:2]])
 
 
-def look_azimuth(platforms: tuple[PlatformSymbols, ...] = PLATFORMS) -> Expr:
+def look_azimuth() -> Expr:
     """Bistatic look angle φ_b of (11), by atan2: the printed arctan loses the quadrant. [rad]"""
-    s_x, s_y = look_vector(platforms)
+    s_x, s_y = look_vector()
     return atan2(s_y, s_x)
 
 
 @cache
-def smear_direction(platforms: tuple[PlatformSymbols, ...] = PLATFORMS) -> Matrix:
+def smear_direction() -> Matrix:
     """Return (31), (2,): direction of the second column of Q⁻¹, along which quadratic errors smear. [-]"""
-    adjugate, _ = ground_inverse(platforms)
-    return ImmutableMatrix(in_angles(adjugate[:, 1], platforms))
+    adjugate, _ = ground_inverse()
+    return ImmutableMatrix(in_angles(adjugate[:, 1]))

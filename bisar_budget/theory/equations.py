@@ -66,9 +66,9 @@ piece = tuple(real(f"betatilde_{n}i") for n in range(2))
 piece_range = tuple(real(f"beta_{n}i") for n in range(2))
 
 
-def phase(differential_range: Expr, at: Expr = f_i) -> Expr:
+def phase(differential_range: Expr) -> Expr:
     """Return (2): phase of a sample whose scatterer has a differential range. [rad]"""
-    return -2 * pi * at * differential_range / c
+    return -2 * pi * f_i * differential_range / c
 
 
 def in_slow_time(expression: Expr, at: Expr = tau_k) -> Expr:

@@ -118,13 +118,13 @@ def direct_sight(platform: PlatformSymbols) -> Matrix:
     return Matrix([-direct_range_error(platform).coeff(e).subs(own) for e in dr.error_track(platform)])
 
 
-def legendre_fit(count: int, digits: int = 17) -> tuple[tuple[Expr, ...], ...]:
+def legendre_fit(count: int) -> tuple[tuple[Expr, ...], ...]:
     """Gauss-Legendre nodes of a history over −1 … 1, and the weights that fit it there, (5, count).
 
     The fit of a history f is its projection on Legendre polynomials, (2n + 1)/2 ∫ f·Pₙ. Rows: nodes; value P₀;
     slope P₁; quadratic at the edge, 3/2 of P₂ = (3x² - 1)/2; cubic at the edge, 5/2 of P₃ = (5x³ - 3x)/2.
     """
-    x = real("x")
+    x, digits = real("x"), 17
     nodes, weights = gauss_legendre(count, digits + 5)
     rows = []
     for n, leading in enumerate((1, 1, Rational(3, 2), Rational(5, 2))):

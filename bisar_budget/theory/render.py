@@ -75,9 +75,13 @@ class _Name:
         subscript = (match["index"] or "").lstrip("_") or match["subscript"] or ""
         return cls(match["letter"], match["accent"] or "", subscript)
 
-    def text(self) -> str:
+    @property
+    def head(self) -> str:
         letter = self.letter.replace("Delta", "Δ").replace("det", "det ").replace("adj", "adj ")
-        head = unicodedata.normalize("NFC", _GREEK.get(letter, letter) + _ACCENTS.get(self.accent, ""))
+        return _GREEK.get(letter, letter)
+
+    def text(self) -> str:
+        head = unicodedata.normalize("NFC", self.head + _ACCENTS.get(self.accent, ""))
         return f"{head}_{_GREEK.get(self.subscript, self.subscript)}" if self.subscript else head
 
     def latex(self) -> str:
@@ -205,10 +209,9 @@ class _MathML(MathMLPresentationPrinter):  # type: ignore[misc]
 
     def _name(self, name: str) -> object:
         parts = _Name.of(name)
-        letter = parts.letter.replace("Delta", "Δ").replace("det", "det ").replace("adj", "adj ")
-        head = self._leaf("mi", _GREEK.get(letter, letter))
+        head = self._leaf("mi", parts.head)
         if parts.accent == "prime":
-            head = self._leaf("mi", _GREEK.get(letter, letter) + _ACCENTS["prime"])
+            head = self._leaf("mi", parts.head + _ACCENTS["prime"])
         elif parts.accent:
             over = self.dom.createElement("mover")
             over.setAttribute("accent", "true")

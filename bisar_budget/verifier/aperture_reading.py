@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.geometry import GroundVector
+from bisar_budget.ranges.exact_ranges import ExactEffect
 from bisar_budget.simulator.autofocus import Focused
 from bisar_budget.simulator.collection import (
     CELLS,
@@ -28,7 +29,7 @@ from bisar_budget.simulator.collection import (
     pulses_for,
 )
 from bisar_budget.simulator.image_formation import taylor_window
-from bisar_budget.simulator.phase_history import Complexes, Errors, ExactEffect, Floats, cell_centres
+from bisar_budget.simulator.phase_history import Complexes, Errors, Floats, cell_centres
 
 READ_CELLS = 1  # of range that a chip needs around the middle line, beside what a response walks
 _STRIDE = 2  # lines from one that is read to the next

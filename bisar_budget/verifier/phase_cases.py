@@ -14,9 +14,10 @@ from bisar_budget.effects.vibration import Line, unit_of_line
 from bisar_budget.findings.images import Verdict
 from bisar_budget.geometry import GroundVector
 from bisar_budget.phrases import NOTHING, Note
+from bisar_budget.ranges.exact_ranges import ExactEffect
 from bisar_budget.simulator.collection import CELLS, MAX_CELLS, OVERSAMPLING, RANGE_CELLS
 from bisar_budget.simulator.impulse_response import highest, impulse_response, line_at, row_of_peak
-from bisar_budget.simulator.phase_history import Errors, ExactEffect, NoGroundPointError, PathError, PathSinusoid
+from bisar_budget.simulator.phase_history import Errors, NoGroundPointError, PathError, PathSinusoid
 from bisar_budget.verifier import reasons
 from bisar_budget.verifier.aperture_reading import READ_CELLS, ApertureReading, measured_shift
 from bisar_budget.verifier.study import Responses, Sizes, Study
@@ -77,7 +78,7 @@ def _bound_elsewhere(study: Study, source: ErrorSource) -> Verdict:
     blank = study.blank(source.id, size, source.unit)
     requirements = study.mission.requirements
     try:
-        images = study.images(study.together([(source, study.worse_sign([(source, size)], 1.0) * size)]))
+        images = study.images(study.together([(source, size)], study.worse_sign([(source, size)])))
         reading = study.read(images)
     except ValueError as error:
         return _without_image(study, blank, error)
@@ -168,7 +169,7 @@ def pull_in(study: Study, n_pull: float) -> Verdict:
 def refocused(study: Study, sizes: Sizes, budget: float) -> dict[str, Any]:
     """Form the image at the limit with autofocus and refocus it; hold what is left to the plain budget."""
     try:
-        errors = study.together(sizes, study.worse_sign(sizes, 1.0))
+        errors = study.together(sizes, study.worse_sign(sizes))
         room = ROOM[study.mission.autofocus.algorithm]
         spread = study.spread(errors, study.collection.effect(errors))
         if room * spread.smear > MAX_CELLS:
@@ -243,7 +244,7 @@ def _judged(study: Study, blank: Verdict, sizes: Sizes) -> Verdict:
     by_table = abs(math.fsum(s.effect.qpe * size for s, size in sizes))
     blank = blank._replace(published_qpe_rad=by_table)
     try:
-        scale = study.worse_sign(sizes, 1.0)
+        scale = study.worse_sign(sizes)
         images = study.images(study.together(sizes, scale))
         reading = study.read(images)
     except ValueError as error:

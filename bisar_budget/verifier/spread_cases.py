@@ -14,7 +14,7 @@ from functools import partial
 
 import numpy as np
 
-from bisar_budget.analysis.spread import declared_powers, islr_db, mainlobe_energy, shown_islr_db, spread_limit, tones
+from bisar_budget.analysis.spread import declared_powers, islr_db, islr_of, mainlobe_energy, spread_limit, tones
 from bisar_budget.analysis.vibration_limits import echo_phase, highest_echo, tone_limits, vibration_limits
 from bisar_budget.budget.random_rows import HELD, ISLR, held_effect, limits_for, sizes_at
 from bisar_budget.constants import SPEED_OF_LIGHT
@@ -568,7 +568,7 @@ def _power(
         return phases
 
     allowed = spread_limit(mission, study.allocation, owner, "full") or 0.0  # what an image may show
-    required = shown_islr_db(mission, allowed**2) or 0.0
+    required = float(islr_of(mission, allowed**2)) if allowed else 0.0
     return measured_power(collection, blank._replace(requirement_db=required), left, reasons.power_of_time_series())
 
 

@@ -9,12 +9,13 @@ import numpy as np
 from bisar_budget.analysis.analysis import Analysis, Model
 from bisar_budget.effects.declared import QUADRATIC
 from bisar_budget.effects.effect import PLATFORMS, ErrorSource, Subject
+from bisar_budget.effects.sources import exact_ranges
 from bisar_budget.findings.images import Verdict
 from bisar_budget.mission.model import Mission
-from bisar_budget.ranges.exact_ranges import FINE, STILL, ExactRanges, Found, followed
+from bisar_budget.ranges.exact_ranges import FINE, STILL, ExactEffect, Found, followed
 from bisar_budget.simulator.autofocus import ALGORITHMS
 from bisar_budget.simulator.collection import CELLS, MAX_CELLS, OVERSAMPLING, RANGE_CELLS, Chip, PointCollection
-from bisar_budget.simulator.phase_history import Errors, ExactEffect, Floats, PathError, superposed
+from bisar_budget.simulator.phase_history import Errors, Floats, PathError, superposed
 from bisar_budget.verifier.aperture_reading import READ_CELLS, ApertureReading, read_aperture, refocused
 
 Sizes = Sequence[tuple[ErrorSource, float]]  # errors and how large each is, signed
@@ -62,13 +63,12 @@ class Study:
     @property
     def models(self) -> tuple[Model, ...]:
         """Models that gate: under `strictest` both."""
-        full, published = self.analysis.models("full")
-        return {"full": (full,), "published": (published,)}.get(self.model, (published, full))
+        return tuple(getattr(self.analysis, name) for name in self.analysis.gates)
 
     @property
     def declared(self) -> list[ErrorSource]:
         """Declared errors that an image can show; `other` errors are phases without a motion."""
-        return [s for s in self.analysis.stated if s.declared and s.is_motion and s.is_heard]
+        return [s for s in self.analysis.stated if s.declared and s.displaces]
 
     def members(self, owner: str) -> list[ErrorSource]:
         """Declared errors that count against an owner's budget."""
@@ -92,9 +92,6 @@ class Study:
         kind = source.subject.kind
         if source.clock is not None:
             return Errors(clock=tuple(size * term for term in source.clock))
-        if kind == "terrain":  # a scene that is higher: both platforms measured too high
-            up = PathError(position=(0.0, 0.0, size))
-            return Errors(transmitter=up, receiver=up)
         found = Errors()
         for place in source.platforms:
             error = PathError(time_tag=size)
@@ -102,6 +99,7 @@ class Study:
                 x, y, z = (size * component for component in source.direction_of(place))
                 error = {
                     "position": PathError(position=(x, y, z)),
+                    "terrain": PathError(position=(x, y, z)),  # a higher scene: both platforms measured too high
                     "velocity": PathError(velocity=(x, y, z)),
                     "acceleration": PathError(acceleration=(x, y, z)),
                 }[kind]
@@ -122,17 +120,15 @@ class Study:
         They are by the name of what has them. That of the clock is a range error, (draws, nodes). The nodes are those
         of `aperture_nodes`.
         """
-        paths, seen = (self.geometry.transmitter, self.geometry.receiver), self.collection
-        is_heard = seen.has_direct_path
-        exact = ExactRanges.of(paths, seen.wavelength, seen.aperture_time, FINE, has_direct_path=is_heard)
+        exact = exact_ranges(self.mission, self.geometry, FINE)
         moved = {name: np.ascontiguousarray(one.T) for name, one in courses.items()}
         shifts = [moved.get(name, STILL) for name in PLATFORMS]
         draws = len(next(iter(courses.values())))
         clock = moved.get("clock", np.zeros((FINE, draws)))
         return followed(exact, clock, shifts, np.zeros(draws, dtype=int))
 
-    def worse_sign(self, sizes: Sizes, scale: float) -> float:
-        """The scale with the sign that leaves more quadratic phase: a limit has two signs.
+    def worse_sign(self, sizes: Sizes) -> float:
+        """The sign that leaves more quadratic phase, 1 or -1: a limit has two signs.
 
         Raises
         ------
@@ -140,14 +136,14 @@ class Study:
             With neither sign any ground point has the range history.
         """
         phases = {}
-        for signed in (scale, -scale):
+        for sign in (1.0, -1.0):
             try:
-                phases[signed] = abs(self.effect(sizes, signed).quadratic)
+                phases[sign] = abs(self.effect(sizes, sign).quadratic)
             except ValueError as error:
                 none = error
         if not phases:
             raise none
-        return max(phases, key=lambda signed: phases[signed])
+        return max(phases, key=lambda sign: phases[sign])
 
     def summed(self, members: Sequence[ErrorSource], budget: float) -> list[tuple[ErrorSource, float]]:
         """Declared errors scaled until their phases by the gating model, of the worse sign each, sum to a budget.
@@ -186,7 +182,7 @@ class Study:
         """Images at a limit of a row of quadratic phase, as its verdict reads them."""
         source = next((s for s in self.sources if s.subject == of), None)
         sizes = [(source, limit)] if source is not None else self.summed(self.members(of.owner), limit)
-        return self.images(self.together(sizes, self.worse_sign(sizes, 1.0)), room=room)
+        return self.images(self.together(sizes, self.worse_sign(sizes)), room=room)
 
     def images(self, errors: Errors, range_cells: int = RANGE_CELLS, room: float = 1.0) -> Responses:
         """Images of errors, large enough for the smear.

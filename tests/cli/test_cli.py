@@ -365,15 +365,17 @@ class TestDerive:
 
     def test_check_fails_on_a_changed_file_and_shows_where(self, run, tmp_path, monkeypatch) -> None:
         """What the derivation gives is taken from the committed files here: `test_emit` holds them to it."""
-        from bisar_budget.theory import emit, emit_catalogue
+        from bisar_budget.theory import emit
 
-        for generated, old, new in ((emit, "0.25*shared_1", "0.26*shared_1"), (emit_catalogue, "{4", "{5")):
-            changed = tmp_path / generated.TARGET.name
-            text = generated.TARGET.read_text(encoding="utf-8")
-            monkeypatch.setattr(generated, "source", lambda text=text: text)
+        generated = {}
+        slips = (("0.25*shared_1", "0.26*shared_1"), ("{4", "{5"))
+        for path, (old, new) in zip(emit.GENERATED, slips, strict=True):
+            changed = tmp_path / path.name
+            text = path.read_text(encoding="utf-8")
             assert old in text
             changed.write_text(text.replace(old, new), encoding="utf-8")
-            monkeypatch.setattr(generated, "TARGET", changed)
+            generated[changed] = lambda text=text: text
+        monkeypatch.setattr(emit, "GENERATED", generated)
         result = run("derive", "--check")
         assert result.exit_code == 1
         assert "0.26*shared_1" in result.stdout

@@ -30,7 +30,7 @@ from bisar_budget.budget.check import check_mission
 from bisar_budget.cli import _end as end
 from bisar_budget.cli import cli
 from bisar_budget.cli.streams import harmless, replacing, write_file
-from bisar_budget.effects.vibration_spectra import spectrum_pieces
+from bisar_budget.effects.vibration import spectrum_pieces
 from bisar_budget.faults import MissionError
 from bisar_budget.findings.mission import Report
 from bisar_budget.mission import load

@@ -25,8 +25,8 @@ import bisar_budget as bb
 from bisar_budget.formats.exporting import export_phase_history
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import Mission
+from bisar_budget.ranges.exact_ranges import ExactEffect
 from bisar_budget.simulator.impulse_response import ImpulseResponse
-from bisar_budget.simulator.phase_history import ExactEffect
 from bisar_budget.simulator.targets import Targets
 from tests.conftest import ROOT
 from tests.outside.focus import Aperture, Collection, Response

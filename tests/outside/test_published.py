@@ -19,7 +19,7 @@ from bisar_budget.constants import STANDARD_GRAVITY
 from bisar_budget.effects.oscillator_acceleration import accelerated_tones, pieces_by_acceleration
 from bisar_budget.effects.oscillators import noise_of
 from bisar_budget.effects.spectra import PowerLawPiece
-from bisar_budget.effects.vibration_spectra import displacement_rms
+from bisar_budget.effects.vibration import displacement_rms
 from bisar_budget.units import ANGLE_RANDOM_WALK, VELOCITY_RANDOM_WALK, parse_quantity
 from tests.conftest import ROOT
 from tests.outside.record import compare

@@ -22,8 +22,7 @@ from bisar_budget.effects.air_delays import (
     metres_per_unit,
 )
 from bisar_budget.effects.declared import CUBIC, LOCATION
-from bisar_budget.effects.lever_arms import arm_at, body_axes
-from bisar_budget.effects.navigation_errors import TILTS, process_of, specific_force
+from bisar_budget.effects.navigation_errors import TILTS, arm_at, body_axes, process_of, specific_force
 from bisar_budget.effects.oscillator_acceleration import accelerated_tones, felt, flies_a_turn, pieces_by_acceleration
 from bisar_budget.effects.random_effect import RandomEffect, RandomError
 from bisar_budget.effects.random_errors import random_errors
@@ -36,8 +35,7 @@ from bisar_budget.effects.spectra import (
     synchronized_parts,
     tone,
 )
-from bisar_budget.effects.vibration import SLOWEST, counted
-from bisar_budget.effects.vibration_spectra import displacement_rms, pieces_of_vibration, power_of
+from bisar_budget.effects.vibration import SLOWEST, counted, displacement_rms, pieces_of_vibration, power_of
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import PlatformState
 from bisar_budget.mission.instruments import Synchronization
