@@ -3,7 +3,6 @@
 import os
 import sys
 from collections.abc import Sequence
-from dataclasses import replace
 from datetime import datetime
 from typing import TYPE_CHECKING
 
@@ -142,7 +141,7 @@ def sweep(
             run = questions.sweep(
                 loaded, cases, columns=columns, model=model, date=judged_on, jobs=jobs, outside=from_outside
             )
-            run = replace(run, workers=workers, beside=output if is_kept else None, is_resumed=is_resumed)
+            run.workers, run.beside, run.is_resumed = workers, output if is_kept else None, is_resumed
             _foresee(run, force)
             _write(run, output, plot, plot_column, is_polar)
         sys.exit(EXIT_BROKEN if run.is_unjudged else 0)

@@ -38,10 +38,6 @@ _AHEAD = 4  # blocks for each thread of a worker that are given out at once
 _LEAST_AHEAD = 32
 
 
-class UnlikeWorkerError(Exception):
-    """A worker that is not like the one who asks; the message says which, and what it lacks."""
-
-
 @contextmanager
 def connected(address: str, patience: float, tell: Callable[[str], None]) -> "Iterator[Workers]":
     """Give the workers of a scheduler; `local:N` starts N here, and ends them.
@@ -231,11 +227,11 @@ def _called(version: str, function: Callable[[Any, Any], Any], common: Any, bloc
 
     here = get_worker().address
     if version != __version__:
-        raise UnlikeWorkerError(_unlike(here, __version__, version))
+        raise ClusterError(_unlike(here, __version__, version))
     try:
         return function(common, block)
     except MissionError as error:
-        raise UnlikeWorkerError(f"worker {here} cannot use the mission: {'; '.join(error.lines())}") from None
+        raise ClusterError(f"worker {here} cannot use the mission: {'; '.join(error.lines())}") from None
 
 
 def _unlike(worker: str, found: object, version: str) -> str:
@@ -247,7 +243,7 @@ def _why(error: BaseException, about: str) -> Exception:
     """Words for the fault of a block that failed."""
     from distributed.scheduler import KilledWorker
 
-    if isinstance(error, UnlikeWorkerError):
+    if isinstance(error, ClusterError):  # the worker is not like this process
         return ClusterError(f"{about}: {error}")
     if isinstance(error, KilledWorker):
         last = error.last_worker.address

@@ -111,11 +111,10 @@ def check(
         mission = parse_mission(mission.data, mission.file, model, changes=mission.changes)
     found = check_mission(mission, today, outside=given)
     if monte_carlo is not None:
-        from bisar_budget.front.shared_work import drawn_by
+        from bisar_budget.front.shared_work import drawn_here
         from bisar_budget.sampling.probability import monte_carlo as drawn
 
-        with drawn_by(None, 0, monte_carlo, seed) as draws:
-            found = found._replace(monte_carlo=draws and drawn(found.analysed(), *draws))
+        found = found._replace(monte_carlo=drawn(found.analysed(), *drawn_here(monte_carlo, seed)))
     if verify:
         found = cast("MissionFindings", with_images([found], today, is_illustrated=True)[0])
     if sweep:
