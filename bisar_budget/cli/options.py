@@ -1,13 +1,14 @@
 """Options that commands share; where values come from: the command line, the environment, a project's settings."""
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from datetime import date, datetime
 from typing import TYPE_CHECKING, Any
 
 import click
 from click.core import ParameterSource
 
+from bisar_budget.cli.streams import fail
 from bisar_budget.faults import printable
 from bisar_budget.resources import DISK, Files
 
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 
     from bisar_budget.faults import SetValue
     from bisar_budget.findings.requirement import Outside
+    from bisar_budget.mission.model import Mission
     from bisar_budget.settings import Settings
 else:
 
@@ -179,6 +181,20 @@ def day(today: datetime | None) -> date:
         return day_of(today)
     except ValueError as error:
         raise click.UsageError(str(error)) from None
+
+
+def ask_each(
+    missions: "Sequence[Mission]", model: str | None, today: datetime | None, ask: Callable[..., Any]
+) -> Iterator[Any]:
+    """Ask each mission in turn; exits where one cannot be asked."""
+    from bisar_budget.mission.quantities import QuestionError
+
+    judged_on, from_outside = day(today), outside(today)
+    for mission in missions:
+        try:
+            yield ask(mission, model=model, date=judged_on, outside=from_outside)
+        except QuestionError as error:
+            fail(f"{mission.file}: {error}")
 
 
 def root_of_names() -> tuple[str, bool]:
