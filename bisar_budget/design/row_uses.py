@@ -60,27 +60,11 @@ class Near(NamedTuple):
     is_limit: Truths
     is_free: Truths
 
-
-class Cuts(NamedTuple):
-    """Rows of a program, as they were seen at several sizes.
-
-    A displacement that adds up over all signs is the largest over all directions: what was seen before still holds.
-    """
-
-    share: list[Floats]
-    power: list[Floats]
-    room: list[Floats]
-
-    def with_rows(self, near: Near, of: str = "") -> "Cuts":
-        """These, and what is seen near other sizes: every row that limits any, or one."""
-        limits = near.is_limit & np.array([not of or row == of for row in near.found.ids])
-        power = near.found.powers[limits]
-        share = near.part[limits] / near.sizes ** power[:, None]
-        return Cuts([*self.share, share], [*self.power, power], [*self.room, near.room[limits]])
-
-    def rows(self, some: Truths) -> Rows:
-        """The rows for some of the sizes."""
-        return Rows(np.concatenate(self.share)[:, some], np.concatenate(self.power), np.concatenate(self.room))
+    def rows(self, of: str = "") -> Rows:
+        """Rows of a program: every one that limits any size, or one."""
+        limits = self.is_limit & np.array([not of or row == of for row in self.found.ids])
+        power = self.found.powers[limits]
+        return Rows(self.part[limits] / self.sizes ** power[:, None], power, self.room[limits])
 
 
 class SpecifiedMission:
