@@ -295,8 +295,7 @@ def check(
         statuses = {one.status for one in texts}
     else:
         from bisar_budget.findings.mission import Report
-        from bisar_budget.front.checks import checked
-        from bisar_budget.front.shared_work import drawn_by
+        from bisar_budget.front.checks import checked, drawn_by
         from bisar_budget.mission.quantities import QuestionError
 
         asked |= {"swept": swept, "is_verified": verifying, "is_illustrated": illustrated}

@@ -118,7 +118,7 @@ def sweep(
     spare([mission, *([cases_file] if cases_file else [])], [output, plot])
     from bisar_budget.front import questions
     from bisar_budget.front.missions import cases_of, cases_of_texts
-    from bisar_budget.front.shared_work import hold_to_tables, workers_of
+    from bisar_budget.front.progress import hold_to_tables, workers_of
     from bisar_budget.mission.quantities import QuestionError, TableError
     from bisar_budget.report.drawing.trades import check_plot
     from bisar_budget.report.tables import MissingTablesError

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.budget.waivers import overrides
 from bisar_budget.findings.requirement import Outside, Override
-from bisar_budget.front.checks import day_of, outside_of
+from bisar_budget.front.checks import day_of, drawn_here, outside_of
 from bisar_budget.front.missions import cases_of
 from bisar_budget.front.progress import FORMING, foretell, watched, watched_checks
 from bisar_budget.front.results import (
@@ -18,7 +18,6 @@ from bisar_budget.front.results import (
     SensitivityResult,
     SolveResult,
 )
-from bisar_budget.front.shared_work import drawn_here
 from bisar_budget.front.sweeps import SweepResult
 from bisar_budget.mission.given import text_of
 from bisar_budget.mission.load import load_mission

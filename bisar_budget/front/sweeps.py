@@ -211,7 +211,9 @@ class SweepResult:
 
     def to_dataframe(self, library: str | None = None) -> Any:
         """The table as a data frame of pandas, or of polars: what `sweep` writes as CSV."""
-        return frame_of({name: _plain(values) for name, values in self.columns.items()}, library)
+        columns = self.columns.items()
+        plain = {name: values.tolist() if values.dtype == object else values for name, values in columns}
+        return frame_of(plain, library)
 
     def to_xarray(self, chunks: Any = None) -> Any:
         """The table as `xarray.Dataset`, a dimension for each key, with units and long names (CF).
@@ -304,8 +306,3 @@ def percentage(some: int, of: int) -> str:
     if some in (0, of):
         return "100 %" if some else "0 %"
     return f"{min(max(100 * some / of, 0.1), 99.9):.3g} %"
-
-
-def _plain(values: Any) -> Any:
-    """Texts as a list, numbers as they are."""
-    return values.tolist() if values.dtype == object else values
