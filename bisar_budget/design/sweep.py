@@ -68,27 +68,9 @@ def sweep(
     today: date,
     jobs: int = 1,
 ) -> Swept:
-    """Check a mission in many cases.
+    """Check a mission in many cases; the parts are found as they are asked for.
 
-    Parameters
-    ----------
-    mission : Mission
-        As loaded.
-    cases : Cases
-        Which keys vary, and their values.
-    columns : sequence of str
-        Further columns, `ROW.FIELD`, such as `receiver.acceleration.x.allowable`; one named twice is there once.
-    model : str, optional
-        Gating model in place of the mission's own.
-    today : date
-        Day on which waivers are judged, UTC.
-    jobs : int
-        Processes to share the cases out to.
-
-    Returns
-    -------
-    Swept
-        Its parts are found as they are asked for.
+    Arguments are those of `bisar_budget.sweep`. A column that is named twice is there once.
 
     Raises
     ------

@@ -21,6 +21,7 @@ from bisar_budget.budget.judged_mission import JudgedMission, field, judged_miss
 from bisar_budget.budget.judged_requirements import first_highest
 from bisar_budget.budget.judged_rows import REQUIREMENTS, WHOLE, Judged
 from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.design.cases import Values
 from bisar_budget.design.varied import is_held, is_image, scaled
 from bisar_budget.faults import MissionError, SetNumber, SetValue
 from bisar_budget.findings.row import SPECIFICATION, unknown_id
@@ -36,7 +37,6 @@ from bisar_budget.workers import Progress, unseen
 
 _SOON, _SELDOM = (2, 12), 48  # cases after which it is told how far many are
 
-Values = NDArray[np.float64] | NDArray[np.object_]
 Places = NDArray[np.intp]
 
 
