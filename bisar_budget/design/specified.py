@@ -72,9 +72,8 @@ class Specified(NamedTuple):
     @property
     def largest(self) -> float:
         """The largest size that a mission file may state."""
-        _, _, less, most = self.number.reader.bounds
-        bound = min(less, most) * (1 - 1e-9) if not self.number.is_level else min(less, most)
-        return float(10 ** (bound / 20)) if self.number.is_level and bound < math.inf else bound
+        bound = min(self.number.reader.bounds[2:])
+        return float(10 ** (bound / 20)) if self.number.is_level else bound * (1 - 1e-9)
 
     @property
     def tiny(self) -> float:
