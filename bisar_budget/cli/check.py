@@ -11,14 +11,13 @@ from click.core import ParameterSource
 
 from bisar_budget import __version__
 from bisar_budget.cli.options import (
-    DAY_OF_RUN,
+    COMMAND_LINE,
     FILE,
     GATING_MODEL,
     MISSIONS,
     SET,
     ParamType,
     day,
-    day_origin,
     origin_of,
     outside,
     root_of_names,
@@ -325,6 +324,7 @@ def check(
 def _options(judged_on: date | None, today: datetime | None) -> "Iterator[Option]":
     """Say what the options that bear on the result are, and where each came from."""
     from bisar_budget.findings.mission import Option
+    from bisar_budget.front.checks import day_origin
 
     context = click.get_current_context()
     for parameter in context.command.params:
@@ -335,7 +335,7 @@ def _options(judged_on: date | None, today: datetime | None) -> "Iterator[Option
             said = value or "as each file says"
         elif name == "today":
             if value is None and judged_on is not None:
-                origin = day_origin(today)
+                origin = day_origin(today, COMMAND_LINE)
             said = "the day of the run (not recorded: no waiver depends on it)"
             said = judged_on.isoformat() if judged_on else said
         elif name == "changes":
@@ -388,6 +388,7 @@ def _explain(
 ) -> None:
     """Explain a row, or a requirement, in every mission that has it."""
     from bisar_budget.findings.row import unknown_id
+    from bisar_budget.front.checks import DAY_OF_RUN
     from bisar_budget.front.checks import check as ask
     from bisar_budget.report.explain.explanation import explain, explain_requirement
     from bisar_budget.report.words.requirements import overrides_lines, requirement_id

@@ -29,7 +29,7 @@ else:
             return cls
 
 
-DAY_OF_RUN = "the day of the run"
+COMMAND_LINE = "command line"
 _BEARING = ("model", "strict", "exit_zero")  # on the verdict, besides the day and --set
 
 
@@ -131,7 +131,7 @@ def origin_of(parameter: click.Parameter) -> str:
     """Say where the value of a parameter comes from."""
     source = click.get_current_context().get_parameter_source(str(parameter.name))
     if source is ParameterSource.COMMANDLINE:
-        return "command line"
+        return COMMAND_LINE
     if source is ParameterSource.ENVIRONMENT:
         return f"environment, {parameter.envvar}"
     if source is not ParameterSource.DEFAULT_MAP:
@@ -155,6 +155,7 @@ def settings_here(files: Files = DISK) -> "Settings | None":
 def outside(today: datetime | None) -> "Outside":
     """Gather the options of the command that bear on verdicts; `today` is the value of --date."""
     from bisar_budget.findings.requirement import Outside, Override
+    from bisar_budget.front.checks import day_origin
 
     context, found = click.get_current_context(), []
     for parameter in context.command.params:
@@ -163,14 +164,7 @@ def outside(today: datetime | None) -> "Outside":
         if name in _BEARING and origin != "default" and value is not None:
             said = ("yes" if value else "no") if isinstance(value, bool) else value
             found.append(Override(parameter.opts[0], said, origin))
-    return Outside(tuple(found), day_origin(today), today is not None)
-
-
-def day_origin(today: datetime | None) -> str:
-    """Say where the day of waivers comes from."""
-    if today is not None:
-        return "command line"
-    return "environment, SOURCE_DATE_EPOCH" if os.environ.get("SOURCE_DATE_EPOCH") else DAY_OF_RUN
+    return Outside(tuple(found), day_origin(today, COMMAND_LINE), today is not None)
 
 
 def day(today: datetime | None) -> date:

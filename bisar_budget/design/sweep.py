@@ -59,16 +59,8 @@ _FIELDS = {
 _UNITS = {"rad": "rad", "db": "dB"}  # by what a field's name ends with
 
 
-def sweep(
-    mission: Mission,
-    cases: Cases,
-    *,
-    columns: Sequence[str] = (),
-    model: str | None = None,
-    today: date,
-    jobs: int = 1,
-) -> Swept:
-    """Check a mission in many cases; the parts are found as they are asked for.
+class Asked:
+    """A mission that is to be checked in many cases, in chunks.
 
     Arguments are those of `bisar_budget.sweep`. A column that is named twice is there once.
 
@@ -77,11 +69,6 @@ def sweep(
     QuestionError
         A column is of no row, or of no field; a key makes no mission whatever its value.
     """
-    return Asked(mission, cases, columns=columns, model=model, today=today).checked(jobs)
-
-
-class Asked:
-    """The cases of a mission that a sweep is about, in chunks; arguments and faults are those of `sweep`."""
 
     def __init__(
         self,
@@ -176,7 +163,7 @@ class Asked:
             parts=parts,
         )
 
-    def checked(self, jobs: int) -> Swept:
+    def checked(self, jobs: int = 1) -> Swept:
         """The sweep, whose parts are checked as they are asked for, by so many processes."""
         return self.swept(self.shared_out(self.chunks.starts, jobs))
 

@@ -34,6 +34,7 @@ MAX_CASES = 40_000  # of a study: a page has no room for more
 MAX_KEYS = 2  # of a study: a drawing has no more axes
 _MANY_DRAWS = 1_000_000  # from which on it is measured how long they will take
 _FEW_DRAWS = 1 << 12  # of the first trial
+DAY_OF_RUN = "the day of the run"
 _CALLER = "the caller"
 _OPTION = "--sweep"
 
@@ -64,11 +65,17 @@ def day_of(given: str | dt.date | None) -> dt.date:
         raise ValueError(f"SOURCE_DATE_EPOCH must be seconds since 1970 (got {printable(epoch)!r})") from None
 
 
+def day_origin(given: str | dt.date | None, giver: str) -> str:
+    """Where the day of waivers comes from: who gives one, else the environment, else the clock."""
+    if given is not None:
+        return giver
+    return "environment, SOURCE_DATE_EPOCH" if os.environ.get("SOURCE_DATE_EPOCH") else DAY_OF_RUN
+
+
 def outside_of(model: str | None, given: str | dt.date | None) -> Outside:
     """Influences of a question's arguments on its verdict."""
     options = () if model is None else (Override("--model", model, _CALLER),)
-    origin = "environment, SOURCE_DATE_EPOCH" if os.environ.get("SOURCE_DATE_EPOCH") else "the day of the run"
-    return Outside(options, _CALLER if given is not None else origin, given is not None, _CALLER)
+    return Outside(options, day_origin(given, _CALLER), given is not None, _CALLER)
 
 
 # ---------------------------------------------------------------------- one mission
@@ -339,11 +346,11 @@ def gathered(
     jobs: int | None = None,
 ) -> "Gathered":
     """Check all cases, and gather what a drawing needs, and some columns; `advance` is told how many are done."""
-    from bisar_budget.design.sweep import sweep
+    from bisar_budget.design.sweep import Asked
     from bisar_budget.report.drawing.trades import Gathered
     from bisar_budget.report.tables import Described
 
-    swept = sweep(mission, cases, columns=columns, model=model, today=today, jobs=jobs or cores())
+    swept = Asked(mission, cases, columns=columns, model=model, today=today).checked(jobs or cores())
     found = Gathered(Described(swept, cases, mission, __version__), ("binding_requirement", *columns))
     for part in swept.parts:
         found.add(part)

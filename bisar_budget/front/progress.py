@@ -115,15 +115,7 @@ def foreseen(count: int, trial: Callable[[int], float], few: int, most: int) -> 
 
 # ---------------------------------------------------------------------- who shares it
 def workers_of(scheduler: str | None, patience: int) -> "AbstractContextManager[Workers | None]":
-    """Give the workers of a scheduler, None where none is named.
-
-    Parameters
-    ----------
-    scheduler : str or None
-        `tcp://HOST:PORT`, or `local:N` for N processes here.
-    patience : int
-        How long it may have no worker before it is given up. [s]
-    """
+    """Give the workers of a scheduler, None where none is named; `patience` is how long it may have no worker. [s]"""
     if scheduler is None:
         return nullcontext()
     from bisar_budget.cluster.scheduler import connected

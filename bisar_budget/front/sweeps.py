@@ -14,7 +14,6 @@ import numpy as np
 from bisar_budget import __version__, notebook
 from bisar_budget.design.cases import Cases, some_of
 from bisar_budget.design.sweep import Asked, Block, part_of
-from bisar_budget.design.sweep import sweep as swept_by
 from bisar_budget.design.table import Part, Question, Swept
 from bisar_budget.faults import ClusterError, printable
 from bisar_budget.findings.requirement import Override
@@ -76,7 +75,8 @@ class SweepResult:
 
         def trial(some: int) -> float:
             few = some_of(self.cases, some)
-            parts = swept_by(self.mission, few, columns=self.more, model=self.model, today=self.day).parts
+            asked = Asked(self.mission, few, columns=self.more, model=self.model, today=self.day)
+            parts = asked.checked().parts
             began = perf_counter()
             for _ in parts:
                 pass
