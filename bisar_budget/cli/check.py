@@ -13,11 +13,12 @@ from bisar_budget import __version__
 from bisar_budget.cli.options import (
     COMMAND_LINE,
     FILE,
-    GATING_MODEL,
     MISSIONS,
     SET,
     ParamType,
+    date_option,
     day,
+    model_option,
     origin_of,
     outside,
     root_of_names,
@@ -160,19 +161,8 @@ class _Draws(ParamType[int]):
     envvar="BISAR_BUDGET_EXIT_ZERO",
     help="Exit with 0 even if a requirement is broken or not judged; every report says it.",
 )
-@click.option(
-    "--model",
-    envvar="BISAR_BUDGET_MODEL",
-    type=GATING_MODEL,
-    help="Model that decides, instead of the mission file's.",
-)
-@click.option(
-    "--date",
-    "today",
-    type=click.DateTime(["%Y-%m-%d"]),
-    help="Day on which waivers are judged (default: SOURCE_DATE_EPOCH, else today, UTC). A compliance report shows "
-    "it only if it is given.",
-)
+@model_option("BISAR_BUDGET_MODEL")
+@date_option(" A compliance report shows it only if it is given.")
 @SET
 @click.option("--verify", "verifying", is_flag=True, help="Also form images at the limits and add their verdicts.")
 @click.option(

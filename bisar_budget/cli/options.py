@@ -33,14 +33,10 @@ COMMAND_LINE = "command line"
 _BEARING = ("model", "strict", "exit_zero")  # on the verdict, besides the day and --set
 
 
-class FileName(ParamType[str]):
+class FileName(click.types.StringParamType):
     """Name of a file, which a shell completes; what can be read is seen when it is."""
 
     name = "file"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
-        """Take the text as it is."""
-        return str(value)
 
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> "list[CompletionItem]":
         """Leave it to the shell, which knows the files."""
@@ -94,17 +90,21 @@ TEXT_OR_JSON = click.option(
 )
 
 GATING_MODEL = click.Choice(["published", "full", "strictest"])
-MODEL = click.option(
-    "--model",
-    type=GATING_MODEL,
-    help="Model that decides, instead of the mission file's.",
-)
-DATE = click.option(
-    "--date",
-    "today",
-    type=click.DateTime(["%Y-%m-%d"]),
-    help="Day on which waivers are judged (default: SOURCE_DATE_EPOCH, else today, UTC).",
-)
+
+
+def model_option(variable: str | None = None) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Give the option `--model`, which a variable of the environment may stand in for."""
+    words = "Model that decides, instead of the mission file's."
+    return click.option("--model", envvar=variable, type=GATING_MODEL, help=words)
+
+
+def date_option(more: str = "") -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Give the option `--date`; `more` is what else there is to say."""
+    words = "Day on which waivers are judged (default: SOURCE_DATE_EPOCH, else today, UTC)." + more
+    return click.option("--date", "today", type=click.DateTime(["%Y-%m-%d"]), help=words)
+
+
+MODEL, DATE = model_option(), date_option()
 
 
 def scheduler_options(doing: str, more: str = "") -> Callable[[Callable[..., Any]], Callable[..., Any]]:

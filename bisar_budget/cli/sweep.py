@@ -134,7 +134,7 @@ def sweep(
             if output is None or output == "-":
                 raise click.UsageError("--scheduler and --resume need -o FILE: parts are kept in FILE.parts.")
             if scheduler is None:
-                hold_to_tables("--resume")
+                hold_to_tables()
         if plot_column is not None and "." in plot_column and plot_column not in columns:
             columns = (*columns, plot_column)
         with workers_of(scheduler, patience) as workers:

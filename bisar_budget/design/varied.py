@@ -119,9 +119,9 @@ def is_image(mission: Mission, geometries: BistaticGeometry, cases: int) -> NDAr
         for _, _, degrees in least_elevations(mission.propagation, legs, mission.collection.aperture_time):
             is_one &= degrees > LEAST_ELEVATION_DEG * SAFE
     if mission.has_direct_path:
-        flown = np.broadcast_to(half, (cases,))
-        least = np.maximum(LEAST_BASELINE, geometries.apart.travelled(flown) / FARTHEST_BY)
-        is_one &= least_baseline(geometries.apart, flown) > SAFE * least
+        halves = np.broadcast_to(half, (cases,))
+        least = np.maximum(LEAST_BASELINE, geometries.apart.travelled(halves) / FARTHEST_BY)
+        is_one &= least_baseline(geometries.apart, halves) > SAFE * least
     return is_one & (np.asarray(mission.radar.bandwidth) * SAFE < 2 * np.asarray(mission.radar.center_frequency))
 
 

@@ -123,8 +123,8 @@ def workers_of(scheduler: str | None, patience: int) -> "AbstractContextManager[
     return connected(scheduler, patience, SAYING.get())
 
 
-def hold_to_tables(option: str) -> None:
-    """Refuse an option that keeps parts without the libraries that write them."""
+def hold_to_tables() -> None:
+    """Refuse to keep parts without the libraries that write them."""
     from bisar_budget.cluster.parts_folder import check_libraries
 
-    check_libraries(option, OF_TABLES, "tables", "pyarrow")
+    check_libraries("--resume", OF_TABLES, "tables", "pyarrow")

@@ -267,7 +267,9 @@ class _Answer:
         return sorted({*super().__dir__(), *dir(self.found)} - set(dir(tuple)))
 
     def _document(self) -> str:
-        raise NotImplementedError
+        from bisar_budget.report.formats.answers import as_json
+
+        return as_json(__version__, [self.found])
 
     def to_dict(self) -> dict[str, Any]:
         """The document of `--format json` of the command."""
@@ -292,11 +294,6 @@ class SolveResult(_Answer):
         if (parts := getattr(self.found, "parts", None)) is not None:
             return f"{len(self.complying)} of {len(parts)} parts comply"
         return "none" if self.value is None else f"{self.value:.6g} {self.unit}"
-
-    def _document(self) -> str:
-        from bisar_budget.report.formats.answers import as_json
-
-        return as_json(__version__, [self.found])
 
     def _repr_html_(self) -> str:
         found, rows = self.found, list[tuple[object, ...]]()
@@ -326,11 +323,6 @@ class SensitivityResult(_Answer):
         """The number that matters most, on one line."""
         first = self.found.slopes[0].key if self.found.slopes else "none"
         return f"<sensitivity of {self.found.name!r}: {len(self.found.slopes)} numbers, first {first}>"
-
-    def _document(self) -> str:
-        from bisar_budget.report.formats.answers import as_json
-
-        return as_json(__version__, [self.found])
 
     def plot(self) -> Picture:
         """The effects as bars."""
