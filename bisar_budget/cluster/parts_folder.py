@@ -8,7 +8,7 @@ import json
 import os
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from hashlib import sha256
 from importlib import import_module
 
@@ -71,14 +71,14 @@ def parts_folder(path: str, question: Question, chunks: Chunks, *, is_resumed: b
     A `ClusterError` says that parts are there and should not be, or are of another question; that the folder cannot
     be written, or that another command has it.
     """
-    lock = None
-    try:
+    with ExitStack() as ends:
         try:
             os.makedirs(path, exist_ok=True)
-            lock = locked(os.path.realpath(path))
-            for name in os.listdir(path):
-                if name.startswith(".part-") and lock is not None:  # a command that was killed was writing it
-                    os.unlink(os.path.join(path, name))
+            if (lock := locked(os.path.realpath(path))) is not None:
+                ends.callback(os.close, lock)
+                for name in os.listdir(path):
+                    if name.startswith(".part-"):  # a command that was killed was writing it
+                        os.unlink(os.path.join(path, name))
             folder = PartsFolder(path, question)
             folder.find(chunks, is_resumed)
         except BlockingIOError:
@@ -86,9 +86,6 @@ def parts_folder(path: str, question: Question, chunks: Chunks, *, is_resumed: b
         except OSError as error:
             raise ClusterError(f"cannot write {path}: {error.strerror or error}") from None
         yield folder
-    finally:
-        if lock is not None:
-            os.close(lock)
 
 
 class PartsFolder:

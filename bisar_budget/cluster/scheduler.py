@@ -12,8 +12,8 @@ import pydoc
 import re
 import signal
 import socket
-import threading
 from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from itertools import islice
@@ -76,10 +76,13 @@ def connected(address: str, patience: float, tell: Callable[[str], None]) -> "It
 
 
 def _local_cluster(count: int, ends: ExitStack) -> Any:
-    """Start a scheduler and workers here; `ends` closes them."""
+    """Start a scheduler and workers here; `ends` closes them.
+
+    A thread does it, which Ctrl-C does not stop half way: half of a cluster cannot be closed.
+    """
     from distributed import LocalCluster
 
-    with _interrupts_later():
+    def started() -> Any:
         cluster = LocalCluster(
             n_workers=count,
             threads_per_worker=1,
@@ -88,37 +91,22 @@ def _local_cluster(count: int, ends: ExitStack) -> Any:
             preload=[__name__],
         )
         ends.callback(_close, cluster, 10)
-    return cluster
+        return cluster
+
+    resource_tracker.ensure_running()  # else that thread would: it unblocks the signal there
+    with ThreadPoolExecutor(1, initializer=_block_interrupts) as starter:
+        return starter.submit(started).result()
+
+
+def _block_interrupts() -> None:
+    """Block Ctrl-C in this thread and in the workers that it starts, before they could ignore it."""
+    if hasattr(signal, "pthread_sigmask"):  # Windows has none
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
 
 
 def dask_setup(worker: object) -> None:
     """Leave Ctrl-C, which a terminal sends to every process, to the command; Dask calls this in workers of here."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-
-@contextmanager
-def _interrupts_later() -> Iterator[None]:
-    """Hold Ctrl-C back while workers are started: half of a cluster cannot be closed.
-
-    Workers, and the thread that starts them, have it blocked from the beginning, before they could ignore it.
-    """
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    held: list[int] = []
-    before = signal.signal(signal.SIGINT, lambda number, _: held.append(number)) or signal.SIG_DFL
-    can_block = hasattr(signal, "pthread_sigmask")  # Windows cannot
-    if can_block:
-        resource_tracker.ensure_running()  # else that thread would: it unblocks the signal there
-        mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        if can_block:
-            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
-        signal.signal(signal.SIGINT, before)
-        if held:
-            signal.raise_signal(signal.SIGINT)
 
 
 def _close(opened: Any, seconds: float) -> None:
