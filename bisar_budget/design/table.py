@@ -14,7 +14,6 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bisar_budget.analysis.analysis import Analysis, by_nodes
 from bisar_budget.budget.judged_mission import JudgedMission, field, judged_mission, statuses
@@ -33,11 +32,10 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.mission.quantities import FACTOR, Number, QuestionError, number_of, tree_of, with_number
 from bisar_budget.mission.stacked import picked, stacked
 from bisar_budget.mission.tree import Tree, read_tree
+from bisar_budget.ranges.exact_ranges import Places
 from bisar_budget.workers import Progress, unseen
 
 _SOON, _SELDOM = (2, 12), 48  # cases after which it is told how far many are
-
-Places = NDArray[np.intp]
 
 
 class Column(NamedTuple):

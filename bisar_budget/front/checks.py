@@ -10,9 +10,9 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any, cast
 
 from bisar_budget import __version__
-from bisar_budget.budget.check import MANY, Draws, check_files, check_mission, whole, without_analysis
+from bisar_budget.budget.check import MANY, Draws, Found, check_files, check_mission, whole, without_analysis
 from bisar_budget.faults import SetValue, printable
-from bisar_budget.findings.mission import FileWarning, MissionFindings, UnusableMission
+from bisar_budget.findings.mission import FileWarning, MissionFindings
 from bisar_budget.findings.requirement import NOTHING_OUTSIDE, Outside, Override
 from bisar_budget.findings.status import complying
 from bisar_budget.front.progress import foreseen, foretell, watched, workers_of
@@ -37,8 +37,6 @@ _FEW_DRAWS = 1 << 12  # of the first trial
 DAY_OF_RUN = "the day of the run"
 _CALLER = "the caller"
 _OPTION = "--sweep"
-
-Found = MissionFindings | UnusableMission
 
 
 # ---------------------------------------------------------------------- the day, and where it comes from
