@@ -22,7 +22,7 @@ import numpy as np
 from bisar_budget.budget.check import check_mission
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.design.cases import Grid
-from bisar_budget.design.sweep import sweep
+from bisar_budget.design.sweep import Asked
 from bisar_budget.evaluators import LEGENDRE_FITS
 from bisar_budget.faults import SetValue
 from bisar_budget.mission.load import load_mission, parse_mission
@@ -115,7 +115,7 @@ def of_kinds(runs: int, side: int = 64, few: int = 16) -> None:
         cases = Grid(numbers, axes)
 
         def together(mission: Mission = mission, cases: Grid = cases) -> None:
-            for _ in sweep(mission, cases, today=DAY).parts:
+            for _ in Asked(mission, cases, today=DAY).checked().parts:
                 pass
 
         def one_by_one(mission: Mission = mission, cases: Grid = cases) -> None:
@@ -143,7 +143,7 @@ def of_a_million(count: int, runs: int) -> None:
     azimuth, T = (axis.ravel() for axis in np.meshgrid(*axes, indexing="ij"))
 
     def swept() -> None:
-        for _ in sweep(mission, cases, today=DAY).parts:
+        for _ in Asked(mission, cases, today=DAY).checked().parts:
             pass
 
     def looped(few: int = 200) -> None:
@@ -167,7 +167,7 @@ def of_a_million(count: int, runs: int) -> None:
             f"  {label:5} {ours:6.2f} s ÷ {hand:6.2f} s = {ratio:.2f}    a loop of check ÷ sweep = {loop / ours:.0f}"
         )
     few = Grid(cases.varied, tuple(axis[:: side // 50] for axis in axes))
-    found = sweep(mission, few, today=DAY)
+    found = Asked(mission, few, today=DAY).checked()
     whole = np.concatenate([part.values["utilization"] for part in found.parts])
     use, *_ = by_hand(*(axis.ravel() for axis in np.meshgrid(*few.axes, indexing="ij")))
     print(f"  largest difference of the utilization {np.abs(whole / use - 1).max():.0e} of itself")

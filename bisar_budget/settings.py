@@ -53,16 +53,13 @@ def project_settings(folder: str, files: Files = DISK) -> Settings | None:
     """
     folder = os.path.abspath(folder)
     while True:
-        settings = _read(os.path.join(folder, "pyproject.toml"), files)
+        file = os.path.join(folder, "pyproject.toml")
+        data = _bytes_of(file, files)
+        settings = None if data is None else _parsed(file, data)
         above = os.path.dirname(folder)
         if settings is not None or above == folder:
             return settings
         folder = above
-
-
-def _read(file: str, files: Files) -> Settings | None:
-    data = _bytes_of(file, files)
-    return None if data is None else _parsed(file, data)
 
 
 @lru_cache(maxsize=4)

@@ -39,13 +39,6 @@ _MODULES = {
 _FRUGAL = ("init", "schema")  # without NumPy
 
 
-def _command(name: str) -> click.Command:
-    """A command; where its name is a word of Python, its function has another."""
-    module = import_module(f"bisar_budget.cli.{_MODULES[name]}")
-    command: click.Command = getattr(module, "import_file" if name == "import" else name)
-    return command
-
-
 class _Commands(click.Group):
     """A group of late imports, whose crashes exit with 3: 1 means a requirement that is broken or not judged."""
 
@@ -58,7 +51,8 @@ class _Commands(click.Group):
         if cmd_name not in _FRUGAL:
             memory.spare_threads()
             memory.hold_room(memory.LEAST, cmd_name)
-        command = _command(cmd_name)
+        module = import_module(f"bisar_budget.cli.{_MODULES[cmd_name]}")
+        command: click.Command = getattr(module, "import_file" if cmd_name == "import" else cmd_name)
         command.help = command.help or docstring(command.callback)  # without one under -OO
         return command
 

@@ -3,7 +3,7 @@
 import math
 import os
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from datetime import datetime
 from functools import partial
 from typing import TYPE_CHECKING
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import click
 
 from bisar_budget import __version__
-from bisar_budget.cli.options import DATE, FILE, MISSIONS, MODEL, OUTPUT, SET, day, outside, root_of_names
+from bisar_budget.cli.options import DATE, FILE, MISSIONS, MODEL, OUTPUT, SET, ask_each, root_of_names
 from bisar_budget.cli.streams import (
     EXIT_BROKEN,
     complain,
@@ -26,7 +26,6 @@ from bisar_budget.cli.streams import (
 
 if TYPE_CHECKING:
     from bisar_budget.faults import SetValue
-    from bisar_budget.mission.model import Mission
     from bisar_budget.report.formats.specification_sheet import Answer
 
 _FORMATS = ("text", "json", "csv", "markdown", "html", "needs", "sdoc")
@@ -92,48 +91,22 @@ def allocate(
     if other is not None and len(files) > 1:
         raise click.UsageError("--compare holds one offer to one mission.")
     spare([*files, *([other] if other else [])], [output])
-    answers = list(_answers(load_all(files, model, changes), keys, reserve, other, model, changes, today))
-    if is_mission and output is not None:  # first: one that cannot be written leaves no output at all
-        _write_mission(answers[0], output, model)
-        output = None
-    deliver(_written(answers, format_name, output), output, format_name)
-    is_broken = any(not one.sheet.complies or (one.offer is not None and not one.offer.complies) for one in answers)
-    sys.exit(EXIT_BROKEN if is_broken else 0)
-
-
-def _answers(
-    missions: "Sequence[Mission]",
-    keys: Sequence[str],
-    reserve: float | None,
-    other: str | None,
-    model: str | None,
-    changes: "tuple[SetValue, ...]",
-    today: datetime | None,
-) -> "Iterator[Answer]":
-    """Ask each mission in turn, with a bar; exits where one cannot be asked."""
+    loaded = load_all(files, model, changes)
+    if (twice := next((key for place, key in enumerate(keys) if key in keys[:place]), None)) is not None:
+        raise click.UsageError(f"--for {twice}: stands twice; each key once.")
     from bisar_budget.front import questions
-    from bisar_budget.mission.quantities import QuestionError
     from bisar_budget.report.formats.specification_sheet import Answer
 
-    judged_on, from_outside = day(today), outside(today)
-    twice = next((key for place, key in enumerate(keys) if key in keys[:place]), None)
-    if twice is not None:
-        raise click.UsageError(f"--for {twice}: stands twice; each key once.")
-    offered = None if other is None else load_all([other], model, changes)[0]
-    for mission in missions:
-        try:
-            found = questions.allocate(
-                mission,
-                keys,
-                reserve=None if reserve is None else reserve / 100,
-                offer=offered,
-                model=model,
-                date=judged_on,
-                outside=from_outside,
-            )
-        except QuestionError as error:
-            fail(f"{mission.file}: {error}")
-        yield Answer(found.found, found.offer)
+    offer = None if other is None else load_all([other], model, changes)[0]
+    kept_free = None if reserve is None else reserve / 100
+    ask = partial(questions.allocate, keys=keys, reserve=kept_free, offer=offer)
+    found = [Answer(one.found, one.offer) for one in ask_each(loaded, model, today, ask)]
+    if is_mission and output is not None:  # first: one that cannot be written leaves no output at all
+        _write_mission(found[0], output, model)
+        output = None
+    deliver(_written(found, format_name, output), output, format_name)
+    is_broken = any(not one.sheet.complies or (one.offer is not None and not one.offer.complies) for one in found)
+    sys.exit(EXIT_BROKEN if is_broken else 0)
 
 
 def _written(answers: "Sequence[Answer]", format_name: str, output: str | None) -> str:

@@ -11,14 +11,14 @@ from click.core import ParameterSource
 
 from bisar_budget import __version__
 from bisar_budget.cli.options import (
-    DAY_OF_RUN,
+    COMMAND_LINE,
     FILE,
-    GATING_MODEL,
     MISSIONS,
     SET,
     ParamType,
+    date_option,
     day,
-    day_origin,
+    model_option,
     origin_of,
     outside,
     root_of_names,
@@ -161,19 +161,8 @@ class _Draws(ParamType[int]):
     envvar="BISAR_BUDGET_EXIT_ZERO",
     help="Exit with 0 even if a requirement is broken or not judged; every report says it.",
 )
-@click.option(
-    "--model",
-    envvar="BISAR_BUDGET_MODEL",
-    type=GATING_MODEL,
-    help="Model that decides, instead of the mission file's.",
-)
-@click.option(
-    "--date",
-    "today",
-    type=click.DateTime(["%Y-%m-%d"]),
-    help="Day on which waivers are judged (default: SOURCE_DATE_EPOCH, else today, UTC). A compliance report shows "
-    "it only if it is given.",
-)
+@model_option("BISAR_BUDGET_MODEL")
+@date_option(" A compliance report shows it only if it is given.")
 @SET
 @click.option("--verify", "verifying", is_flag=True, help="Also form images at the limits and add their verdicts.")
 @click.option(
@@ -295,8 +284,7 @@ def check(
         statuses = {one.status for one in texts}
     else:
         from bisar_budget.findings.mission import Report
-        from bisar_budget.front.checks import checked
-        from bisar_budget.front.shared_work import drawn_by
+        from bisar_budget.front.checks import checked, drawn_by
         from bisar_budget.mission.quantities import QuestionError
 
         asked |= {"swept": swept, "is_verified": verifying, "is_illustrated": illustrated}
@@ -326,6 +314,7 @@ def check(
 def _options(judged_on: date | None, today: datetime | None) -> "Iterator[Option]":
     """Say what the options that bear on the result are, and where each came from."""
     from bisar_budget.findings.mission import Option
+    from bisar_budget.front.checks import day_origin
 
     context = click.get_current_context()
     for parameter in context.command.params:
@@ -336,7 +325,7 @@ def _options(judged_on: date | None, today: datetime | None) -> "Iterator[Option
             said = value or "as each file says"
         elif name == "today":
             if value is None and judged_on is not None:
-                origin = day_origin(today)
+                origin = day_origin(today, COMMAND_LINE)
             said = "the day of the run (not recorded: no waiver depends on it)"
             said = judged_on.isoformat() if judged_on else said
         elif name == "changes":
@@ -389,6 +378,7 @@ def _explain(
 ) -> None:
     """Explain a row, or a requirement, in every mission that has it."""
     from bisar_budget.findings.row import unknown_id
+    from bisar_budget.front.checks import DAY_OF_RUN
     from bisar_budget.front.checks import check as ask
     from bisar_budget.report.explain.explanation import explain, explain_requirement
     from bisar_budget.report.words.requirements import overrides_lines, requirement_id

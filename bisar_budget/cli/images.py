@@ -60,7 +60,7 @@ def verify(
     for wrong usage, an unusable file, or a mission on whose limits no image gave a verdict.
     """
     from bisar_budget.front.imaging import verify_all
-    from bisar_budget.front.shared_work import workers_of
+    from bisar_budget.front.progress import workers_of
     from bisar_budget.mission.quantities import QuestionError
     from bisar_budget.report.formats import verification
 

@@ -1,13 +1,14 @@
 """Options that commands share; where values come from: the command line, the environment, a project's settings."""
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from datetime import date, datetime
 from typing import TYPE_CHECKING, Any
 
 import click
 from click.core import ParameterSource
 
+from bisar_budget.cli.streams import fail
 from bisar_budget.faults import printable
 from bisar_budget.resources import DISK, Files
 
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 
     from bisar_budget.faults import SetValue
     from bisar_budget.findings.requirement import Outside
+    from bisar_budget.mission.model import Mission
     from bisar_budget.settings import Settings
 else:
 
@@ -27,18 +29,14 @@ else:
             return cls
 
 
-DAY_OF_RUN = "the day of the run"
+COMMAND_LINE = "command line"
 _BEARING = ("model", "strict", "exit_zero")  # on the verdict, besides the day and --set
 
 
-class FileName(ParamType[str]):
+class FileName(click.types.StringParamType):
     """Name of a file, which a shell completes; what can be read is seen when it is."""
 
     name = "file"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
-        """Take the text as it is."""
-        return str(value)
 
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> "list[CompletionItem]":
         """Leave it to the shell, which knows the files."""
@@ -92,17 +90,21 @@ TEXT_OR_JSON = click.option(
 )
 
 GATING_MODEL = click.Choice(["published", "full", "strictest"])
-MODEL = click.option(
-    "--model",
-    type=GATING_MODEL,
-    help="Model that decides, instead of the mission file's.",
-)
-DATE = click.option(
-    "--date",
-    "today",
-    type=click.DateTime(["%Y-%m-%d"]),
-    help="Day on which waivers are judged (default: SOURCE_DATE_EPOCH, else today, UTC).",
-)
+
+
+def model_option(variable: str | None = None) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Give the option `--model`, which a variable of the environment may stand in for."""
+    words = "Model that decides, instead of the mission file's."
+    return click.option("--model", envvar=variable, type=GATING_MODEL, help=words)
+
+
+def date_option(more: str = "") -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Give the option `--date`; `more` is what else there is to say."""
+    words = "Day on which waivers are judged (default: SOURCE_DATE_EPOCH, else today, UTC)." + more
+    return click.option("--date", "today", type=click.DateTime(["%Y-%m-%d"]), help=words)
+
+
+MODEL, DATE = model_option(), date_option()
 
 
 def scheduler_options(doing: str, more: str = "") -> Callable[[Callable[..., Any]], Callable[..., Any]]:
@@ -129,7 +131,7 @@ def origin_of(parameter: click.Parameter) -> str:
     """Say where the value of a parameter comes from."""
     source = click.get_current_context().get_parameter_source(str(parameter.name))
     if source is ParameterSource.COMMANDLINE:
-        return "command line"
+        return COMMAND_LINE
     if source is ParameterSource.ENVIRONMENT:
         return f"environment, {parameter.envvar}"
     if source is not ParameterSource.DEFAULT_MAP:
@@ -153,6 +155,7 @@ def settings_here(files: Files = DISK) -> "Settings | None":
 def outside(today: datetime | None) -> "Outside":
     """Gather the options of the command that bear on verdicts; `today` is the value of --date."""
     from bisar_budget.findings.requirement import Outside, Override
+    from bisar_budget.front.checks import day_origin
 
     context, found = click.get_current_context(), []
     for parameter in context.command.params:
@@ -161,14 +164,7 @@ def outside(today: datetime | None) -> "Outside":
         if name in _BEARING and origin != "default" and value is not None:
             said = ("yes" if value else "no") if isinstance(value, bool) else value
             found.append(Override(parameter.opts[0], said, origin))
-    return Outside(tuple(found), day_origin(today), today is not None)
-
-
-def day_origin(today: datetime | None) -> str:
-    """Say where the day of waivers comes from."""
-    if today is not None:
-        return "command line"
-    return "environment, SOURCE_DATE_EPOCH" if os.environ.get("SOURCE_DATE_EPOCH") else DAY_OF_RUN
+    return Outside(tuple(found), day_origin(today, COMMAND_LINE), today is not None)
 
 
 def day(today: datetime | None) -> date:
@@ -179,6 +175,20 @@ def day(today: datetime | None) -> date:
         return day_of(today)
     except ValueError as error:
         raise click.UsageError(str(error)) from None
+
+
+def ask_each(
+    missions: "Sequence[Mission]", model: str | None, today: datetime | None, ask: Callable[..., Any]
+) -> Iterator[Any]:
+    """Ask each mission in turn; exits where one cannot be asked."""
+    from bisar_budget.mission.quantities import QuestionError
+
+    judged_on, from_outside = day(today), outside(today)
+    for mission in missions:
+        try:
+            yield ask(mission, model=model, date=judged_on, outside=from_outside)
+        except QuestionError as error:
+            fail(f"{mission.file}: {error}")
 
 
 def root_of_names() -> tuple[str, bool]:

@@ -2,19 +2,18 @@
 
 import os
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from datetime import datetime
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
-from bisar_budget.cli.options import DATE, FILE, MISSIONS, MODEL, OUTPUT, SET, TEXT_OR_JSON, day, outside
+from bisar_budget.cli.options import DATE, FILE, MISSIONS, MODEL, OUTPUT, SET, TEXT_OR_JSON, ask_each
 from bisar_budget.cli.streams import (
     EXIT_BROKEN,
     deliver_found,
     expand,
-    fail,
     hold_to_suffixes,
     load_all,
     spare,
@@ -23,7 +22,6 @@ from bisar_budget.cli.streams import (
 
 if TYPE_CHECKING:
     from bisar_budget.faults import SetValue
-    from bisar_budget.mission.model import Mission
 
 
 @click.command()
@@ -92,26 +90,11 @@ def solve(
         raise click.UsageError(str(error)) from None
     files = expand(missions)
     spare(files, [output])
-    asked: dict[str, Any] = {"between": between, "scale": is_scale, "row": row, "target": target, "verify": is_imaged}
-    ask = partial(questions.solve, key=key, **asked)
-    found = list(_answers(load_all(files, model, changes), model, today, ask))
+    ask = partial(questions.solve, key=key, between=between, scale=is_scale, row=row, target=target, verify=is_imaged)
+    found = [one.found for one in ask_each(load_all(files, model, changes), model, today, ask)]
     deliver_found(answers, found, format_name, output)
     is_broken = any(one.status == "none" or (one.imaged and one.imaged.is_optimistic) for one in found)
     sys.exit(EXIT_BROKEN if is_broken else 0)
-
-
-def _answers(
-    missions: "Sequence[Mission]", model: str | None, today: datetime | None, ask: Callable[..., Any]
-) -> Iterator[Any]:
-    """Ask each mission in turn; exits where one cannot be asked."""
-    from bisar_budget.mission.quantities import QuestionError
-
-    judged_on, from_outside = day(today), outside(today)
-    for mission in missions:
-        try:
-            yield ask(mission, model=model, date=judged_on, outside=from_outside).found
-        except QuestionError as error:
-            fail(f"{mission.file}: {error}")
 
 
 @click.command()
@@ -149,8 +132,8 @@ def sensitivity(
     if plot is not None and len(files) > 1:
         raise click.UsageError("--plot draws one mission.")
     spare(files, [output, plot])
-    loaded = load_all(files, model, changes)
-    found = list(_answers(loaded, model, today, partial(questions.sensitivity, row=row)))
+    ask = partial(questions.sensitivity, row=row)
+    found = [one.found for one in ask_each(load_all(files, model, changes), model, today, ask)]
     if plot is not None:
         from bisar_budget.report.drawing.tornado import tornado
 

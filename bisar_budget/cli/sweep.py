@@ -3,7 +3,6 @@
 import os
 import sys
 from collections.abc import Sequence
-from dataclasses import replace
 from datetime import datetime
 from typing import TYPE_CHECKING
 
@@ -119,7 +118,7 @@ def sweep(
     spare([mission, *([cases_file] if cases_file else [])], [output, plot])
     from bisar_budget.front import questions
     from bisar_budget.front.missions import cases_of, cases_of_texts
-    from bisar_budget.front.shared_work import hold_to_tables, workers_of
+    from bisar_budget.front.progress import hold_to_tables, workers_of
     from bisar_budget.mission.quantities import QuestionError, TableError
     from bisar_budget.report.drawing.trades import check_plot
     from bisar_budget.report.tables import MissingTablesError
@@ -135,14 +134,14 @@ def sweep(
             if output is None or output == "-":
                 raise click.UsageError("--scheduler and --resume need -o FILE: parts are kept in FILE.parts.")
             if scheduler is None:
-                hold_to_tables("--resume")
+                hold_to_tables()
         if plot_column is not None and "." in plot_column and plot_column not in columns:
             columns = (*columns, plot_column)
         with workers_of(scheduler, patience) as workers:
             run = questions.sweep(
                 loaded, cases, columns=columns, model=model, date=judged_on, jobs=jobs, outside=from_outside
             )
-            run = replace(run, workers=workers, beside=output if is_kept else None, is_resumed=is_resumed)
+            run.workers, run.beside, run.is_resumed = workers, output if is_kept else None, is_resumed
             _foresee(run, force)
             _write(run, output, plot, plot_column, is_polar)
         sys.exit(EXIT_BROKEN if run.is_unjudged else 0)

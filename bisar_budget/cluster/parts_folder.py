@@ -4,12 +4,11 @@ Each file says in its metadata which question it answers, and is written beside 
 whole. Values are those of the engine, in SI; the table that was asked for is written from them in the end.
 """
 
-import io
 import json
 import os
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from hashlib import sha256
 from importlib import import_module
 
@@ -38,7 +37,7 @@ def check_libraries(option: str, room: int, extra: str, *modules: str) -> None:
         raise ClusterError(said) from None
 
 
-def question_of(asked: Asked, chunks: Chunks) -> Question:
+def question_of(asked: Asked) -> Question:
     """All that decides the values of parts, by the words that a message has for it: equal ones can be mixed."""
     question, swept = asked.travelling, asked.swept(iter(()))
     waives = bool(asked.table.mission.waivers)  # the day decides about waivers alone
@@ -51,7 +50,7 @@ def question_of(asked: Asked, chunks: Chunks) -> Question:
         "--date was": question.today.isoformat() if waives else "",
         "the cases were": f"{asked.cases.count} of {', '.join(swept.varied)}",
         "the hash of the values of the cases was": _hash_of(asked.cases)[:16],
-        "the size of the parts was": str(chunks.size),
+        "the size of the parts was": str(asked.chunks.size),
         "the columns were": ", ".join(column.name for column in swept.columns),
     }
 
@@ -72,14 +71,14 @@ def parts_folder(path: str, question: Question, chunks: Chunks, *, is_resumed: b
     A `ClusterError` says that parts are there and should not be, or are of another question; that the folder cannot
     be written, or that another command has it.
     """
-    lock = None
-    try:
+    with ExitStack() as ends:
         try:
             os.makedirs(path, exist_ok=True)
-            lock = locked(os.path.realpath(path))
-            for name in os.listdir(path):
-                if name.startswith(".part-") and lock is not None:  # a command that was killed was writing it
-                    os.unlink(os.path.join(path, name))
+            if (lock := locked(os.path.realpath(path))) is not None:
+                ends.callback(os.close, lock)
+                for name in os.listdir(path):
+                    if name.startswith(".part-"):  # a command that was killed was writing it
+                        os.unlink(os.path.join(path, name))
             folder = PartsFolder(path, question)
             folder.find(chunks, is_resumed)
         except BlockingIOError:
@@ -87,9 +86,6 @@ def parts_folder(path: str, question: Question, chunks: Chunks, *, is_resumed: b
         except OSError as error:
             raise ClusterError(f"cannot write {path}: {error.strerror or error}") from None
         yield folder
-    finally:
-        if lock is not None:
-            os.close(lock)
 
 
 class PartsFolder:
@@ -111,13 +107,11 @@ class PartsFolder:
                     "or remove the folder"
                 )
             start = int(name[5:17])
-            if start in self.done:
+            # A pipe would be waited for, and a device never ends.
+            if start in self.done or not os.path.isfile(self._file(start)):
                 continue
-            if not os.path.isfile(self._file(start)):  # a pipe would be waited for, and a device never ends
-                continue
-            with suppress(
-                OSError, TypeError, ValueError, pa.ArrowException
-            ):  # a machine stopped, its disk without it
+            # A machine stopped, its disk without it.
+            with suppress(OSError, TypeError, ValueError, pa.ArrowException):
                 found = pq.read_metadata(self._file(start))
                 said = found.metadata or {}
                 question, of = dict(json.loads(said.get(b"question", b"{}"))), int(said.get(b"start", -1))
@@ -138,12 +132,10 @@ class PartsFolder:
         said = {"question": json.dumps(self.question), "start": str(part.start)}
         kinds = {name: pa.string() if values.dtype == object else None for name, values in part.values.items()}
         table = pa.table({name: pa.array(values, kinds[name]) for name, values in part.values.items()})
-        buffer = io.BytesIO()
-        pq.write_table(table.replace_schema_metadata(said), buffer, write_page_checksum=True)
         temporary = os.path.join(self.path, f".part-{os.getpid()}")
         try:
             with open(temporary, "wb") as file:
-                file.write(buffer.getbuffer())
+                pq.write_table(table.replace_schema_metadata(said), file, write_page_checksum=True)
             os.replace(temporary, self._file(part.start))
         except OSError as error:
             raise ClusterError(f"cannot write {self.path}: {error.strerror or error}") from None

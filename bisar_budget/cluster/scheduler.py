@@ -12,8 +12,8 @@ import pydoc
 import re
 import signal
 import socket
-import threading
 from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from itertools import islice
@@ -36,10 +36,6 @@ _LOOK = 5.0  # s between two looks at who works
 _FETCH = 20.0  # s for what came of a block; then it is looked who works
 _AHEAD = 4  # blocks for each thread of a worker that are given out at once
 _LEAST_AHEAD = 32
-
-
-class UnlikeWorkerError(Exception):
-    """A worker that is not like the one who asks; the message says which, and what it lacks."""
 
 
 @contextmanager
@@ -80,10 +76,13 @@ def connected(address: str, patience: float, tell: Callable[[str], None]) -> "It
 
 
 def _local_cluster(count: int, ends: ExitStack) -> Any:
-    """Start a scheduler and workers here; `ends` closes them."""
+    """Start a scheduler and workers here; `ends` closes them.
+
+    A thread does it, which Ctrl-C does not stop half way: half of a cluster cannot be closed.
+    """
     from distributed import LocalCluster
 
-    with _interrupts_later():
+    def started() -> Any:
         cluster = LocalCluster(
             n_workers=count,
             threads_per_worker=1,
@@ -92,37 +91,22 @@ def _local_cluster(count: int, ends: ExitStack) -> Any:
             preload=[__name__],
         )
         ends.callback(_close, cluster, 10)
-    return cluster
+        return cluster
+
+    resource_tracker.ensure_running()  # else that thread would: it unblocks the signal there
+    with ThreadPoolExecutor(1, initializer=_block_interrupts) as starter:
+        return starter.submit(started).result()
+
+
+def _block_interrupts() -> None:
+    """Block Ctrl-C in this thread and in the workers that it starts, before they could ignore it."""
+    if hasattr(signal, "pthread_sigmask"):  # Windows has none
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
 
 
 def dask_setup(worker: object) -> None:
     """Leave Ctrl-C, which a terminal sends to every process, to the command; Dask calls this in workers of here."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-
-@contextmanager
-def _interrupts_later() -> Iterator[None]:
-    """Hold Ctrl-C back while workers are started: half of a cluster cannot be closed.
-
-    Workers, and the thread that starts them, have it blocked from the beginning, before they could ignore it.
-    """
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    held: list[int] = []
-    before = signal.signal(signal.SIGINT, lambda number, _: held.append(number)) or signal.SIG_DFL
-    can_block = hasattr(signal, "pthread_sigmask")  # Windows cannot
-    if can_block:
-        resource_tracker.ensure_running()  # else that thread would: it unblocks the signal there
-        mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        if can_block:
-            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
-        signal.signal(signal.SIGINT, before)
-        if held:
-            signal.raise_signal(signal.SIGINT)
 
 
 def _close(opened: Any, seconds: float) -> None:
@@ -231,11 +215,11 @@ def _called(version: str, function: Callable[[Any, Any], Any], common: Any, bloc
 
     here = get_worker().address
     if version != __version__:
-        raise UnlikeWorkerError(_unlike(here, __version__, version))
+        raise ClusterError(_unlike(here, __version__, version))
     try:
         return function(common, block)
     except MissionError as error:
-        raise UnlikeWorkerError(f"worker {here} cannot use the mission: {'; '.join(error.lines())}") from None
+        raise ClusterError(f"worker {here} cannot use the mission: {'; '.join(error.lines())}") from None
 
 
 def _unlike(worker: str, found: object, version: str) -> str:
@@ -247,7 +231,7 @@ def _why(error: BaseException, about: str) -> Exception:
     """Words for the fault of a block that failed."""
     from distributed.scheduler import KilledWorker
 
-    if isinstance(error, UnlikeWorkerError):
+    if isinstance(error, ClusterError):  # the worker is not like this process
         return ClusterError(f"{about}: {error}")
     if isinstance(error, KilledWorker):
         last = error.last_worker.address

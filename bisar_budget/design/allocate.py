@@ -10,21 +10,21 @@ fifth more and a fifth less of it, at the sizes found before, until these change
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import date
-from typing import NamedTuple
+from itertools import compress
 
 import numpy as np
 
 from bisar_budget.budget.check import check_mission
 from bisar_budget.budget.judged_rows import CODE, REQUIREMENTS
-from bisar_budget.design.geometric_program import largest_sizes
-from bisar_budget.design.row_uses import Cuts, Near, SpecifiedMission
-from bisar_budget.design.specified import Specified, specified_errors
-from bisar_budget.design.suitable_parts import catalogue, ordered_noise, suitable_parts
+from bisar_budget.design.geometric_program import Rows, largest_sizes
+from bisar_budget.design.row_uses import Near, SpecifiedMission
+from bisar_budget.design.specified import Specified, catalogue, ordered_noise, specified_errors, suitable_parts
 from bisar_budget.design.table import Variation
 from bisar_budget.effects.declared import END_OF_IMAGE, LOCATION
 from bisar_budget.findings.specification import Broken, RowUse, Specification, SpecificationSheet
 from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.model import Mission
+from bisar_budget.mission.parts import Entry
 from bisar_budget.mission.quantities import QuestionError, tree_of
 from bisar_budget.ranges.exact_ranges import Floats, Truths
 from bisar_budget.workers import Progress, unseen
@@ -50,25 +50,9 @@ def allocate(
 ) -> SpecificationSheet:
     """Find the largest sizes of errors with which a mission, as a whole, meets every requirement.
 
-    Parameters
-    ----------
-    mission : Mission
-        As loaded. Its split, combination, coverage, autofocus and model hold; waivers do not count.
-    keys : mapping of str to float, optional
-        Keys of the errors to specify, with their weights; omitted: those of `allocation.specify`, else the usual.
-    reserve : float, optional
-        Part of every limit that is kept free; omitted: what `allocation.warn_above` leaves.
-    model : str, optional
-        Gating model in place of the mission's own.
-    today : date
-        Day of the check.
-    progress : callable, optional
-        Is told how many rounds are done, and how many there may be.
-
-    Returns
-    -------
-    SpecificationSheet
-        With the verdict of a full check that has what is ordered in place.
+    Arguments are those of `bisar_budget.allocate`; of `keys` the weights. Split, combination, coverage, autofocus and
+    model of the mission hold; waivers do not count. The sheet has the verdict of a full check with what is ordered in
+    place. `progress` is told how many rounds are done, and how many there may be.
 
     Raises
     ------
@@ -79,7 +63,8 @@ def allocate(
         raise QuestionError(_each(mission, keys, model, today))
     of = SpecifiedMission(mission, keys, reserve, model, today)
     broken = _broken(of)
-    return _sheet(of, None, broken) if broken else _sheet(of, _SizeSearch(of).found(progress), ())
+    sizes, rows = (np.full(of.tiny.shape, math.nan), ()) if broken else _SizeSearch(of).found(progress)
+    return _sheet(of, sizes, rows, broken)
 
 
 def _each(mission: Mission, keys: Mapping[str, float] | None, model: str | None, today: date) -> str:
@@ -98,22 +83,6 @@ def _each(mission: Mission, keys: Mapping[str, float] | None, model: str | None,
         "combine: each holds every error alone to its limit, and the single allowables are the answer"
         f"{listed}. accepted: combine: rss or sum, for specifications that hold together"
     )
-
-
-class _Found(NamedTuple):
-    """Sizes as found, (sizes,), nan: limited by nothing; with the rows that limit any, (rows,).
-
-    `parts` are those of the power of what each row may use, (rows, sizes).
-    """
-
-    sizes: Floats
-    ids: list[str]
-    requirements: list[str | None]
-    powers: Floats
-    used: Floats
-    allowed: Floats
-    parts: Floats
-    multipliers: Floats
 
 
 def _broken(of: SpecifiedMission) -> tuple[Broken, ...]:
@@ -138,10 +107,14 @@ class _SizeSearch:
     def __init__(self, of: SpecifiedMission) -> None:
         self.of = of
 
-    def found(self, progress: Progress) -> _Found:
-        """Search for the sizes: at each step what rows use is taken as it is near the sizes of the step before."""
+    def found(self, progress: Progress) -> tuple[Floats, tuple[RowUse, ...]]:
+        """The sizes, (sizes,), nan: limited by nothing; and the rows that limit any, the one that does most first.
+
+        At each step what rows use is taken as it is near the sizes of the step before.
+        """
         sizes = self._begun()
-        inside, before, is_woken = np.minimum(self.of.tiny, sizes), Cuts([], [], []), False
+        inside, is_woken = np.minimum(self.of.tiny, sizes), False
+        before = Rows(np.zeros((0, sizes.size)), np.zeros(0), np.zeros(0))
         for done in range(ROUNDS):
             progress(done, ROUNDS)
             near = self.of.near(sizes)
@@ -151,13 +124,14 @@ class _SizeSearch:
                 continue
             some = ~near.is_free
             if some.any():
-                log = largest_sizes(self.of.weights[some], before.with_rows(near).rows(some)).log
+                log = largest_sizes(self.of.weights[some], before.with_rows(near.rows()).of_sizes(some)).log
                 inside, sizes = sizes, sizes.copy()
                 sizes[some] = np.exp(log)
                 if done >= _ABOUT:
                     sizes = np.sqrt(sizes * inside)
+                # What adds up over all signs is the largest over all directions: what was seen before still holds.
                 if self.of.combine == "sum":
-                    before = before.with_rows(near, of=f"mission.{LOCATION}")
+                    before = before.with_rows(near.rows(f"mission.{LOCATION}"))
             self.of.most = np.where(sizes > self.of.largest, self.of.largest, self.of.most)
             if not some.any() or np.abs(np.log(sizes / inside)).max() < CHANGES:
                 if is_woken or some.all():
@@ -182,8 +156,11 @@ class _SizeSearch:
         return found
 
     def _find_ends(self, inside: Floats, sizes: Floats) -> None:
-        """Note the size of each error, between two, from which there is no image, whatever the others are."""
-        for place in self._lost_alone(inside, sizes):
+        """Note the size from which an error leaves no image, of each that leaves none where the others are inside."""
+        count = sizes.size
+        cases = np.repeat(inside[:, None], count, axis=1)
+        cases[np.arange(count), np.arange(count)] = sizes
+        for place in np.flatnonzero(np.isinf(self.of.uses(cases).uses).any(axis=0)).tolist():
             self.of.ends[place] = self._end_between(place, inside, min(sizes[place], self.of.ends[place]))
 
     def _end_between(self, place: int, inside: Floats, high: float) -> float:
@@ -197,13 +174,6 @@ class _SizeSearch:
             first = int(is_lost.argmax()) if is_lost.any() else _STEPS - 1
             low, high = float(steps[max(first - 1, 0)]), float(steps[first])
         return low
-
-    def _lost_alone(self, inside: Floats, sizes: Floats) -> Iterator[int]:
-        """Errors that leave no image at their size, where the others are inside."""
-        count = sizes.size
-        cases = np.repeat(inside[:, None], count, axis=1)
-        cases[np.arange(count), np.arange(count)] = sizes
-        yield from np.flatnonzero(np.isinf(self.of.uses(cases).uses).any(axis=0)).tolist()
 
     def _begun(self) -> Floats:
         """Sizes that alone would each use so little of what limits it that all together have room."""
@@ -220,7 +190,7 @@ class _SizeSearch:
             self.of.ends = np.where(is_end, reach, math.inf).min(axis=0)
         return np.where(np.isfinite(alone), alone / (2 * count), self.of.tiny)
 
-    def _kept(self, sizes: Floats, before: Cuts) -> _Found:
+    def _kept(self, sizes: Floats, before: Rows) -> tuple[Floats, tuple[RowUse, ...]]:
         """Keep to what rows may use, to the last digit, and say what each error takes of it."""
         near = self.of.near(sizes)
         for _ in range(_SHRINKS):
@@ -237,49 +207,29 @@ class _SizeSearch:
                 break
             sizes = np.where(near.is_free, sizes, sizes / (over * (1 + _CLOSE)))
         some, limits = ~near.is_free, near.is_limit
-        multipliers = np.zeros(limits.sum())
+        whole = (near.allowed**near.found.powers)[limits]
+        parts, multipliers = near.part[limits] / whole[:, None], np.zeros(whole.size)
         if some.any():
-            whole = near.allowed**near.found.powers
-            cuts = before.with_rows(near)
-            of_room = largest_sizes(self.of.weights[some], cuts.rows(some)).multipliers
-            multipliers = of_room[-len(multipliers) :] * whole[limits] / near.room[limits]
-        ids = [row for row, is_limit in zip(near.found.ids, limits, strict=True) if is_limit]
-        requirements = [row for row, is_limit in zip(near.found.requirements, limits, strict=True) if is_limit]
-        parts = near.part[limits] / (near.allowed**near.found.powers)[limits, None]
-        if some.any():
-            self._with_earlier(before, of_room, near, sizes, ids, parts, multipliers)
-        sizes = np.where(near.is_free, math.nan, sizes)
-        return _Found(
-            sizes,
-            ids,
-            requirements,
-            near.found.powers[limits],
-            used[limits],
-            near.allowed[limits],
-            parts,
-            multipliers,
-        )
+            rows = before.with_rows(near.rows()).of_sizes(some)
+            of_room = largest_sizes(self.of.weights[some], rows).multipliers
+            multipliers = of_room[-whole.size :] * whole / near.room[limits]
+            self._with_earlier(before, of_room, near, sizes, parts, multipliers)
+        rows_used = tuple(self._row_uses(near, used, parts, multipliers))
+        return np.where(near.is_free, math.nan, sizes), rows_used
 
     @staticmethod
     def _with_earlier(
-        before: Cuts,
-        of_room: Floats,
-        near: Near,
-        sizes: Floats,
-        ids: Sequence[str],
-        parts: Floats,
-        multipliers: Floats,
+        before: Rows, of_room: Floats, near: Near, sizes: Floats, parts: Floats, multipliers: Floats
     ) -> None:
         """Count what a displacement is worth in other directions to its row: parts are those of all, by worth."""
-        if not any(map(len, before.room)):
+        if not before.room.size:
             return
-        place = ids.index(f"mission.{LOCATION}")
-        share, room = np.concatenate(before.share), np.concatenate(before.room)
+        place = list(compress(near.found.ids, near.is_limit)).index(f"mission.{LOCATION}")
         allowed = near.allowed[near.is_limit][place]
-        worth = of_room[: len(room)] * allowed / room
+        worth = of_room[: before.room.size] * allowed / before.room
         whole = multipliers[place] + worth.sum()
         if whole > 0:
-            earlier = (worth[:, None] * share * sizes / allowed).sum(axis=0)
+            earlier = (worth[:, None] * before.share * sizes / allowed).sum(axis=0)
             parts[place] = (multipliers[place] * parts[place] + earlier) / whole
             multipliers[place] = whole
 
@@ -288,6 +238,22 @@ class _SizeSearch:
         found = self.of.uses(sizes[:, None])
         uses = dict(zip(found.ids, found.uses[:, 0].tolist(), strict=True))
         return np.array([uses.get(row, 0.0) for row in near.found.ids])
+
+    def _row_uses(self, near: Near, used: Floats, parts: Floats, multipliers: Floats) -> Iterator[RowUse]:
+        """Rows by what they are worth; parts, (limits, sizes), are those of the power of what each may use."""
+        places = np.flatnonzero(near.is_limit)
+        for limit in np.argsort(-multipliers, kind="stable").tolist():
+            place = int(places[limit])
+            use, allowed = float(used[place]), float(near.allowed[place])
+            taken = zip(self.of.specified, parts[limit].tolist(), strict=True)
+            shares = {one.key: part for one, part in taken if part > 0}
+            whole, worth = (use / allowed) ** float(near.found.powers[place]), float(multipliers[limit])
+            # An error that grows faster than its size takes less than what a little more of it would add.
+            excess = max(1.0, sum(shares.values()) / whole) if whole else 1.0
+            shares = {key: part / excess for key, part in shares.items()}
+            fixed = max(0.0, whole - sum(shares.values()))
+            row, requirement = near.found.ids[place], near.found.requirements[place]
+            yield RowUse(row, requirement, use, allowed, fixed, shares, worth * excess)
 
 
 def _shares(rows: Sequence[RowUse], key: str) -> dict[str, float]:
@@ -299,49 +265,17 @@ def _shares(rows: Sequence[RowUse], key: str) -> dict[str, float]:
     return shares
 
 
-def _row_uses(found: _Found, specified: Sequence[Specified]) -> Iterator[RowUse]:
-    """Rows by what they are worth, the one that limits most first."""
-    for place in np.argsort(-found.multipliers, kind="stable").tolist():
-        parts = found.parts[place].tolist()
-        used, allowed = float(found.used[place]), float(found.allowed[place])
-        shares = {one.key: part for one, part in zip(specified, parts, strict=True) if part > 0}
-        whole, worth = (used / allowed) ** float(found.powers[place]), float(found.multipliers[place])
-        # An error that grows faster than its size takes less than what a little more of it would add.
-        excess = max(1.0, sum(shares.values()) / whole) if whole else 1.0
-        shares = {key: part / excess for key, part in shares.items()}
-        fixed = max(0.0, whole - sum(shares.values()))
-        yield RowUse(found.ids[place], found.requirements[place], used, allowed, fixed, shares, worth * excess)
-
-
 # ---------------------------------------------------------------- the sheet
-def _sheet(of: SpecifiedMission, found: _Found | None, broken: tuple[Broken, ...]) -> SpecificationSheet:
+def _sheet(
+    of: SpecifiedMission, sizes: Floats, rows: tuple[RowUse, ...], broken: tuple[Broken, ...]
+) -> SpecificationSheet:
     """Put what was found into words and units, and check the mission with what is ordered."""
-    values = [math.nan] * len(of.specified) if found is None else _values(of, found)
-    ordered = [
-        (math.nan, "") if math.isnan(value) else one.ordered(value)
-        for one, value in zip(of.specified, values, strict=True)
-    ]
-    texts = [text for _, text in ordered]
-    findings = check_mission(of.with_values(texts), of.today)
-    rows = () if found is None else tuple(_row_uses(found, of.specified))
-    among = catalogue(of)
-    specifications = [
-        Specification(
-            key=one.key,
-            weight=one.weight,
-            unit=one.number.dimension.si,
-            value=None if math.isnan(value) else value,
-            ordered=None if math.isnan(value) else number,
-            text=text,
-            declared=one.number.value,
-            declared_text="" if one.number.value is None else one.number.text(one.number.value),
-            shares=_shares(rows, one.key) if text else {},
-            parts=() if not text else tuple(suitable_parts(of, one, number, among)),
-            found_text="" if math.isnan(value) else one.said(value),
-            remark="" if not text else ordered_noise(of, one, number),
-        )
-        for one, value, (number, text) in zip(of.specified, values, ordered, strict=True)
-    ]
+    among = catalogue(of.stated)
+    specifications = tuple(
+        _specification(of.stated, one, float(one.numbers(np.array(size))), rows, among)
+        for one, size in zip(of.specified, sizes.tolist(), strict=True)
+    )
+    findings = check_mission(of.with_values([one.text for one in specifications]), of.today)
     return SpecificationSheet(
         file=of.given.file,
         name=of.given.name,
@@ -350,7 +284,7 @@ def _sheet(of: SpecifiedMission, found: _Found | None, broken: tuple[Broken, ...
         status=findings.status,
         reserve=of.reserve,
         requirements=findings.requirements,
-        specifications=tuple(specifications),
+        specifications=specifications,
         rows=rows,
         broken=broken,
         notes=tuple(of.notes),
@@ -360,8 +294,31 @@ def _sheet(of: SpecifiedMission, found: _Found | None, broken: tuple[Broken, ...
     )
 
 
-def _values(of: SpecifiedMission, found: _Found) -> list[float]:
-    return [
-        float(one.numbers(np.array([size]))[0]) if not math.isnan(size) else math.nan
-        for one, size in zip(of.specified, found.sizes.tolist(), strict=True)
-    ]
+def _specification(
+    mission: Mission, one: Specified, value: float, rows: Sequence[RowUse], among: Sequence[Entry]
+) -> Specification:
+    """What is ordered of an error, by its number as found; nan: nothing limits it."""
+    declared = one.number.value
+    silent = Specification(
+        key=one.key,
+        weight=one.weight,
+        unit=one.number.dimension.si,
+        value=None,
+        ordered=None,
+        text="",
+        declared=declared,
+        declared_text="" if declared is None else one.number.text(declared),
+        shares={},
+    )
+    if math.isnan(value):
+        return silent
+    ordered, text = one.ordered(value)
+    return silent._replace(
+        value=value,
+        ordered=ordered,
+        text=text,
+        shares=_shares(rows, one.key),
+        parts=tuple(suitable_parts(mission, one, ordered, among)),
+        found_text=one.said(value),
+        remark=ordered_noise(mission, one, ordered),
+    )

@@ -23,10 +23,10 @@ from bisar_budget.mission.quantities import (
     number_of,
 )
 from bisar_budget.mission.readers import DIRECTION, TextList
+from bisar_budget.ranges.exact_ranges import Floats
 from bisar_budget.units import Dimension, normal_unit, parse_quantity
 
-Floats = NDArray[np.float64]
-Values = NDArray[np.float64] | NDArray[np.object_]  # numbers in SI, or words
+Values = Floats | NDArray[np.object_]  # numbers in SI, or words
 
 MAX_VALUES = 10_000_000  # of one key, and of all keys of a table: 80 MB
 LARGEST_TABLE = 256 << 20  # characters: of as many values, each of seventeen digits with sign and exponent

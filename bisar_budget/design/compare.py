@@ -5,7 +5,7 @@ import math
 import os
 from collections.abc import Iterator, Sequence
 from datetime import date
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from bisar_budget.analysis.analysis import Analysis, Case
 from bisar_budget.budget.judged_mission import JudgedMission, judged_mission
@@ -20,7 +20,7 @@ from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.load import folder_of
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.parts import FIGURES, Part, PartError, entries, evidence, find_part, folders
-from bisar_budget.mission.quantities import QuestionError, tree_of
+from bisar_budget.mission.quantities import QuestionError
 from bisar_budget.workers import Progress, unseen
 
 _KINDS = {"motion_error": ("imu", "gnss"), "oscillator": ("oscillator",)}
@@ -197,10 +197,9 @@ class _PartSearch:
         self.variation, self.key = variation, key
         _, self.platform, self.section, _ = parts_of(key)
         beside = folder_of(variation.mission.file)
-        named: Any = tree_of(variation.mission)
-        for name in parts_of(key):
-            named = named.get(name) if isinstance(named, dict) else None
-        names = named if isinstance(named, list) else [named] if isinstance(named, str) else []
+        section = getattr(getattr(variation.mission.platforms, self.platform), self.section)
+        named = None if section is None else section.sensor
+        names = named if isinstance(named, tuple) else [named] if named else []
         self.given = {name: find_part(name, beside) for name in names}
         of_given = {part.kind for part in self.given.values()}
         self.kinds = tuple(kind for kind in _KINDS[self.section] if not of_given or kind in of_given)

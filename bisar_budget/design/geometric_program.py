@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bisar_budget.ranges.exact_ranges import Floats
+from bisar_budget.ranges.exact_ranges import Floats, Truths
 
 _GAP = 1e-8  # of Σ w·x, that the maximum may be above what is found
 _STEP = 30.0  # by which the barrier gives way each time
@@ -28,6 +28,14 @@ class Rows(NamedTuple):
         """Parts of each row at sizes e^x, over its room, (rows, sizes)."""
         found: Floats = self.share * np.exp(self.power[:, None] * x) / self.room[:, None]
         return found
+
+    def with_rows(self, others: "Rows") -> "Rows":
+        """These and other rows."""
+        return Rows(*(np.concatenate(both) for both in zip(self, others, strict=True)))
+
+    def of_sizes(self, some: Truths) -> "Rows":
+        """The rows for some of the sizes."""
+        return self._replace(share=self.share[:, some])
 
 
 class Largest(NamedTuple):

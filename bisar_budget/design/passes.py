@@ -151,26 +151,9 @@ def passes(
 ) -> Passes:
     """Find the passes of a satellite over the scene, and check the mission in each.
 
-    Parameters
-    ----------
-    mission : Mission
-        As loaded, with its paths or without; its `collection.center_time` does not count.
-    start : Instant
-        Beginning of the span.
-    days : float
-        Its length.
-    platform : str, optional
-        The platform whose passes are listed; omitted: the one that has an orbit, of two the transmitter.
-    min_elevation : float
-        Least elevation of every satellite, seen from the scene. [rad]
-    squint : float
-        Of the mid-time, positive looking forward. [rad]
-    model : str, optional
-        Gating model in place of the mission's own.
-    today : date
-        Day on which waivers are judged, UTC.
-    progress : callable, optional
-        Is told how many passes are checked, and how many there are.
+    Arguments are those of `bisar_budget.passes`; elevation and squint, positive looking forward, are in radians. The
+    mission is as loaded, with its paths or without; its `collection.center_time` does not count. `progress` is told
+    how many passes are checked, and how many there are.
 
     Raises
     ------
@@ -278,7 +261,9 @@ def _at_mid_time(number: int, stretch: Stretch, satellite: Watched, axes: SceneA
         return found._replace(
             reason=f"its squint is {seen.min():.1f} deg to {seen.max():.1f} deg, never {math.degrees(squint):.4g} deg"
         )
-    center = _to_a_millisecond(satellite.origin.after(time))
+    # To a millisecond, as the file of a mission has it: that is checked as the pass is.
+    center = satellite.origin.after(time)
+    center = parse_instant(center.as_text()) or center
     time = center.since(satellite.origin)
     state = satellite.state(time)
     return found._replace(
@@ -288,11 +273,6 @@ def _at_mid_time(number: int, stretch: Stretch, satellite: Watched, axes: SceneA
         is_ascending=axes.turned_back(state.velocity)[2] > 0,
         doubt=satellite.orbit(time).doubt(center).size,
     )
-
-
-def _to_a_millisecond(instant: Instant) -> Instant:
-    """The instant that `Instant.as_text` writes: a file that has it is checked as the pass is."""
-    return parse_instant(instant.as_text()) or instant
 
 
 def _side(state: PlatformState, axes: SceneAxes) -> str:

@@ -40,8 +40,8 @@ _WARN_ONLY = ("autofocus_pull_in", "spatial_variance")  # kinds of rows that war
 class RowUses(NamedTuple):
     """Utilizations of the rows that can fail in some cases, (rows, cases), by their ids; and what judges each."""
 
-    ids: list[str]
-    requirements: list[str | None]
+    ids: Sequence[str]
+    requirements: Sequence[str | None]
     powers: Floats
     uses: Floats
 
@@ -60,27 +60,11 @@ class Near(NamedTuple):
     is_limit: Truths
     is_free: Truths
 
-
-class Cuts(NamedTuple):
-    """Rows of a program, as they were seen at several sizes.
-
-    A displacement that adds up over all signs is the largest over all directions: what was seen before still holds.
-    """
-
-    share: list[Floats]
-    power: list[Floats]
-    room: list[Floats]
-
-    def with_rows(self, near: Near, of: str = "") -> "Cuts":
-        """These, and what is seen near other sizes: every row that limits any, or one."""
-        limits = near.is_limit & np.array([not of or row == of for row in near.found.ids])
-        power = near.found.powers[limits]
-        share = near.part[limits] / near.sizes ** power[:, None]
-        return Cuts([*self.share, share], [*self.power, power], [*self.room, near.room[limits]])
-
-    def rows(self, some: Truths) -> Rows:
-        """The rows for some of the sizes."""
-        return Rows(np.concatenate(self.share)[:, some], np.concatenate(self.power), np.concatenate(self.room))
+    def rows(self, of: str = "") -> Rows:
+        """Rows of a program: every one that limits any size, or one."""
+        limits = self.is_limit & np.array([not of or row == of for row in self.found.ids])
+        power = self.found.powers[limits]
+        return Rows(self.part[limits] / self.sizes ** power[:, None], power, self.room[limits])
 
 
 class SpecifiedMission:
@@ -155,7 +139,7 @@ class SpecifiedMission:
     def uses(self, sizes: Floats) -> RowUses:
         """Utilizations of the rows that can fail, with sizes."""
         judged = self.judged(sizes)
-        ids, requirements, powers, uses = list[str](), list[str | None](), list[float](), list[Floats]()
+        found: list[tuple[str, str | None, float, Floats]] = []
         for row in judged.rows:
             is_judged = ~np.isin(row.status, (CODE["info"], CODE["not_declared"]))
             if not is_judged.any():
@@ -166,24 +150,16 @@ class SpecifiedMission:
             use = np.nan_to_num(row.utilization, nan=0.0, posinf=math.inf) * is_heeded
             use = np.where(is_lost, math.inf, use)
             binding = int(row.binding.max())
-            ids.append(row.subject.id)
-            requirements.append(
-                row.metric if binding < 0 or binding >= len(REQUIREMENTS) - 1 else REQUIREMENTS[binding]
-            )
-            powers.append(self._power(row.subject.kind))
-            uses.append(use)
+            requirement = row.metric if binding < 0 or binding >= len(REQUIREMENTS) - 1 else REQUIREMENTS[binding]
+            found.append((row.subject.id, requirement, self._power(row.subject.kind), use))
         level = min(TENTH * float(np.max(self.stated.requirements.quadratic_phase_error)), SMALL_RAD)
         for one in judged.untaken:
-            ids.append(f"{NEGLIGIBLE}.{one.kind}")
-            requirements.append(None)
-            powers.append(1.0 if self.combine == "sum" else 2.0)
-            uses.append(np.broadcast_to(one.total, sizes.shape[1:]) / level)
+            use = np.broadcast_to(one.total, sizes.shape[1:]) / level
+            found.append((f"{NEGLIGIBLE}.{one.kind}", None, 1.0 if self.combine == "sum" else 2.0, use))
         for name, limits in ((END_OF_IMAGE, self.ends), (ACCEPTED, self.most)):
             for place in np.flatnonzero(np.isfinite(limits)).tolist():
-                ids.append(f"{name}.{self.specified[place].key}")
-                requirements.append(None)
-                powers.append(2.0)
-                uses.append(sizes[place] / limits[place])
+                found.append((f"{name}.{self.specified[place].key}", None, 2.0, sizes[place] / limits[place]))
+        ids, requirements, powers, uses = zip(*found, strict=True)
         return RowUses(ids, requirements, np.array(powers), np.array(uses))
 
     def _power(self, kind: str) -> float:

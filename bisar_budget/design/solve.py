@@ -169,32 +169,9 @@ def solve(
 ) -> Solution:
     """Find every value of a number of a mission at which its compliance begins or ends.
 
-    Parameters
-    ----------
-    mission : Mission
-        As loaded; the file that it came from is read anew for each value, with the options that changed it.
-    key : str
-        Path of the number in the mission file, such as `collection.aperture_time`; with `is_scale` of a section.
-    between : str, optional
-        Range to look at, `A..B` with units. Omitted: a tenth to ten times the file's value; of an azimuth the circle;
-        of a factor 0.1 to 10.
-    row : str, optional
-        Id of the row that has to comply, instead of the whole mission.
-    target : str
-        fail: what `check` exits with 0 on complies; warn: what `check --strict` does.
-    model : str, optional
-        Gating model in place of the mission's own.
-    is_scale : bool
-        Solve for the factor that multiplies all errors below the key.
-    today : date
-        Day on which waivers are judged, UTC.
-    progress : callable, optional
-        Is told how many values are done, and how many there are.
-
-    Returns
-    -------
-    Solution
-        Crossings in rising order, values in SI.
+    Arguments are those of `bisar_budget.solve`; `between` is `A..B` with units, of a factor 0.1 to 10 where it is
+    omitted. By the target `fail` complies what `check` exits with 0 on, by `warn` what `check --strict` does.
+    `progress` is told how many values are done, and how many there are. Values found are in SI.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The errors that are specified: which keys name one, what their sizes are, in which units they are ordered."""
+"""The errors that are specified: which keys name one, in which units sizes are ordered, which parts keep to them."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -8,12 +8,16 @@ import numpy as np
 
 from bisar_budget import units
 from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.effects.oscillators import noise_of
+from bisar_budget.effects.spectra import PowerLawPiece, density
 from bisar_budget.mission.changes import ACCEPTED_ERRORS, is_error, parts_of
+from bisar_budget.mission.instruments import Oscillator
+from bisar_budget.mission.load import folder_of
 from bisar_budget.mission.model import Mission
-from bisar_budget.mission.parts import taken_figures
+from bisar_budget.mission.parts import Entry, OscillatorPart, PartError, entries, folders, taken_figures
 from bisar_budget.mission.quantities import Number, QuestionError, as_number, number_of
 from bisar_budget.ranges.exact_ranges import Floats
-from bisar_budget.units import Dimension, parse_quantity
+from bisar_budget.units import Dimension, format_quantity, parse_quantity
 
 DIGITS = 2  # of a number that is ordered
 _SILENT_DB = -400.0  # a level of nothing
@@ -42,6 +46,11 @@ _TINY: Mapping[Dimension, float] = {
     units.TONE: 1e-9,
 }
 _LEAST = 1e-18
+_CURVES = ("phase_noise", "power_law", "allan_deviation", "spurs")  # that a level shifts
+_OFFSETS = (1.0, 10.0, 100.0, 1e3)  # at which the phase noise of an ordered level is said [Hz]
+_PER_DECADE = 20  # offsets at which spectra are compared
+_SLOW = 0.1  # cycles per aperture, from which on phase noise is seen
+_SAME = 1 + 1e-9
 
 
 class Specified(NamedTuple):
@@ -63,9 +72,8 @@ class Specified(NamedTuple):
     @property
     def largest(self) -> float:
         """The largest size that a mission file may state."""
-        _, _, less, most = self.number.reader.bounds
-        bound = min(less, most) * (1 - 1e-9) if not self.number.is_level else min(less, most)
-        return float(10 ** (bound / 20)) if self.number.is_level and bound < math.inf else bound
+        bound = min(self.number.reader.bounds[2:])
+        return float(10 ** (bound / 20)) if self.number.is_level else bound * (1 - 1e-9)
 
     @property
     def tiny(self) -> float:
@@ -82,7 +90,7 @@ class Specified(NamedTuple):
 
     def text(self, size: float) -> str:
         """A size as the file would have it, in SI."""
-        return f"{float(self.numbers(np.array([size]))[0])!r} {self.number.dimension.si}".rstrip()
+        return f"{float(self.numbers(np.array(size)))!r} {self.number.dimension.si}".rstrip()
 
     def unit_of(self, value: float) -> str:
         """Unit in which a number is ordered: that of the file, else the one that suits it."""
@@ -179,10 +187,68 @@ def multiplied(keys: Sequence[str]) -> tuple[str, str] | None:
             continue
         for other in keys:
             within = parts_of(other)[: len(section)] == tuple(section) and other != key
-            if within and (name == "spectrum_level" or _is_of_curve(parts_of(other)[len(section)])):
+            if within and (name == "spectrum_level" or parts_of(other)[len(section)] in _CURVES):
                 return key, other
     return None
 
 
-def _is_of_curve(name: str) -> bool:
-    return name in ("phase_noise", "power_law", "allan_deviation", "spurs")
+# ---------------------------------------------------------------- parts that keep to what is ordered
+def catalogue(mission: Mission) -> list[Entry]:
+    """Parts that the file of a mission may name: those that come with the tool, and those of its project."""
+    try:
+        return list(entries(folders(folder_of(mission.file))))
+    except PartError:  # a folder of the project has a file that is no part; `sensors` says which
+        return []
+
+
+def suitable_parts(mission: Mission, one: Specified, most: float, among: Sequence[Entry]) -> Iterator[str]:
+    """Ids of the parts that keep to a specification, whose ordered number is `most`; the mission states its error.
+
+    A sensor does with a figure of the same name that is no larger in any axis. An oscillator does whose phase noise
+    is nowhere above the spectrum that is ordered, at the same frequency; one that says nothing of some offsets not.
+    """
+    *above, section, figure = parts_of(one.key)
+    if section == "oscillator" and figure == "level":
+        yield from _quiet_oscillators(mission, above[-1], most, among)
+    kind = {"motion_error": "gnss", "imu": "imu"}.get(section)
+    for entry in among:
+        value = getattr(entry.part, figure, None) if entry.part.kind == kind else None
+        if value is not None and np.abs(value).max() <= most:
+            yield entry.id
+
+
+def _quiet_oscillators(mission: Mission, name: str, level: float, among: Sequence[Entry]) -> Iterator[str]:
+    carrier, pieces = _spectrum(mission, name)
+    aperture = mission.collection.aperture_time
+    last = max(piece.high for piece in pieces)
+    first = min([_SLOW / aperture, *(piece.low for piece in pieces if piece.low)])
+    offsets = np.geomspace(first, last * (1 - 1e-9), 1 + math.ceil(_PER_DECADE * math.log10(last / first)))
+    most = density(pieces, offsets) * 10 ** (level / 10) * _SAME
+    for entry in among:
+        part = entry.part
+        if not isinstance(part, OscillatorPart):
+            continue
+        alone = Oscillator(part.frequency, part.phase_noise, part.allan_deviation, part.power_law)
+        noise = density(noise_of(alone, carrier, aperture).pieces, offsets)
+        if np.all((noise > 0) & (noise <= most)):
+            yield entry.id
+
+
+def ordered_noise(mission: Mission, one: Specified, level: float) -> str:
+    """The phase noise that a level of an oscillator asks for, where the file states it by its points; else empty."""
+    _, name, *below = parts_of(one.key)
+    if below != ["oscillator", "level"]:
+        return ""
+    carrier, pieces = _spectrum(mission, name)
+    found = zip(_OFFSETS, density(pieces, np.array(_OFFSETS)).tolist(), strict=True)
+    points = [
+        f"{10 * math.log10(size / 2) + level:.1f} dBc/Hz at {offset:g} Hz" for offset, size in found if size > 0
+    ]
+    return f"{', '.join(points)} from {format_quantity(carrier, 'Hz', 4)}" if points else ""
+
+
+def _spectrum(mission: Mission, name: str) -> tuple[float, Sequence[PowerLawPiece]]:
+    """Frequency of a platform's oscillator, else of the radar, and the spectrum of its phase there at 0 dB."""
+    oscillator = getattr(mission.platforms, name).oscillator
+    carrier = oscillator.frequency or mission.radar.center_frequency
+    return carrier, noise_of(oscillator.noise_alone, carrier, mission.collection.aperture_time).pieces

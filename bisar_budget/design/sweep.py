@@ -59,49 +59,16 @@ _FIELDS = {
 _UNITS = {"rad": "rad", "db": "dB"}  # by what a field's name ends with
 
 
-def sweep(
-    mission: Mission,
-    cases: Cases,
-    *,
-    columns: Sequence[str] = (),
-    model: str | None = None,
-    today: date,
-    jobs: int = 1,
-) -> Swept:
-    """Check a mission in many cases.
+class Asked:
+    """A mission that is to be checked in many cases, in chunks.
 
-    Parameters
-    ----------
-    mission : Mission
-        As loaded.
-    cases : Cases
-        Which keys vary, and their values.
-    columns : sequence of str
-        Further columns, `ROW.FIELD`, such as `receiver.acceleration.x.allowable`; one named twice is there once.
-    model : str, optional
-        Gating model in place of the mission's own.
-    today : date
-        Day on which waivers are judged, UTC.
-    jobs : int
-        Processes to share the cases out to.
-
-    Returns
-    -------
-    Swept
-        Its parts are found as they are asked for.
+    Arguments are those of `bisar_budget.sweep`. A column that is named twice is there once.
 
     Raises
     ------
     QuestionError
         A column is of no row, or of no field; a key makes no mission whatever its value.
     """
-    asked = Asked(mission, cases, columns=columns, model=model, today=today)
-    chunks = asked.chunks()
-    return asked.swept(asked.shared_out(chunks, chunks.starts, jobs))
-
-
-class Asked:
-    """The cases of a mission that a sweep is about, in chunks; arguments and faults are those of `sweep`."""
 
     def __init__(
         self,
@@ -196,6 +163,11 @@ class Asked:
             parts=parts,
         )
 
+    def checked(self, jobs: int = 1) -> Swept:
+        """The sweep, whose parts are checked as they are asked for, by so many processes."""
+        return self.swept(self.shared_out(self.chunks.starts, jobs))
+
+    @cached_property
     def chunks(self) -> "Chunks":
         """How the cases are cut: into few where many are read by themselves, which some of them show."""
         cases, is_slow = self.cases, False
@@ -212,17 +184,15 @@ class Asked:
         words = [SetValue(one.key, word) for one, chosen in words_of(self.cases) for word in chosen]
         return self.question._replace(named=named_by(self.mission, words))
 
-    def shared_out(
-        self, chunks: "Chunks", starts: Sequence[int], jobs: int, mapped: MapBlocks | None = None
-    ) -> Iterator[Part]:
+    def shared_out(self, starts: Sequence[int], jobs: int, mapped: MapBlocks | None = None) -> Iterator[Part]:
         """Check the chunks that begin at `starts`, in their order; processes share out what is read case by case.
 
         What arrays hold takes less time than to send it from one process to another. Where `mapped` has others do it,
         they do all, and parts come in any order.
         """
-        stops = ((start, chunks.stop(start)) for start in starts)
+        stops = ((start, self.chunks.stop(start)) for start in starts)
         blocks = ((start, stop, self.cases.values(start, stop)) for start, stop in stops)
-        if mapped is None and chunks.is_slow and jobs > 1 and len(starts) >= _MANY:
+        if mapped is None and self.chunks.is_slow and jobs > 1 and len(starts) >= _MANY:
             mapped = in_processes(jobs)
         if mapped is None:
             yield from (self.table.part(*block) for block in blocks)

@@ -14,13 +14,13 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bisar_budget.analysis.analysis import Analysis, by_nodes
 from bisar_budget.budget.judged_mission import JudgedMission, field, judged_mission, statuses
 from bisar_budget.budget.judged_requirements import first_highest
 from bisar_budget.budget.judged_rows import REQUIREMENTS, WHOLE, Judged
 from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.design.cases import Values
 from bisar_budget.design.varied import is_held, is_image, scaled
 from bisar_budget.faults import MissionError, SetNumber, SetValue
 from bisar_budget.findings.row import SPECIFICATION, unknown_id
@@ -32,12 +32,10 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.mission.quantities import FACTOR, Number, QuestionError, number_of, tree_of, with_number
 from bisar_budget.mission.stacked import picked, stacked
 from bisar_budget.mission.tree import Tree, read_tree
+from bisar_budget.ranges.exact_ranges import Places
 from bisar_budget.workers import Progress, unseen
 
 _SOON, _SELDOM = (2, 12), 48  # cases after which it is told how far many are
-
-Values = NDArray[np.float64] | NDArray[np.object_]
-Places = NDArray[np.intp]
 
 
 class Column(NamedTuple):

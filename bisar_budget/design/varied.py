@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from bisar_budget import units
 from bisar_budget.effects.effect import MOTION, PLATFORMS
-from bisar_budget.geometry import STILL, BistaticGeometry, PlatformState, norm
+from bisar_budget.geometry import STILL, BistaticGeometry, norm
 from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.covariance import EIGENVALUE_TOLERANCE
 from bisar_budget.mission.instruments import RISE, STEEPEST
@@ -40,7 +40,6 @@ from bisar_budget.mission.propagation import LEAST_ELEVATION_DEG, least_elevatio
 from bisar_budget.mission.quantities import QuestionError
 from bisar_budget.mission.readers import ListOf, OneOf, Quantity, Reader, Section, Triple
 from bisar_budget.mission.vibrations import Spectrum
-from bisar_budget.ranges.exact_ranges import Floats
 
 # ---------------------------------------------------------------- where arrays can stand, which cases are missions
 SAFE = 1 + 1e-6  # nearer to a border of what forms an image, a case is checked by itself
@@ -120,15 +119,10 @@ def is_image(mission: Mission, geometries: BistaticGeometry, cases: int) -> NDAr
         for _, _, degrees in least_elevations(mission.propagation, legs, mission.collection.aperture_time):
             is_one &= degrees > LEAST_ELEVATION_DEG * SAFE
     if mission.has_direct_path:
-        is_one &= _has_baseline(geometries.apart, np.broadcast_to(half, (cases,)))
+        halves = np.broadcast_to(half, (cases,))
+        least = np.maximum(LEAST_BASELINE, geometries.apart.travelled(halves) / FARTHEST_BY)
+        is_one &= least_baseline(geometries.apart, halves) > SAFE * least
     return is_one & (np.asarray(mission.radar.bandwidth) * SAFE < 2 * np.asarray(mission.radar.center_frequency))
-
-
-def _has_baseline(apart: PlatformState, half: Floats) -> NDArray[np.bool_]:
-    """Whether there is a direct path to follow, with room to spare."""
-    return np.asarray(
-        least_baseline(apart, half) > SAFE * np.maximum(LEAST_BASELINE, apart.travelled(half) / FARTHEST_BY)
-    )
 
 
 def _has_possible_figures(mission: Mission, cases: int) -> NDArray[np.bool_]:

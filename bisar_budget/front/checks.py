@@ -3,17 +3,19 @@
 import datetime as dt
 import os
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import partial
+from time import perf_counter
 from typing import TYPE_CHECKING, Any, cast
 
 from bisar_budget import __version__
-from bisar_budget.budget.check import check_files, check_mission, whole, without_analysis
+from bisar_budget.budget.check import MANY, Draws, Found, check_files, check_mission, whole, without_analysis
 from bisar_budget.faults import SetValue, printable
-from bisar_budget.findings.mission import FileWarning, MissionFindings, UnusableMission
+from bisar_budget.findings.mission import FileWarning, MissionFindings
 from bisar_budget.findings.requirement import NOTHING_OUTSIDE, Outside, Override
 from bisar_budget.findings.status import complying
-from bisar_budget.front.progress import watched
+from bisar_budget.front.progress import foreseen, foretell, watched, workers_of
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.quantities import QuestionError, tree_of
@@ -22,17 +24,19 @@ from bisar_budget.report import Piece, Style, piece
 from bisar_budget.resources import cores
 
 if TYPE_CHECKING:
-    from bisar_budget.budget.check import Draws
+    from bisar_budget.cluster.scheduler import Workers
     from bisar_budget.design.cases import Cases, Grid
     from bisar_budget.front.results import CheckResult
     from bisar_budget.report.drawing.trades import Gathered
+    from bisar_budget.sampling.draws import Drawing, DrawsPiece, Share, Tally
 
 MAX_CASES = 40_000  # of a study: a page has no room for more
 MAX_KEYS = 2  # of a study: a drawing has no more axes
+_MANY_DRAWS = 1_000_000  # from which on it is measured how long they will take
+_FEW_DRAWS = 1 << 12  # of the first trial
+DAY_OF_RUN = "the day of the run"
 _CALLER = "the caller"
 _OPTION = "--sweep"
-
-Found = MissionFindings | UnusableMission
 
 
 # ---------------------------------------------------------------------- the day, and where it comes from
@@ -59,11 +63,17 @@ def day_of(given: str | dt.date | None) -> dt.date:
         raise ValueError(f"SOURCE_DATE_EPOCH must be seconds since 1970 (got {printable(epoch)!r})") from None
 
 
+def day_origin(given: str | dt.date | None, giver: str) -> str:
+    """Where the day of waivers comes from: who gives one, else the environment, else the clock."""
+    if given is not None:
+        return giver
+    return "environment, SOURCE_DATE_EPOCH" if os.environ.get("SOURCE_DATE_EPOCH") else DAY_OF_RUN
+
+
 def outside_of(model: str | None, given: str | dt.date | None) -> Outside:
     """Influences of a question's arguments on its verdict."""
     options = () if model is None else (Override("--model", model, _CALLER),)
-    origin = "environment, SOURCE_DATE_EPOCH" if os.environ.get("SOURCE_DATE_EPOCH") else "the day of the run"
-    return Outside(options, _CALLER if given is not None else origin, given is not None, _CALLER)
+    return Outside(options, day_origin(given, _CALLER), given is not None, _CALLER)
 
 
 # ---------------------------------------------------------------------- one mission
@@ -111,11 +121,9 @@ def check(
         mission = parse_mission(mission.data, mission.file, model, changes=mission.changes)
     found = check_mission(mission, today, outside=given)
     if monte_carlo is not None:
-        from bisar_budget.front.shared_work import drawn_by
         from bisar_budget.sampling.probability import monte_carlo as drawn
 
-        with drawn_by(None, 0, monte_carlo, seed) as draws:
-            found = found._replace(monte_carlo=draws and drawn(found.analysed(), *draws))
+        found = found._replace(monte_carlo=drawn(found.analysed(), *drawn_here(monte_carlo, seed)))
     if verify:
         found = cast("MissionFindings", with_images([found], today, is_illustrated=True)[0])
     if sweep:
@@ -182,6 +190,54 @@ def pieces(
     """Check files for a report that is joined of a text for each mission: no findings are kept."""
     keep = partial(piece, format_name=format_name, style=style)
     return check_files(files, today, model, keep, changes=changes, outside=outside)
+
+
+# ---------------------------------------------------------------------- draws
+def drawn_here(draws: int, seed: int | None) -> Draws:
+    """Draws that this process makes, seen by who waits."""
+    from bisar_budget.sampling.draws import in_turn
+
+    return Draws(draws, seed, partial(_watched, in_turn, None))
+
+
+@contextmanager
+def drawn_by(
+    scheduler: str | None, patience: int, draws: int | None, seed: int | None, files: int
+) -> "Iterator[Draws | None]":
+    """Say who makes the draws of so many files, the workers of a scheduler at hand; None where none are asked for."""
+    if draws is None:
+        yield None
+        return
+    from bisar_budget.sampling.draws import shared_out
+
+    with workers_of(scheduler, patience) as workers:
+        if workers is not None:
+            yield Draws(draws, seed, partial(_watched, partial(shared_out, mapped=workers.mapped), workers))
+        else:  # files that processes share out draw for themselves
+            yield Draws(draws, seed) if files >= MANY else drawn_here(draws, seed)
+
+
+def _watched(make: "Share", workers: "Workers | None", drawing: "Drawing") -> "Iterator[tuple[DrawsPiece, Tally]]":
+    """Pass on the pieces of draws that `make` gives; say how long they will take, and how far they are."""
+    from bisar_budget.sampling.draws import Drawer, DrawsPiece
+
+    if drawing.draws > _MANY_DRAWS and drawing.judged:
+        drawer = Drawer(drawing)
+
+        def trial(count: int) -> float:
+            began = perf_counter()
+            drawer.tally(DrawsPiece(0, count))
+            return perf_counter() - began
+
+        seconds = foreseen(drawing.draws, trial, _FEW_DRAWS, min(drawing.chunk, drawing.draws))
+        threads = max(workers.threads, 1) if workers else 1
+        foretell(seconds / threads, f"{drawing.draws:,} draws of {printable(drawing.name)}")
+    done = 0
+    with watched("Drawing errors") as told:
+        for piece, tally in make(drawing):
+            yield piece, tally
+            done += piece.stop - piece.start
+            told(done, drawing.draws)
 
 
 # ---------------------------------------------------------------------- images
@@ -288,11 +344,11 @@ def gathered(
     jobs: int | None = None,
 ) -> "Gathered":
     """Check all cases, and gather what a drawing needs, and some columns; `advance` is told how many are done."""
-    from bisar_budget.design.sweep import sweep
+    from bisar_budget.design.sweep import Asked
     from bisar_budget.report.drawing.trades import Gathered
     from bisar_budget.report.tables import Described
 
-    swept = sweep(mission, cases, columns=columns, model=model, today=today, jobs=jobs or cores())
+    swept = Asked(mission, cases, columns=columns, model=model, today=today).checked(jobs or cores())
     found = Gathered(Described(swept, cases, mission, __version__), ("binding_requirement", *columns))
     for part in swept.parts:
         found.add(part)

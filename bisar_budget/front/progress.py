@@ -1,8 +1,8 @@
-"""How long work will take, and how far it is: a bar in a notebook or a terminal, nothing elsewhere."""
+"""How long work will take, who shares it, and how far it is: a bar in a notebook or a terminal, nothing elsewhere."""
 
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from contextvars import ContextVar
 from importlib import import_module
 from importlib.util import find_spec
@@ -11,8 +11,10 @@ from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 from bisar_budget.faults import printable
+from bisar_budget.memory import OF_TABLES
 
 if TYPE_CHECKING:
+    from bisar_budget.cluster.scheduler import Workers
     from bisar_budget.workers import Progress
 
 LONG = 60.0  # s; what takes longer is announced
@@ -109,3 +111,20 @@ def foreseen(count: int, trial: Callable[[int], float], few: int, most: int) -> 
             break
     # Few take their time too, but not once more for each part of them all.
     return count * max((seconds - before) / (tried - tried / _LARGER), seconds / tried / 10)
+
+
+# ---------------------------------------------------------------------- who shares it
+def workers_of(scheduler: str | None, patience: int) -> "AbstractContextManager[Workers | None]":
+    """Give the workers of a scheduler, None where none is named; `patience` is how long it may have no worker. [s]"""
+    if scheduler is None:
+        return nullcontext()
+    from bisar_budget.cluster.scheduler import connected
+
+    return connected(scheduler, patience, SAYING.get())
+
+
+def hold_to_tables() -> None:
+    """Refuse to keep parts without the libraries that write them."""
+    from bisar_budget.cluster.parts_folder import check_libraries
+
+    check_libraries("--resume", OF_TABLES, "tables", "pyarrow")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.budget.waivers import overrides
 from bisar_budget.findings.requirement import Outside, Override
-from bisar_budget.front.checks import day_of, outside_of
+from bisar_budget.front.checks import day_of, drawn_here, outside_of
 from bisar_budget.front.missions import cases_of
 from bisar_budget.front.progress import FORMING, foretell, watched, watched_checks
 from bisar_budget.front.results import (
@@ -18,7 +18,6 @@ from bisar_budget.front.results import (
     SensitivityResult,
     SolveResult,
 )
-from bisar_budget.front.shared_work import drawn_by
 from bisar_budget.front.sweeps import SweepResult
 from bisar_budget.mission.given import text_of
 from bisar_budget.mission.load import load_mission
@@ -79,9 +78,7 @@ def sweep(
     """
     today, said = _judged(mission, model, date, outside)
     cases = cases_of(mission, values, paired) if isinstance(values, Mapping | str | os.PathLike) else values
-    found = SweepResult(mission, cases, tuple(columns), model, today, jobs or cores(), said)
-    found.asked()  # a question that cannot be asked is said here
-    return found
+    return SweepResult(mission, cases, tuple(columns), model, today, jobs or cores(), said)
 
 
 def solve(
@@ -301,6 +298,4 @@ def monte_carlo(mission: Mission, draws: int = 20_000, *, seed: int | None = Non
     ValueError
         So many draws cannot be made.
     """
-    with drawn_by(None, 0, draws, seed) as made:
-        assert made is not None  # draws are asked for
-        return MonteCarloResult(monte_carlo_of(Analysis(mission, is_whole=True), *made))
+    return MonteCarloResult(monte_carlo_of(Analysis(mission, is_whole=True), *drawn_here(draws, seed)))

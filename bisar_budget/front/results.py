@@ -4,7 +4,7 @@ import json
 import os
 from base64 import b64encode
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date
 from functools import cached_property
@@ -64,6 +64,11 @@ def frame_of(columns: Mapping[str, Any], library: str | None = None) -> Any:
     raise MissingPackageError(f"a data frame needs {' or '.join(wanted)}: pip install {wanted[0]}")
 
 
+def _frame_of_rows(rows: Sequence[Mapping[str, Any]], library: str | None) -> Any:
+    """A data frame of rows that are those of a document: its columns are the keys of the first."""
+    return frame_of({key: [row.get(key) for row in rows] for key in (rows[0] if rows else ())}, library)
+
+
 class Picture:
     """A drawing: a notebook shows it, `save` writes a file, `of` gives the content of one.
 
@@ -96,10 +101,6 @@ class Picture:
             raise ValueError(f"{os.fspath(path)}: the suffix must be one of .svg, .png, .pdf")
         with open(path, "wb") as file:
             file.write(self.of(kind))
-
-
-def _as_png(png: bytes, words: str) -> str:
-    return f'<img alt="{words}" src="data:image/png;base64,{b64encode(png).decode()}">'
 
 
 # ---------------------------------------------------------------------- a check
@@ -168,7 +169,7 @@ class CheckResult(Mapping[str, Row]):
         """
         (mission,) = self.to_dict()["missions"]
         rows = [{key: value for key, value in row.items() if key not in _NESTED} for row in mission["rows"]]
-        return frame_of({key: [row.get(key) for row in rows] for key in rows[0]}, library)
+        return _frame_of_rows(rows, library)
 
     def report(self, path: str | os.PathLike[str], detail: str = "summary") -> None:
         """Write a report, in the format of its suffix: .html, .md, .json, .csv, .xml, .sarif, .txt.
@@ -266,7 +267,9 @@ class _Answer:
         return sorted({*super().__dir__(), *dir(self.found)} - set(dir(tuple)))
 
     def _document(self) -> str:
-        raise NotImplementedError
+        from bisar_budget.report.formats.answers import as_json
+
+        return as_json(__version__, [self.found])
 
     def to_dict(self) -> dict[str, Any]:
         """The document of `--format json` of the command."""
@@ -291,11 +294,6 @@ class SolveResult(_Answer):
         if (parts := getattr(self.found, "parts", None)) is not None:
             return f"{len(self.complying)} of {len(parts)} parts comply"
         return "none" if self.value is None else f"{self.value:.6g} {self.unit}"
-
-    def _document(self) -> str:
-        from bisar_budget.report.formats.answers import as_json
-
-        return as_json(__version__, [self.found])
 
     def _repr_html_(self) -> str:
         found, rows = self.found, list[tuple[object, ...]]()
@@ -325,11 +323,6 @@ class SensitivityResult(_Answer):
         """The number that matters most, on one line."""
         first = self.found.slopes[0].key if self.found.slopes else "none"
         return f"<sensitivity of {self.found.name!r}: {len(self.found.slopes)} numbers, first {first}>"
-
-    def _document(self) -> str:
-        from bisar_budget.report.formats.answers import as_json
-
-        return as_json(__version__, [self.found])
 
     def plot(self) -> Picture:
         """The effects as bars."""
@@ -364,8 +357,7 @@ class AllocateResult(_Answer):
     def to_dataframe(self, library: str | None = None) -> Any:
         """The specifications as a data frame; numbers in SI, lists of three where axes differ."""
         (mission,) = self.to_dict()["missions"]
-        rows = mission["specifications"]
-        return frame_of({key: [row[key] for row in rows] for key in _SPECIFIED}, library)
+        return _frame_of_rows([{key: row[key] for key in _SPECIFIED} for row in mission["specifications"]], library)
 
     def _repr_html_(self) -> str:
         rows = [(one.key, one.text or "no limit") for one in self.found.specifications]
@@ -394,8 +386,7 @@ class VerifyResult(_Answer):
     def to_dataframe(self, library: str | None = None) -> Any:
         """The verdicts as a data frame."""
         (mission,) = self.to_dict()["missions"]
-        rows = mission["rows"]
-        return frame_of({key: [row.get(key) for row in rows] for key in rows[0]} if rows else {}, library)
+        return _frame_of_rows(mission["rows"], library)
 
     def _repr_html_(self) -> str:
         rows = [(row.id, row.boundary_error, row.unit, row.verdict) for row in self.found.rows]
@@ -446,8 +437,7 @@ class PassesResult(_Answer):
 
     def to_dataframe(self, library: str | None = None) -> Any:
         """The passes as a data frame; angles in radians, lengths in metres, times as texts of UTC."""
-        rows = self.to_dict()["passes"]
-        return frame_of({key: [row.get(key) for row in rows] for key in rows[0]} if rows else {}, library)
+        return _frame_of_rows(self.to_dict()["passes"], library)
 
     def plot(self) -> Picture:
         """Tracks in the sky, and resolutions over time."""
@@ -516,6 +506,5 @@ class SimulateResult:
         return Picture(self._mission.name, lambda kind: drawn(self.images, self._mission.name, kind))
 
     def _repr_html_(self) -> str:
-        from bisar_budget.report.drawing.point_plot import drawn
-
-        return notebook.page(_as_png(drawn(self.images, self._mission.name, "png"), "images of a point"))
+        drawn = b64encode(self.plot().of("png")).decode()
+        return notebook.page(f'<img alt="images of a point" src="data:image/png;base64,{drawn}">')

@@ -1,8 +1,8 @@
 """A mission checked in many cases: a table, a drawing, a line that says how many comply."""
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import dataclass, field, replace
 from datetime import date
 from functools import cached_property, partial
@@ -14,15 +14,13 @@ import numpy as np
 from bisar_budget import __version__, notebook
 from bisar_budget.design.cases import Cases, some_of
 from bisar_budget.design.sweep import Asked, Block, part_of
-from bisar_budget.design.sweep import sweep as swept_by
 from bisar_budget.design.table import Part, Question, Swept
-from bisar_budget.faults import printable
+from bisar_budget.faults import ClusterError, printable
 from bisar_budget.findings.requirement import Override
 from bisar_budget.findings.status import complying
 from bisar_budget.front import progress
 from bisar_budget.front.checks import gathered
 from bisar_budget.front.results import MissingPackageError, Picture, frame_of
-from bisar_budget.front.shared_work import kept
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.quantities import QuestionError
 from bisar_budget.report.drawing.trades import Gathered, check_plot, uses_of_rows
@@ -58,6 +56,10 @@ class SweepResult:
     is_resumed: bool = False
     statuses: Counter[str] = field(default_factory=Counter)
 
+    def __post_init__(self) -> None:
+        """Ask: what cannot be asked is said here."""
+        self.asked = Asked(self.mission, self.cases, columns=self.more, model=self.model, today=self.day)
+
     def __repr__(self) -> str:
         """Keys, number of cases and how many comply, on one line."""
         return f"<sweep of {self.mission.name!r} over {self._keys(', ')}: {self.summary}>"
@@ -66,11 +68,6 @@ class SweepResult:
         return between.join(one.key for one in self.cases.varied)
 
     # ------------------------------------------------------------------ cases, as they are checked
-    def asked(self, more: Sequence[str] = ()) -> Asked:
-        """The question, with some columns more than its own."""
-        columns = (*self.more, *more)
-        return Asked(self.mission, self.cases, columns=columns, model=self.model, today=self.day)
-
     def foreseen(self) -> float:
         """About how long the cases take; 0 where there are few. [s]"""
         if self.cases.count <= _MANY:
@@ -78,30 +75,63 @@ class SweepResult:
 
         def trial(some: int) -> float:
             few = some_of(self.cases, some)
-            parts = swept_by(self.mission, few, columns=self.more, model=self.model, today=self.day).parts
+            asked = Asked(self.mission, few, columns=self.more, model=self.model, today=self.day)
+            parts = asked.checked().parts
             began = perf_counter()
             for _ in parts:
                 pass
             return perf_counter() - began
 
         seconds = progress.foreseen(self.cases.count, trial, _FEW, self.cases.count)
-        if self.asked().chunks().is_slow:  # else processes are no faster than arrays
+        if self.asked.chunks.is_slow:  # else processes are no faster than arrays
             seconds /= self.workers.threads if self.workers else min(self.jobs, cores())
         return seconds
 
     @contextmanager
-    def checked(self, more: Sequence[str] = ()) -> Iterator[tuple[Described, Iterator[Part]]]:
+    def checked(self) -> Iterator[tuple[Described, Iterator[Part]]]:
         """Give the table and its parts, each checked as it is asked for; a bar shows it, where somebody watches."""
-        asked = self.asked(more)
         found: AbstractContextManager[Swept]
         if self.beside is None:
-            chunks = asked.chunks()
-            found = nullcontext(asked.swept(asked.shared_out(chunks, chunks.starts, self.jobs)))
+            found, label = nullcontext(self.asked.checked(self.jobs)), "Checking cases"
         else:
-            found = kept(asked, self.beside, self.jobs, self.workers, is_resumed=self.is_resumed)
-        label = "Checking cases" if self.beside is None else "Writing"
+            found, label = self._kept(f"{self.beside}.parts"), "Writing"
         with found as swept, progress.watched(label) as told:
             yield self._described(swept), self._counted(swept.parts, told)
+
+    @contextmanager
+    def _kept(self, path: str) -> Iterator[Swept]:
+        """Give the sweep when all its parts are kept in a folder, and take them away when the table is written.
+
+        Workers of a scheduler find them, or processes here. What ends it before leaves the parts, and says how to go
+        on.
+        """
+        from bisar_budget.cluster.parts_folder import parts_folder, question_of
+
+        asked, chunks, say = self.asked, self.asked.chunks, progress.SAYING.get()
+        question = question_of(asked)
+        with parts_folder(path, question, chunks, is_resumed=self.is_resumed) as folder:
+
+            def said() -> str:
+                return f"{len(folder.done)} of {len(chunks.starts)} parts"
+
+            try:
+                if folder.done:
+                    say(f"{folder.path} has {said()}.")
+                left = [start for start in chunks.starts if start not in folder.done]
+                done = sum(chunks.stop(start) - start for start in folder.done)
+                with progress.watched("Checking cases") as told:
+                    for part in asked.shared_out(left, self.jobs, self.workers.mapped if self.workers else None):
+                        folder.put(part)
+                        done += part.stop - part.start
+                        told(done, self.cases.count)
+                yield asked.swept(folder.parts(chunks.starts))
+            except BaseException:
+                with suppress(ClusterError, OSError):
+                    folder.find(chunks, True)  # Ctrl-C may come between a part's rename and its note
+                dated = f" --date {question['--date was']}" if question["--date was"] else ""
+                say(f"{folder.path} keeps {said()}; the same command with --resume{dated} goes on from there.")
+                raise
+            folder.remove()
 
     def _described(self, swept: Swept) -> Described:
         return Described(swept, self.cases, self.mission, __version__, self.overrides)
@@ -181,7 +211,9 @@ class SweepResult:
 
     def to_dataframe(self, library: str | None = None) -> Any:
         """The table as a data frame of pandas, or of polars: what `sweep` writes as CSV."""
-        return frame_of({name: _plain(values) for name, values in self.columns.items()}, library)
+        columns = self.columns.items()
+        plain = {name: values.tolist() if values.dtype == object else values for name, values in columns}
+        return frame_of(plain, library)
 
     def to_xarray(self, chunks: Any = None) -> Any:
         """The table as `xarray.Dataset`, a dimension for each key, with units and long names (CF).
@@ -201,7 +233,7 @@ class SweepResult:
         """
         if chunks is None:
             return dataset(self._table, self.columns)
-        found = dataset(self._described(self.asked().swept(iter(()))), self._later())
+        found = dataset(self._described(self.asked.swept(iter(()))), self._later())
         sizes = (
             {} if chunks == "auto" else chunks if isinstance(chunks, Mapping) else dict.fromkeys(found.dims, chunks)
         )
@@ -219,9 +251,8 @@ class SweepResult:
             from dask.utils import SerializableLock
         except ImportError:
             raise MissingPackageError("chunks need Dask: pip install dask") from None
-        asked = self.asked()
-        table, chunks = self._described(asked.swept(iter(()))), asked.chunks()
-        common = delayed((asked.travelling, table, SerializableLock()), pure=False)
+        table, chunks = self._described(self.asked.swept(iter(()))), self.asked.chunks
+        common = delayed((self.asked.travelling, table, SerializableLock()), pure=False)
         columns: dict[str, list[Any]] = {column.name: [] for column in table.columns}
         for start in chunks.starts:
             stop = chunks.stop(start)
@@ -275,8 +306,3 @@ def percentage(some: int, of: int) -> str:
     if some in (0, of):
         return "100 %" if some else "0 %"
     return f"{min(max(100 * some / of, 0.1), 99.9):.3g} %"
-
-
-def _plain(values: Any) -> Any:
-    """Texts as a list, numbers as they are."""
-    return values.tolist() if values.dtype == object else values

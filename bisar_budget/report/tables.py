@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from bisar_budget.design.cases import Cases, Grid, in_unit
-from bisar_budget.design.table import Column, Part, Swept, Values
+from bisar_budget.design.cases import Cases, Grid, Values, in_unit
+from bisar_budget.design.table import Column, Part, Swept
 from bisar_budget.faults import changes_words, printable
 from bisar_budget.findings.requirement import Override
 from bisar_budget.findings.status import STATUS

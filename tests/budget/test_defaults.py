@@ -13,7 +13,7 @@ import yaml
 
 from bisar_budget.budget.check import check_mission
 from bisar_budget.design.cases import grid_of
-from bisar_budget.design.sweep import sweep
+from bisar_budget.design.sweep import Asked
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import mission_schema
@@ -97,7 +97,7 @@ def test_a_sweep_judges_such_a_file_likewise() -> None:
     mission = parse_mission(text_of(receiver={"velocity": "1 cm/s"}))
     cases = grid_of(tree_of(mission), {"collection.aperture_time": [3.0, 6.0]})
     column = "receiver.quadratic_phase_error.utilization"
-    (part,) = sweep(mission, cases, columns=[column], today=TODAY).parts
+    (part,) = Asked(mission, cases, columns=[column], today=TODAY).checked().parts
     one = row(check_mission(mission, TODAY), "receiver.quadratic_phase_error")
     assert part.values[column][1] == pytest.approx(one.utilization, rel=1e-9)
 

@@ -15,7 +15,7 @@ pytest.importorskip("pyarrow")
 
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.cluster.scheduler import Workers, connected
-from bisar_budget.front import progress, shared_work
+from bisar_budget.front import checks, progress
 from bisar_budget.mission.load import load_mission
 from bisar_budget.sampling import draws as drawing
 from bisar_budget.sampling.draws import Drawing, in_turn, joined, shared_out
@@ -134,7 +134,7 @@ def test_a_terminal_has_a_bar() -> None:
 
 def test_how_long_many_draws_take(run, monkeypatch: pytest.MonkeyPatch) -> None:
     """By the time of some of them, shared by as many threads as there are."""
-    monkeypatch.setattr(shared_work, "_MANY", 10_000)
+    monkeypatch.setattr(checks, "_MANY_DRAWS", 10_000)
     monkeypatch.setattr(progress, "_TRIAL", 0.001)
     monkeypatch.setattr(progress, "LONG", 0.0)
     found = run("check", "-q", DRONES, "--monte-carlo", "20e3")

@@ -63,7 +63,7 @@ def test_words_of_cases_are_part_of_the_question() -> None:
 
     def question(text: str) -> Mapping[str, str]:
         asked = Asked(mission, grid(tree_of(mission), [text, f"{TIME}=1,2s"]), today=date(2026, 1, 1))
-        return question_of(asked, asked.chunks())
+        return question_of(asked)
 
     one, other = question("allocation.model=published,full"), question("allocation.model=full,published")
     assert one["the cases were"] == f"4 of allocation.model, {TIME}"
@@ -178,9 +178,9 @@ def test_a_sweep_goes_on_with_what_is_not_done(run, ended, monkeypatch: pytest.M
     shared_out = Asked.shared_out
     left: list[int] = []
 
-    def watched(self: Asked, chunks: Any, starts: Any, *arguments: Any) -> Iterator[Part]:
+    def watched(self: Asked, starts: Any, *arguments: Any) -> Iterator[Part]:
         left.extend(starts)
-        return shared_out(self, chunks, starts, *arguments)
+        return shared_out(self, starts, *arguments)
 
     monkeypatch.setattr(Asked, "shared_out", watched)
     found = run("sweep", SECTION_V, *ASKED, "-o", str(output), "--resume")

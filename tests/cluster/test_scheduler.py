@@ -22,7 +22,7 @@ from bisar_budget import __version__
 from bisar_budget.cli import cli
 from bisar_budget.cli.streams import complain
 from bisar_budget.cluster import scheduler
-from bisar_budget.cluster.scheduler import UnlikeWorkerError, Workers
+from bisar_budget.cluster.scheduler import Workers
 from bisar_budget.design import sweep
 from bisar_budget.design.cases import grid
 from bisar_budget.design.sweep import Asked, Chunks, part_of
@@ -264,9 +264,11 @@ class Client:
         self.is_cancelled = True
 
 
-def asked() -> Asked:
+def asked(cases: int) -> Asked:
     mission = load_mission(SECTION_V)
-    return Asked(mission, grid(tree_of(mission), [f"{TIME}=1:2s:1000"]), today=date(2026, 1, 1))
+    found = Asked(mission, grid(tree_of(mission), [f"{TIME}=1:2s:1000"]), today=date(2026, 1, 1))
+    found.chunks = Chunks(cases, 64, True)
+    return found
 
 
 @pytest.mark.parametrize(
@@ -274,15 +276,15 @@ def asked() -> Asked:
     [
         (ValueError("a matrix\nis singular"), RuntimeError, "^cases 64 to 127, on a worker: ValueError: a matrix$"),
         (ModuleNotFoundError("No module named 'x'"), ClusterError, "on a worker: ModuleNotFoundError: No module"),
-        (UnlikeWorkerError("worker w has another"), ClusterError, "^cases 64 to 127: worker w has another$"),
-        (UnlikeWorkerError("worker w cannot use"), ClusterError, "^cases 64 to 127: worker w cannot use$"),
+        (ClusterError("worker w has another"), ClusterError, "^cases 64 to 127: worker w has another$"),
+        (ClusterError("worker w cannot use"), ClusterError, "^cases 64 to 127: worker w cannot use$"),
     ],
 )
 def test_what_a_worker_raises_is_said_once(error: BaseException, kind: type[Exception], said: str) -> None:
     client = Client(error)
     workers = Workers(client, "tcp://a:0", 30, pytest.fail)
     with pytest.raises(kind, match=said):
-        list(asked().shared_out(Chunks(1000, 64, True), [64], 1, workers.mapped))
+        list(asked(1000).shared_out([64], 1, workers.mapped))
     assert workers.threads == 3
     assert client.is_cancelled
 
@@ -293,7 +295,7 @@ def test_what_ended_every_worker_that_had_it_is_said() -> None:
     error = KilledWorker("chunk", SimpleNamespace(address="tcp://b:1"), 3)
     workers = Workers(Client(error), "tcp://a:0", 30, pytest.fail)
     with pytest.raises(ClusterError, match=r"^cases 64 to 99 ended 4 workers, the last of them tcp://b:1, as when"):
-        list(asked().shared_out(Chunks(100, 64, True), [64], 1, workers.mapped))
+        list(asked(100).shared_out([64], 1, workers.mapped))
 
 
 def test_a_cluster_may_shrink(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from bisar_budget.budget.check import check_mission
 from bisar_budget.design.allocate import SpecificationSheet, allocate
 from bisar_budget.design.row_uses import SpecifiedMission
-from bisar_budget.design.specified import Specified, specified_errors, usual_keys
-from bisar_budget.design.suitable_parts import catalogue, suitable_parts
+from bisar_budget.design.specified import Specified, catalogue, specified_errors, suitable_parts, usual_keys
 from bisar_budget.design.table import Variation
 from bisar_budget.faults import SetValue
 from bisar_budget.findings.mission import MissionFindings
@@ -247,9 +246,9 @@ def test_an_oscillator_keeps_to_a_level_where_its_noise_is_nowhere_above_the_spe
     file = mission(platforms__receiver__oscillator={"power_law": {"h-1": 1e-25}})
     of = SpecifiedMission(file, {"platforms.receiver.oscillator.level": 1.0}, 0.0, None, DAY)
     floor = 10 * math.log10((8e-14) ** 2 / (2 * math.log(2)) / 1e-25)
-    (one,), among = of.specified, catalogue(of)
-    assert "bva" in suitable_parts(of, one, floor + 0.01, among)
-    assert "bva" not in suitable_parts(of, one, floor - 0.01, among)
+    (one,), among = of.specified, catalogue(of.stated)
+    assert "bva" in suitable_parts(of.stated, one, floor + 0.01, among)
+    assert "bva" not in suitable_parts(of.stated, one, floor - 0.01, among)
 
 
 def test_an_oscillator_that_says_nothing_of_some_offsets_keeps_to_none() -> None:
@@ -259,7 +258,7 @@ def test_an_oscillator_that_says_nothing_of_some_offsets_keeps_to_none() -> None
         file = mission(platforms__receiver__oscillator=mask)
         of = SpecifiedMission(file, {"platforms.receiver.oscillator.level": 1.0}, 0.0, None, DAY)
         (one,) = of.specified
-        assert ("bva" in suitable_parts(of, one, 0.0, catalogue(of))) == is_told
+        assert ("bva" in suitable_parts(of.stated, one, 0.0, catalogue(of.stated))) == is_told
 
 
 @given(

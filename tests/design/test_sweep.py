@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from bisar_budget.budget.check import check_mission
 from bisar_budget.design.cases import CaseTable, Grid, sample
 from bisar_budget.design.cases import grid as cases_of
-from bisar_budget.design.sweep import sweep
+from bisar_budget.design.sweep import Asked
 from bisar_budget.design.table import breaking
 from bisar_budget.faults import MissionError, SetValue
 from bisar_budget.mission.changes import apply_changes
@@ -43,7 +43,7 @@ def grid(mission, **axes) -> Grid:
 
 def swept(mission, cases, columns=(), model=None, jobs=1):
     """Every column of a sweep, whole."""
-    found = sweep(mission, cases, columns=columns, model=model, today=DAY, jobs=jobs)
+    found = Asked(mission, cases, columns=columns, model=model, today=DAY).checked(jobs)
     parts = list(found.parts)
     assert [part.start for part in parts] == [0, *(part.stop for part in parts[:-1])]
     assert parts[-1].stop == found.count == cases.count
@@ -645,7 +645,7 @@ def test_processes_find_the_same(monkeypatch) -> None:
 def test_columns_that_are_not_there(column, says) -> None:
     mission = load_mission(str(MISSIONS / "rigling_moses_section_v.yaml"))
     with pytest.raises(QuestionError, match="--column") as error:
-        sweep(mission, grid(mission, collection__aperture_time=[1.0]), columns=[column], today=DAY)
+        Asked(mission, grid(mission, collection__aperture_time=[1.0]), columns=[column], today=DAY)
     assert says in str(error.value)
 
 
@@ -661,7 +661,7 @@ def test_a_column_that_is_named_twice_is_there_once() -> None:
     """A Parquet file had it twice, which its readers refuse."""
     mission = load_mission(str(MISSIONS / "rigling_moses_section_v.yaml"))
     names = ["transmitter.acceleration.x.margin", "timing.linear.margin", "transmitter.acceleration.x.margin"]
-    found = sweep(mission, grid(mission, collection__aperture_time=[1.0]), columns=names, today=DAY)
+    found = Asked(mission, grid(mission, collection__aperture_time=[1.0]), columns=names, today=DAY).checked()
     assert [one.name for one in found.columns if one.name.endswith("margin")] == names[:2]
 
 
@@ -670,7 +670,7 @@ def test_a_key_that_makes_no_mission_whatever_its_value_is_refused() -> None:
     mission = load_mission(str(MISSIONS / "uav_pair_l_band.yaml"))
     cases = grid(mission, platforms__receiver__azimuth=np.linspace(0, 6, 7))
     with pytest.raises(QuestionError, match=r"no value of it makes a mission: .* mixes position with azimuth"):
-        sweep(mission, cases, today=DAY)
+        Asked(mission, cases, today=DAY)
 
 
 def test_a_fixed_platform_has_no_direction_to_fly_in() -> None:
@@ -738,7 +738,8 @@ class TestWords:
         mission = load_mission(str(MISSIONS / "rigling_moses_section_v.yaml"))
         key = "platforms.receiver.motion_error.sensor"
         cases = cases_of(tree_of(mission), [f"{key}=stim300,mosaic-x5-rtk"])
-        (part,) = sweep(mission, cases, columns=["receiver.imu.accelerometer_bias.utilization"], today=DAY).parts
+        asked = Asked(mission, cases, columns=["receiver.imu.accelerometer_bias.utilization"], today=DAY)
+        (part,) = asked.checked().parts
         use = part.values["receiver.imu.accelerometer_bias.utilization"]
         assert np.isfinite(use).tolist() == [True, False]
 
@@ -786,15 +787,15 @@ class TestWords:
     def test_what_no_number_can_mend_is_said_at_once(self, text: str, said: str) -> None:
         mission = load_mission(str(MISSIONS / "rigling_moses_section_v.yaml"))
         with pytest.raises(QuestionError, match=said):
-            sweep(mission, cases_of(tree_of(mission), [f"platforms.receiver.{text}"]), today=DAY)
+            Asked(mission, cases_of(tree_of(mission), [f"platforms.receiver.{text}"]), today=DAY)
 
     def test_a_word_that_lacks_another_key_says_which(self) -> None:
         mission = load_mission(str(MISSIONS / "rigling_moses_section_v.yaml"))
         with pytest.raises(QuestionError, match=r"method=linear: synchronization\.\w+ is missing"):
-            sweep(mission, cases_of(tree_of(mission), ["synchronization.method=linear"]), today=DAY)
+            Asked(mission, cases_of(tree_of(mission), ["synchronization.method=linear"]), today=DAY)
 
     def test_a_model_of_the_command_leaves_none_to_compare(self) -> None:
         mission = load_mission(str(MISSIONS / "rigling_moses_section_v.yaml"))
         cases = cases_of(tree_of(mission), ["allocation.model=full"])
         with pytest.raises(QuestionError, match="--model stands in for it"):
-            sweep(mission, cases, model="full", today=DAY)
+            Asked(mission, cases, model="full", today=DAY)
