@@ -127,7 +127,11 @@ def passes(
     from bisar_budget.mission.quantities import QuestionError
 
     judged_on = day(today)
-    least, wanted = _angle("--min-elevation", min_elevation, 0.0), _angle("--squint", squint, -90.0)
+    try:
+        least = questions.angle_of("--min-elevation", min_elevation, 0.0)
+        wanted = questions.angle_of("--squint", squint, -90.0)
+    except QuestionError as error:
+        raise click.UsageError(str(error)) from None
     (loaded,) = read_all([partial(load_mission, mission, model, changes, is_placed=False)])
     try:
         found = questions.passes(
@@ -153,19 +157,6 @@ def passes(
         write_file(plot, found.plot().of(os.path.splitext(plot)[1][1:].lower()))
     deliver(_written(found.found, format_name, output, judged_on), output, format_name)
     sys.exit(0 if found.complying else EXIT_BROKEN)
-
-
-def _angle(option: str, text: str, least: float) -> float:
-    """An angle of an option, from a least one to less than 90 deg. [rad]"""
-    from bisar_budget import units
-    from bisar_budget.faults import InvalidValueError, closed, shown
-    from bisar_budget.mission.readers import Quantity
-
-    bounds = {"ge": 0.0} if least == 0 else {"gt": math.radians(least)}
-    try:
-        return Quantity(units.ANGLE, lt=math.pi / 2, **bounds).leaf(text)
-    except InvalidValueError as error:
-        raise click.UsageError(f"{option} {shown(text)}: {closed(error.problem.words)}") from None
 
 
 def _written(found: "Passes", format_name: str, output: str | None, stamp: date) -> str:

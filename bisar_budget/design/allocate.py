@@ -206,6 +206,8 @@ class _SizeSearch:
             if over <= 1:
                 break
             sizes = np.where(near.is_free, sizes, sizes / (over * (1 + _CLOSE)))
+        else:
+            used = self._used(near, sizes)
         some, limits = ~near.is_free, near.is_limit
         whole = (near.allowed**near.found.powers)[limits]
         parts, multipliers = near.part[limits] / whole[:, None], np.zeros(whole.size)

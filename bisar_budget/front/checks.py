@@ -51,7 +51,10 @@ def day_of(given: str | dt.date | None) -> dt.date:
     if isinstance(given, dt.datetime):
         return given.date()
     if given is not None:
-        return given if isinstance(given, dt.date) else dt.date.fromisoformat(given)
+        try:
+            return given if isinstance(given, dt.date) else dt.date.fromisoformat(given)
+        except (TypeError, ValueError):
+            raise ValueError(f"no day (got {printable(str(given))!r}); accepted: 2026-12-31") from None
     epoch = os.environ.get("SOURCE_DATE_EPOCH")
     if not epoch:
         return dt.datetime.now(dt.UTC).date()

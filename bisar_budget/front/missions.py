@@ -103,6 +103,8 @@ def cases_of(mission: Mission, values: Mapping[str, Any] | str | os.PathLike[str
     """
     if not isinstance(values, Mapping):
         return table_file(tree_of(mission), os.fspath(values))
+    if not values:
+        raise QuestionError("no key varies; accepted: values of one key or more")
     found = grid_of(mission, values)
     if not paired:
         return found

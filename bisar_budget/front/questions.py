@@ -1,12 +1,15 @@
 """Questions of a mission that are answered by many checks: sweeps, solutions, specifications, passes, draws."""
 
 import datetime as dt
+import math
 import os
 from collections.abc import Mapping, Sequence
+from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.budget.waivers import overrides
+from bisar_budget.faults import InvalidValueError, closed, printable, shown
 from bisar_budget.findings.requirement import Outside, Override
 from bisar_budget.front.checks import day_of, drawn_here, outside_of
 from bisar_budget.front.missions import cases_of
@@ -21,11 +24,12 @@ from bisar_budget.front.results import (
 from bisar_budget.front.sweeps import SweepResult
 from bisar_budget.mission.given import text_of
 from bisar_budget.mission.load import load_mission
-from bisar_budget.mission.model import Mission
+from bisar_budget.mission.model import GATING_MODELS, Mission
 from bisar_budget.mission.quantities import QuestionError
+from bisar_budget.mission.readers import Quantity
 from bisar_budget.resources import cores
 from bisar_budget.sampling.probability import monte_carlo as monte_carlo_of
-from bisar_budget.units import ANGLE, parse_quantity
+from bisar_budget.units import ANGLE
 
 if TYPE_CHECKING:
     from bisar_budget.design.cases import Cases
@@ -33,10 +37,15 @@ if TYPE_CHECKING:
     from bisar_budget.design.solve import Solution
 
 
+TARGETS = ("fail", "warn")  # what must not happen
+
+
 def _judged(
     mission: Mission, model: str | None, date: str | dt.date | None, outside: Outside | None
 ) -> tuple[dt.date, tuple[Override, ...]]:
     """Day on which waivers are judged, and what from outside the file bears on the verdict."""
+    if model not in (None, *GATING_MODELS):
+        raise QuestionError(f"--model {printable(str(model))}: accepted: {', '.join(GATING_MODELS)}")
     today = day_of(date)
     return today, overrides(mission, outside or outside_of(model, date), today)
 
@@ -46,7 +55,7 @@ def sweep(
     values: "Mapping[str, Any] | str | os.PathLike[str] | Cases",
     *,
     paired: bool = False,
-    columns: Sequence[str] = (),
+    columns: str | Sequence[str] = (),
     model: str | None = None,
     date: str | dt.date | None = None,
     jobs: int | None = None,
@@ -64,7 +73,7 @@ def sweep(
         Or the path of a CSV file, whose header has a `KEY [unit]` for each column.
     paired : bool
         Each case takes one value of every key, instead of every combination.
-    columns : sequence of str
+    columns : str or sequence of str
         Columns more, `ROW.FIELD` such as `receiver.velocity.x.allowable`.
     model, date, outside
         As of `check`.
@@ -78,7 +87,8 @@ def sweep(
     """
     today, said = _judged(mission, model, date, outside)
     cases = cases_of(mission, values, paired) if isinstance(values, Mapping | str | os.PathLike) else values
-    return SweepResult(mission, cases, tuple(columns), model, today, jobs or cores(), said)
+    more = (columns,) if isinstance(columns, str) else tuple(columns)
+    return SweepResult(mission, cases, more, model, today, jobs or cores(), said)
 
 
 def solve(
@@ -126,6 +136,8 @@ def solve(
     from bisar_budget.design.solve import solve as solved
 
     today, said = _judged(mission, model, date, outside)
+    if target not in TARGETS:
+        raise QuestionError(f"--target {printable(str(target))}: accepted: {' or '.join(TARGETS)}")
     if between is not None and not isinstance(between, str):
         between = "..".join(text_of("", one) for one in between)
     how: dict[str, Any] = {"row": row, "target": target, "model": model, "today": today}
@@ -187,7 +199,7 @@ def sensitivity(
 
 def allocate(
     mission: Mission,
-    keys: Sequence[str] | Mapping[str, float] | None = None,
+    keys: str | Sequence[str] | Mapping[str, float] | None = None,
     *,
     reserve: float | None = None,
     offer: Mission | None = None,
@@ -201,8 +213,9 @@ def allocate(
     ----------
     mission : Mission
         As of `check`.
-    keys : sequence or mapping, optional
-        Keys of the errors to specify, or their weights; omitted: `allocation.specify` of the file, else the usual.
+    keys : str, sequence or mapping, optional
+        Keys of the errors to specify, or of each its weight, above 0; omitted: `allocation.specify` of the file, else
+        the usual.
     reserve : float, optional
         Part of every limit that is kept free, 0 to 1; omitted: what `allocation.warn_above` leaves.
     offer : Mission, optional
@@ -219,11 +232,23 @@ def allocate(
     from bisar_budget.design.offers import offer as offered
 
     today, said = _judged(mission, model, date, outside)
-    wanted = keys if keys is None or isinstance(keys, Mapping) else dict.fromkeys(keys, 1.0)
+    if reserve is not None and not 0 <= reserve < 1:
+        raise QuestionError(f"--reserve {100 * reserve:g} %: accepted: from 0 to less than 100 %")
+    wanted = _weighted([keys] if isinstance(keys, str) else keys)
     with watched_checks(mission.name) as progress:
         found = allocated(mission, keys=wanted, reserve=reserve, model=model, today=today, progress=progress)
     found = found._replace(overrides=said)
     return AllocateResult(found, None if offer is None else offered(found, offer, today))
+
+
+def _weighted(keys: Sequence[str] | Mapping[str, float] | None) -> Mapping[str, float] | None:
+    """Weights of the errors to specify, by their keys."""
+    if not isinstance(keys, Mapping):
+        return keys if keys is None else dict.fromkeys(keys, 1.0)
+    for key, weight in keys.items():
+        if not (isinstance(weight, Real) and 0 < weight < math.inf):
+            raise QuestionError(f"--for {printable(key)}: has the weight {weight!r}; accepted: a number above 0")
+    return keys
 
 
 def passes(
@@ -265,7 +290,7 @@ def passes(
 
     asked = mission if isinstance(mission, Mission) else load_mission(os.fspath(mission), is_placed=False)
     today, said = _judged(asked, model, date, outside)
-    least, wanted = (parse_quantity(text_of("rad", one), ANGLE) for one in (min_elevation, squint))
+    least, wanted = angle_of("--min-elevation", min_elevation, 0.0), angle_of("--squint", squint, -90.0)
     with watched("Checking passes") as progress:
         found = listed(
             asked,
@@ -279,6 +304,22 @@ def passes(
             progress=progress,
         )
     return PassesResult(found._replace(overrides=said), asked, model)
+
+
+def angle_of(option: str, value: Any, least: float) -> float:
+    """An angle that an option asks for, from a least one [deg] to less than 90 deg. [rad]
+
+    Raises
+    ------
+    QuestionError
+        It is none.
+    """
+    bounds = {"ge": 0.0} if least == 0 else {"gt": math.radians(least)}
+    text = text_of("rad", value)
+    try:
+        return Quantity(ANGLE, lt=math.pi / 2, **bounds).leaf(text)
+    except InvalidValueError as error:
+        raise QuestionError(f"{option} {shown(text)}: {closed(error.problem.words)}") from None
 
 
 def monte_carlo(mission: Mission, draws: int = 20_000, *, seed: int | None = None) -> MonteCarloResult:

@@ -300,6 +300,9 @@ def _form_of_split(value: Any) -> Reader:
     return SHARES if value.keys().isdisjoint(METRIC_SPLITS.keys) else METRIC_SPLITS
 
 
+GATING_MODELS = ("published", "full", "strictest")
+
+
 class AllocationRules(NamedTuple):
     """How the budget is divided and which model gates."""
 
@@ -320,7 +323,7 @@ class AllocationRules(NamedTuple):
     model: Annotated[
         str,
         Key(
-            Choice("published", "full", "strictest"),
+            Choice(*GATING_MODELS),
             "The model that gates: full: exact ranges; published: the paper's; strictest: the stricter for each row.",
         ),
     ] = "full"

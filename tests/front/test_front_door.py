@@ -3,8 +3,10 @@
 import csv
 import io
 import json
+import re
 import subprocess
 import sys
+from collections.abc import Callable
 from datetime import date
 from pathlib import Path
 from typing import Any
@@ -447,9 +449,7 @@ def test_a_report_has_what_was_asked_besides(tmp_path: Path) -> None:
 
 
 def test_a_report_of_a_result_has_the_sheet_of_specifications(tmp_path: Path) -> None:
-    specified = bb.load(MISSIONS / "tandem_x.yaml").replace(
-        {"allocation.specify": "{platforms.receiver.motion_error.velocity: 1}"}
-    )
+    specified = bb.load(TANDEM_X).replace({"allocation.specify": "{platforms.receiver.motion_error.velocity: 1}"})
     bb.check(specified).report(tmp_path / "r.html")
     assert "Specifications" in (tmp_path / "r.html").read_text(encoding="utf-8")
 
@@ -528,3 +528,44 @@ def test_a_day_from_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
     assert day_of("2026-01-02") == day_of(date(2026, 1, 2)) == date(2026, 1, 2)
     with pytest.raises(ValueError, match="tomorrow"):
         day_of("tomorrow")
+
+
+@pytest.mark.parametrize(
+    ("ask", "said"),
+    [
+        (lambda m: bb.sweep(m, {}), "no key varies"),
+        (lambda m: bb.sweep(m, {}, paired=True), "no key varies"),
+        (
+            lambda m: bb.sweep(m, {TIME: [1.0]}, model="other"),
+            "--model other: accepted: published",
+        ),
+        (lambda m: bb.solve(m, TIME, target="pass"), "--target pass: accepted: fail or warn"),
+        (lambda m: bb.solve(m, TIME, model="other"), "--model other: "),
+        (lambda m: bb.allocate(m, reserve=1.0), "--reserve 100 %: accepted: from 0 to less than 100 %"),
+        (lambda m: bb.allocate(m, reserve=-0.1), "--reserve -10 %: "),
+        (lambda m: bb.allocate(m, {"timing_error.linear": 0.0}), "--for timing_error.linear: has the weight 0.0"),
+        (lambda m: bb.passes(m, min_elevation="90 deg"), "--min-elevation 90 deg: must be less than 90 deg"),
+        (lambda m: bb.passes(m, min_elevation="-1 deg"), "--min-elevation -1 deg: must be at least 0 deg"),
+        (lambda m: bb.passes(m, squint="-90 deg"), "--squint -90 deg: must be greater than -90 deg"),
+        (lambda m: bb.passes(m, squint="steep"), "--squint steep: must be an angle"),
+        (lambda m: bb.passes(m, model="other"), "--model other: "),
+    ],
+)
+def test_python_refuses_what_the_command_refuses(ask: Callable[[bb.Mission], object], said: str) -> None:
+    """An empty sweep and an unknown model were errors of indexing; the others were answered."""
+    with pytest.raises(bb.QuestionError, match=re.escape(said)):
+        ask(bb.load(TANDEM_X))
+
+
+def test_a_day_that_is_none_is_refused_by_its_words() -> None:
+    with pytest.raises(ValueError, match=re.escape("no day (got '31.12.2026'); accepted: 2026-12-31")):
+        bb.check(bb.load(TANDEM_X), date="31.12.2026")
+
+
+def test_one_key_to_specify_and_one_column_are_words() -> None:
+    """Their letters were taken for keys."""
+    mission = bb.load(TANDEM_X)
+    (one,) = bb.allocate(mission, "timing_error.linear").found.specifications
+    assert one.key == "timing_error.linear"
+    column = "receiver.velocity.x.allowable"
+    assert column in bb.sweep(mission, {TIME: [1.0]}, columns=column).columns

@@ -13,7 +13,7 @@ from bisar_budget.findings.requirement import NAMES
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.changes import parts_of
-from bisar_budget.mission.model import Mission, Requirements, Waiver
+from bisar_budget.mission.model import GATING_MODELS, Mission, Requirements, Waiver
 from bisar_budget.mission.parts import figure_text, taken_figures
 from bisar_budget.report.words.sentences import dotted, percent
 from bisar_budget.settings import TABLE
@@ -114,7 +114,7 @@ def _numbers(found: MissionFindings) -> Iterator[tuple[str, str, float | None]]:
 _SUMS = (*NAMES, "autofocus_pull_in")  # kinds of rows that are no error
 _COMPUTED = ("oscillator", "spatial_variance")  # the file states no such number: a zero is a result, as a level is
 # Each asks for more than the one before it.
-_RULES = {"combine": ("each", "rss", "sum"), "model": ("published", "full", "strictest")}
+_RULES = {"combine": ("each", "rss", "sum"), "model": GATING_MODELS}
 
 _NAMED = ("other", "random")  # kinds of error of which a file may state several, each with a name
 _NUMBERS = (("autofocus", "n_pull", 1), ("allocation", "coverage_factor", -1), ("allocation", "warn_above", 1))
