@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 from bisar_budget import units
 from bisar_budget.constants import SPEED_OF_LIGHT
-from bisar_budget.faults import Changed, KeyPath, Place, Problem, SetValue, shown
+from bisar_budget.faults import Changed, KeyPath, Place, Problem, SetValue, shown, upwards
 from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.earth_orientation import EARTH_ORIENTATION, EarthOrientation
 from bisar_budget.mission.instruments import SYNCHRONIZATION, Synchronization
@@ -501,17 +501,13 @@ class Mission(NamedTuple):
         At last that is the file's first key; None for a mission that came from no file, and for a value that an
         option set.
         """
-        get = self.places.get
-        event = get(path)
-        while event is None and path:
-            path = path[:-1]
-            event = get(path)
+        event = next(filter(None, map(self.places.get, (*upwards(path), ()))), None)
         return None if event is None or isinstance(event, Changed) else Place.of(event)
 
     def is_changed(self, path: KeyPath) -> bool:
         """Whether a value, or what holds it, comes from an option."""
-        above = (self.places.get(path[:length]) for length in range(len(path), 0, -1))
-        return bool(self.changes) and isinstance(next(filter(None, above), None), Changed)
+        event = next(filter(None, map(self.places.get, upwards(path))), None)
+        return bool(self.changes) and isinstance(event, Changed)
 
 
 def has_instruments(mission: Mission) -> bool:

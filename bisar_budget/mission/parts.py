@@ -154,12 +154,12 @@ FIGURES = {"imu": IMU_KINDS, "gnss": _GNSS_KINDS, "oscillator": ("frequency", *F
 class PartError(Exception):
     """A part that cannot be used; each of its arguments says what is wrong.
 
-    `faults` are those of its file, with their places; empty where there is none to read.
+    `faults` are those of its file, with their places; empty where there is none to read. `hint` is what may help.
     """
 
-    def __init__(self, *said: str, faults: Sequence[Fault] = ()) -> None:
+    def __init__(self, *said: str, faults: Sequence[Fault] = (), hint: str = "") -> None:
         super().__init__(*said)
-        self.faults = tuple(faults)
+        self.faults, self.hint = tuple(faults), hint
 
     @classmethod
     def of(cls, file: str, faults: Sequence[Fault]) -> "PartError":
@@ -169,14 +169,6 @@ class PartError(Exception):
     def __str__(self) -> str:
         """Say all of it."""
         return "; ".join(map(str, self.args))
-
-
-class UnknownPartError(PartError):
-    """No part of the catalogue has a name; `hint` says where names are found, and which is the nearest."""
-
-    def __init__(self, hint: str) -> None:
-        super().__init__("is no part of the catalogue")
-        self.hint = hint
 
 
 def evidence(part: Part, figure: str) -> str:
@@ -420,7 +412,7 @@ def _file_of(name: str, beside: str, files: Files) -> str:
                 if file in there:
                     return os.path.join(folder, file)
     near = did_you_mean(name.lower(), tuple(catalogue(places, files)))
-    raise UnknownPartError(sentences("`bisar-budget sensors` lists them", near))
+    raise PartError("is no part of the catalogue", hint=sentences("`bisar-budget sensors` lists them", near))
 
 
 def with_parts(mission: Mission, find: Find, report: Report) -> Any:
@@ -513,15 +505,11 @@ def _parts_of(
             kind = entry.part.kind
             if kind not in kinds:
                 raise PartError(f"is an {kind}" if kind != "gnss" else "is a GNSS receiver")
-        except UnknownPartError as error:
-            report(here, Problem(str(error), f"accepted: parts of the kind {' or '.join(kinds)}", error.hint))
-            is_valid = False
-            continue
         except PartError as error:
             # What is wrong with its file says what is accepted there, and names the file.
             accepted = "" if error.faults else f"accepted: parts of the kind {' or '.join(kinds)}"
             for said in map(str, error.args):
-                report(here, Problem(said, accepted, names_value=bool(error.faults)))
+                report(here, Problem(said, accepted, error.hint, names_value=bool(error.faults)))
             is_valid = False
             continue
         if any(kind == other.part.kind for other in found):
