@@ -39,10 +39,10 @@ from bisar_budget.effects.vibration import counted, projected
 from bisar_budget.effects.vibration_spectra import displacement_rms, power_of
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import GroundVector
-from bisar_budget.mission.curves import SortedPoints
 from bisar_budget.mission.instruments import FORMS, Oscillator, Synchronization
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
+from bisar_budget.mission.readers import SortedPoints
 from bisar_budget.mission.vibrations import Vibration
 from bisar_budget.phrases import NOTHING, Note
 

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 from bisar_budget import units
 from bisar_budget.constants import SPEED_OF_LIGHT
-from bisar_budget.faults import Changed, KeyPath, Place, Problem, SetValue, shown, upwards
-from bisar_budget.geometry import BistaticGeometry
-from bisar_budget.mission.earth_orientation import EARTH_ORIENTATION, EarthOrientation
+from bisar_budget.faults import Changed, KeyPath, Place, Problem, SetValue, changes_words, shown, upwards
+from bisar_budget.geometry import BistaticGeometry, PlatformState
 from bisar_budget.mission.instruments import SYNCHRONIZATION, Synchronization
 from bisar_budget.mission.platforms import INSTANT, CommonMotionError, Platforms, without_image
 from bisar_budget.mission.propagation import PROPAGATION, Propagation, too_low
@@ -35,6 +34,7 @@ from bisar_budget.mission.readers import (
     OneOf,
     Quantity,
     Reader,
+    Reference,
     Section,
     SizeMap,
     Text,
@@ -43,12 +43,15 @@ from bisar_budget.mission.readers import (
     Weights,
     Whole,
     Words,
+    either,
 )
+from bisar_budget.paths.earth import Geodetic, SceneAxes, axes_at
 from bisar_budget.paths.instant import Instant
+from bisar_budget.paths.orientation import FARTHEST_POLE, FARTHEST_UT1, UNKNOWN, Orientation
+from bisar_budget.units import format_quantity
 
 if TYPE_CHECKING:
     from bisar_budget.mission.quantities import Number
-    from bisar_budget.paths.earth import SceneAxes
 
 
 class Document(NamedTuple):
@@ -116,16 +119,49 @@ class Scene(NamedTuple):
         return self.latitude is not None
 
     @property
-    def axes(self) -> "SceneAxes | None":
+    def axes(self) -> SceneAxes | None:
         """East, north and up there, in Earth-fixed axes; None where the file does not say where it is."""
         if self.latitude is None or self.longitude is None or self.height is None:
             return None
-        from bisar_budget.paths.earth import Geodetic, axes_at
-
         return axes_at(Geodetic(self.latitude, self.longitude, self.height))
 
 
 PLACE_KEYS = ("latitude", "longitude", "height")
+
+_ACCEPTED_ORIENTATIONS = "accepted: ut1_minus_utc, with or without polar_motion_x and polar_motion_y; or file"
+_POLE = Quantity(units.ANGLE, ge=-FARTHEST_POLE, le=FARTHEST_POLE)
+
+
+class EarthOrientation(NamedTuple):
+    """UT1 - UTC and polar motion in the middle of the aperture; orbits in axes of the stars need them."""
+
+    ut1_minus_utc: Annotated[
+        float | None, Key(Quantity(units.TIME, ge=-FARTHEST_UT1, le=FARTHEST_UT1), "IERS, Bulletin A or B.")
+    ] = None
+    polar_motion_x: Annotated[float | None, Key(_POLE, "Of the pole, towards Greenwich.")] = None
+    polar_motion_y: Annotated[float | None, Key(_POLE, "Of the pole, towards 90 deg west.")] = None
+    file: Annotated[str | None, Key(Reference(), "Table of the IERS instead: finals2000A, daily or all.")] = None
+
+    @staticmethod
+    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
+        """Hold it to figures that go together, or to a table."""
+        figures = [key for key in values if key != "file" and values[key] is not None]
+        if values.get("file") is not None:
+            if figures:
+                yield Problem(f"mixes file with {figures[0]}", _ACCEPTED_ORIENTATIONS, at=(figures[0],))
+        elif "ut1_minus_utc" not in figures:
+            yield Problem("lacks ut1_minus_utc", _ACCEPTED_ORIENTATIONS)
+        elif len(figures) == 2:
+            yield Problem("has half of the polar motion", _ACCEPTED_ORIENTATIONS, at=(figures[1],))
+
+    @property
+    def orientation(self) -> Orientation:
+        """What the figures say; where the pole is not stated, its doubt stays."""
+        x, y = self.polar_motion_x, self.polar_motion_y
+        pole, doubt = UNKNOWN.pole, UNKNOWN.pole_doubt
+        if x is not None and y is not None:
+            pole, doubt = (x, y), 0.0
+        return Orientation(self.ut1_minus_utc or 0.0, pole, 0.0, doubt)
 
 
 class TimingError(NamedTuple):
@@ -280,7 +316,7 @@ class Shares(NamedTuple):
 
 RULE = Choice("equal", "balanced")
 SHARES = Section(Shares)
-SPLIT = OneOf(lambda value: SHARES if isinstance(value, dict) else RULE, (RULE, SHARES))
+SPLIT = either(dict, SHARES, RULE)
 
 
 class MetricSplits(NamedTuple):
@@ -397,7 +433,8 @@ class Mission(NamedTuple):
     document: Annotated[Document, Key(Section(Document), "Number, issue and author, for the reports.")] = Document()
     scene: Annotated[Scene, Key(Section(Scene))] = Scene()
     earth_orientation: Annotated[
-        EarthOrientation | None, Key(EARTH_ORIENTATION, "How the Earth is turned, for orbits in axes of the stars.")
+        EarthOrientation | None,
+        Key(Section(EarthOrientation), "How the Earth is turned, for orbits in axes of the stars."),
     ] = None
     common_motion_error: Annotated[
         CommonMotionError | None, Key(Section(CommonMotionError), "The same for both platforms.")
@@ -435,9 +472,24 @@ class Mission(NamedTuple):
         return f"Mission({self.file!r}, {shown(self.name)!r})"
 
     def _repr_html_(self) -> str:
-        from bisar_budget.mission.overview import overview
+        """Radar, aperture, where the platforms are and how they move, as a notebook shows them."""
+        from html import escape  # a check does without
 
-        return overview(self)
+        from bisar_budget import notebook
+
+        geometry = self.geometry
+        rows = [
+            ("center frequency", format_quantity(self.radar.center_frequency, "Hz", 4)),
+            ("bandwidth", format_quantity(self.radar.bandwidth, "Hz", 4)),
+            ("aperture time", format_quantity(self.collection.aperture_time, "s", 4)),
+            ("transmitter", _at_a_glance(geometry.transmitter)),
+            ("receiver", _at_a_glance(geometry.receiver)),
+            ("bistatic angle", f"{math.degrees(geometry.bistatic_angle):.3g}°"),
+            ("rules", f"{self.gating_model} model, combine: {self.allocation.combine}"),
+        ]
+        file = f'<p class="muted">{escape(" ".join((self.file, changes_words(self.changes))))}</p>'
+        title = f"<p><strong>{escape(self.name)}</strong></p>"
+        return notebook.page(title, notebook.table(("", ""), rows), file)
 
     def __eq__(self, other: object) -> bool:
         """Whether it says the same, in the same file; `places` are where the bytes of `data` stand."""
@@ -508,6 +560,12 @@ class Mission(NamedTuple):
         """Whether a value, or what holds it, comes from an option."""
         event = next(filter(None, map(self.places.get, upwards(path))), None)
         return bool(self.changes) and isinstance(event, Changed)
+
+
+def _at_a_glance(state: PlatformState) -> str:
+    speed = math.hypot(*state.velocity)
+    moves = "stands still" if state.is_still else f"moves at {format_quantity(speed, 'm/s', 4)}"
+    return f"{format_quantity(state.slant_range, 'm', 4)} away, {math.degrees(state.elevation):.1f}° high, {moves}"
 
 
 def has_instruments(mission: Mission) -> bool:

@@ -53,13 +53,13 @@ from bisar_budget.mission.readers import (
     Key,
     Label,
     ListOf,
-    OneOf,
     Reference,
     Report,
     Section,
     TextMap,
     Triple,
     did_you_mean,
+    either,
 )
 from bisar_budget.mission.tree import MAX_BYTES, Tree, UnusableError, read_tree
 from bisar_budget.resources import DISK, Files, UnreadableError, resource, standard_input
@@ -68,10 +68,10 @@ from bisar_budget.settings import SettingsError, project_settings
 Find = Callable[[str], tuple[str, bytes]]  # file and content of a part by its name
 
 MOTION_ERROR = Section(MotionError)
-_TEXT, _BY_FIGURE = Label(), TextMap("figure")
-_SOURCE = OneOf(lambda value: _BY_FIGURE if isinstance(value, dict) else _TEXT, (_TEXT, _BY_FIGURE))
+_TEXT = Label()
 _NAME = Key(_TEXT, "Maker, type, and revision or mode; reports show it.")
 _SAYS = Key(_TEXT, "What its figures are in their source: which statistic, typical or largest, in which conditions.")
+_SOURCE = either(dict, TextMap("figure"), _TEXT)
 _SOURCES = Key(_SOURCE, "Document, revision and table of every figure, or of each by its key.")
 _KIND = "Which kind of part it is, and which figures it has."
 _POSITION = "1 sigma east, north, up; a single value stands for each."

@@ -47,16 +47,16 @@ from bisar_budget.mission.readers import (
     VELOCITY,
     Choice,
     Key,
-    OneOf,
     Quantity,
     Reader,
     Reference,
     Report,
     Section,
-    Text,
+    Source,
     TextList,
     Triple,
     Whole,
+    either,
 )
 from bisar_budget.mission.vibrations import Vibration
 from bisar_budget.paths.instant import parse_instant
@@ -72,8 +72,7 @@ _PLACES = np.linspace(-1, 1, 65)[:, None]
 
 FRAMES = Choice("scene", "track", "look", "ric")
 TIME_TAG = Quantity(units.TIME, ge=-1e3, le=1e3)
-PART = Reference()
-PARTS = OneOf(lambda value: TextList() if isinstance(value, list) else PART, (PART, TextList()))
+PARTS = either(list, TextList(), Reference())
 
 
 class MotionError(NamedTuple):
@@ -119,7 +118,7 @@ class MotionError(NamedTuple):
     lever_arm: Annotated[
         LeverArm | None, Key(LEVER_ARM, "From the navigation's reference to the antenna's phase centre.")
     ] = None
-    source: Annotated[str | None, Key(Text(), "Where the values come from; shown as evidence.")] = None
+    source: Source = None
     of_parts: tuple[tuple[str, str], ...] = ()
     overridden: tuple[Overridden, ...] = ()
 
@@ -190,7 +189,7 @@ class CommonMotionError(NamedTuple):
             "As that of a platform, where one clock tags both.",
         ),
     ] = None
-    source: Annotated[str | None, Key(Text(), "Where the values come from; shown as evidence.")] = None
+    source: Source = None
 
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
@@ -226,7 +225,7 @@ class OrbitSource(NamedTuple):
     tle: Annotated[
         str | tuple[str, str] | None,
         Key(
-            OneOf(lambda value: _Lines() if isinstance(value, list) else _FILE, (_FILE, _Lines())),
+            either(list, _Lines(), _FILE),
             "File of two-line elements, or the two lines; SGP4.",
         ),
     ] = None

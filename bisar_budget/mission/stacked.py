@@ -31,16 +31,12 @@ def stacked(missions: Iterable[Mission]) -> Iterator[tuple[Mission, NDArray[np.i
         rows.append(numbers)
     for mission, places, rows in shapes.values():
         columns = [column if np.ptp(column) else column.item(0) for column in np.array(rows).T]
-        yield _with_leaves(mission, partial(_next_of, iter(columns), _is_number)), np.array(places)
+        yield _with_leaves(mission, partial(_next_of, iter(columns))), np.array(places)
 
 
-def _is_number(leaf: Any) -> bool:
-    return isinstance(leaf, float)
-
-
-def _next_of(numbers: Iterator[Any], is_theirs: Callable[[Any], Any], leaf: Any) -> Any:
-    """The next number in the place of a leaf that is one of theirs."""
-    return next(numbers) if is_theirs(leaf) else leaf
+def _next_of(numbers: Iterator[Any], leaf: Any) -> Any:
+    """The next number in the place of one, and a word as it is."""
+    return next(numbers) if isinstance(leaf, float) else leaf
 
 
 def _bare(mission: Mission) -> Mission:
@@ -72,7 +68,7 @@ def _parts(value: Any) -> Any:
 
 def _shape(value: Any, numbers: list[float]) -> Any:
     """All of a value but its numbers, which are put into a list."""
-    if _is_number(value):
+    if isinstance(value, float):
         numbers.append(value)
         return float
     parts = _parts(value)
