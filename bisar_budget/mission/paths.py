@@ -39,9 +39,8 @@ from bisar_budget.paths.flight import (
     smoothed,
     stretch_around,
 )
-from bisar_budget.paths.flight_log import hold_to_motion
 from bisar_budget.paths.instant import DAY, Instant
-from bisar_budget.paths.log_places import LogKeys, around_aperture
+from bisar_budget.paths.log_places import LogKeys, around_aperture, hold_to_motion
 from bisar_budget.paths.orbit_formats import ORBIT_FORMATS, hold_to_format, hold_to_log
 from bisar_budget.paths.orientation import UNKNOWN, Orientation, read_finals
 from bisar_budget.paths.recognised import read_log

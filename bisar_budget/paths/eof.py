@@ -41,14 +41,10 @@ def read_eof(
     ----------
     data : bytes
         A whole file.
-    name : str
-        What messages call it.
     wanted : str, optional
         The satellite, as `Sentinel-1A` or `S1A`; the file has one.
-    center : Instant
-        Middle of the aperture.
-    orientation : Orientation
-        Not needed: the axes are those of the Earth.
+    name, center, orientation
+        As of `orbit_through`. The orientation is not needed: the axes are those of the Earth.
 
     Raises
     ------

@@ -70,12 +70,8 @@ def read_solution(data: bytes, name: str, keys: LogKeys) -> Log:
 
     Parameters
     ----------
-    data : bytes
-        The file, at most `LARGEST` bytes.
-    name : str
-        What messages call it.
-    keys : LogKeys
-        What the mission file says of it.
+    data, name, keys
+        As of every reader of `LOG_FORMATS`; at most `LARGEST` bytes.
 
     Returns
     -------

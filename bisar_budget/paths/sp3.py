@@ -51,14 +51,10 @@ def read_sp3(
     ----------
     data : bytes
         A whole file.
-    name : str
-        What messages call it.
     wanted : str, optional
         The satellite, such as `G05`; needed where the file has several.
-    center : Instant
-        Middle of the aperture.
-    orientation : Orientation
-        Not needed: the axes are those of the Earth.
+    name, center, orientation
+        As of `orbit_through`. The orientation is not needed: the axes are those of the Earth.
 
     Raises
     ------
