@@ -424,8 +424,8 @@ class Platform(NamedTuple):
     @property
     def way(self) -> str:
         """First key of the way in which its path is stated."""
-        keys = ("position", "orbit", "trajectory", "latitude")
-        return next((key for key in keys if getattr(self, key) is not None), "slant_range")
+        firsts = [way.keys[0] for way in WAYS]
+        return next((key for key in firsts if getattr(self, key) is not None), firsts[-1])
 
     @property
     def is_of_the_earth(self) -> bool:
