@@ -10,7 +10,6 @@ from bisar_budget import units
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.mission.changes import ACCEPTED_ERRORS, is_error, parts_of
 from bisar_budget.mission.model import Mission
-from bisar_budget.mission.parts import taken_figures
 from bisar_budget.mission.quantities import Number, QuestionError, as_number, number_of
 from bisar_budget.ranges.exact_ranges import Floats
 from bisar_budget.units import Dimension, parse_quantity
@@ -166,7 +165,7 @@ def specified_number(mission: Mission, tree: dict[str, object], key: str) -> Num
     number = number_of(tree, key, is_for_each=True)
     if number.value is not None:
         return number
-    taken = next((one.value for one in taken_figures(mission) if one.key == key), None)
+    taken = next((one.value for one in mission.taken if one.key == key), None)
     of_each = [as_number(key, number.reader, one) for one in (taken if isinstance(taken, list) else [taken])]
     return max(of_each, key=lambda one: abs(one.value or 0.0))
 

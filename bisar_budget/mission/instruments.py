@@ -64,6 +64,17 @@ class Overridden(NamedTuple):
     text: str
 
 
+class TakenFigure(NamedTuple):
+    """A figure that a mission takes from a part: the key that could state it, what the part says, the part's name.
+
+    What the part says is text, or a mapping or a list of text, as its file has it.
+    """
+
+    key: str
+    value: Any
+    part: str
+
+
 class Imu(NamedTuple):
     """Figures of an inertial sensor, 1 sigma. A scalar means each axis; three values follow the error's frame."""
 

@@ -9,7 +9,7 @@ from bisar_budget import units
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.faults import Changed, KeyPath, Place, Problem, SetValue, changes_words, shown, upwards
 from bisar_budget.geometry import BistaticGeometry, PlatformState
-from bisar_budget.mission.instruments import SYNCHRONIZATION, Synchronization
+from bisar_budget.mission.instruments import SYNCHRONIZATION, Synchronization, TakenFigure
 from bisar_budget.mission.platforms import INSTANT, CommonMotionError, Platforms, without_image
 from bisar_budget.mission.propagation import PROPAGATION, Propagation, too_low
 from bisar_budget.mission.readers import (
@@ -422,7 +422,7 @@ class Mission(NamedTuple):
 
     `file` and `places` say where it stands: the path of each value to the parser's event. `data` is the file as
     read, byte for byte. `changes` are the values that options put in place of the file's, `parts` the files of
-    parts that it takes figures from.
+    parts that it names, `taken` the figures that it takes from them: it is the same mission if its file states them.
     """
 
     schema_version: Annotated[int, Key(Version())]
@@ -466,6 +466,7 @@ class Mission(NamedTuple):
     data: bytes = b""
     changes: tuple[SetValue, ...] = ()
     parts: tuple[PartFile, ...] = ()
+    taken: tuple[TakenFigure, ...] = ()
 
     def __repr__(self) -> str:
         """File and name, on one line."""

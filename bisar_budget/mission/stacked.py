@@ -14,7 +14,11 @@ from bisar_budget.mission.platforms import FlownPath
 
 def picked(mission: Mission, places: NDArray[np.intp]) -> Mission:
     """The mission with some of the cases of its arrays."""
-    return cast(Mission, _with_leaves(mission, lambda leaf: leaf[places] if np.ndim(leaf) else leaf))
+
+    def of_cases(leaf: Any) -> Any:
+        return leaf[places] if isinstance(leaf, np.ndarray) and leaf.ndim else leaf
+
+    return cast(Mission, _with_leaves(mission, of_cases))
 
 
 def stacked(missions: Iterable[Mission]) -> Iterator[tuple[Mission, NDArray[np.intp]]]:
@@ -41,7 +45,7 @@ def _next_of(numbers: Iterator[Any], leaf: Any) -> Any:
 
 def _bare(mission: Mission) -> Mission:
     """The mission without what says where it and its paths come from."""
-    for name, platform in zip(mission.platforms._fields, mission.platforms, strict=True):
+    for name, platform in mission.platforms._asdict().items():
         if platform.path is not None:
             path = platform.path
             path = FlownPath(
@@ -53,7 +57,7 @@ def _bare(mission: Mission) -> Mission:
             )
             platforms = mission.platforms._replace(**{name: platform._replace(path=path)})
             mission = mission._replace(platforms=platforms)
-    whence: dict[str, Any] = {"file": "", "places": {}, "data": b"", "changes": (), "parts": ()}
+    whence: dict[str, Any] = {"file": "", "places": {}, "data": b"", "changes": (), "parts": (), "taken": ()}
     return mission._replace(name="", document=Document(), requirement_ids={}, **whence)
 
 
