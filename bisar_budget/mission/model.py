@@ -283,7 +283,7 @@ def _noise_cut_off(values: Mapping[str, Any]) -> Iterator[Problem]:
     if platforms is None or collection is None:
         return
     T = collection.aperture_time
-    for name, platform in zip(platforms._fields, platforms, strict=True):
+    for name, platform in platforms._asdict().items():
         bandwidth = None if platform.oscillator is None else platform.oscillator.bandwidth
         if bandwidth is not None and bandwidth < least_bandwidth(T):
             yield Problem(

@@ -430,8 +430,8 @@ def with_parts(mission: Mission, find: Find, report: Report) -> Any:
     """
     is_valid, taken = True, list[TakenFigure]()
     platforms = mission.platforms
-    for name in platforms._fields:
-        platform, path = getattr(platforms, name), ("platforms", name)
+    for name, platform in platforms._asdict().items():
+        path = ("platforms", name)
         error = _with_sensors(platform.motion_error, (*path, "motion_error"), find, report, taken)
         oscillator = platform.oscillator and _with_sensor(
             platform.oscillator, (*path, "oscillator"), find, report, taken

@@ -91,8 +91,7 @@ def reader_of(folder: str, files: Files = DISK) -> Beside:
 
 def path_files(mission: Mission) -> Iterator[tuple[str, str]]:
     """Keys under which a mission names an orbit or a log, and the names."""
-    for name in Platforms._fields:
-        platform: Platform = getattr(mission.platforms, name)
+    for name, platform in mission.platforms._asdict().items():
         for key, section in (("orbit", platform.orbit), ("trajectory", platform.trajectory)):
             for form in _FILES:
                 if isinstance(file := getattr(section, form, None), str):
@@ -139,8 +138,7 @@ def with_paths(mission: Mission, read: Beside, report: Report) -> Any:
     if (wrong := _unusable_orientation(mission, read)) is not None:
         report(("earth_orientation", "file"), wrong)
         return INVALID
-    for name in platforms._fields:
-        platform: Platform = getattr(platforms, name)
+    for name, platform in platforms._asdict().items():
         try:
             found = _with_path(mission, platform, axes, read)
         except _UnusablePathError as unusable:

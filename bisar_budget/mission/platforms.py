@@ -521,7 +521,7 @@ def _no_image(geometry: BistaticGeometry) -> Iterator[Problem]:
 
 
 def _no_common_frame(platforms: Platforms, frame: str) -> Iterator[Problem]:
-    for name, platform in zip(Platforms._fields, platforms, strict=True):
+    for name, platform in platforms._asdict().items():
         if frame == "ric" and platform.path is None:  # yet
             continue
         try:
@@ -545,7 +545,7 @@ def has_body_axes(state: PlatformState, half: Any, margin: float = 1.0) -> Any:
 
 def _no_body_axes(platforms: Platforms, half: float) -> Iterator[Problem]:
     """Lever arms of platforms whose velocity has no direction on the ground, at some time of the aperture."""
-    for name, platform in zip(Platforms._fields, platforms, strict=True):
+    for name, platform in platforms._asdict().items():
         if platform.motion_error.lever_arm is None or platform.state.is_still:
             continue
         if not has_body_axes(platform.state, np.array([half]))[0]:
@@ -557,7 +557,7 @@ def _no_body_axes(platforms: Platforms, half: float) -> Iterator[Problem]:
 
 
 def _dives(platforms: Platforms, geometry: BistaticGeometry, aperture_time: float) -> Iterator[Problem]:
-    for name, platform, state in zip(Platforms._fields, platforms, geometry.both, strict=True):
+    for (name, platform), state in zip(platforms._asdict().items(), geometry.both, strict=True):
         lowest = min(state.place(tau)[2] for tau in _turning_points(state, aperture_time / 2))
         if lowest < 0 <= state.position[2]:
             key: KeyPath = ("climb",) if platform.velocity is None else ("velocity", 2)
