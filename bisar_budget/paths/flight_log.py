@@ -8,13 +8,13 @@ Time is `time [s]`, counted from anywhere, or stamps of ISO 8601: `utc` with a Z
 `time [UTC]` is the same as `utc`, and a `time` without a unit is in the scale that the mission file says. Places are
 `latitude`, `longitude` and `height` above the ellipsoid of WGS-84 or `altitude` above mean sea level, or Earth-fixed
 `x`, `y`, `z`, or `east`, `north`, `up` of the scene's centre. `geoid_separation` makes a height of an altitude. Other
-columns are not read. Cells are parted by commas, semicolons or tabs. Headers of exporters are those of `vendor_logs`.
+columns are not read. Cells are parted by commas, semicolons or tabs. Exporters have headers of their own, see below.
 """
 
 import csv
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple, NoReturn
@@ -42,7 +42,6 @@ from bisar_budget.paths.log_places import (
     unix_instant,
     utc_of,
 )
-from bisar_budget.paths.vendor_logs import Vendor, dataflash_as_csv, vendor_of
 
 LARGEST = 200_000_000  # bytes; four hours at 200 Hz
 _CHUNK = 1 << 16  # lines that are text and numbers at once
@@ -66,14 +65,29 @@ _EXAMPLE = "2026-06-01T05:20:31.250Z"
 _CLOCKS_APART_S = 1.0  # of an exporter's two clocks, beyond the second to which one is written
 
 
-@dataclass(frozen=True)
-class _Column:
-    """A column that is read: its name, place in a row, unit as written and factor to SI. An instant has no unit."""
+class _Column(NamedTuple):
+    """A column that is read: its name, unit as written, factor to SI and place in a row. An instant has no unit.
+
+    Names of exporters' columns are those of plain logs, and `altitude` above mean sea level, `unix` since 1970 in
+    UTC, GPS `week`, kind of `fix`, number of the `receiver`.
+    """
 
     name: str
-    place: int
     unit: str = ""
     scale: float = 1.0
+    place: int = -1
+
+
+class _Vendor(NamedTuple):
+    """Whose columns: words for reports, names that tell it, and what columns mean; names are in small letters.
+
+    `least_fix` is the kind of fix from which a place has a height.
+    """
+
+    words: str
+    signs: frozenset[str]
+    columns: Mapping[str, _Column]
+    least_fix: int = 0
 
 
 @dataclass(frozen=True)
@@ -90,7 +104,7 @@ class _Header:
     stamp: _Column | None = None
     scale: str = "utc"
     zone: Callable[[str], object] = _ZONED
-    vendor: Vendor | None = None
+    vendor: _Vendor | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -121,14 +135,10 @@ class _Table(NamedTuple):
 def is_csv(data: bytes) -> bool:
     """Whether the first line that says something names columns of places."""
     head = data[:100_000].decode("utf-8-sig", "replace").replace("\r\n", "\n").replace("\r", "\n").split("\n")
-    line = next(filter(_is_said, dataflash_as_csv(head)), "")
+    line = next(filter(_is_said, _dataflash_as_csv(head)), "")
     cells = line.split(max(",;\t", key=line.count))
     names = {_name_of(cell)[0] for cell in cells}
-    return _vendor(cells) is not None or any(names.issuperset(kind[:2]) for kind in _KINDS)
-
-
-def _vendor(cells: Sequence[str]) -> Vendor | None:
-    return vendor_of([cell.strip().lower() for cell in cells])
+    return _vendor_of(cells) is not None or any(names.issuperset(kind[:2]) for kind in _KINDS)
 
 
 def read_csv(data: bytes, name: str, keys: LogKeys = NOTHING_SAID) -> Log:
@@ -149,7 +159,7 @@ def read_csv(data: bytes, name: str, keys: LogKeys = NOTHING_SAID) -> Log:
     PathFileError
         Names the file and the line of the fault: `flight.csv:17: ...`.
     """
-    lines = dataflash_as_csv(_text(data, name).split("\n"))
+    lines = _dataflash_as_csv(_text(data, name).split("\n"))
     header = _header(lines, name, keys)
     table, left_out = _with_fix(_all_rows(lines, header, name), header, name)
     rows = LogRows(name, table.lines)
@@ -342,7 +352,7 @@ def _header(lines: Sequence[str], name: str, keys: LogKeys) -> _Header:
     cells = _cells(lines[at], delimiter)
     if isinstance(cells, str):
         refuse(cells)
-    vendor = _vendor(cells)
+    vendor = _vendor_of(cells)
     if vendor is not None:
         return _vendor_header(vendor, cells, delimiter, at + 1, f"{name}:{at + 1}", keys)
     found: dict[str, tuple[int, str | None]] = {}
@@ -397,18 +407,18 @@ def _header(lines: Sequence[str], name: str, keys: LogKeys) -> _Header:
             refuse(f"time counts in {time.unit}; trajectory.time_scale says of instants in which scale they are")
         return _Header(at + 1, delimiter, len(cells), (time, *axes))
     hold_to_scale(scale, keys, f"{name}:{at + 1}")
-    return _Header(at + 1, delimiter, len(cells), tuple(axes), _Column(times[0], index), scale, zone)
+    return _Header(at + 1, delimiter, len(cells), tuple(axes), _Column(times[0], place=index), scale, zone)
 
 
 def _vendor_header(
-    vendor: Vendor, cells: Sequence[str], delimiter: str, line: int, where: str, keys: LogKeys
+    vendor: _Vendor, cells: Sequence[str], delimiter: str, line: int, where: str, keys: LogKeys
 ) -> _Header:
     """Columns that an exporter names."""
     columns: dict[str, _Column] = {}
     for index, cell in enumerate(cells):
         known = vendor.columns.get(cell.strip().lower())
         if known is not None:
-            columns.setdefault(known.name, _Column(known.name, index, known.unit, known.scale))
+            columns.setdefault(known.name, known._replace(place=index))
     if "height" not in columns and "altitude" not in columns:
         raise PathFileError(
             f"{where}: {vendor.words} has no height above the sea or the ellipsoid; one above take-off is no place"
@@ -438,7 +448,7 @@ def _measured(name: str, index: int, unit: str | None, refuse: Callable[[str], N
         more = ", or say trajectory.time_scale" if name == "time" else ""
         refuse(f"{name} has no unit; write '{example}'{more}")
     try:
-        return _Column(name, index, shown(unit), units.parse_quantity(f"1 {unit}", dimension))
+        return _Column(name, shown(unit), units.parse_quantity(f"1 {unit}", dimension), index)
     except InvalidValueError as error:
         refuse(fault_words(f"{name} {error.problem.problem}", "", f"write '{example}'", error.problem.hint))
 
@@ -580,3 +590,114 @@ def _row_fault(text: str, header: _Header) -> str | None:
             hint = "; write a decimal point" if re.fullmatch(r"[+-]?\d+,\d+", cell, re.ASCII) else ""
             return f"{column.name} must be a {'finite ' * is_number}number (got {shown(cell)!r}){hint}"
     return None
+
+
+# ---------------------------------------------------------------------- headers of exporters
+# Airdata, of DJI and other drones: `time(millisecond),datetime(utc),latitude,longitude,…,
+# altitude_above_seaLevel(feet or meters),…`. Source: the headers in the README of drone-comp/m30ttools and in the
+# reference of Aarhus University's DroneVideoMeasure, "Drone logfile input format"; the instant is to a second.
+#
+# PX4, by ulog2csv: topics `vehicle_gps_position` and `sensor_gps` in 1e-7 deg and mm, from release 1.14 on in deg and
+# m; `vehicle_global_position` in deg and m, on the clock of the autopilot. Source: PX4-Autopilot msg/SensorGps.msg,
+# msg/versioned/VehicleGlobalPosition.msg; pyulog/ulog2csv.py writes the names of fields.
+#
+# ArduPilot: rows GPS of a dataflash log, from `mavlogdump.py --format csv --types GPS`, or among others in the text
+# that Mission Planner and mavlogdump write, whose FMT rows name the columns. Alt is above mean sea level. Source:
+# ardupilot libraries/AP_GPS/LogStructure.h (LOG_STRUCTURE_FROM_GPS; a Status of 3 is a fix in three dimensions) and
+# AP_GPS.h (undulation), pymavlink/tools/mavlogdump.py.
+_DEGREE = math.pi / 180
+
+
+def _vendor(words: str, signs: str, least_fix: int = 0, **columns: _Column) -> _Vendor:
+    return _Vendor(words, frozenset(signs.split()), columns, least_fix)
+
+
+_LATITUDE, _LONGITUDE = _Column("latitude", "deg", _DEGREE), _Column("longitude", "deg", _DEGREE)
+_FIX = _Column("fix")
+_UNIX = _Column("unix", "us", 1e-6)
+_VENDORS = (
+    _Vendor(
+        "CSV of Airdata",
+        frozenset(("time(millisecond)", "datetime(utc)", "latitude", "longitude")),
+        {
+            "time(millisecond)": _Column("time", "ms", 1e-3),
+            "datetime(utc)": _Column("utc"),
+            "latitude": _LATITUDE,
+            "longitude": _LONGITUDE,
+            "altitude_above_sealevel(feet)": _Column("altitude", "ft", 0.3048),
+            "altitude_above_sealevel(meters)": _Column("altitude", "m"),
+        },
+    ),
+    _vendor(
+        "CSV of PX4's GPS topic",
+        "time_utc_usec lat lon fix_type",
+        3,
+        time_utc_usec=_UNIX,
+        lat=_Column("latitude", "1e-7 deg", 1e-7 * _DEGREE),
+        lon=_Column("longitude", "1e-7 deg", 1e-7 * _DEGREE),
+        alt_ellipsoid=_Column("height", "mm", 1e-3),
+        alt=_Column("altitude", "mm", 1e-3),
+        fix_type=_FIX,
+    ),
+    _vendor(
+        "CSV of PX4's GPS topic",
+        "time_utc_usec latitude_deg longitude_deg fix_type",
+        3,
+        time_utc_usec=_UNIX,
+        latitude_deg=_LATITUDE,
+        longitude_deg=_LONGITUDE,
+        altitude_ellipsoid_m=_Column("height", "m"),
+        altitude_msl_m=_Column("altitude", "m"),
+        fix_type=_FIX,
+    ),
+    _vendor(
+        "CSV of PX4's global position",
+        "timestamp lat lon alt terrain_alt",
+        1,
+        lat_lon_valid=_FIX,
+        timestamp=_Column("time", "us", 1e-6),
+        lat=_LATITUDE,
+        lon=_LONGITUDE,
+        alt_ellipsoid=_Column("height", "m"),
+        alt=_Column("altitude", "m"),
+    ),
+    _vendor(
+        "GPS rows of ArduPilot",
+        "gwk gms lat lng alt status",
+        3,
+        gwk=_Column("week"),
+        gms=_Column("time", "ms", 1e-3),
+        lat=_LATITUDE,
+        lng=_LONGITUDE,
+        alt=_Column("altitude", "m"),
+        status=_FIX,
+        i=_Column("receiver"),
+    ),
+)
+
+
+def _vendor_of(cells: Sequence[str]) -> _Vendor | None:
+    """Whose columns these are; None where they are nobody's."""
+    names = [cell.strip().lower() for cell in cells]
+    return next((one for one in _VENDORS if one.signs.issubset(names)), None)
+
+
+def _dataflash_as_csv(lines: list[str]) -> list[str]:
+    """Lines of a dataflash log with its GPS rows alone, and their FMT row as the header; other lines as they are.
+
+    Each line keeps its number.
+    """
+    if not any(line.startswith("FMT,") for line in lines[:100]):
+        return lines
+    found = []
+    header = ""
+    for line in lines:
+        kept = ""
+        if line.startswith("GPS,"):
+            kept = line if header else ""
+        elif line.startswith("FMT,") and not header:
+            cells = [cell.strip() for cell in line.split(",")]
+            if cells[3:4] == ["GPS"]:
+                kept = header = ",".join(["GPS", *cells[5:]])
+        found.append(kept)
+    return found
