@@ -107,7 +107,9 @@ def _samples(file: MessageElement, system: str, name: str) -> tuple[list[Sample]
     """State vectors, the lines where each begins, and what is said of those that are not of nominal quality."""
     samples, lines, flawed = [], [], []
     for vector in file.all("OSV"):
-        samples.append(_sample(vector, system, name))
+        parts = {one.name: one for one in vector.children}
+        x, y, z, u, v, w = _numbers(vector, parts, name)
+        samples.append(Sample(_time(vector, parts, system, name), (x, y, z), (u, v, w)))
         lines.append(vector.line)
         quality = next(vector.all("Quality"), None)
         if quality is not None and quality.text.strip().upper() != "NOMINAL":
@@ -116,12 +118,6 @@ def _samples(file: MessageElement, system: str, name: str) -> tuple[list[Sample]
         if after.time.since(before.time) < APART:
             raise PathFileError(f"{name}:{line}: the time is not after that of the state vector before it")
     return samples, lines, flawed
-
-
-def _sample(vector: MessageElement, system: str, name: str) -> Sample:
-    parts = {one.name: one for one in vector.children}
-    x, y, z, u, v, w = _numbers(vector, parts, name)
-    return Sample(_time(vector, parts, system, name), (x, y, z), (u, v, w))
 
 
 def _numbers(vector: MessageElement, parts: dict[str, MessageElement], name: str) -> Iterator[float]:

@@ -37,8 +37,8 @@ _RIGHT_ANGLE = math.pi / 2 * (1 + 1e-12)
 _WINDOW = 1.0  # s over which positions and velocities are compared; noise of a position is less than 0.1 m/s then
 _APART = 1.0  # m/s, and a hundredth of the speed: what velocities of another frame exceed
 _SMALLEST = 1e-100  # of any unit
+_Fields = tuple[tuple[str, int, float, float, str], ...]  # name, place in a record, lowest, highest, unit
 _FIELDS = (
-    # name, place in a record, lowest, highest, unit
     ("time", 0, 0.0, _LATEST, "s"),
     ("latitude", 1, -_RIGHT_ANGLE, _RIGHT_ANGLE, "rad"),
     ("longitude", 2, -2 * _RIGHT_ANGLE, 4 * _RIGHT_ANGLE, "rad"),
@@ -157,7 +157,7 @@ def read_accuracy(
     return Accuracy((east, north, down), (east_rate, north_rate, down_rate), len(inside))
 
 
-def _records(data: bytes, name: str, width: int, fields: tuple[tuple[str, int, float, float, str], ...]) -> Floats:
+def _records(data: bytes, name: str, width: int, fields: _Fields) -> Floats:
     """Records (n, width) whose fields are where they can be."""
     size = 8 * width
     hold_to_bytes(data, LARGEST, name)
@@ -183,9 +183,7 @@ def _records(data: bytes, name: str, width: int, fields: tuple[tuple[str, int, f
     raise PathFileError(f"{says}, which it cannot be; are these records of {width} doubles?")
 
 
-def _first_wrong(
-    records: Floats, fields: tuple[tuple[str, int, float, float, str], ...]
-) -> tuple[int, str, float, str] | None:
+def _first_wrong(records: Floats, fields: _Fields) -> tuple[int, str, float, str] | None:
     """Index, field, value and unit of what is out of its range first."""
     found = []
     with np.errstate(invalid="ignore"):
