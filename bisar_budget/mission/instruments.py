@@ -27,14 +27,6 @@ from bisar_budget.mission.readers import (
 )
 from bisar_budget.mission.vibrations import FELT_VIBRATION, LEVEL, FeltVibration
 
-IMU_KINDS = (
-    "accelerometer_bias",
-    "accelerometer_scale_factor",
-    "attitude",
-    "gyro_bias",
-    "velocity_random_walk",
-    "angle_random_walk",
-)
 _BIAS = Triple(Quantity(units.ACCELERATION, ge=0, le=1e3), or_scalar=True)
 _SCALE = Triple(Quantity(units.RATIO, ge=0, le=0.1), or_scalar=True)
 _TILT = Triple(Quantity(units.ANGLE, ge=0, le=math.pi / 4), or_scalar=True)
@@ -90,6 +82,9 @@ class Imu(NamedTuple):
     def is_stated(self) -> bool:
         """Whether the file states any of its figures; a zero does."""
         return any(getattr(self, kind) is not None for kind in IMU_KINDS)
+
+
+IMU_KINDS = Imu._fields[:-1]  # its figures, without their source
 
 
 class GaussMarkov(NamedTuple):

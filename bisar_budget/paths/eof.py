@@ -39,12 +39,9 @@ def read_eof(
 
     Parameters
     ----------
-    data : bytes
-        A whole file.
-    wanted : str, optional
-        The satellite, as `Sentinel-1A` or `S1A`; the file has one.
-    name, center, orientation
-        As of `orbit_through`. The orientation is not needed: the axes are those of the Earth.
+    data, name, wanted, center, orientation
+        As of every reader of `ORBIT_FORMATS`. The satellite is `Sentinel-1A` or `S1A`. The orientation is not needed:
+        the axes are those of the Earth.
 
     Raises
     ------

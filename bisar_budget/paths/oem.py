@@ -60,12 +60,8 @@ def read_oem(
 
     Parameters
     ----------
-    data : bytes
-        A whole file.
-    wanted : str, optional
-        OBJECT_NAME or OBJECT_ID.
-    name, center, orientation
-        As of `orbit_through`.
+    data, name, wanted, center, orientation
+        As of every reader of `ORBIT_FORMATS`. An object is named by OBJECT_NAME or OBJECT_ID.
 
     Raises
     ------

@@ -19,8 +19,8 @@ from bisar_budget.paths.tle import read_tle
 class OrbitFormat(NamedTuple):
     """A format: its words, what its files show within their first lines, as text and as XML, and its reader.
 
-    The reader takes the bytes, what messages call the file, the object that is wanted, the middle of the aperture and
-    the Earth's orientation.
+    The reader takes the bytes of a whole file, what messages call it, the object that is wanted (needed where there
+    are several), the middle of the aperture, and the orientation that axes of the stars are turned to the Earth with.
     """
 
     words: str

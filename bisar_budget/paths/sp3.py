@@ -49,12 +49,9 @@ def read_sp3(
 
     Parameters
     ----------
-    data : bytes
-        A whole file.
-    wanted : str, optional
-        The satellite, such as `G05`; needed where the file has several.
-    name, center, orientation
-        As of `orbit_through`. The orientation is not needed: the axes are those of the Earth.
+    data, name, wanted, center, orientation
+        As of every reader of `ORBIT_FORMATS`. A satellite is `G05`, say. The orientation is not needed: the axes are
+        those of the Earth.
 
     Raises
     ------
