@@ -180,7 +180,7 @@ def _scene(mission: Mission, targets: Targets, half: float) -> tuple[Floats, NDA
             f"clutter of {count} scatterers, at most {_MOST_SCATTERERS} are simulated: put the targets nearer to "
             "each other"
         )
-    rng = np.random.default_rng([mission.simulation.seed if mission.simulation else 1, _CLUTTER_STREAM])
+    rng = np.random.default_rng([(mission.simulation or Simulation()).seed, _CLUTTER_STREAM])
     ground = np.pad(rng.uniform(-half, half, (count, 2)), ((0, 0), (0, 1)))
     random = (rng.normal(size=count) + 1j * rng.normal(size=count)) * 10 ** (targets.clutter_db / 20) / math.sqrt(2)
     return np.concatenate((places, ground)), np.concatenate((amplitudes, random))
