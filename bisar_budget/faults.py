@@ -1,9 +1,14 @@
 """Faults of input, said so that they can be mended: where, what, the value given, what is accepted."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 KeyPath = tuple[str | int, ...]
+
+
+def upwards(path: KeyPath) -> Iterator[KeyPath]:
+    """A path and those above it, the nearest first; not the file itself."""
+    return (path[:length] for length in range(len(path), 0, -1))
 
 
 class Region(NamedTuple):
@@ -21,11 +26,12 @@ class Region(NamedTuple):
 class Place(int):
     """Line of a value in a file, from 1, which also knows where on the line the value stands.
 
-    A number for everybody who wants the line; reports for editors and pull requests ask for the region.
+    A number for everybody who wants the line; reports for editors and pull requests ask for the region. `text` is
+    what stands there, as the file has it; empty for a mapping or a list.
     """
 
-    _region: tuple[int | None, ...]
-    _text: str
+    region: Region
+    text: str
 
     @classmethod
     def of(cls, event: Any) -> "Place":
@@ -41,19 +47,9 @@ class Place(int):
             place = known["place"] = cls(line)
             is_scalar = known.get("value") is not None
             ends = (end.line + 1, end.column + 1) if is_scalar else (None, None)
-            place._region = (line, start.column + 1, *ends)
-            place._text = known["value"] if is_scalar else ""
+            place.region = Region(line, start.column + 1, *ends)
+            place.text = known["value"] if is_scalar else ""
         return place
-
-    @property
-    def region(self) -> Region:
-        """Start of the value and, for a scalar, its end."""
-        return Region._make(self._region)
-
-    @property
-    def text(self) -> str:
-        """The text that stands there, as the file has it; empty for a mapping or a list."""
-        return self._text
 
 
 def printable(text: str) -> str:
@@ -113,17 +109,16 @@ _BY_UNIT = ("m/s^2", "(m/s^2)^2/Hz", "m^2/Hz")  # of keys whose readers tell by 
 class SetNumber(SetValue):
     """A number in SI in the same place, as of a case of a sweep: readers take it as it is, the text is for people.
 
-    A key that has several dimensions takes the text, which `is_by_unit`.
+    `value` is what readers take: of a key that has several dimensions the text.
     """
 
-    number: float
-    is_by_unit: bool
+    value: float | str
 
     @classmethod
     def of(cls, key: str, number: float, unit: str) -> "SetNumber":
         """The number for a key; `unit` is the one of SI."""
         found = cls(key, f"{number!r} {unit}".rstrip())
-        found.number, found.is_by_unit = number, unit in _BY_UNIT
+        found.value = found.text if unit in _BY_UNIT else number
         return found
 
 

@@ -330,7 +330,7 @@ def format_in(value: float, unit: str, given: str, digits: int = 3, rounding: st
 
 @cache
 def _pretty(given: str) -> str:
-    """Write a unit of the tables behind a number: `um` is µm, `m/s^2` m/s², `deg/sqrt(h)` deg/√h."""
+    """Write a unit of the tables behind a number: `um` is µm, `m/s^2` m/s², `deg/sqrt(h)` deg/√h, `1/s` /s."""
     text = given.replace("^2", "²").replace("^3", "³").replace("^4", "⁴").replace("°", "deg")
     text = re.sub(r"sqrt\((\w+)\)", r"√\1", text)
     text = re.sub(r"^u(?=m|g|s|rad|Gal)", "µ", text)
@@ -370,11 +370,9 @@ def _steps(unit: str) -> tuple[tuple[float, float, float, str], ...]:
     if unit in _SHEETS:
         scale, suffix = _SHEETS[unit]
         return ((scale, 0.0, math.inf, suffix),)
-    pretty = unit.replace("^2", "²").replace("^3", "³").replace("^4", "⁴")
-    if pretty.startswith("1/"):
-        return ((1.0, 0.0, math.inf, pretty[1:]),)
-    steps = ((scale, scale * 0.9995, scale * 1e6, f" {prefix}{pretty}") for scale, prefix in _STEPS.get(unit, ()))
-    return (*steps, (1.0, 0.0, math.inf, f" {pretty}".rstrip()))
+    suffix = _pretty(unit).rstrip()
+    steps = ((scale, scale * 0.9995, scale * 1e6, f" {prefix}{suffix[1:]}") for scale, prefix in _STEPS.get(unit, ()))
+    return (*steps, (1.0, 0.0, math.inf, suffix))
 
 
 def _stricter(level: float, digits: int) -> str:

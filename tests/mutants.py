@@ -444,7 +444,7 @@ MUTANTS = (
     ),
     Mutant(
         "an SBET counts in TAI",
-        "bisar_budget/paths/recognised.py",
+        "bisar_budget/paths/sbet.py",
         'hold_to_scale("gps", keys, name)\n    hold_to_ellipsoid',
         'hold_to_scale("tai", keys, name)\n    hold_to_ellipsoid',
         ("tests/paths/test_sbet.py::test_a_mission_file_may_say_no_other_time_than_the_log_counts",),

@@ -38,10 +38,10 @@ from bisar_budget.effects.random_effect import RandomEffect, RandomError
 from bisar_budget.effects.vibration import counted, displacement_rms, power_of, projected
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import GroundVector
-from bisar_budget.mission.curves import SortedPoints
 from bisar_budget.mission.instruments import FORMS, Oscillator, Synchronization
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
+from bisar_budget.mission.readers import SortedPoints
 from bisar_budget.mission.vibrations import Vibration
 from bisar_budget.phrases import NOTHING, Note
 

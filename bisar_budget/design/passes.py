@@ -26,10 +26,10 @@ from bisar_budget.mission.load import folder_of
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.paths import orbits_of, reader_of
 from bisar_budget.mission.quantities import QuestionError
-from bisar_budget.paths.earth import SceneAxes
+from bisar_budget.paths.earth import Floats, SceneAxes
 from bisar_budget.paths.flight import PathFileError
 from bisar_budget.paths.instant import DAY, Instant, parse_instant
-from bisar_budget.paths.visibility import Floats, Stretch, Watched, shared
+from bisar_budget.paths.visibility import Stretch, Watched, shared
 from bisar_budget.workers import Progress, unseen
 
 CENTER_TIME = "collection.center_time"

@@ -25,7 +25,6 @@ from bisar_budget.faults import SetValue
 from bisar_budget.findings.requirement import Override
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.model import MISSION, SHARES, Mission
-from bisar_budget.mission.parts import taken_figures
 from bisar_budget.mission.propagation import DELAYS
 from bisar_budget.mission.quantities import FACTOR, Number, QuestionError, as_number, form_of, tree_of
 from bisar_budget.mission.readers import (
@@ -247,7 +246,7 @@ def sensitivity(
     """
     variation = Variation(mission, model)
     base = variation.read()
-    if taken := list(taken_figures(base)):  # as if the file stated the figures that it takes from parts
+    if taken := base.taken:  # as if the file stated the figures that it takes from parts
         stated = variation.read([SetValue(one.key, json.dumps(one.value)) for one in taken])
         variation = Variation(stated, model)
         base = variation.read()

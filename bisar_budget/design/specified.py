@@ -14,7 +14,7 @@ from bisar_budget.mission.changes import ACCEPTED_ERRORS, is_error, parts_of
 from bisar_budget.mission.instruments import Oscillator
 from bisar_budget.mission.load import folder_of
 from bisar_budget.mission.model import Mission
-from bisar_budget.mission.parts import Entry, OscillatorPart, PartError, entries, folders, taken_figures
+from bisar_budget.mission.parts import Entry, OscillatorPart, PartError, entries, folders
 from bisar_budget.mission.quantities import Number, QuestionError, as_number, number_of
 from bisar_budget.ranges.exact_ranges import Floats
 from bisar_budget.units import Dimension, format_quantity, parse_quantity
@@ -174,7 +174,7 @@ def specified_number(mission: Mission, tree: dict[str, object], key: str) -> Num
     number = number_of(tree, key, is_for_each=True)
     if number.value is not None:
         return number
-    taken = next((one.value for one in taken_figures(mission) if one.key == key), None)
+    taken = next((one.value for one in mission.taken if one.key == key), None)
     of_each = [as_number(key, number.reader, one) for one in (taken if isinstance(taken, list) else [taken])]
     return max(of_each, key=lambda one: abs(one.value or 0.0))
 

@@ -12,9 +12,9 @@ from bisar_budget import evaluators, phrases
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.spectra import PowerLawPiece, held
 from bisar_budget.geometry import BistaticGeometry
-from bisar_budget.mission.curves import Points, SortedPoints
 from bisar_budget.mission.instruments import Oscillator, PowerLaw
 from bisar_budget.mission.model import Mission
+from bisar_budget.mission.readers import Points, SortedPoints
 from bisar_budget.phrases import NOTHING, Note
 
 BANDWIDTH = 1e3  # Hz, to which noise counts that is stated without an end

@@ -17,16 +17,13 @@ from textwrap import wrap
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.faults import printable
 from bisar_budget.formats.containers import Element
 from bisar_budget.geometry import FRAME_AXES, STRAIGHT, Axes, PlatformState, Vector, cross, dot, norm, unit
-from bisar_budget.paths.earth import Geodetic, SceneAxes
+from bisar_budget.paths.earth import Floats, Geodetic, SceneAxes
 from bisar_budget.paths.flight import Fitted, least_squares, path_of, powers_of
-
-Floats = NDArray[np.float64]
 
 FEWEST = 5  # pulses in an aperture that a path is fitted to
 LONGEST = 1e6  # s, of an aperture, and to its middle

@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 
 from bisar_budget.faults import printable, shown
 from bisar_budget.geometry import Vector
-
-Floats = NDArray[np.float64]
+from bisar_budget.paths.earth import Floats
 
 _HIGHEST_POWER = 30  # of a polynomial; more is no polynomial that anybody fitted
 _INCLUDE = "{http://www.w3.org/2001/XInclude}"
@@ -90,8 +89,8 @@ class Element:
         return [Element(self.file, node) for node in self.node.findall(_any_namespace(path))]
 
     def maybe(self, path: str) -> "Element | None":
-        """First element at a path."""
-        node = self.node.find(_any_namespace(path))
+        """First element at a path; of an empty one itself."""
+        node = self.node.find(_any_namespace(path)) if path else self.node
         return None if node is None else Element(self.file, node)
 
     def one(self, path: str) -> "Element":
@@ -107,8 +106,7 @@ class Element:
 
     def text(self, path: str = "") -> str:
         """Text at a path."""
-        node = self.one(path) if path else self
-        return (node.node.text or "").strip()
+        return (self.one(path).node.text or "").strip()
 
     def number(self, path: str = "") -> float:
         """Finite number at a path."""
@@ -130,12 +128,12 @@ class Element:
 
     def vector(self, path: str = "") -> Vector:
         """X, Y and Z at a path."""
-        node = self.one(path) if path else self
+        node = self.one(path)
         return (node.number("X"), node.number("Y"), node.number("Z"))
 
     def polynomial(self, path: str = "", variables: int = 1) -> Floats:
         """Coefficients of a polynomial of some variables, (order1 + 1, …)."""
-        node = self.one(path) if path else self
+        node = self.one(path)
         numbers = range(1, variables + 1)
         found = np.zeros([node._attribute(f"order{number}", _HIGHEST_POWER) + 1 for number in numbers])
         for coefficient in node.all("Coef"):

@@ -25,15 +25,13 @@ from bisar_budget.formats.collected import ADDED, KINDS, correlated
 from bisar_budget.formats.containers import check_extra
 from bisar_budget.geometry import Axes, PlatformState, Vector
 from bisar_budget.mission.model import Mission, Simulation, has_instruments
-from bisar_budget.paths.earth import Geodetic, SceneAxes, axes_at, geodetic
+from bisar_budget.paths.earth import Floats, Geodetic, SceneAxes, axes_at, geodetic
 from bisar_budget.paths.instant import Instant, parse_instant
 from bisar_budget.simulator.collection import PointCollection
 from bisar_budget.simulator.phase_history import Errors, Flight
 from bisar_budget.simulator.point import SimulationError, declared_errors, pulses_for
 from bisar_budget.simulator.realisations import has_unset_clocks
 from bisar_budget.simulator.targets import Targets
-
-Floats = NDArray[np.float64]
 
 NAMESPACE = "http://api.nsgreg.nga.mil/schema/cphd/1.1.0"
 NOWHERE = Geodetic(0.0, 0.0, 0.0)  # of a scene whose mission does not say where it is
@@ -66,7 +64,6 @@ class Exported:
     vectors: int
     samples: int
     half: float
-    place: Geodetic
     scatterers: int
     remarks: tuple[str, ...]
 
@@ -114,12 +111,10 @@ def export_phase_history(mission: Mission, targets: Targets) -> Exported:
     noise = {"noise_power": 10 ** (settings.noise / 10) if settings.noise is not None else 0.0, "rng": rng}
     history = flown.record(scatterers, amplitudes, slow_time, frequency, **noise)
     remarks = []
-    scene = mission.scene
-    if scene.latitude is None or scene.longitude is None or scene.height is None:
-        place = NOWHERE
+    axes = mission.scene.axes
+    if axes is None:
+        axes = axes_at(NOWHERE)
         remarks.append("the mission does not say where its scene is (scene.latitude): it is put at 0 deg N, 0 deg E")
-    else:
-        place = Geodetic(scene.latitude, scene.longitude, scene.height)
     middle = mission.collection.center_time
     if middle is None:
         remarks.append(f"the mission has no collection.center_time: the collection is put at {UNDATED}")
@@ -130,11 +125,10 @@ def export_phase_history(mission: Mission, targets: Targets) -> Exported:
             "the mission does not say how its oscillators are set (timing_error.constant and linear, or "
             "synchronization): they are flown without mean and slope"
         )
-    axes = axes_at(place)
     vectors, offset = _vectors(mission, slow_time, flown, collection.flight(errors.smooth(), slow_time), axes, plan)
     tree = _document(mission, targets, plan, axes, vectors, middle.after(-offset), offset, remarks)
     data = _file(tree, vectors, history.samples.astype(np.complex64))
-    return Exported(data, plan.pulses, plan.samples, plan.half, place, len(amplitudes), tuple(remarks))
+    return Exported(data, plan.pulses, plan.samples, plan.half, len(amplitudes), tuple(remarks))
 
 
 def _plan(mission: Mission, targets: Targets, collection: PointCollection, errors: Errors) -> _Plan:
@@ -186,7 +180,7 @@ def _scene(mission: Mission, targets: Targets, half: float) -> tuple[Floats, NDA
             f"clutter of {count} scatterers, at most {_MOST_SCATTERERS} are simulated: put the targets nearer to "
             "each other"
         )
-    rng = np.random.default_rng([mission.simulation.seed if mission.simulation else 1, _CLUTTER_STREAM])
+    rng = np.random.default_rng([(mission.simulation or Simulation()).seed, _CLUTTER_STREAM])
     ground = np.pad(rng.uniform(-half, half, (count, 2)), ((0, 0), (0, 1)))
     random = (rng.normal(size=count) + 1j * rng.normal(size=count)) * 10 ** (targets.clutter_db / 20) / math.sqrt(2)
     return np.concatenate((places, ground)), np.concatenate((amplitudes, random))

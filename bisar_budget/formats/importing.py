@@ -27,11 +27,9 @@ from bisar_budget.formats.collected import (
 )
 from bisar_budget.formats.containers import Container, Element, FormatError, check_extra, open_container
 from bisar_budget.geometry import PlatformState, Vector
-from bisar_budget.paths.earth import SceneAxes, axes_at, geodetic
+from bisar_budget.paths.earth import Floats, SceneAxes, axes_at, geodetic
 from bisar_budget.paths.flight import Fitted
 from bisar_budget.paths.instant import parse_instant
-
-Floats = NDArray[np.float64]
 
 _SAMPLES = 201  # moments at which a polynomial of the file is taken; enough for one of any order there
 _SETTLING = 5  # rounds of a light time; each leaves v/c of what the one before left

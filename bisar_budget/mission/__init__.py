@@ -4,7 +4,6 @@
 __all__ = [
     "changes",
     "covariance",
-    "curves",
     "edited",
     "given",
     "instruments",

@@ -125,7 +125,7 @@ def _put(container: Any, name: str | int, value: Any) -> None:
 def _value(tree: Tree, change: SetValue, path: KeyPath) -> Any:
     """Read the text of the value as the file's own would be; its faults name the option. A number is as it is."""
     if isinstance(change, SetNumber):
-        return change.text if change.is_by_unit else change.number
+        return change.value
     try:
         _forget(tree, path)
         value = tree.document(change.text, path, "one value")

@@ -13,7 +13,17 @@ import numpy as np
 from bisar_budget import units
 from bisar_budget.faults import KeyPath, Problem
 from bisar_budget.geometry import FRAME_AXES, Vector
-from bisar_budget.mission.readers import INVALID, Key, OneOf, Quantity, Reader, Report, Section, Triple
+from bisar_budget.mission.readers import (
+    INVALID,
+    Key,
+    Quantity,
+    Reader,
+    Report,
+    Section,
+    Triple,
+    either,
+    read_part,
+)
 
 KINDS = ("position", "velocity")
 SIZE = 6
@@ -85,7 +95,7 @@ def _rows(value: Any, readers: Sequence[Sequence[Reader]], path: KeyPath, report
         return INVALID
     rows = [
         [
-            item if item is INVALID else reader.read(item, (*path, i, j), report)
+            read_part(reader, item, (*path, i, j), report)
             for j, (item, reader) in enumerate(zip(row, of_row, strict=True))
         ]
         for i, (row, of_row) in enumerate(zip(value, readers, strict=True))
@@ -203,7 +213,7 @@ class _CorrelationReader(Reader):
         named: dict[frozenset[int | None], str] = {}
         is_valid = True
         for key, text in value.items():
-            number = text if text is INVALID else self._NUMBER.read(text, (*path, key), report)
+            number = read_part(self._NUMBER, text, (*path, key), report)
             indices = [error_index(name.strip()) for name in key.split("-")]
             first, second = indices if len(indices) == 2 else (None, None)
             pair = frozenset((first, second))
@@ -268,8 +278,7 @@ class _SigmasReader(Section):
         return Covariance(sigmas, stated.correlation.matrix, is_matrix=False, pairs=stated.correlation.pairs)
 
 
-_FORMS: tuple[Reader, Reader] = (_MatrixReader(), _SigmasReader(Sigmas))
-COVARIANCE = OneOf(lambda value: _FORMS[isinstance(value, dict)], _FORMS)
+COVARIANCE = either(dict, _SigmasReader(Sigmas), _MatrixReader())
 
 
 def misplaced_axes(covariance: Covariance, frame: str) -> Iterator[Problem]:

@@ -75,7 +75,7 @@ def in_folder(mission: Mission, folder: str) -> Iterator[SetValue]:
 
 def _parts_beside(mission: Mission) -> Iterator[tuple[str, str]]:
     """Keys under which a mission names files of parts, not parts of a catalogue, and the names."""
-    for owner, platform in zip(mission.platforms._fields, mission.platforms, strict=True):
+    for owner, platform in mission.platforms._asdict().items():
         sensor = platform.motion_error.sensor
         key = f"platforms.{owner}.motion_error.sensor"
         each = {key: sensor} if isinstance(sensor, str) else {f"{key}.{n}": one for n, one in enumerate(sensor or ())}

@@ -29,15 +29,8 @@ def changed(mission: Mission, values: Mapping[str, Any]) -> Mission:
         The mission cannot be used with them; a key is unknown.
     """
     tree = tree_of(mission)
-    changes = [SetValue(key, _text(tree, key, value)) for key, value in values.items()]
+    changes = [SetValue(key, text_of(_si_of(tree, key), value)) for key, value in values.items()]
     return parse_mission(mission.data, mission.file, changes=(*mission.changes, *changes))
-
-
-def _text(tree: dict[str, Any], key: str, value: Any) -> str:
-    """A value as the file would have it; a number gets the SI unit that its key must have."""
-    if isinstance(value, str):
-        return value
-    return text_of(_si_of(tree, key), value)
 
 
 def _si_of(tree: dict[str, Any], key: str) -> str:

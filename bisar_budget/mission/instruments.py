@@ -8,30 +8,25 @@ from typing import Annotated, Any, NamedTuple
 from bisar_budget import units
 from bisar_budget.faults import KeyPath, Problem
 from bisar_budget.geometry import Vector
-from bisar_budget.mission.curves import CurveReader, Points
 from bisar_budget.mission.readers import (
     INVALID,
     Choice,
+    CurveReader,
     Key,
     ListOf,
+    Points,
     Quantity,
     Reader,
     Reference,
     Report,
     Section,
+    Source,
     Text,
     Triple,
+    read_part,
 )
 from bisar_budget.mission.vibrations import FELT_VIBRATION, LEVEL, FeltVibration
 
-IMU_KINDS = (
-    "accelerometer_bias",
-    "accelerometer_scale_factor",
-    "attitude",
-    "gyro_bias",
-    "velocity_random_walk",
-    "angle_random_walk",
-)
 _BIAS = Triple(Quantity(units.ACCELERATION, ge=0, le=1e3), or_scalar=True)
 _SCALE = Triple(Quantity(units.RATIO, ge=0, le=0.1), or_scalar=True)
 _TILT = Triple(Quantity(units.ANGLE, ge=0, le=math.pi / 4), or_scalar=True)
@@ -61,6 +56,17 @@ class Overridden(NamedTuple):
     text: str
 
 
+class TakenFigure(NamedTuple):
+    """A figure that a mission takes from a part: the key that could state it, what the part says, the part's name.
+
+    What the part says is text, or a mapping or a list of text, as its file has it.
+    """
+
+    key: str
+    value: Any
+    part: str
+
+
 class Imu(NamedTuple):
     """Figures of an inertial sensor, 1 sigma. A scalar means each axis; three values follow the error's frame."""
 
@@ -70,12 +76,15 @@ class Imu(NamedTuple):
     gyro_bias: GyroBias = None
     velocity_random_walk: VelocityRandomWalk = None
     angle_random_walk: AngleRandomWalk = None
-    source: Annotated[str | None, Key(Text(), "Where the values come from; shown as evidence.")] = None
+    source: Source = None
 
     @property
     def is_stated(self) -> bool:
         """Whether the file states any of its figures; a zero does."""
         return any(getattr(self, kind) is not None for kind in IMU_KINDS)
+
+
+IMU_KINDS = Imu._fields[:-1]  # its figures, without their source
 
 
 class GaussMarkov(NamedTuple):
@@ -106,7 +115,7 @@ class LeverArm(NamedTuple):
             Triple(Quantity(units.LENGTH, ge=0, le=1e3), or_scalar=True), "1 sigma, each axis; it turns as the body."
         ),
     ] = None
-    source: Annotated[str | None, Key(Text(), "Where the values come from; shown as evidence.")] = None
+    source: Source = None
 
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
@@ -125,7 +134,7 @@ class PowerLaw(NamedTuple):
     white_phase: float = 0.0
 
 
-_POWERS = ("h-2", "h-1", "h0", "h1", "h2")
+POWERS = dict(zip(("h-2", "h-1", "h0", "h1", "h2"), PowerLaw._fields, strict=True))  # as the file has them
 _COEFFICIENT = Quantity(units.RATIO, ge=0, le=1)
 
 
@@ -136,28 +145,28 @@ class _PowerLawReader(Reader):
 
     def read(self, value: Any, path: KeyPath, report: Report) -> Any:
         """Read each coefficient at its own place."""
+        accepted = f"accepted: {', '.join(POWERS)}"
         if not isinstance(value, dict) or not value:
-            report(path, Problem("must be a mapping of coefficients", f"accepted: {', '.join(_POWERS)}"))
+            report(path, Problem("must be a mapping of coefficients", accepted))
             return INVALID
-        read = dict.fromkeys(_POWERS, 0.0)
+        read = dict.fromkeys(POWERS, 0.0)
         is_valid = True
         for key, item in value.items():
             if key not in read:
-                accepted = f"accepted: {', '.join(_POWERS)}"
                 report((*path, key), Problem("is not a known key", accepted, is_of_key=True))
                 is_valid = False
                 continue
-            read[key] = item if item is INVALID else _COEFFICIENT.read(item, (*path, key), report)
+            read[key] = read_part(_COEFFICIENT, item, (*path, key), report)
         return PowerLaw(*read.values()) if is_valid and INVALID not in read.values() else INVALID
 
     def below(self, part: str) -> Reader | None:
         """Give the reader of a coefficient."""
-        return _COEFFICIENT if part in _POWERS else None
+        return _COEFFICIENT if part in POWERS else None
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
         """Object of coefficients."""
         one = _COEFFICIENT.schema(definitions)
-        properties = dict.fromkeys(_POWERS, one)
+        properties = dict.fromkeys(POWERS, one)
         return {"type": "object", "properties": properties, "additionalProperties": False, "minProperties": 1}
 
 
@@ -257,7 +266,7 @@ class Oscillator(NamedTuple):
     sensor: Annotated[
         str | None, Key(Reference(), "A part of the catalogue, or a file; keys beside it override.")
     ] = None
-    source: Annotated[str | None, Key(Text(), "Where the values come from; shown as evidence.")] = None
+    source: Source = None
     overridden: tuple[Overridden, ...] = ()
     of_parts: tuple[tuple[str, str], ...] = ()
 
@@ -305,7 +314,6 @@ METHODS: Mapping[str, tuple[str, ...]] = {
     "direct_path": ("error",),
     "holdover": ("age", "averaging"),
 }
-_OF_METHODS = ("interval", "error", "age", "averaging")
 
 
 class Synchronization(NamedTuple):
@@ -352,7 +360,7 @@ class Synchronization(NamedTuple):
         float | None,
         Key(Quantity(units.RATIO, ge=-1e-2, le=1e-2), "Fractional frequency that setting left, 1 sigma."),
     ] = None
-    source: Annotated[str | None, Key(Text(), "Where the values come from; shown as evidence.")] = None
+    source: Source = None
 
     @property
     def is_direct_path(self) -> bool:
@@ -371,7 +379,7 @@ class Synchronization(NamedTuple):
         if method is None:
             return
         needed = METHODS[method]
-        for key in _OF_METHODS:
+        for key in _MEANS:
             if key in values and values[key] is None and key in needed:
                 yield Problem("is missing", f"accepted: {_MEANS[key]}", at=(key,))
             elif values.get(key) is not None and key not in needed:

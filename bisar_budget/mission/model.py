@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 from bisar_budget import units
 from bisar_budget.constants import SPEED_OF_LIGHT
-from bisar_budget.faults import Changed, KeyPath, Place, Problem, SetValue, shown
-from bisar_budget.geometry import BistaticGeometry
-from bisar_budget.mission.earth_orientation import EARTH_ORIENTATION, EarthOrientation
-from bisar_budget.mission.instruments import SYNCHRONIZATION, Synchronization
+from bisar_budget.faults import Changed, KeyPath, Place, Problem, SetValue, changes_words, shown, upwards
+from bisar_budget.geometry import BistaticGeometry, PlatformState
+from bisar_budget.mission.instruments import SYNCHRONIZATION, Synchronization, TakenFigure
 from bisar_budget.mission.platforms import INSTANT, CommonMotionError, Platforms, without_image
 from bisar_budget.mission.propagation import PROPAGATION, Propagation, too_low
 from bisar_budget.mission.readers import (
@@ -35,6 +34,7 @@ from bisar_budget.mission.readers import (
     OneOf,
     Quantity,
     Reader,
+    Reference,
     Section,
     SizeMap,
     Text,
@@ -43,12 +43,15 @@ from bisar_budget.mission.readers import (
     Weights,
     Whole,
     Words,
+    either,
 )
+from bisar_budget.paths.earth import Geodetic, SceneAxes, axes_at
 from bisar_budget.paths.instant import Instant
+from bisar_budget.paths.orientation import FARTHEST_POLE, FARTHEST_UT1, UNKNOWN, Orientation
+from bisar_budget.units import format_quantity
 
 if TYPE_CHECKING:
     from bisar_budget.mission.quantities import Number
-    from bisar_budget.paths.earth import SceneAxes
 
 
 class Document(NamedTuple):
@@ -116,16 +119,49 @@ class Scene(NamedTuple):
         return self.latitude is not None
 
     @property
-    def axes(self) -> "SceneAxes | None":
+    def axes(self) -> SceneAxes | None:
         """East, north and up there, in Earth-fixed axes; None where the file does not say where it is."""
         if self.latitude is None or self.longitude is None or self.height is None:
             return None
-        from bisar_budget.paths.earth import Geodetic, axes_at
-
         return axes_at(Geodetic(self.latitude, self.longitude, self.height))
 
 
 PLACE_KEYS = ("latitude", "longitude", "height")
+
+_ACCEPTED_ORIENTATIONS = "accepted: ut1_minus_utc, with or without polar_motion_x and polar_motion_y; or file"
+_POLE = Quantity(units.ANGLE, ge=-FARTHEST_POLE, le=FARTHEST_POLE)
+
+
+class EarthOrientation(NamedTuple):
+    """UT1 - UTC and polar motion in the middle of the aperture; orbits in axes of the stars need them."""
+
+    ut1_minus_utc: Annotated[
+        float | None, Key(Quantity(units.TIME, ge=-FARTHEST_UT1, le=FARTHEST_UT1), "IERS, Bulletin A or B.")
+    ] = None
+    polar_motion_x: Annotated[float | None, Key(_POLE, "Of the pole, towards Greenwich.")] = None
+    polar_motion_y: Annotated[float | None, Key(_POLE, "Of the pole, towards 90 deg west.")] = None
+    file: Annotated[str | None, Key(Reference(), "Table of the IERS instead: finals2000A, daily or all.")] = None
+
+    @staticmethod
+    def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
+        """Hold it to figures that go together, or to a table."""
+        figures = [key for key in values if key != "file" and values[key] is not None]
+        if values.get("file") is not None:
+            if figures:
+                yield Problem(f"mixes file with {figures[0]}", _ACCEPTED_ORIENTATIONS, at=(figures[0],))
+        elif "ut1_minus_utc" not in figures:
+            yield Problem("lacks ut1_minus_utc", _ACCEPTED_ORIENTATIONS)
+        elif len(figures) == 2:
+            yield Problem("has half of the polar motion", _ACCEPTED_ORIENTATIONS, at=(figures[1],))
+
+    @property
+    def orientation(self) -> Orientation:
+        """What the figures say; where the pole is not stated, its doubt stays."""
+        x, y = self.polar_motion_x, self.polar_motion_y
+        pole, doubt = UNKNOWN.pole, UNKNOWN.pole_doubt
+        if x is not None and y is not None:
+            pole, doubt = (x, y), 0.0
+        return Orientation(self.ut1_minus_utc or 0.0, pole, 0.0, doubt)
 
 
 class TimingError(NamedTuple):
@@ -247,7 +283,7 @@ def _noise_cut_off(values: Mapping[str, Any]) -> Iterator[Problem]:
     if platforms is None or collection is None:
         return
     T = collection.aperture_time
-    for name, platform in zip(platforms._fields, platforms, strict=True):
+    for name, platform in platforms._asdict().items():
         bandwidth = None if platform.oscillator is None else platform.oscillator.bandwidth
         if bandwidth is not None and bandwidth < least_bandwidth(T):
             yield Problem(
@@ -280,7 +316,7 @@ class Shares(NamedTuple):
 
 RULE = Choice("equal", "balanced")
 SHARES = Section(Shares)
-SPLIT = OneOf(lambda value: SHARES if isinstance(value, dict) else RULE, (RULE, SHARES))
+SPLIT = either(dict, SHARES, RULE)
 
 
 class MetricSplits(NamedTuple):
@@ -389,7 +425,7 @@ class Mission(NamedTuple):
 
     `file` and `places` say where it stands: the path of each value to the parser's event. `data` is the file as
     read, byte for byte. `changes` are the values that options put in place of the file's, `parts` the files of
-    parts that it takes figures from.
+    parts that it names, `taken` the figures that it takes from them: it is the same mission if its file states them.
     """
 
     schema_version: Annotated[int, Key(Version())]
@@ -400,7 +436,8 @@ class Mission(NamedTuple):
     document: Annotated[Document, Key(Section(Document), "Number, issue and author, for the reports.")] = Document()
     scene: Annotated[Scene, Key(Section(Scene))] = Scene()
     earth_orientation: Annotated[
-        EarthOrientation | None, Key(EARTH_ORIENTATION, "How the Earth is turned, for orbits in axes of the stars.")
+        EarthOrientation | None,
+        Key(Section(EarthOrientation), "How the Earth is turned, for orbits in axes of the stars."),
     ] = None
     common_motion_error: Annotated[
         CommonMotionError | None, Key(Section(CommonMotionError), "The same for both platforms.")
@@ -432,15 +469,31 @@ class Mission(NamedTuple):
     data: bytes = b""
     changes: tuple[SetValue, ...] = ()
     parts: tuple[PartFile, ...] = ()
+    taken: tuple[TakenFigure, ...] = ()
 
     def __repr__(self) -> str:
         """File and name, on one line."""
         return f"Mission({self.file!r}, {shown(self.name)!r})"
 
     def _repr_html_(self) -> str:
-        from bisar_budget.mission.overview import overview
+        """Radar, aperture, where the platforms are and how they move, as a notebook shows them."""
+        from html import escape  # a check does without
 
-        return overview(self)
+        from bisar_budget import notebook
+
+        geometry = self.geometry
+        rows = [
+            ("center frequency", format_quantity(self.radar.center_frequency, "Hz", 4)),
+            ("bandwidth", format_quantity(self.radar.bandwidth, "Hz", 4)),
+            ("aperture time", format_quantity(self.collection.aperture_time, "s", 4)),
+            ("transmitter", _at_a_glance(geometry.transmitter)),
+            ("receiver", _at_a_glance(geometry.receiver)),
+            ("bistatic angle", f"{math.degrees(geometry.bistatic_angle):.3g}°"),
+            ("rules", f"{self.gating_model} model, combine: {self.allocation.combine}"),
+        ]
+        file = f'<p class="muted">{escape(" ".join((self.file, changes_words(self.changes))))}</p>'
+        title = f"<p><strong>{escape(self.name)}</strong></p>"
+        return notebook.page(title, notebook.table(("", ""), rows), file)
 
     def __eq__(self, other: object) -> bool:
         """Whether it says the same, in the same file; `places` are where the bytes of `data` stand."""
@@ -504,17 +557,19 @@ class Mission(NamedTuple):
         At last that is the file's first key; None for a mission that came from no file, and for a value that an
         option set.
         """
-        get = self.places.get
-        event = get(path)
-        while event is None and path:
-            path = path[:-1]
-            event = get(path)
+        event = next(filter(None, map(self.places.get, (*upwards(path), ()))), None)
         return None if event is None or isinstance(event, Changed) else Place.of(event)
 
     def is_changed(self, path: KeyPath) -> bool:
         """Whether a value, or what holds it, comes from an option."""
-        above = (self.places.get(path[:length]) for length in range(len(path), 0, -1))
-        return bool(self.changes) and isinstance(next(filter(None, above), None), Changed)
+        event = next(filter(None, map(self.places.get, upwards(path))), None)
+        return bool(self.changes) and isinstance(event, Changed)
+
+
+def _at_a_glance(state: PlatformState) -> str:
+    speed = math.hypot(*state.velocity)
+    moves = "stands still" if state.is_still else f"moves at {format_quantity(speed, 'm/s', 4)}"
+    return f"{format_quantity(state.slant_range, 'm', 4)} away, {math.degrees(state.elevation):.1f}° high, {moves}"
 
 
 def has_instruments(mission: Mission) -> bool:

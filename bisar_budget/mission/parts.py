@@ -5,7 +5,7 @@ mission names parts, and what the mission says itself overrides single figures.
 """
 
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Annotated, Any, NamedTuple
@@ -41,6 +41,7 @@ from bisar_budget.mission.instruments import (
     Overridden,
     PhaseNoise,
     PowerLawFigures,
+    TakenFigure,
     VelocityRandomWalk,
 )
 from bisar_budget.mission.model import DRAFT, Mission
@@ -53,13 +54,13 @@ from bisar_budget.mission.readers import (
     Key,
     Label,
     ListOf,
-    OneOf,
     Reference,
     Report,
     Section,
     TextMap,
     Triple,
     did_you_mean,
+    either,
 )
 from bisar_budget.mission.tree import MAX_BYTES, Tree, UnusableError, read_tree
 from bisar_budget.resources import DISK, Files, UnreadableError, resource, standard_input
@@ -68,10 +69,10 @@ from bisar_budget.settings import SettingsError, project_settings
 Find = Callable[[str], tuple[str, bytes]]  # file and content of a part by its name
 
 MOTION_ERROR = Section(MotionError)
-_TEXT, _BY_FIGURE = Label(), TextMap("figure")
-_SOURCE = OneOf(lambda value: _BY_FIGURE if isinstance(value, dict) else _TEXT, (_TEXT, _BY_FIGURE))
+_TEXT = Label()
 _NAME = Key(_TEXT, "Maker, type, and revision or mode; reports show it.")
 _SAYS = Key(_TEXT, "What its figures are in their source: which statistic, typical or largest, in which conditions.")
+_SOURCE = either(dict, TextMap("figure"), _TEXT)
 _SOURCES = Key(_SOURCE, "Document, revision and table of every figure, or of each by its key.")
 _KIND = "Which kind of part it is, and which figures it has."
 _POSITION = "1 sigma east, north, up; a single value stands for each."
@@ -154,12 +155,12 @@ FIGURES = {"imu": IMU_KINDS, "gnss": _GNSS_KINDS, "oscillator": ("frequency", *F
 class PartError(Exception):
     """A part that cannot be used; each of its arguments says what is wrong.
 
-    `faults` are those of its file, with their places; empty where there is none to read.
+    `faults` are those of its file, with their places; empty where there is none to read. `hint` is what may help.
     """
 
-    def __init__(self, *said: str, faults: Sequence[Fault] = ()) -> None:
+    def __init__(self, *said: str, faults: Sequence[Fault] = (), hint: str = "") -> None:
         super().__init__(*said)
-        self.faults = tuple(faults)
+        self.faults, self.hint = tuple(faults), hint
 
     @classmethod
     def of(cls, file: str, faults: Sequence[Fault]) -> "PartError":
@@ -169,14 +170,6 @@ class PartError(Exception):
     def __str__(self) -> str:
         """Say all of it."""
         return "; ".join(map(str, self.args))
-
-
-class UnknownPartError(PartError):
-    """No part of the catalogue has a name; `hint` says where names are found, and which is the nearest."""
-
-    def __init__(self, hint: str) -> None:
-        super().__init__("is no part of the catalogue")
-        self.hint = hint
 
 
 def evidence(part: Part, figure: str) -> str:
@@ -420,7 +413,7 @@ def _file_of(name: str, beside: str, files: Files) -> str:
                 if file in there:
                     return os.path.join(folder, file)
     near = did_you_mean(name.lower(), tuple(catalogue(places, files)))
-    raise UnknownPartError(sentences("`bisar-budget sensors` lists them", near))
+    raise PartError("is no part of the catalogue", hint=sentences("`bisar-budget sensors` lists them", near))
 
 
 def with_parts(mission: Mission, find: Find, report: Report) -> Any:
@@ -435,19 +428,19 @@ def with_parts(mission: Mission, find: Find, report: Report) -> Any:
     report : callable
         Takes what is wrong, and where.
     """
-    is_valid = True
+    is_valid, taken = True, list[TakenFigure]()
     platforms = mission.platforms
-    for name in platforms._fields:
-        platform = getattr(platforms, name)
-        error = _with_sensors(platform.motion_error, ("platforms", name, "motion_error"), find, report)
+    for name, platform in platforms._asdict().items():
+        path = ("platforms", name)
+        error = _with_sensors(platform.motion_error, (*path, "motion_error"), find, report, taken)
         oscillator = platform.oscillator and _with_sensor(
-            platform.oscillator, ("platforms", name, "oscillator"), find, report
+            platform.oscillator, (*path, "oscillator"), find, report, taken
         )
         if INVALID in (error, oscillator):
             is_valid = False
             continue
         platforms = platforms._replace(**{name: platform._replace(motion_error=error, oscillator=oscillator)})
-    return mission._replace(platforms=platforms) if is_valid else INVALID
+    return mission._replace(platforms=platforms, taken=tuple(taken)) if is_valid else INVALID
 
 
 def report_parts(root: Any, find: Find, report: Report) -> None:
@@ -463,9 +456,9 @@ def report_parts(root: Any, find: Find, report: Report) -> None:
             continue
         path: KeyPath = ("platforms", name)
         if motion := _stand_in(MOTION_ERROR, platform.get("motion_error")):
-            _with_sensors(MotionError(**motion), (*path, "motion_error"), find, report)
+            _with_sensors(MotionError(**motion), (*path, "motion_error"), find, report, [])
         if oscillator := _stand_in(OSCILLATOR, platform.get("oscillator")):
-            _with_sensor(Oscillator(**oscillator), (*path, "oscillator"), find, report)
+            _with_sensor(Oscillator(**oscillator), (*path, "oscillator"), find, report, [])
 
 
 def _stand_in(section: Section, value: Any) -> dict[str, Any]:
@@ -476,35 +469,12 @@ def _stand_in(section: Section, value: Any) -> dict[str, Any]:
     return {key: found for key, found in values.items() if key == "sensor" and found is not INVALID}
 
 
-def _with_sensors(error: MotionError, path: KeyPath, find: Find, report: Report) -> Any:
-    """A motion error with the figures of its parts; `INVALID` after a report."""
-    path = (*path, "sensor")
-    parts = _parts_of(error.sensor, path, ("imu", "gnss"), find, report)
-    return INVALID if parts is INVALID else _motion_of(error, parts, path, report)
-
-
-def _with_sensor(oscillator: Oscillator, path: KeyPath, find: Find, report: Report) -> Any:
-    """An oscillator with the figures of its part; `INVALID` after a report."""
-    if oscillator.sensor is None:
-        return oscillator
-    parts = _parts_of(oscillator.sensor, (*path, "sensor"), ("oscillator",), find, report)
-    found = INVALID if parts is INVALID else _oscillator_of(oscillator, parts[0], path, report)
-    if found is not INVALID and found.needs_frequency and found.frequency is None:
-        problem = f"{shown(parts[0].part.name)} states no frequency, at which the mask or the tones are stated"
-        report(path, Problem(problem, "accepted: oscillator.frequency", at=("frequency",)))
-        return INVALID
-    if found is not INVALID and found.vibration is not None and found.acceleration_sensitivity is None:
-        report(path, NOT_SENSITIVE)
-        return INVALID
-    return found
-
-
 def _parts_of(
     names: str | tuple[str, ...] | None, path: KeyPath, kinds: Sequence[str], find: Find, report: Report
 ) -> Any:
-    """Entries of parts; `INVALID` after a report."""
+    """Entries of parts by their names; `INVALID` after a report."""
     is_list = isinstance(names, tuple)
-    found: list[Entry] = []
+    found: dict[str, Entry] = {}
     is_valid = True
     for index, name in enumerate(names if isinstance(names, tuple) else [names] if names else []):
         here = (*path, index) if is_list else path
@@ -513,51 +483,63 @@ def _parts_of(
             kind = entry.part.kind
             if kind not in kinds:
                 raise PartError(f"is an {kind}" if kind != "gnss" else "is a GNSS receiver")
-        except UnknownPartError as error:
-            report(here, Problem(str(error), f"accepted: parts of the kind {' or '.join(kinds)}", error.hint))
-            is_valid = False
-            continue
         except PartError as error:
             # What is wrong with its file says what is accepted there, and names the file.
             accepted = "" if error.faults else f"accepted: parts of the kind {' or '.join(kinds)}"
             for said in map(str, error.args):
-                report(here, Problem(said, accepted, names_value=bool(error.faults)))
+                report(here, Problem(said, accepted, error.hint, names_value=bool(error.faults)))
             is_valid = False
             continue
-        if any(kind == other.part.kind for other in found):
+        if any(kind == other.part.kind for other in found.values()):
             report(here, Problem(f"is a second {kind}", "accepted: one part of each kind"))
             is_valid = False
-        found.append(entry)
+        found[name] = entry
     return found if is_valid else INVALID
 
 
-def _motion_of(error: MotionError, parts: Sequence[Entry], path: KeyPath, report: Report) -> Any:
-    """Put figures of parts where the file has none; what it has overrides exactly that figure, and says so."""
+def _with_sensors(error: MotionError, path: KeyPath, find: Find, report: Report, taken: list[TakenFigure]) -> Any:
+    """A motion error with the figures of parts where the file has none, which are noted; `INVALID` after a report.
+
+    What the file has overrides exactly that figure, and says so.
+    """
+    path = (*path, "sensor")
+    parts = _parts_of(error.sensor, path, ("imu", "gnss"), find, report)
+    if parts is INVALID:
+        return INVALID
     of_parts = dict(error.of_parts)  # an accuracy file may have been before
     overridden = list(error.overridden)
-    for entry in parts:
+    for name, entry in parts.items():
         part = entry.part
         imu = error.imu or Imu()
         own = imu if isinstance(part, ImuPart) else error
-        taken = {}
+        figures = {}
         for figure, text in entry.figures.items():
             key = _own_key(error, own, figure)
             if key:
                 overridden.append(Overridden(figure, key, part.name, text))
             else:
-                taken[figure] = getattr(part, figure)
+                figures[figure] = getattr(part, figure)
         if isinstance(part, ImuPart):
-            error = error._replace(imu=imu._replace(**taken))
-        elif taken and error.frame != "scene":
+            error = error._replace(imu=imu._replace(**figures))
+        elif figures and error.frame != "scene":
             report(path, Problem(f"{shown(part.name)} is stated east, north, up", "accepted: frame: scene"))
             return INVALID
-        elif taken.keys() & {"position", "velocity"} and error.distribution != "normal":
+        elif figures.keys() & {"position", "velocity"} and error.distribution != "normal":
             report(path, Problem(f"{shown(part.name)} is stated as one sigma", "accepted: distribution: normal"))
             return INVALID
         else:
-            error = error._replace(**taken)
-        of_parts |= {figure: evidence(part, figure) for figure in taken}
+            error = error._replace(**figures)
+        of_parts |= {figure: evidence(part, figure) for figure in figures}
+        section = (*path[:-1], "imu") if isinstance(part, ImuPart) else path[:-1]
+        taken += _taken(name, entry, section, figures)
     return error._replace(of_parts=tuple(of_parts.items()), overridden=tuple(overridden))
+
+
+def _taken(name: str, entry: Entry, section: KeyPath, figures: Collection[str]) -> Iterator[TakenFigure]:
+    """Figures that a section takes from a part, in the order of the part's file."""
+    for figure in entry.figures:
+        if figure in figures:
+            yield TakenFigure(".".join(map(str, (*section, figure))), entry.written[figure], name)
 
 
 def _own_key(error: MotionError, own: MotionError | Imu, figure: str) -> str:
@@ -572,75 +554,53 @@ def _own_key(error: MotionError, own: MotionError | Imu, figure: str) -> str:
     return f"motion_error.imu.{figure}" if isinstance(own, Imu) else f"motion_error.{figure}"
 
 
-@dataclass(frozen=True)
-class TakenFigure:
-    """A figure that a mission takes from a part: the key that could state it, what the part says, the part's name."""
+def _with_sensor(oscillator: Oscillator, path: KeyPath, find: Find, report: Report, taken: list[TakenFigure]) -> Any:
+    """An oscillator with the figures of its part, which are noted; `INVALID` after a report.
 
-    key: str
-    value: Any
-    part: str
-
-
-def taken_figures(mission: Mission) -> Iterator[TakenFigure]:
-    """Figures that a mission takes from parts; it is the same mission if its file states them.
-
-    Values are text, or mappings and lists of text, as the file of the part has them.
+    What the file states overrides exactly that figure, and says so. A mask holds at the frequency it was measured
+    at: with another one beside it, the same decibels would be those of a better or a worse oscillator. The file has
+    to state both, or neither.
     """
-    read = {one.name: _entry(one.file, one.data) for one in mission.parts}
-    for name, platform in zip(mission.platforms._fields, mission.platforms, strict=True):
-        error, oscillator = platform.motion_error, platform.oscillator
-        names = error.sensor if isinstance(error.sensor, tuple) else (error.sensor,) if error.sensor else ()
-        for each in names:
-            entry = read[each]
-            inner = "imu." if entry.part.kind == "imu" else ""
-            for figure in entry.figures:
-                if dict(error.of_parts).get(figure) == evidence(entry.part, figure):
-                    yield TakenFigure(f"platforms.{name}.motion_error.{inner}{figure}", entry.written[figure], each)
-        if oscillator is not None and oscillator.sensor:
-            entry = read[oscillator.sensor]
-            path = ("platforms", name, "oscillator", "frequency")
-            is_own = {"frequency": path in mission.places}
-            is_own |= {form: oscillator.source != evidence(entry.part, form) for form in FORMS}
-            is_own |= {figure: figure not in dict(oscillator.of_parts) for figure in BESIDE_NOISE}
-            for figure in entry.figures:
-                if not is_own[figure]:
-                    key = f"platforms.{name}.oscillator.{figure}"
-                    yield TakenFigure(key, entry.written[figure], oscillator.sensor)
-
-
-def _oscillator_of(oscillator: Oscillator, entry: Entry, path: KeyPath, report: Report) -> Any:
-    """An oscillator with the figures of a part; what the file states overrides exactly that figure, and says so.
-
-    A mask holds at the frequency it was measured at: with another one beside it, the same decibels would be those of
-    a better or a worse oscillator. The file has to state both, or neither.
-    """
-    part, figures = entry.part, entry.figures
+    if oscillator.sensor is None:
+        return oscillator
+    parts = _parts_of(oscillator.sensor, (*path, "sensor"), ("oscillator",), find, report)
+    if parts is INVALID:
+        return INVALID
+    entry = parts[oscillator.sensor]
+    part, written, overridden, of_parts = entry.part, entry.figures, [], []
     own = next((form for form in FORMS if getattr(oscillator, form) is not None), None)
     (form,) = [form for form in FORMS if getattr(part, form) is not None]
-    stated, overridden = getattr(part, "frequency", None), []
-    taken: dict[str, Any] = {}
+    figures: dict[str, Any] = {}
     if own is None:
-        taken = {form: getattr(part, form), "source": evidence(part, form)}
+        figures = {form: getattr(part, form), "source": evidence(part, form)}
     else:
-        overridden.append(Overridden(own, f"oscillator.{own}", part.name, f"{form} {figures[form]}"))
+        overridden.append(Overridden(own, f"oscillator.{own}", part.name, f"{form} {written[form]}"))
     if oscillator.frequency is None:
-        taken["frequency"] = stated
-    elif stated is not None and oscillator.frequency != stated:
-        at = figures["frequency"]
+        figures["frequency"] = part.frequency
+    elif part.frequency is not None and oscillator.frequency != part.frequency:
+        at = written["frequency"]
         if own is None and form == "phase_noise":
             problem = f"the phase noise of {shown(part.name)} is stated at its own frequency, {at}"
             report(path, Problem(problem, "accepted: no frequency, or phase_noise beside it", at=("frequency",)))
             return INVALID
         overridden.append(Overridden("frequency", "oscillator.frequency", part.name, at))
-    of_parts = []
     for figure in BESIDE_NOISE:
         value = getattr(part, figure)
         if value is not None and getattr(oscillator, figure) is None:
-            taken[figure] = value
+            figures[figure] = value
             of_parts.append((figure, evidence(part, figure)))
         elif value is not None:
-            overridden.append(Overridden(figure, f"oscillator.{figure}", part.name, figures[figure]))
-    return oscillator._replace(**taken, of_parts=tuple(of_parts), overridden=tuple(overridden))
+            overridden.append(Overridden(figure, f"oscillator.{figure}", part.name, written[figure]))
+    found = oscillator._replace(**figures, of_parts=tuple(of_parts), overridden=tuple(overridden))
+    if found.needs_frequency and found.frequency is None:
+        problem = f"{shown(part.name)} states no frequency, at which the mask or the tones are stated"
+        report(path, Problem(problem, "accepted: oscillator.frequency", at=("frequency",)))
+        return INVALID
+    if found.vibration is not None and found.acceleration_sensitivity is None:
+        report(path, NOT_SENSITIVE)
+        return INVALID
+    taken += _taken(oscillator.sensor, entry, path, figures)
+    return found
 
 
 # ---------------------------------------------------------------------- JSON Schema of a part

@@ -6,11 +6,11 @@ import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from bisar_budget.faults import Problem, printable
+from bisar_budget.faults import KeyPath, Problem, printable
 from bisar_budget.geometry import STRAIGHT, PlatformState, Vector
 from bisar_budget.mission.instruments import Overridden
 from bisar_budget.mission.model import Mission
@@ -39,9 +39,8 @@ from bisar_budget.paths.flight import (
     smoothed,
     stretch_around,
 )
-from bisar_budget.paths.flight_log import hold_to_motion
 from bisar_budget.paths.instant import DAY, Instant
-from bisar_budget.paths.log_places import LogKeys, around_aperture
+from bisar_budget.paths.log_places import LogKeys, around_aperture, hold_to_motion
 from bisar_budget.paths.orbit_formats import ORBIT_FORMATS, hold_to_format, hold_to_log
 from bisar_budget.paths.orientation import UNKNOWN, Orientation, read_finals
 from bisar_budget.paths.recognised import read_log
@@ -49,6 +48,7 @@ from bisar_budget.paths.sbet import read_accuracy
 from bisar_budget.resources import DISK, Files, UnreadableError
 from bisar_budget.units import format_quantity
 
+_T = TypeVar("_T")
 Beside = Callable[[str], bytes]  # content of a file that a mission names
 
 _FILES = (*ORBIT_FORMATS, "file", "accuracy")  # keys of a path that name one
@@ -91,8 +91,7 @@ def reader_of(folder: str, files: Files = DISK) -> Beside:
 
 def path_files(mission: Mission) -> Iterator[tuple[str, str]]:
     """Keys under which a mission names an orbit or a log, and the names."""
-    for name in Platforms._fields:
-        platform: Platform = getattr(mission.platforms, name)
+    for name, platform in mission.platforms._asdict().items():
         for key, section in (("orbit", platform.orbit), ("trajectory", platform.trajectory)):
             for form in _FILES:
                 if isinstance(file := getattr(section, form, None), str):
@@ -107,26 +106,20 @@ def report_files(root: Any, read: Beside, report: Report) -> None:
     What they say is looked at where the rest of the mission is there: a path depends on its scene, time and aperture.
     The parameters are those of `with_paths`, `root` is what the file says.
     """
-    platforms = root.get("platforms")
+    platforms, stated = root.get("platforms"), root.get("earth_orientation")
+    named: dict[KeyPath, Any] = {}
     for name in Platforms._fields:
         platform = platforms.get(name) if isinstance(platforms, dict) else None
         for key, section in (("orbit", ORBIT), ("trajectory", TRAJECTORY)):
-            named = section.each(platform.get(key)) if isinstance(platform, dict) else {}
-            for form in _FILES:
-                file = named.get(form)
-                if not isinstance(file, str):
-                    continue
-                try:
-                    read(file)
-                except PathFileError as error:
-                    report(("platforms", name, key, form), _of_file(file, error))
-    stated = root.get("earth_orientation")
-    file = stated.get("file") if isinstance(stated, dict) else None
-    if isinstance(file, str):
-        try:
-            read(file)
-        except PathFileError as error:
-            report(("earth_orientation", "file"), _of_file(file, error))
+            values = section.each(platform.get(key)) if isinstance(platform, dict) else {}
+            named |= {("platforms", name, key, form): values.get(form) for form in _FILES}
+    named["earth_orientation", "file"] = stated.get("file") if isinstance(stated, dict) else None
+    for path, file in named.items():
+        if isinstance(file, str):
+            try:
+                read(file)
+            except PathFileError as error:
+                report(path, _of_file(file, error))
 
 
 def with_paths(mission: Mission, read: Beside, report: Report) -> Any:
@@ -145,8 +138,7 @@ def with_paths(mission: Mission, read: Beside, report: Report) -> Any:
     if (wrong := _unusable_orientation(mission, read)) is not None:
         report(("earth_orientation", "file"), wrong)
         return INVALID
-    for name in platforms._fields:
-        platform: Platform = getattr(platforms, name)
+    for name, platform in platforms._asdict().items():
         try:
             found = _with_path(mission, platform, axes, read)
         except _UnusablePathError as unusable:
@@ -159,16 +151,13 @@ def with_paths(mission: Mission, read: Beside, report: Report) -> Any:
         platforms = platforms._replace(**{name: found})
     if not is_valid:
         return INVALID
-    aperture_time = mission.collection.aperture_time
-    common = mission.common_motion_error
-    for problem in without_image(platforms, aperture_time, common, has_direct_path=mission.has_direct_path):
-        report((), problem)
-        is_valid = False
+    aperture_time, common = mission.collection.aperture_time, mission.common_motion_error
+    problems = list(without_image(platforms, aperture_time, common, has_direct_path=mission.has_direct_path))
     if mission.propagation is not None:
-        for problem in too_low(mission.propagation, platforms, aperture_time):
-            report((), problem)
-            is_valid = False
-    return mission._replace(platforms=platforms) if is_valid else INVALID
+        problems += too_low(mission.propagation, platforms, aperture_time)
+    for problem in problems:
+        report((), problem)
+    return INVALID if problems else mission._replace(platforms=platforms)
 
 
 def _unusable_orientation(mission: Mission, read: Beside) -> Problem | None:
@@ -293,7 +282,7 @@ def _of_orbit(mission: Mission, route: OrbitSource, axes: earth.SceneAxes, read:
             return path._replace(orientation=table) if orbit.is_turned else path
 
         key = (*given._replace(data=digest.encode()), center, axes, T, orientation, table)
-        path: FlownPath = _kept(_paths, _PATHS_KEPT, key, found)
+        path = _kept(_paths, _PATHS_KEPT, key, found)
     except PathFileError as error:
         named = getattr(route, _form_of(route))
         file = named if isinstance(named, str) else None
@@ -312,7 +301,7 @@ def _orientation(mission: Mission, center: Instant, read: Beside) -> tuple[Orien
     return read_finals(data, stated.file, center), (stated.file, hashlib.sha256(data).hexdigest())
 
 
-def _kept(kept: dict[tuple[object, ...], Any], most: int, key: tuple[object, ...], made: Callable[[], Any]) -> Any:
+def _kept(kept: dict[tuple[object, ...], _T], most: int, key: tuple[object, ...], made: Callable[[], _T]) -> _T:
     """What follows from a key, as it was made before or made now; so many are kept, the last that were asked for."""
     found = kept.pop(key, None) or made()
     kept[key] = found
@@ -372,11 +361,10 @@ def _of_log(mission: Mission, route: TrajectorySource, axes: earth.SceneAxes | N
         data = read(route.file)
         digest = hashlib.sha256(data).hexdigest()
         key = (route, digest, mission.collection.center_time, axes, aperture_time)
-        path: FlownPath = _kept(_paths, _PATHS_KEPT, key, lambda: _log_path(mission, route, axes, data, digest))
+        return _kept(_paths, _PATHS_KEPT, key, lambda: _log_path(mission, route, axes, data, digest))
     except PathFileError as error:
         problem = _of_file(None if error.key else route.file, error)
         raise _UnusablePathError(("trajectory", error.key or "file"), problem) from None
-    return path
 
 
 def _log_path(
@@ -410,8 +398,7 @@ def _log(route: TrajectorySource, data: bytes, digest: str) -> Log:
         hold_to_log(data, route.file)
         return read_log(data, route.file, route.format, keys)
 
-    log: Log = _kept(_logs, _LOGS_KEPT, key, made)
-    return log
+    return _kept(_logs, _LOGS_KEPT, key, made)
 
 
 def _by_accuracy(
@@ -471,8 +458,7 @@ def _of_place(platform: Platform, axes: earth.SceneAxes, aperture_time_s: float)
         return _flown(fitted, "geodetic place, flight along the geodesic")
 
     key = (place, heading, speed, climb, axes, aperture_time_s)
-    found: FlownPath = _kept(_paths, _PATHS_KEPT, key, path)
-    return found
+    return _kept(_paths, _PATHS_KEPT, key, path)
 
 
 def _flown(fitted: Fitted, words: str, file: str | None = None, digest: str | None = None) -> FlownPath:

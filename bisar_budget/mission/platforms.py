@@ -47,16 +47,16 @@ from bisar_budget.mission.readers import (
     VELOCITY,
     Choice,
     Key,
-    OneOf,
     Quantity,
     Reader,
     Reference,
     Report,
     Section,
-    Text,
+    Source,
     TextList,
     Triple,
     Whole,
+    either,
 )
 from bisar_budget.mission.vibrations import Vibration
 from bisar_budget.paths.instant import parse_instant
@@ -72,8 +72,7 @@ _PLACES = np.linspace(-1, 1, 65)[:, None]
 
 FRAMES = Choice("scene", "track", "look", "ric")
 TIME_TAG = Quantity(units.TIME, ge=-1e3, le=1e3)
-PART = Reference()
-PARTS = OneOf(lambda value: TextList() if isinstance(value, list) else PART, (PART, TextList()))
+PARTS = either(list, TextList(), Reference())
 
 
 class MotionError(NamedTuple):
@@ -119,7 +118,7 @@ class MotionError(NamedTuple):
     lever_arm: Annotated[
         LeverArm | None, Key(LEVER_ARM, "From the navigation's reference to the antenna's phase centre.")
     ] = None
-    source: Annotated[str | None, Key(Text(), "Where the values come from; shown as evidence.")] = None
+    source: Source = None
     of_parts: tuple[tuple[str, str], ...] = ()
     overridden: tuple[Overridden, ...] = ()
 
@@ -190,7 +189,7 @@ class CommonMotionError(NamedTuple):
             "As that of a platform, where one clock tags both.",
         ),
     ] = None
-    source: Annotated[str | None, Key(Text(), "Where the values come from; shown as evidence.")] = None
+    source: Source = None
 
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
@@ -226,7 +225,7 @@ class OrbitSource(NamedTuple):
     tle: Annotated[
         str | tuple[str, str] | None,
         Key(
-            OneOf(lambda value: _Lines() if isinstance(value, list) else _FILE, (_FILE, _Lines())),
+            either(list, _Lines(), _FILE),
             "File of two-line elements, or the two lines; SGP4.",
         ),
     ] = None
@@ -425,8 +424,8 @@ class Platform(NamedTuple):
     @property
     def way(self) -> str:
         """First key of the way in which its path is stated."""
-        keys = ("position", "orbit", "trajectory", "latitude")
-        return next((key for key in keys if getattr(self, key) is not None), "slant_range")
+        firsts = [way.keys[0] for way in WAYS]
+        return next((key for key in firsts if getattr(self, key) is not None), firsts[-1])
 
     @property
     def is_of_the_earth(self) -> bool:
@@ -522,7 +521,7 @@ def _no_image(geometry: BistaticGeometry) -> Iterator[Problem]:
 
 
 def _no_common_frame(platforms: Platforms, frame: str) -> Iterator[Problem]:
-    for name, platform in zip(Platforms._fields, platforms, strict=True):
+    for name, platform in platforms._asdict().items():
         if frame == "ric" and platform.path is None:  # yet
             continue
         try:
@@ -546,7 +545,7 @@ def has_body_axes(state: PlatformState, half: Any, margin: float = 1.0) -> Any:
 
 def _no_body_axes(platforms: Platforms, half: float) -> Iterator[Problem]:
     """Lever arms of platforms whose velocity has no direction on the ground, at some time of the aperture."""
-    for name, platform in zip(Platforms._fields, platforms, strict=True):
+    for name, platform in platforms._asdict().items():
         if platform.motion_error.lever_arm is None or platform.state.is_still:
             continue
         if not has_body_axes(platform.state, np.array([half]))[0]:
@@ -558,7 +557,7 @@ def _no_body_axes(platforms: Platforms, half: float) -> Iterator[Problem]:
 
 
 def _dives(platforms: Platforms, geometry: BistaticGeometry, aperture_time: float) -> Iterator[Problem]:
-    for name, platform, state in zip(Platforms._fields, platforms, geometry.both, strict=True):
+    for (name, platform), state in zip(platforms._asdict().items(), geometry.both, strict=True):
         lowest = min(state.place(tau)[2] for tau in _turning_points(state, aperture_time / 2))
         if lowest < 0 <= state.position[2]:
             key: KeyPath = ("climb",) if platform.velocity is None else ("velocity", 2)

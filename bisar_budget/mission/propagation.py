@@ -10,7 +10,7 @@ from bisar_budget.constants import EARTH_RADIUS
 from bisar_budget.faults import KeyPath, Problem
 from bisar_budget.geometry import PlatformState, Vectors
 from bisar_budget.mission.platforms import Platforms
-from bisar_budget.mission.readers import Key, Quantity, Section, Text
+from bisar_budget.mission.readers import Key, Quantity, Section, Source
 
 DELAYS = ("zenith_delay", "zenith_electron_content")
 LEAST_ELEVATION_DEG = 3.0  # below, a delay does not follow from that of the zenith
@@ -28,7 +28,7 @@ class LegDelay(NamedTuple):
     zenith_electron_content: Annotated[
         float | None, Key(_ELECTRON_CONTENT, "Of the ionosphere; 1 TECU is 1e16/m².")
     ] = None
-    source: Annotated[str | None, Key(Text(), "Where the values come from; shown as evidence.")] = None
+    source: Source = None
 
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
@@ -49,7 +49,7 @@ class Propagation(NamedTuple):
     ] = None
     transmitter: Annotated[LegDelay | None, Key(_LEG, "From the transmitter to the scene, alone.")] = None
     receiver: Annotated[LegDelay | None, Key(_LEG, "From the scene to the receiver, alone.")] = None
-    source: Annotated[str | None, Key(Text(), "Where the values come from; shown as evidence.")] = None
+    source: Source = None
 
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:

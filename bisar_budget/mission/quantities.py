@@ -20,7 +20,7 @@ from bisar_budget.mission.changes import (
     parts_of,
 )
 from bisar_budget.mission.covariance import KINDS, Covariance, error_index
-from bisar_budget.mission.instruments import Imu, LeverArm, PowerLaw
+from bisar_budget.mission.instruments import IMU_KINDS, POWERS, Imu, LeverArm
 from bisar_budget.mission.model import MISSION, Mission, Simulation
 from bisar_budget.mission.platforms import CommonMotionError, MotionError
 from bisar_budget.mission.readers import (
@@ -297,7 +297,7 @@ _SECTIONS: Mapping[str, Callable[[], Any]] = {
     "common_motion_error": CommonMotionError,
     "simulation": Simulation,
 }
-_TRIPLES = ("position", "velocity", "acceleration", *Imu._fields[:-1], "uncertainty")
+_TRIPLES = ("position", "velocity", "acceleration", *IMU_KINDS, "uncertainty")
 # Curves of an oscillator, with the dimension of what their points are named by.
 _CURVES: Mapping[str, Dimension] = {
     "phase_noise": units.FREQUENCY,
@@ -305,7 +305,6 @@ _CURVES: Mapping[str, Dimension] = {
     "allan_deviation": units.TIME,
     "spectrum": units.FREQUENCY,
 }
-POWERS = dict(zip(("h-2", "h-1", "h0", "h1", "h2"), PowerLaw._fields, strict=True))
 
 
 def with_number(mission: Mission, key: str, number: Any) -> Mission:

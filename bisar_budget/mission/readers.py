@@ -8,8 +8,8 @@ library would, in a fifth of the import time: `check` starts in every commit of 
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sized
-from typing import Any, NamedTuple
+from collections.abc import Callable, Sized
+from typing import Annotated, Any, NamedTuple
 
 from bisar_budget import units
 from bisar_budget.faults import InvalidValueError, KeyPath, Problem
@@ -22,6 +22,7 @@ Report = Callable[[KeyPath, Problem], None]
 _POINT = "A decimal is written with a point, a comma separates"
 _MAX_TEXT = 500  # characters
 _MAX_ENTRIES = 1000  # of a list
+_MAX_POINTS = 100  # of a curve
 _FEW = 8  # parts that one platform is made of
 _MAX_IDS = 4000  # more rows than all lists together make
 _MAX_WILDCARDS = 20  # an id has four parts; patterns of hundreds take a second for each fifty
@@ -146,7 +147,7 @@ class Triple(Reader):
             hint = _POINT if isinstance(value, list) and len(value) > 3 else ""
             report(path, Problem(f"must be three components{given}", "accepted: [a, b, c]", hint))
             return INVALID
-        parts = tuple([_read(self.component, part, (*path, index), report) for index, part in enumerate(value)])
+        parts = tuple([read_part(self.component, part, (*path, index), report) for index, part in enumerate(value)])
         return INVALID if INVALID in parts else parts
 
     def below(self, part: str) -> Reader | None:
@@ -206,26 +207,19 @@ class Glob(Text):
 
 
 class Choice(Reader):
-    """One of a few words; `refused` maps words that mean something elsewhere to why not here.
-
-    `accepted` says which there are; omitted: all of them.
-    """
+    """One of a few words; `accepted` says which there are, omitted: all of them."""
 
     is_word = True
 
-    def __init__(self, *names: str, refused: Mapping[str, str] | None = None, accepted: str = "") -> None:
-        self.names = names
-        self.refused = refused or {}
-        self.accepted = accepted or ", ".join(names)
+    def __init__(self, *names: str, accepted: str = "") -> None:
+        self.names, self.accepted = names, accepted or ", ".join(names)
 
     def leaf(self, value: Any) -> str:
         """Refuse other words, with the nearest."""
         if isinstance(value, str) and value in self.names:
             return value
-        accepted = f"accepted: {self.accepted}"
-        if isinstance(value, str) and value in self.refused:
-            raise InvalidValueError(self.refused[value], accepted)
-        raise InvalidValueError("is not a known choice", accepted, did_you_mean(value, self.names))
+        near = did_you_mean(value, self.names)
+        raise InvalidValueError("is not a known choice", f"accepted: {self.accepted}", near)
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
         """Enumeration."""
@@ -235,9 +229,9 @@ class Choice(Reader):
 class Words(Reader):
     """A list of some of a few words, each once."""
 
-    def __init__(self, *names: str, accepted: str = "") -> None:
+    def __init__(self, *names: str, accepted: str) -> None:
         self.word: Reader = Choice(*names, accepted=accepted)
-        self.problem = Problem("must be a list", f"accepted: some of {accepted or ', '.join(names)}")
+        self.problem = Problem("must be a list", f"accepted: some of {accepted}")
         self.fewest, self.most = 0.0, math.inf
 
     def read(self, value: Any, path: KeyPath, report: Report) -> Any:
@@ -245,7 +239,7 @@ class Words(Reader):
         if not isinstance(value, list) or not self.fewest <= len(value) <= self.most:
             report(path, self.problem)
             return INVALID
-        words = tuple([_read(self.word, word, (*path, index), report) for index, word in enumerate(value)])
+        words = tuple([read_part(self.word, word, (*path, index), report) for index, word in enumerate(value)])
         for index, word in enumerate(words):
             if word is not INVALID and word in words[:index]:
                 report((*path, index), Problem("is in the list twice"))
@@ -353,7 +347,7 @@ class TextMap(Reader):
         """Read each value at its own place."""
         if not _is_few(value, dict, "must be a mapping of keys to values", path, report):
             return INVALID
-        result = {key: _read(Text(), text, (*path, key), report) for key, text in value.items()}
+        result = {key: read_part(Text(), text, (*path, key), report) for key, text in value.items()}
         return INVALID if any(text is INVALID for text in result.values()) else result
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
@@ -390,12 +384,12 @@ class Weights(Reader):
         if not _is_few(value, (dict, list), "must be keys with their weights, or a list of keys", path, report):
             return INVALID
         if isinstance(value, list):
-            names = [_read(Text(), name, (*path, place), report) for place, name in enumerate(value)]
+            names = [read_part(Text(), name, (*path, place), report) for place, name in enumerate(value)]
             twice = [place for place, name in enumerate(names) if name in names[:place]]
             for place in twice:
                 report((*path, place), Problem("stands twice", "accepted: each key once"))
             return INVALID if twice or any(name is INVALID for name in names) else dict.fromkeys(names, 1.0)
-        weights = {key: _read(_WEIGHT, weight, (*path, key), report) for key, weight in value.items()}
+        weights = {key: read_part(_WEIGHT, weight, (*path, key), report) for key, weight in value.items()}
         return INVALID if any(weight is INVALID for weight in weights.values()) else weights
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
@@ -461,7 +455,9 @@ class Section(Reader):
     def each(self, value: Any) -> dict[str, Any]:
         """Read each known key by itself, and say nothing: `INVALID` stands for what is wrong."""
         given = value.items() if isinstance(value, dict) else ()
-        return {name: _read(self.keys[name].reader, item, (), _unsaid) for name, item in given if name in self.keys}
+        return {
+            name: read_part(self.keys[name].reader, item, (), _unsaid) for name, item in given if name in self.keys
+        }
 
     def below(self, part: str) -> Reader | None:
         """Give the reader of a key."""
@@ -511,7 +507,7 @@ class ListOf(Reader):
         if len(value) > _MAX_ENTRIES:
             report(path, Problem(f"must have at most {_MAX_ENTRIES} entries, has {len(value)}"))
             return INVALID
-        entries = tuple([_read(self.section, entry, (*path, index), report) for index, entry in enumerate(value)])
+        entries = tuple([read_part(self.section, entry, (*path, index), report) for index, entry in enumerate(value)])
         return INVALID if INVALID in entries else entries
 
     def below(self, part: str) -> Reader | None:
@@ -538,12 +534,70 @@ class OneOf(Reader):
         return {"anyOf": [form.schema(definitions) for form in self.forms]}
 
 
+Points = tuple[tuple[float, float], ...]
+
+
+class SortedPoints(tuple[tuple[float, float], ...]):
+    """Points of a curve in rising order, which the file has in another: the rows that rest on them say so."""
+
+
+class CurveReader(Reader):
+    """A mapping of abscissas to ordinates, read in rising order: `SortedPoints` if the file has another."""
+
+    def __init__(self, abscissa: Quantity, ordinate: Quantity, what: str, fewest: int) -> None:
+        self.abscissa, self.ordinate, self.what, self.fewest = abscissa, ordinate, what, fewest
+
+    def read(self, value: Any, path: KeyPath, report: Report) -> Any:
+        """Read each point at its own place."""
+        if not isinstance(value, dict) or not self.fewest <= len(value) <= _MAX_POINTS:
+            given = f", {len(value)} given" if isinstance(value, dict) else ""
+            report(path, Problem(f"must be {self.fewest} to {_MAX_POINTS} points{given}", f"accepted: {self.what}"))
+            return INVALID
+        points = {}
+        is_valid = True
+        for key, item in value.items():
+            here = (*path, key)
+            try:
+                at = self.abscissa.leaf(key)
+            except InvalidValueError as error:
+                report(here, error.problem._replace(is_of_key=True))
+                is_valid = False
+                continue
+            if at in points:
+                report(here, Problem("is in the list twice"))
+                is_valid = False
+            points[at] = read_part(self.ordinate, item, here, report)
+        if INVALID in points.values() or not is_valid:
+            return INVALID
+        found = sorted(points.items())
+        return tuple(found) if found == list(points.items()) else SortedPoints(found)
+
+    def below(self, part: str) -> Reader | None:
+        """Give the reader of an ordinate."""
+        return self.ordinate
+
+    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
+        """Object of points."""
+        return {
+            "type": "object",
+            "additionalProperties": self.ordinate.schema(definitions),
+            "minProperties": self.fewest,
+            "maxProperties": _MAX_POINTS,
+        }
+
+
+def either(kind: type, form: Reader, other: Reader) -> OneOf:
+    """One form for a list or a mapping, which is the `kind`, and another for all else."""
+    return OneOf(lambda value: form if isinstance(value, kind) else other, (other, form))
+
+
 def is_place(part: str) -> bool:
     """Whether a part of a key is the number of an entry, from 0."""
     return part.isascii() and part.isdigit() and len(part) < 9
 
 
-def _read(reader: Reader, value: Any, path: KeyPath, report: Report) -> Any:
+def read_part(reader: Reader, value: Any, path: KeyPath, report: Report) -> Any:
+    """Read a part of a list or a mapping; one that was reported stays `INVALID`."""
     return INVALID if value is INVALID else reader.read(value, path, report)
 
 
@@ -583,3 +637,4 @@ SIDELOBE_REQUIREMENT = Quantity(units.POWER_RATIO, lt=0, ge=-200)
 SHARE = Quantity(units.RATIO, gt=0, ge=1e-6, le=1)
 DISTRIBUTION = Choice("normal", "uniform", "bound")
 DISTRIBUTIONS = "normal: the values are one sigma; uniform, bound: they are not exceeded."
+Source = Annotated[str | None, Key(Text(), "Where the values come from; shown as evidence.")]

@@ -133,7 +133,8 @@ class Revision:
 
         Links below the top are left to the revision, which may have others.
         """
-        real = os.path.join(os.path.realpath(_existing(path)[0]), _existing(path)[1])
+        folder, rest = _existing(path)
+        real = os.path.join(os.path.realpath(folder), rest)
         for whole in (os.path.abspath(path), real):
             above, below = whole, os.curdir
             while True:

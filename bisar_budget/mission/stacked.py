@@ -14,7 +14,11 @@ from bisar_budget.mission.platforms import FlownPath
 
 def picked(mission: Mission, places: NDArray[np.intp]) -> Mission:
     """The mission with some of the cases of its arrays."""
-    return cast(Mission, _with_leaves(mission, lambda leaf: leaf[places] if np.ndim(leaf) else leaf))
+
+    def of_cases(leaf: Any) -> Any:
+        return leaf[places] if isinstance(leaf, np.ndarray) and leaf.ndim else leaf
+
+    return cast(Mission, _with_leaves(mission, of_cases))
 
 
 def stacked(missions: Iterable[Mission]) -> Iterator[tuple[Mission, NDArray[np.intp]]]:
@@ -31,21 +35,17 @@ def stacked(missions: Iterable[Mission]) -> Iterator[tuple[Mission, NDArray[np.i
         rows.append(numbers)
     for mission, places, rows in shapes.values():
         columns = [column if np.ptp(column) else column.item(0) for column in np.array(rows).T]
-        yield _with_leaves(mission, partial(_next_of, iter(columns), _is_number)), np.array(places)
+        yield _with_leaves(mission, partial(_next_of, iter(columns))), np.array(places)
 
 
-def _is_number(leaf: Any) -> bool:
-    return isinstance(leaf, float)
-
-
-def _next_of(numbers: Iterator[Any], is_theirs: Callable[[Any], Any], leaf: Any) -> Any:
-    """The next number in the place of a leaf that is one of theirs."""
-    return next(numbers) if is_theirs(leaf) else leaf
+def _next_of(numbers: Iterator[Any], leaf: Any) -> Any:
+    """The next number in the place of one, and a word as it is."""
+    return next(numbers) if isinstance(leaf, float) else leaf
 
 
 def _bare(mission: Mission) -> Mission:
     """The mission without what says where it and its paths come from."""
-    for name, platform in zip(mission.platforms._fields, mission.platforms, strict=True):
+    for name, platform in mission.platforms._asdict().items():
         if platform.path is not None:
             path = platform.path
             path = FlownPath(
@@ -57,7 +57,7 @@ def _bare(mission: Mission) -> Mission:
             )
             platforms = mission.platforms._replace(**{name: platform._replace(path=path)})
             mission = mission._replace(platforms=platforms)
-    whence: dict[str, Any] = {"file": "", "places": {}, "data": b"", "changes": (), "parts": ()}
+    whence: dict[str, Any] = {"file": "", "places": {}, "data": b"", "changes": (), "parts": (), "taken": ()}
     return mission._replace(name="", document=Document(), requirement_ids={}, **whence)
 
 
@@ -72,7 +72,7 @@ def _parts(value: Any) -> Any:
 
 def _shape(value: Any, numbers: list[float]) -> Any:
     """All of a value but its numbers, which are put into a list."""
-    if _is_number(value):
+    if isinstance(value, float):
         numbers.append(value)
         return float
     parts = _parts(value)

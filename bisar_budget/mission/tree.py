@@ -12,7 +12,7 @@ from typing import Any
 import yaml
 from yaml import AliasEvent, MappingEndEvent, ScalarEvent
 
-from bisar_budget.faults import Fault, KeyPath, MissionError, Problem, SetValue, file_fault, printable, shown
+from bisar_budget.faults import Fault, KeyPath, MissionError, Problem, SetValue, file_fault, printable, shown, upwards
 from bisar_budget.mission.readers import INVALID
 
 MAX_BYTES = 1 << 20  # a mission file has a few kilobytes
@@ -82,10 +82,7 @@ class Tree:
 
     def _change_at(self, path: KeyPath) -> SetValue | None:
         """The option that a value, or what holds it, comes from."""
-        if not self.changes:
-            return None
-        above = (self.changes.get(path[:length]) for length in range(len(path), 0, -1))
-        return next(filter(None, above), None)
+        return next(filter(None, map(self.changes.get, upwards(path))), None)
 
     def in_order(self) -> tuple[Fault, ...]:
         """Faults in the order of the file, each once."""
@@ -102,11 +99,8 @@ class Tree:
                 value = None
                 break
         is_key = value is None or problem.is_of_key
-        place = (self.keys if is_key else self.values).get(path)
-        for length in range(len(path) - 1, 0, -1):
-            if place is not None:
-                break
-            place = self.keys.get(path[:length]) or self.values.get(path[:length])
+        above = (self.keys.get(one) or self.values.get(one) for one in upwards(path[:-1]))
+        place = (self.keys if is_key else self.values).get(path) or next(filter(None, above), None)
         mark = None if place is None else place.start_mark
         given = shown(value) if isinstance(value, str) and not is_key and not problem.names_value else ""
         self.fault(mark, path, problem.problem, given=given, accepted=problem.accepted, hint=problem.hint)

@@ -7,30 +7,27 @@ from typing import Annotated, Any, NamedTuple
 from bisar_budget import units
 from bisar_budget.faults import KeyPath, Problem
 from bisar_budget.geometry import Vector
-from bisar_budget.mission.curves import CurveReader, Points
 from bisar_budget.mission.readers import (
     INVALID,
     SIZE,
     VIBRATION_FREQUENCY,
+    CurveReader,
     Key,
     ListOf,
     OneOf,
+    Points,
     Quantity,
     Reader,
     Report,
     Section,
     Triple,
+    either,
 )
 from bisar_budget.units import Dimension, given_unit
 
-
-def _along_sight_or_axes(size: Quantity) -> OneOf:
-    sizes = Triple(size)
-    return OneOf(lambda value: sizes if isinstance(value, list) else size, (size, sizes))
-
-
-_DISPLACEMENT = _along_sight_or_axes(SIZE)
-_ACCELERATION = _along_sight_or_axes(Quantity(units.ACCELERATION, ge=0, le=1e6))
+_ACCELERATION_SIZE = Quantity(units.ACCELERATION, ge=0, le=1e6)
+_DISPLACEMENT = either(list, Triple(SIZE), SIZE)
+_ACCELERATION = either(list, Triple(_ACCELERATION_SIZE), _ACCELERATION_SIZE)
 _ALONG = "along the line of sight; a vector: along each axis"
 
 
@@ -123,17 +120,13 @@ class Spectrum(NamedTuple):
         return self._replace(points=tuple((f, density * power) for f, density in self.points))
 
 
-_STATED = {True: units.ACCELERATION_DENSITY, False: units.DISPLACEMENT_DENSITY}
-
-
 class _SpectrumReader(CurveReader):
     """A mapping of frequencies to densities that all are of acceleration, or all of displacement."""
 
-    def __init__(self, dimension: Dimension, *, is_accelerated: bool, example: str) -> None:
-        super().__init__(
-            Quantity(units.FREQUENCY, gt=0, ge=1e-6, le=1e9), Quantity(dimension, gt=0, ge=1e-60, le=1e15), example, 2
-        )
-        self.is_accelerated = is_accelerated
+    def __init__(self, dimension: Dimension, example: str) -> None:
+        frequency = Quantity(units.FREQUENCY, gt=0, ge=1e-6, le=1e9)
+        super().__init__(frequency, Quantity(dimension, gt=0, ge=1e-60, le=1e15), f"{example} and the like", 2)
+        self.is_accelerated = dimension is units.ACCELERATION_DENSITY
 
     def read(self, value: Any, path: KeyPath, report: Report) -> Any:
         """Read the points, and say which they are."""
@@ -141,35 +134,23 @@ class _SpectrumReader(CurveReader):
         return INVALID if points is INVALID else Spectrum(points, self.is_accelerated)
 
 
-_SPECTRA = {
-    True: _SpectrumReader(
-        units.ACCELERATION_DENSITY,
-        is_accelerated=True,
-        example="{20 Hz: 0.04 g^2/Hz, 1 kHz: 0.04 g^2/Hz} and the like",
-    ),
-    False: _SpectrumReader(
-        units.DISPLACEMENT_DENSITY,
-        is_accelerated=False,
-        example="{20 Hz: 0.01 mm^2/Hz, 1 kHz: 1e-8 mm^2/Hz} and the like",
-    ),
-}
+_SPECTRA = (
+    _SpectrumReader(units.ACCELERATION_DENSITY, "{20 Hz: 0.04 g^2/Hz, 1 kHz: 0.04 g^2/Hz}"),
+    _SpectrumReader(units.DISPLACEMENT_DENSITY, "{20 Hz: 0.01 mm^2/Hz, 1 kHz: 1e-8 mm^2/Hz}"),
+)
 
 
 def _form_of_spectrum(value: Any) -> Reader:
     """The reader of the dimension that most points have; acceleration where it is not clear."""
     texts = [item for item in value.values() if isinstance(item, str)] if isinstance(value, dict) else []
-    counts = {key: sum(bool(given_unit(text, one.si)) for text in texts) for key, one in _STATED.items()}
-    return _SPECTRA[counts[True] >= counts[False]]
+    accelerations, displacements = (
+        sum(bool(given_unit(text, one.ordinate.dimension.si)) for text in texts) for one in _SPECTRA
+    )
+    return _SPECTRA[accelerations < displacements]
 
 
-SPECTRUM = OneOf(_form_of_spectrum, tuple(_SPECTRA.values()))
+SPECTRUM = OneOf(_form_of_spectrum, _SPECTRA)
 LEVEL = Quantity(units.POWER_RATIO, ge=-200, le=200)
-
-
-def _problems(values: Mapping[str, Any]) -> Iterator[Problem]:
-    """Hold a level to a spectrum."""
-    if values.get("spectrum_level") is not None and "spectrum" in values and values["spectrum"] is None:
-        yield Problem("shifts a spectrum, and there is none", "accepted: spectrum beside it", at=("spectrum_level",))
 
 
 class Vibration(NamedTuple):
@@ -190,7 +171,9 @@ class Vibration(NamedTuple):
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
         """Hold a level to a spectrum."""
-        yield from _problems(values)
+        if values.get("spectrum_level") is not None and "spectrum" in values and values["spectrum"] is None:
+            said = "shifts a spectrum, and there is none"
+            yield Problem(said, "accepted: spectrum beside it", at=("spectrum_level",))
 
     @property
     def is_stated(self) -> bool:
@@ -210,7 +193,7 @@ class FeltVibration(NamedTuple):
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
         """Hold a level to a spectrum."""
-        yield from _problems(values)
+        yield from Vibration.problems(values)
 
 
 FELT_VIBRATION = Section(FeltVibration)

@@ -4,7 +4,6 @@
 __all__ = [
     "earth",
     "flight",
-    "flight_log",
     "instant",
     "log_places",
     "orbit_formats",

@@ -39,16 +39,9 @@ def read_eof(
 
     Parameters
     ----------
-    data : bytes
-        A whole file.
-    name : str
-        What messages call it.
-    wanted : str, optional
-        The satellite, as `Sentinel-1A` or `S1A`; the file has one.
-    center : Instant
-        Middle of the aperture.
-    orientation : Orientation
-        Not needed: the axes are those of the Earth.
+    data, name, wanted, center, orientation
+        As of every reader of `ORBIT_FORMATS`. The satellite is `Sentinel-1A` or `S1A`. The orientation is not needed:
+        the axes are those of the Earth.
 
     Raises
     ------
@@ -111,7 +104,9 @@ def _samples(file: MessageElement, system: str, name: str) -> tuple[list[Sample]
     """State vectors, the lines where each begins, and what is said of those that are not of nominal quality."""
     samples, lines, flawed = [], [], []
     for vector in file.all("OSV"):
-        samples.append(_sample(vector, system, name))
+        parts = {one.name: one for one in vector.children}
+        x, y, z, u, v, w = _numbers(vector, parts, name)
+        samples.append(Sample(_time(vector, parts, system, name), (x, y, z), (u, v, w)))
         lines.append(vector.line)
         quality = next(vector.all("Quality"), None)
         if quality is not None and quality.text.strip().upper() != "NOMINAL":
@@ -120,12 +115,6 @@ def _samples(file: MessageElement, system: str, name: str) -> tuple[list[Sample]
         if after.time.since(before.time) < APART:
             raise PathFileError(f"{name}:{line}: the time is not after that of the state vector before it")
     return samples, lines, flawed
-
-
-def _sample(vector: MessageElement, system: str, name: str) -> Sample:
-    parts = {one.name: one for one in vector.children}
-    x, y, z, u, v, w = _numbers(vector, parts, name)
-    return Sample(_time(vector, parts, system, name), (x, y, z), (u, v, w))
 
 
 def _numbers(vector: MessageElement, parts: dict[str, MessageElement], name: str) -> Iterator[float]:

@@ -118,7 +118,9 @@ class _Between:
     ) -> None:
         self.segment, self.used, self.orientation = segment, interpolation, orientation
         self.span = (utc(segment.first), utc(segment.last))
-        self._off = lru_cache(maxsize=16)(self._off_at)
+        # Error at an instant, or between the samples around it: at a sample it is none, and what is missed between
+        # two is a wrong velocity beside them. [m]
+        self._off = lru_cache(maxsize=16)(lambda at: _misses_around(segment.samples, tai(at), interpolation))
         if not self._off(center) < _LOST_M:
             raise PathFileError(
                 f"{segment.where}: the ephemeris is too sparse around {center.as_text()} to interpolate",
@@ -156,13 +158,6 @@ class _Between:
         if not all(math.isfinite(one) for one in found):
             raise PathFileError(f"{self.segment.where}: the interpolation gives no number at {instant.as_text()}")
         return found
-
-    def _off_at(self, instant: Instant) -> float:
-        """Error of the interpolation at an instant, or between the samples around it: at a sample it is none. [m]
-
-        What is missed between two samples is a wrong velocity beside them.
-        """
-        return _misses_around(self.segment.samples, tai(instant), self.used)
 
     def doubt(self, instant: Instant) -> PathDoubt:
         stated = self.segment.accuracy

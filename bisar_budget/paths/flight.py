@@ -13,12 +13,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.polynomial import chebyshev, legendre
-from numpy.typing import NDArray
 
 from bisar_budget.geometry import STRAIGHT, PlatformState, Vector
+from bisar_budget.paths.earth import Floats
 from bisar_budget.paths.instant import Instant
-
-Floats = NDArray[np.float64]
 
 _NODES = 15  # Chebyshev points of an interpolation, so many coefficients
 _LEAST_WINDOW = 10.0  # s; in a shorter one rounding of an Earth-fixed place, 1e-9 m, is an acceleration

@@ -8,13 +8,13 @@ Time is `time [s]`, counted from anywhere, or stamps of ISO 8601: `utc` with a Z
 `time [UTC]` is the same as `utc`, and a `time` without a unit is in the scale that the mission file says. Places are
 `latitude`, `longitude` and `height` above the ellipsoid of WGS-84 or `altitude` above mean sea level, or Earth-fixed
 `x`, `y`, `z`, or `east`, `north`, `up` of the scene's centre. `geoid_separation` makes a height of an altitude. Other
-columns are not read. Cells are parted by commas, semicolons or tabs. Headers of exporters are those of `vendor_logs`.
+columns are not read. Cells are parted by commas, semicolons or tabs. Exporters have headers of their own, see below.
 """
 
 import csv
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple, NoReturn
@@ -42,8 +42,6 @@ from bisar_budget.paths.log_places import (
     unix_instant,
     utc_of,
 )
-from bisar_budget.paths.vendor_logs import Vendor, dataflash_as_csv, vendor_of
-from bisar_budget.units import format_quantity
 
 LARGEST = 200_000_000  # bytes; four hours at 200 Hz
 _CHUNK = 1 << 16  # lines that are text and numbers at once
@@ -67,14 +65,29 @@ _EXAMPLE = "2026-06-01T05:20:31.250Z"
 _CLOCKS_APART_S = 1.0  # of an exporter's two clocks, beyond the second to which one is written
 
 
-@dataclass(frozen=True)
-class _Column:
-    """A column that is read: its name, place in a row, unit as written and factor to SI. An instant has no unit."""
+class _Column(NamedTuple):
+    """A column that is read: its name, unit as written, factor to SI and place in a row. An instant has no unit.
+
+    Names of exporters' columns are those of plain logs, and `altitude` above mean sea level, `unix` since 1970 in
+    UTC, GPS `week`, kind of `fix`, number of the `receiver`.
+    """
 
     name: str
-    place: int
     unit: str = ""
     scale: float = 1.0
+    place: int = -1
+
+
+class _Vendor(NamedTuple):
+    """Whose columns: words for reports, names that tell it, and what columns mean; names are in small letters.
+
+    `least_fix` is the kind of fix from which a place has a height.
+    """
+
+    words: str
+    signs: frozenset[str]
+    columns: Mapping[str, _Column]
+    least_fix: int = 0
 
 
 @dataclass(frozen=True)
@@ -91,7 +104,7 @@ class _Header:
     stamp: _Column | None = None
     scale: str = "utc"
     zone: Callable[[str], object] = _ZONED
-    vendor: Vendor | None = None
+    vendor: _Vendor | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -101,10 +114,6 @@ class _Header:
     def axes(self) -> tuple[str, ...]:
         """Names of the three coordinates."""
         return next((kind for kind in _KINDS if kind[1] in self.names), _GEODETIC)
-
-    @property
-    def kind_words(self) -> str:
-        return self.vendor.words if self.vendor else f"CSV of {', '.join(self.axes)}"
 
     def place(self, name: str) -> int | None:
         """Place of a column among those of numbers; None where there is none."""
@@ -126,14 +135,10 @@ class _Table(NamedTuple):
 def is_csv(data: bytes) -> bool:
     """Whether the first line that says something names columns of places."""
     head = data[:100_000].decode("utf-8-sig", "replace").replace("\r\n", "\n").replace("\r", "\n").split("\n")
-    line = next(filter(_is_said, dataflash_as_csv(head)), "")
+    line = next(filter(_is_said, _dataflash_as_csv(head)), "")
     cells = line.split(max(",;\t", key=line.count))
     names = {_name_of(cell)[0] for cell in cells}
-    return _vendor(cells) is not None or any(names.issuperset(kind[:2]) for kind in _KINDS)
-
-
-def _vendor(cells: Sequence[str]) -> Vendor | None:
-    return vendor_of([cell.strip().lower() for cell in cells])
+    return _vendor_of(cells) is not None or any(names.issuperset(kind[:2]) for kind in _KINDS)
 
 
 def read_csv(data: bytes, name: str, keys: LogKeys = NOTHING_SAID) -> Log:
@@ -141,12 +146,8 @@ def read_csv(data: bytes, name: str, keys: LogKeys = NOTHING_SAID) -> Log:
 
     Parameters
     ----------
-    data : bytes
-        The file: UTF-8, at most `LARGEST` bytes.
-    name : str
-        What messages call it.
-    keys : LogKeys
-        What the mission file says of it.
+    data, name, keys
+        As of every reader of `LOG_FORMATS`; UTF-8, at most `LARGEST` bytes.
 
     Returns
     -------
@@ -158,7 +159,7 @@ def read_csv(data: bytes, name: str, keys: LogKeys = NOTHING_SAID) -> Log:
     PathFileError
         Names the file and the line of the fault: `flight.csv:17: ...`.
     """
-    lines = dataflash_as_csv(_text(data, name).split("\n"))
+    lines = _dataflash_as_csv(_text(data, name).split("\n"))
     header = _header(lines, name, keys)
     table, left_out = _with_fix(_all_rows(lines, header, name), header, name)
     rows = LogRows(name, table.lines)
@@ -167,7 +168,8 @@ def read_csv(data: bytes, name: str, keys: LogKeys = NOTHING_SAID) -> Log:
     hold_to_rise(times, rows, in_utc)
     places = _places(table, header, rows, keys)
     span = times[-1] - times[0]
-    words = f"{header.kind_words}, {counted(len(times))} over {span:.6g} s{clock_words}"
+    words = header.vendor.words if header.vendor else f"CSV of {', '.join(header.axes)}"
+    words += f", {counted(len(times))} over {span:.6g} s{clock_words}"
     words += "" if in_utc is None else scale_words(in_utc, header.scale)
     words += f", {counted(left_out, 'row')} without a fix left out" if left_out else ""
     return Log(times, places, header.axes != _KINDS[2], words, in_utc)
@@ -350,7 +352,7 @@ def _header(lines: Sequence[str], name: str, keys: LogKeys) -> _Header:
     cells = _cells(lines[at], delimiter)
     if isinstance(cells, str):
         refuse(cells)
-    vendor = _vendor(cells)
+    vendor = _vendor_of(cells)
     if vendor is not None:
         return _vendor_header(vendor, cells, delimiter, at + 1, f"{name}:{at + 1}", keys)
     found: dict[str, tuple[int, str | None]] = {}
@@ -405,18 +407,18 @@ def _header(lines: Sequence[str], name: str, keys: LogKeys) -> _Header:
             refuse(f"time counts in {time.unit}; trajectory.time_scale says of instants in which scale they are")
         return _Header(at + 1, delimiter, len(cells), (time, *axes))
     hold_to_scale(scale, keys, f"{name}:{at + 1}")
-    return _Header(at + 1, delimiter, len(cells), tuple(axes), _Column(times[0], index), scale, zone)
+    return _Header(at + 1, delimiter, len(cells), tuple(axes), _Column(times[0], place=index), scale, zone)
 
 
 def _vendor_header(
-    vendor: Vendor, cells: Sequence[str], delimiter: str, line: int, where: str, keys: LogKeys
+    vendor: _Vendor, cells: Sequence[str], delimiter: str, line: int, where: str, keys: LogKeys
 ) -> _Header:
     """Columns that an exporter names."""
     columns: dict[str, _Column] = {}
     for index, cell in enumerate(cells):
         known = vendor.columns.get(cell.strip().lower())
         if known is not None:
-            columns.setdefault(known.name, _Column(known.name, index, known.unit, known.scale))
+            columns.setdefault(known.name, known._replace(place=index))
     if "height" not in columns and "altitude" not in columns:
         raise PathFileError(
             f"{where}: {vendor.words} has no height above the sea or the ellipsoid; one above take-off is no place"
@@ -446,7 +448,7 @@ def _measured(name: str, index: int, unit: str | None, refuse: Callable[[str], N
         more = ", or say trajectory.time_scale" if name == "time" else ""
         refuse(f"{name} has no unit; write '{example}'{more}")
     try:
-        return _Column(name, index, shown(unit), units.parse_quantity(f"1 {unit}", dimension))
+        return _Column(name, shown(unit), units.parse_quantity(f"1 {unit}", dimension), index)
     except InvalidValueError as error:
         refuse(fault_words(f"{name} {error.problem.problem}", "", f"write '{example}'", error.problem.hint))
 
@@ -590,92 +592,112 @@ def _row_fault(text: str, header: _Header) -> str | None:
     return None
 
 
-# ---------------------------------------------------------------------- logs that no platform can have flown
-# A receiver that has frozen goes on writing its last place; one that is slower than its log writes each place several
-# times; a filter that is set anew, or a cell that is wrong, makes a step that no platform takes. A polynomial through
-# such places is smooth all the same, and wrong. What is below the limits here is noise, and counts as the residual.
-_STILL_M = 1e-3  # over a whole aperture; the noise of any receiver is more
-_SAME_M = 1e-6  # between two places; the same numbers, turned to the scene's axes, are rounded to 1e-9 m
-_LEAST_M = 0.1  # of what is missed or jumped: six decimals of a degree are rounded by as much
-_HARDEST = 30.0  # m/s², 3 g; and no platform takes that back within three samples
-_USUAL = 20  # times the median; the largest of thousands of normal numbers is 4 times it, that of rough noise 10
-_BESIDE = 3  # steps on each side that a step is compared with
-_BEYOND = 10  # samples beyond each end of the aperture that say what is usual
+# ---------------------------------------------------------------------- headers of exporters
+# Airdata, of DJI and other drones: `time(millisecond),datetime(utc),latitude,longitude,…,
+# altitude_above_seaLevel(feet or meters),…`. Source: the headers in the README of drone-comp/m30ttools and in the
+# reference of Aarhus University's DroneVideoMeasure, "Drone logfile input format"; the instant is to a second.
+#
+# PX4, by ulog2csv: topics `vehicle_gps_position` and `sensor_gps` in 1e-7 deg and mm, from release 1.14 on in deg and
+# m; `vehicle_global_position` in deg and m, on the clock of the autopilot. Source: PX4-Autopilot msg/SensorGps.msg,
+# msg/versioned/VehicleGlobalPosition.msg; pyulog/ulog2csv.py writes the names of fields.
+#
+# ArduPilot: rows GPS of a dataflash log, from `mavlogdump.py --format csv --types GPS`, or among others in the text
+# that Mission Planner and mavlogdump write, whose FMT rows name the columns. Alt is above mean sea level. Source:
+# ardupilot libraries/AP_GPS/LogStructure.h (LOG_STRUCTURE_FROM_GPS; a Status of 3 is a fix in three dimensions) and
+# AP_GPS.h (undulation), pymavlink/tools/mavlogdump.py.
+_DEGREE = math.pi / 180
 
 
-def hold_to_motion(times: Floats, places: Floats, stretch_s: float, name: str) -> None:
-    """Refuse a log that no platform can have flown.
+def _vendor(words: str, signs: str, least_fix: int = 0, **columns: _Column) -> _Vendor:
+    return _Vendor(words, frozenset(signs.split()), columns, least_fix)
 
-    Parameters
-    ----------
-    times : (n,) ndarray
-        Slow time, rising; what is far outside the stretch is not looked at. [s]
-    places : (n, 3) ndarray
-        In any axes. [m]
-    stretch_s : float
-        Time around the middle of the aperture whose places are used. [s]
-    name : str
-        What messages call the log.
 
-    Raises
-    ------
-    PathFileError
-        The places in the stretch are one place to 1 mm. Or places are those before them while the platform moves by
-        more than 0.1 m, at its mean speed in the aperture. Or a step is off the median of seven around it by more
-        than 0.1 m, by more than 3 g would make it, and by more than 20 times what is usual.
+_LATITUDE, _LONGITUDE = _Column("latitude", "deg", _DEGREE), _Column("longitude", "deg", _DEGREE)
+_FIX = _Column("fix")
+_UNIX = _Column("unix", "us", 1e-6)
+_VENDORS = (
+    _Vendor(
+        "CSV of Airdata",
+        frozenset(("time(millisecond)", "datetime(utc)", "latitude", "longitude")),
+        {
+            "time(millisecond)": _Column("time", "ms", 1e-3),
+            "datetime(utc)": _Column("utc"),
+            "latitude": _LATITUDE,
+            "longitude": _LONGITUDE,
+            "altitude_above_sealevel(feet)": _Column("altitude", "ft", 0.3048),
+            "altitude_above_sealevel(meters)": _Column("altitude", "m"),
+        },
+    ),
+    _vendor(
+        "CSV of PX4's GPS topic",
+        "time_utc_usec lat lon fix_type",
+        3,
+        time_utc_usec=_UNIX,
+        lat=_Column("latitude", "1e-7 deg", 1e-7 * _DEGREE),
+        lon=_Column("longitude", "1e-7 deg", 1e-7 * _DEGREE),
+        alt_ellipsoid=_Column("height", "mm", 1e-3),
+        alt=_Column("altitude", "mm", 1e-3),
+        fix_type=_FIX,
+    ),
+    _vendor(
+        "CSV of PX4's GPS topic",
+        "time_utc_usec latitude_deg longitude_deg fix_type",
+        3,
+        time_utc_usec=_UNIX,
+        latitude_deg=_LATITUDE,
+        longitude_deg=_LONGITUDE,
+        altitude_ellipsoid_m=_Column("height", "m"),
+        altitude_msl_m=_Column("altitude", "m"),
+        fix_type=_FIX,
+    ),
+    _vendor(
+        "CSV of PX4's global position",
+        "timestamp lat lon alt terrain_alt",
+        1,
+        lat_lon_valid=_FIX,
+        timestamp=_Column("time", "us", 1e-6),
+        lat=_LATITUDE,
+        lon=_LONGITUDE,
+        alt_ellipsoid=_Column("height", "m"),
+        alt=_Column("altitude", "m"),
+    ),
+    _vendor(
+        "GPS rows of ArduPilot",
+        "gwk gms lat lng alt status",
+        3,
+        gwk=_Column("week"),
+        gms=_Column("time", "ms", 1e-3),
+        lat=_LATITUDE,
+        lng=_LONGITUDE,
+        alt=_Column("altitude", "m"),
+        status=_FIX,
+        i=_Column("receiver"),
+    ),
+)
+
+
+def _vendor_of(cells: Sequence[str]) -> _Vendor | None:
+    """Whose columns these are; None where they are nobody's."""
+    names = [cell.strip().lower() for cell in cells]
+    return next((one for one in _VENDORS if one.signs.issubset(names)), None)
+
+
+def _dataflash_as_csv(lines: list[str]) -> list[str]:
+    """Lines of a dataflash log with its GPS rows alone, and their FMT row as the header; other lines as they are.
+
+    Each line keeps its number.
     """
-    half = stretch_s / 2 * (1 + 1e-9)
-    first, last = int(np.searchsorted(times, -half, "left")), int(np.searchsorted(times, half, "right"))
-    at, flown = times[first:last], places[first:last]
-    if at.size < 2 * _BESIDE - 1:  # too few for a path, too
-        return
-    extent = float(np.linalg.norm(flown - flown[0], axis=1).max())
-    if extent <= _STILL_M:
-        raise PathFileError(
-            f"{name}: stands still: its {at.size} places around the aperture are the same to {1e3 * _STILL_M:g} mm",
-            "accepted: the log of a platform that moves",
-            "A fixed platform needs no log: give its place, and speed 0",
-        )
-    _hold_to_new_places(at, flown, extent, name)
-    near = slice(max(first - _BEYOND, 0), last + _BEYOND)
-    _hold_to_small_steps(times[near], places[near], half, name)
-
-
-def _hold_to_new_places(at: Floats, flown: Floats, extent: float, name: str) -> None:
-    """Refuse places that are the same as those before them, while the platform moves."""
-    is_held = np.linalg.norm(np.diff(flown, axis=0), axis=1) <= _SAME_M
-    if not is_held.any():
-        return
-    edges = np.diff(np.concatenate([[0], is_held.astype(np.int8), [0]]))
-    begins, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
-    durations = at[ends] - at[begins]
-    longest = int(durations.argmax())
-    missed = extent * float(durations[longest] / (at[-1] - at[0]))
-    if missed > _LEAST_M:
-        raise PathFileError(
-            f"{name}: repeats places: {int(is_held.sum())} of {at.size} around the aperture are the place before;"
-            f" from {at[begins[longest]]:+.4g} s of mid-aperture on for {durations[longest]:.3g} s, in which the"
-            f" platform moves {format_quantity(missed, 'm')}",
-            f"accepted: repeats in which it moves at most {_LEAST_M:g} m",
-            "Leave out places that were not measured anew, or write more digits",
-        )
-
-
-def _hold_to_small_steps(times: Floats, places: Floats, half: float, name: str) -> None:
-    """Refuse steps between neighbouring places that those around them do not allow."""
-    steps = np.diff(times)
-    velocities = np.diff(places, axis=0) / steps[:, None]
-    around = np.pad(velocities, ((_BESIDE, _BESIDE), (0, 0)), mode="reflect")
-    usual = np.median(np.lib.stride_tricks.sliding_window_view(around, 2 * _BESIDE + 1, axis=0), axis=-1)
-    off = np.linalg.norm(velocities - usual, axis=1) * steps
-    allowed = np.maximum(np.maximum(_LEAST_M, _HARDEST * steps**2), _USUAL * np.median(off))
-    is_jump = (off > allowed) & (times[1:] >= -half) & (times[:-1] <= half)
-    if is_jump.any():
-        worst = int(np.where(is_jump, off / allowed, 0.0).argmax())
-        jump, least = format_quantity(float(off[worst]), "m"), format_quantity(float(allowed[worst]), "m", 2)
-        raise PathFileError(
-            f"{name}: jumps by {jump} within {steps[worst]:.3g} s, {times[worst]:+.4g} s from mid-aperture; the "
-            f"steps beside it allow {least}",
-            "accepted: the log of a flight without steps",
-            "Take out the places that are wrong, or smooth the log before",
-        )
+    if not any(line.startswith("FMT,") for line in lines[:100]):
+        return lines
+    found = []
+    header = ""
+    for line in lines:
+        kept = ""
+        if line.startswith("GPS,"):
+            kept = line if header else ""
+        elif line.startswith("FMT,") and not header:
+            cells = [cell.strip() for cell in line.split(",")]
+            if cells[3:4] == ["GPS"]:
+                kept = header = ",".join(["GPS", *cells[5:]])
+        found.append(kept)
+    return found

@@ -35,12 +35,8 @@ def read_gpx(data: bytes, name: str, keys: LogKeys) -> Log:
 
     Parameters
     ----------
-    data : bytes
-        The file.
-    name : str
-        What messages call it.
-    keys : LogKeys
-        What the mission file says of it; with `time_scale` utc a time needs no zone.
+    data, name, keys
+        As of every reader of `LOG_FORMATS`; with the `time_scale` utc a time needs no zone.
 
     Raises
     ------
@@ -62,33 +58,31 @@ def read_gpx(data: bytes, name: str, keys: LogKeys) -> Log:
     instants = [_instant(point, name, keys) for point in points]
     start = instants[0]
     rows = LogRows(name, np.array([point.line for point in points]))
-    degrees = np.array([[_number(point, key, name) for key in ("lat", "lon")] for point in points])
+    degrees = np.array([[_degrees(point, key, name) for key in ("lat", "lon")] for point in points])
     latitude, longitude = np.radians(degrees).T
-    elevations = np.array([_child(point, "ele", name) for point in points])
+    elevations = np.array([_metres(point, "ele", name) for point in points])
     has_own = np.array([any(child.name == "geoidheight" for child in point.children) for point in points])
     if has_own.any():
         rows.refuse(~has_own, lambda _: "the point has no geoidheight, others have one")
-    separations = np.array([_child(point, "geoidheight", name) for point in points]) if has_own.any() else None
+    separations = np.array([_metres(point, "geoidheight", name) for point in points]) if has_own.any() else None
     heights = from_sea_level(elevations, separations, keys, name)
     words = "GPX track" + (f" of {segments} segments" if segments > 1 else "")
     times = np.array([instant.since(start) for instant in instants])
     return geodetic_log(rows, words, times, start, "utc", (latitude, longitude, heights))
 
 
-def _number(point: MessageElement, key: str, name: str) -> float:
-    given = point.attributes.get(key, "")
-    value = number_in(given)
-    if value is None:
-        raise PathFileError(f"{name}:{point.line}: {key} must be a number of degrees (got {shown(given)!r})")
-    return value
+def _degrees(point: MessageElement, key: str, name: str) -> float:
+    return _number(point.attributes.get(key, ""), f"{name}:{point.line}: {key} must be a number of degrees")
 
 
-def _child(point: MessageElement, key: str, name: str) -> float:
-    """Number of an element of a point. [m]"""
-    given = _text(point, key, name)
+def _metres(point: MessageElement, key: str, name: str) -> float:
+    return _number(_text(point, key, name), f"{name}:{point.line}: {key} must be a number of metres")
+
+
+def _number(given: str, otherwise: str) -> float:
     value = number_in(given)
     if value is None:
-        raise PathFileError(f"{name}:{point.line}: {key} must be a number of metres (got {shown(given)!r})")
+        raise PathFileError(f"{otherwise} (got {shown(given)!r})")
     return value
 
 

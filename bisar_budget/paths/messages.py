@@ -106,8 +106,8 @@ def one_object(
     count = len({one.names[-1] for one in found})
     if count > 1:
         said = "objects" if wanted is None else "objects of that name"
-        by = number if wanted is not None or number == "" else f"name or {number}"
-        raise PathFileError(f"{name}: has {count} {said}: {_listed(found)}; choose one by its {by or 'name'}")
+        by = number if wanted is not None else f"name or {number}"
+        raise PathFileError(f"{name}: has {count} {said}: {_listed(found)}; choose one by its {by}")
     return found
 
 

@@ -21,6 +21,7 @@ from typing import NamedTuple, NoReturn
 import numpy as np
 
 from bisar_budget.faults import shown
+from bisar_budget.paths.earth import Floats
 from bisar_budget.paths.flight import Log, PathFileError, hold_to_bytes
 from bisar_budget.paths.instant import DAY, Instant, parse_instant
 from bisar_budget.paths.log_places import LogKeys, LogRows, counted, from_sea_level, geodetic_log, hold_to_scale
@@ -64,12 +65,8 @@ def read_nmea(data: bytes, name: str, keys: LogKeys) -> Log:
 
     Parameters
     ----------
-    data : bytes
-        The file, at most `LARGEST` bytes.
-    name : str
-        What messages call it.
-    keys : LogKeys
-        What the mission file says of it.
+    data, name, keys
+        As of every reader of `LOG_FORMATS`; at most `LARGEST` bytes.
 
     Raises
     ------
@@ -147,9 +144,7 @@ def _log(
     return geodetic_log(rows, words, times, start, "utc", (latitude, longitude, heights))
 
 
-def _dated(
-    fixes: Sequence[_Fix], dates: Sequence[tuple[int, Instant]]
-) -> tuple["np.ndarray[tuple[int], np.dtype[np.float64]]", "np.ndarray[tuple[int], np.dtype[np.float64]]"]:
+def _dated(fixes: Sequence[_Fix], dates: Sequence[tuple[int, Instant]]) -> tuple[Floats, Floats]:
     """Modified Julian days of fixes and seconds of them: within half a day of the date before, or the first."""
     lines = [line for line, _ in dates]
     days = np.empty(len(fixes))

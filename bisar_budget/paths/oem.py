@@ -60,16 +60,8 @@ def read_oem(
 
     Parameters
     ----------
-    data : bytes
-        A whole file.
-    name : str
-        What messages call the file.
-    wanted : str, optional
-        OBJECT_NAME or OBJECT_ID.
-    center : Instant
-        Middle of the aperture.
-    orientation : Orientation
-        What axes of the stars are turned to the Earth with.
+    data, name, wanted, center, orientation
+        As of every reader of `ORBIT_FORMATS`. An object is named by OBJECT_NAME or OBJECT_ID.
 
     Raises
     ------
@@ -230,7 +222,8 @@ def _time(line: int, text: str, system: str, name: str) -> Instant:
     head, _, seconds = text.rpartition(":")
     minute = _minute(head)
     # The second that some days of UTC have more is part of their last minute.
-    longest = 60 + (minute is not None and system == "UTC" and _has_leap_second(minute))
+    is_last = minute is not None and minute.seconds == DAY - 60
+    longest = 60 + (minute is not None and is_last and system == "UTC" and has_leap_second(minute.day))
     if minute is None or not _SECONDS.fullmatch(seconds) or (past := float(seconds.rstrip("Z"))) >= longest:
         raise PathFileError(f"{name}:{line}: must be a time such as 2026-05-31T10:12:13.123 (got {shown(text)})")
     if not FIRST_DAY < minute.day < LATEST:
@@ -242,10 +235,6 @@ def _time(line: int, text: str, system: str, name: str) -> Instant:
 @lru_cache(maxsize=4096)
 def _minute(text: str) -> Instant | None:
     return epoch_in(f"{text}:00")
-
-
-def _has_leap_second(minute: Instant) -> bool:
-    return minute.seconds == DAY - 60 and has_leap_second(minute.day)
 
 
 def _from_keywords(text: str, name: str) -> Iterator[_EphemerisBlock]:

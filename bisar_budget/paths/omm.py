@@ -43,10 +43,8 @@ def read_omm(
 
     Parameters
     ----------
-    data : bytes
-        A whole file.
-    name, wanted, center, orientation
-        As of `elements.orbit_of`.
+    data, name, wanted, center, orientation
+        As of every reader of `ORBIT_FORMATS`.
 
     Raises
     ------

@@ -19,8 +19,8 @@ from bisar_budget.paths.tle import read_tle
 class OrbitFormat(NamedTuple):
     """A format: its words, what its files show within their first lines, as text and as XML, and its reader.
 
-    The reader takes the bytes, what messages call the file, the object that is wanted, the middle of the aperture and
-    the Earth's orientation.
+    The reader takes the bytes of a whole file, what messages call it, the object that is wanted (needed where there
+    are several), the middle of the aperture, and the orientation that axes of the stars are turned to the Earth with.
     """
 
     words: str
@@ -69,9 +69,7 @@ def hold_to_format(data: bytes, name: str, form: str) -> None:
     if found == form:
         return
     accepted = f"accepted: {ORBIT_FORMATS[form].words}"
-    if found is not None:
-        raise PathFileError(f"{name}: is {ORBIT_FORMATS[found].words}", accepted, f"orbit.{found} reads it")
-    _hold_to_others(data, name, accepted)
+    _refuse(data, name, found, accepted)
     log = log_format(data)
     if log is not None:
         raise PathFileError(f"{name}: is {LOG_FORMATS[log].words}", accepted, "trajectory.file reads it")
@@ -79,14 +77,13 @@ def hold_to_format(data: bytes, name: str, form: str) -> None:
 
 def hold_to_log(data: bytes, name: str) -> None:
     """Refuse a file that is known to be no log of a flight, and say which key reads it."""
-    accepted = "accepted: a log of a flight"
-    found = orbit_format(data)
+    _refuse(data, name, orbit_format(data), "accepted: a log of a flight")
+
+
+def _refuse(data: bytes, name: str, found: str | None, accepted: str) -> None:
+    """Refuse a file that is an orbit of a format that was found, or something else that is known and not wanted."""
     if found is not None:
         raise PathFileError(f"{name}: is {ORBIT_FORMATS[found].words}", accepted, f"orbit.{found} reads it")
-    _hold_to_others(data, name, accepted)
-
-
-def _hold_to_others(data: bytes, name: str, accepted: str) -> None:
     for sign, words, remedy in _OTHERS:
         if sign.search(data[:_BEGINNING]):
             raise PathFileError(f"{name}: is {words}", accepted, remedy)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 from bisar_budget.paths.flight import Log, PathFileError
 from bisar_budget.paths.flight_log import is_csv, read_csv
 from bisar_budget.paths.gpx import is_gpx, read_gpx
-from bisar_budget.paths.log_places import LogKeys, hold_to_ellipsoid, hold_to_scale
+from bisar_budget.paths.log_places import LogKeys
 from bisar_budget.paths.nmea import is_nmea, read_nmea
 from bisar_budget.paths.rtklib import is_solution, read_solution
 from bisar_budget.paths.sbet import is_sbet, read_sbet
@@ -25,16 +25,10 @@ class LogFormat(NamedTuple):
     read: Callable[[bytes, str, LogKeys], Log]
 
 
-def _sbet(data: bytes, name: str, keys: LogKeys) -> Log:
-    hold_to_scale("gps", keys, name)
-    hold_to_ellipsoid(keys, name)
-    return read_sbet(data, name, keys.week)
-
-
 # By the word of the mission file, in the order of the schema. What is told by more stands behind.
 LOG_FORMATS: dict[str, LogFormat] = {
     "csv": LogFormat("CSV with a header", (".csv",), is_csv, read_csv),
-    "sbet": LogFormat("an SBET of records of 136 bytes", (".out", ".sbet"), is_sbet, _sbet),
+    "sbet": LogFormat("an SBET of records of 136 bytes", (".out", ".sbet"), is_sbet, read_sbet),
     "pos": LogFormat("a solution of RTKLIB", (".pos",), is_solution, read_solution),
     "nmea": LogFormat("sentences of NMEA 0183", (".nmea",), is_nmea, read_nmea),
     "gpx": LogFormat("a GPX track", (".gpx",), is_gpx, read_gpx),

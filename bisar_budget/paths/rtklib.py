@@ -70,12 +70,8 @@ def read_solution(data: bytes, name: str, keys: LogKeys) -> Log:
 
     Parameters
     ----------
-    data : bytes
-        The file, at most `LARGEST` bytes.
-    name : str
-        What messages call it.
-    keys : LogKeys
-        What the mission file says of it.
+    data, name, keys
+        As of every reader of `LOG_FORMATS`; at most `LARGEST` bytes.
 
     Returns
     -------
@@ -166,7 +162,6 @@ def _row(text: str, header: _Columns, where: str) -> tuple[int, list[float]]:
             said = shown(f"{cells[0]} {cells[1]}")
             raise PathFileError(f"{where}: must begin with a time like 2026/06/01 05:20:19.250 (got {said!r})")
         seconds = int(clock[1]) * 3600.0 + int(clock[2]) * 60.0 + float(clock[3])
-        first = [0.0, 0.0]
     else:
         week, second = number_in(cells[0]), number_in(cells[1])
         if week is None or second is None or week % 1 or not (0 <= week <= 9999 and 0 <= second <= WEEK):
@@ -175,8 +170,8 @@ def _row(text: str, header: _Columns, where: str) -> tuple[int, list[float]]:
                 f"{where}: must begin with a GPS week and its second, like 2421 105619.250 (got {said!r})"
             )
         days, seconds = divmod(second, DAY)
-        day, first = GPS_EPOCH + 7 * int(week) + int(days), [0.0, 0.0]
-    row = list(first)
+        day = GPS_EPOCH + 7 * int(week) + int(days)
+    row = [0.0, 0.0]  # in the places of the time
     for cell in cells[2:]:
         try:
             value = float(cell) if cell.isascii() and "_" not in cell else None

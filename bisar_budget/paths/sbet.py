@@ -17,10 +17,18 @@ from typing import NoReturn
 import numpy as np
 
 from bisar_budget.geometry import Vector
-from bisar_budget.paths.earth import Floats, curvature_radii, earth_fixed_places
+from bisar_budget.paths.earth import Floats, curvature_radii
 from bisar_budget.paths.flight import Log, PathFileError, hold_to_bytes, slow_times
 from bisar_budget.paths.instant import GPS_EPOCH, WEEK, Instant
-from bisar_budget.paths.log_places import around_aperture, scale_words, utc_of
+from bisar_budget.paths.log_places import (
+    LogKeys,
+    LogRows,
+    around_aperture,
+    geodetic_log,
+    hold_to_ellipsoid,
+    hold_to_scale,
+    utc_of,
+)
 
 LARGEST = 1_000_000_000  # bytes; ten hours at 200 Hz
 _LATEST = 2 * WEEK  # a flight over the end of a week may count on
@@ -29,8 +37,8 @@ _RIGHT_ANGLE = math.pi / 2 * (1 + 1e-12)
 _WINDOW = 1.0  # s over which positions and velocities are compared; noise of a position is less than 0.1 m/s then
 _APART = 1.0  # m/s, and a hundredth of the speed: what velocities of another frame exceed
 _SMALLEST = 1e-100  # of any unit
+_Fields = tuple[tuple[str, int, float, float, str], ...]  # name, place in a record, lowest, highest, unit
 _FIELDS = (
-    # name, place in a record, lowest, highest, unit
     ("time", 0, 0.0, _LATEST, "s"),
     ("latitude", 1, -_RIGHT_ANGLE, _RIGHT_ANGLE, "rad"),
     ("longitude", 2, -2 * _RIGHT_ANGLE, 4 * _RIGHT_ANGLE, "rad"),
@@ -56,9 +64,9 @@ class Accuracy:
     records: int
 
 
-def gps_to_utc(week: int, seconds: float) -> Instant:
-    """Instant of UTC of a GPS week, not rolled over, and a second of it."""
-    return utc_of(Instant(GPS_EPOCH + 7 * week, 0.0).after(seconds), "gps")
+def of_gps(week: int, seconds: float) -> Instant:
+    """Day and seconds of GPS time of a week, not rolled over, and a second of it."""
+    return Instant(GPS_EPOCH + 7 * week, 0.0).after(seconds)
 
 
 def is_sbet(data: bytes) -> bool:
@@ -71,7 +79,7 @@ def is_sbet(data: bytes) -> bool:
     return _first_wrong(ends, _FIELDS) is None and bool((np.abs(ends[:, :3]).max(axis=1) > 1e-9).all())
 
 
-def read_sbet(data: bytes, name: str, week: int | None) -> Log:
+def read_sbet(data: bytes, name: str, keys: LogKeys) -> Log:
     """Read a trajectory.
 
     Places come from latitude, longitude and height. Velocities, turned out of the wander frame, have to agree with
@@ -79,12 +87,9 @@ def read_sbet(data: bytes, name: str, week: int | None) -> Log:
 
     Parameters
     ----------
-    data : bytes
-        The file, at most `LARGEST` bytes.
-    name : str
-        What messages call it.
-    week : int or None
-        GPS week of the first record, not rolled over. None: times are seconds of the week, without a start.
+    data, name, keys
+        As of every reader of `LOG_FORMATS`; at most `LARGEST` bytes. Without a `week` times are seconds of the week,
+        without a start.
 
     Returns
     -------
@@ -96,17 +101,16 @@ def read_sbet(data: bytes, name: str, week: int | None) -> Log:
     PathFileError
         Names the file, and the record or byte of the fault.
     """
+    hold_to_scale("gps", keys, name)
+    hold_to_ellipsoid(keys, name)
     records = _records(data, name, 17, _FIELDS)
-    times = _risen(records[:, 0], name)
-    _, latitude, longitude, height = records[:, :4].T
+    times, start = _risen(records[:, 0], name), None
     _hold_to_velocities(times, records, name)
-    words = f"SBET, {len(times)} place{'s' * (len(times) > 1)} over {times[-1] - times[0]:.6g} s"
-    start = None
-    if week is not None:
-        start = gps_to_utc(week, float(times[0]))
+    if keys.week is not None:
+        start = of_gps(keys.week, float(times[0]))
         times = times - times[0]
-        words += scale_words(start, "gps")
-    return Log(times, earth_fixed_places(latitude, longitude, height), True, words, start)
+    _, latitude, longitude, height = records[:, :4].T
+    return geodetic_log(LogRows(name), "SBET", times, start, "gps", (latitude, longitude, height))
 
 
 def read_accuracy(
@@ -141,7 +145,7 @@ def read_accuracy(
     records = _records(data, name, 10, _SIGMAS)
     times, start = _risen(records[:, 0], name), None
     if week is not None:
-        start = gps_to_utc(week, float(times[0]))
+        start = utc_of(of_gps(week, float(times[0])), "gps")
         times = times - times[0]
     slow = slow_times(Log(times, records[:, 1:4], True, "", start), center, center_seconds, aperture_time_s, name)
     inside = records[around_aperture(slow, aperture_time_s)]
@@ -153,7 +157,7 @@ def read_accuracy(
     return Accuracy((east, north, down), (east_rate, north_rate, down_rate), len(inside))
 
 
-def _records(data: bytes, name: str, width: int, fields: tuple[tuple[str, int, float, float, str], ...]) -> Floats:
+def _records(data: bytes, name: str, width: int, fields: _Fields) -> Floats:
     """Records (n, width) whose fields are where they can be."""
     size = 8 * width
     hold_to_bytes(data, LARGEST, name)
@@ -179,9 +183,7 @@ def _records(data: bytes, name: str, width: int, fields: tuple[tuple[str, int, f
     raise PathFileError(f"{says}, which it cannot be; are these records of {width} doubles?")
 
 
-def _first_wrong(
-    records: Floats, fields: tuple[tuple[str, int, float, float, str], ...]
-) -> tuple[int, str, float, str] | None:
+def _first_wrong(records: Floats, fields: _Fields) -> tuple[int, str, float, str] | None:
     """Index, field, value and unit of what is out of its range first."""
     found = []
     with np.errstate(invalid="ignore"):

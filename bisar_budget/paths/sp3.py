@@ -49,16 +49,9 @@ def read_sp3(
 
     Parameters
     ----------
-    data : bytes
-        A whole file.
-    name : str
-        What messages call it.
-    wanted : str, optional
-        The satellite, such as `G05`; needed where the file has several.
-    center : Instant
-        Middle of the aperture.
-    orientation : Orientation
-        Not needed: the axes are those of the Earth.
+    data, name, wanted, center, orientation
+        As of every reader of `ORBIT_FORMATS`. A satellite is `G05`, say. The orientation is not needed: the axes are
+        those of the Earth.
 
     Raises
     ------

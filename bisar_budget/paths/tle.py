@@ -25,10 +25,8 @@ def read_tle(
 
     Parameters
     ----------
-    data : bytes
-        A whole file; blank lines, and those that begin with `#`, are no part of it.
-    name, wanted, center, orientation
-        As of `elements.orbit_of`.
+    data, name, wanted, center, orientation
+        As of every reader of `ORBIT_FORMATS`. Blank lines, and those that begin with `#`, are no part of the file.
 
     Raises
     ------

@@ -105,12 +105,8 @@ def read_ulog(data: bytes, name: str, keys: LogKeys) -> Log:
 
     Parameters
     ----------
-    data : bytes
-        The file.
-    name : str
-        What messages call it.
-    keys : LogKeys
-        What the mission file says of it.
+    data, name, keys
+        As of every reader of `LOG_FORMATS`.
 
     Raises
     ------

@@ -18,11 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget.geometry import PlatformState
-from bisar_budget.paths.earth import SceneAxes
+from bisar_budget.paths.earth import Floats, SceneAxes
 from bisar_budget.paths.flight import Orbit, PathFileError
 from bisar_budget.paths.instant import Instant
-
-Floats = NDArray[np.float64]
 
 STEP = 120.0  # s between places
 _NODES = 8

@@ -22,7 +22,6 @@ from bisar_budget.front.progress import watched_checks
 from bisar_budget.mission.changes import read_changes
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.mission.model import names_parts
-from bisar_budget.mission.parts import taken_figures
 from bisar_budget.mission.quantities import QuestionError
 from bisar_budget.report.drawing import tornado
 from tests.conftest import ROOT, mission_text
@@ -240,11 +239,11 @@ class TestParts:
     )
     def test_a_file_that_states_them_is_the_same_mission(self, name: str) -> None:
         mission = load_mission(str(MISSIONS / f"{name}.yaml"))
-        taken = list(taken_figures(mission))
+        taken = mission.taken
         assert bool(taken) == names_parts(mission)
         changes = [SetValue(one.key, json.dumps(one.value)) for one in taken]
         stated = parse_mission(mission.data, mission.file, changes=changes)
-        assert not list(taken_figures(stated))
+        assert not stated.taken
         was, now = (check_mission(one, DAY) for one in (mission, stated))
         assert [(row.id, row.declared, row.allowable, row.status) for row in was.rows] == [
             (row.id, row.declared, row.allowable, row.status) for row in now.rows

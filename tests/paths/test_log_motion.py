@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from bisar_budget.paths.flight import PathFileError
-from bisar_budget.paths.flight_log import hold_to_motion
+from bisar_budget.paths.log_places import hold_to_motion
 
 RATE, APERTURE = 50, 4.0  # Hz, s
 TIMES = np.arange(-200, 201) / RATE

@@ -14,7 +14,7 @@ from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.model import GATING_MODELS, Mission, Requirements, Waiver
-from bisar_budget.mission.parts import figure_text, taken_figures
+from bisar_budget.mission.parts import figure_text
 from bisar_budget.report.words.sentences import dotted, percent
 from bisar_budget.settings import TABLE
 
@@ -57,7 +57,7 @@ def written(mission: Mission) -> dict[KeyPath, str]:
     texts = {
         path: event.value for path, event in mission.places.items() if isinstance(getattr(event, "value", None), str)
     }
-    for taken in taken_figures(mission):
+    for taken in mission.taken:
         texts[tuple(taken.key.split("."))] = f"{figure_text(taken.value)} (part {taken.part})"
     texts |= dict(_set_values(mission))
     lists: dict[KeyPath, list[str]] = {}
