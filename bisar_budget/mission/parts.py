@@ -8,6 +8,7 @@ import os
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Annotated, Any, NamedTuple
 
 from bisar_budget.faults import (
@@ -264,6 +265,7 @@ def _standard_input() -> bytes:
         raise PartError.of("-", [file_fault(f"cannot be read: {reason}")]) from None
 
 
+@lru_cache(maxsize=64)  # a thousand missions name the same parts
 def _entry(file: str, data: bytes) -> Entry:
     """Read a part, whoever asks for it."""
     part: Any = INVALID
