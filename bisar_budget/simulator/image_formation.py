@@ -28,7 +28,7 @@ def differential_range(history: PhaseHistory, points: Floats, pulse: int) -> Flo
     """ΔR of points (n, 3) for the measured positions at a pulse, exact, (n,). [m]"""
     total: Floats = np.zeros(len(points))
     for position in (history.transmitter[pulse], history.receiver[pulse]):
-        total = total + np.linalg.norm(position - points, axis=-1) - np.linalg.norm(position)
+        total = total + np.linalg.norm(position - points, axis=-1) - np.linalg.norm(position, axis=-1)
     return total
 
 
