@@ -152,11 +152,4 @@ def _largest(phases: Sequence[Floats]) -> Floats:
 
 
 def _split(shares: object) -> Split:
-    if not isinstance(shares, Shares):
-        return EQUAL  # `balanced` weighs phase, not power
-    return Split(
-        transmitter=shares.transmitter,
-        receiver=shares.receiver,
-        clock=shares.clock,
-        reserve=shares.reserve,
-    )
+    return Split(*shares) if isinstance(shares, Shares) else EQUAL  # `balanced` weighs phase, not power

@@ -149,14 +149,6 @@ class Analysis:
         """The model that gates, `published` or `full`, and the other one."""
         return (self.full, self.published) if gating == "full" else (self.published, self.full)
 
-    def does(self, model: Model, source: ErrorSource) -> Declared:
-        """Effect of a declared error by a model."""
-        return self.errors.does(model.name, source).in_one_case()
-
-    def declared(self, model: Model) -> dict[str, Declared]:
-        """Effect of each declared error by a model, by row id, along the axes that the file states it in."""
-        return {source.id: self.does(model, source) for source in self.stated}
-
     @cached_property
     def allocation(self) -> Allocation:
         """Budgets as divided; `balanced` weighs phases by the gating model, under `strictest` the larger of both."""

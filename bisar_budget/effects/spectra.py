@@ -135,9 +135,8 @@ class PowerLawPiece(NamedTuple):
     slope: float
 
     def at(self, f: Any) -> Any:
-        """Density at frequencies, 0 beside it. [rad²/Hz]"""
-        is_in = (self.low <= f) & (f < self.high)
-        return np.where(is_in, self.density * np.where(is_in, f, 1.0) ** -self.slope, 0.0)
+        """Density of its power law at frequencies. [rad²/Hz]"""
+        return self.density * f**-self.slope
 
     def integral(self, low: float, high: float) -> float:
         """Integral of the spectrum between two frequencies; `low` may be zero where it converges."""
@@ -149,7 +148,11 @@ class PowerLawPiece(NamedTuple):
 
 def density(pieces: Sequence[PowerLawPiece], frequency: Floats) -> Floats:
     """Density of a spectrum at frequencies [Hz]; 0 where no piece is. [rad²/Hz]"""
-    return sum((piece.at(frequency) for piece in pieces), np.zeros_like(frequency))
+    found = np.zeros_like(frequency)
+    for piece in pieces:
+        is_in = (piece.low <= frequency) & (frequency < piece.high)
+        found += np.where(is_in, piece.at(np.where(is_in, frequency, 1.0)), 0.0)
+    return found
 
 
 def parts(pieces: Sequence[PowerLawPiece], aperture_time: Any, above: Any = 0.0) -> Parts:
@@ -428,10 +431,10 @@ def _left(pieces: Sequence[PowerLawPiece], beyond: Sequence[float], f: Floats, r
     for piece, far in zip(pieces, beyond, strict=True):
         own, aliases = np.zeros_like(f), np.full_like(f, far)
         for n in range(-_ALIASES, _ALIASES + 1):
-            folded = piece.at(np.abs(start + n * rate))
+            folded = density([piece], np.abs(start + n * rate))
             own = np.where(nearest == n, folded, own)
             aliases = aliases + np.where(nearest == n, 0.0, folded)
-        own = np.where(np.abs(nearest) > _ALIASES, piece.at(f), own)
+        own = np.where(np.abs(nearest) > _ALIASES, density([piece], f), own)
         total += own * (1 - np.sqrt(passed)) ** 2 + passed * aliases
     return total
 
@@ -441,8 +444,8 @@ def _folded_from_beyond(piece: PowerLawPiece, rate: float) -> float:
     low = max(piece.low, (_ALIASES + 0.5) * rate)
     if low >= piece.high:
         return 0.0
-    rise = -piece.slope * float(piece.at(low)) / low  # of the spectrum, at the integral's beginning
-    return 2 * (piece.integral(low, piece.high) / rate + rise * rate / 24)
+    rise = -piece.slope * piece.at(low) / low  # of the spectrum, at the integral's beginning
+    return float(2 * (piece.integral(low, piece.high) / rate + rise * rate / 24))
 
 
 def _exchange_edges(aperture_time: float, rate: float) -> list[float]:

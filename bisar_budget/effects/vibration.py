@@ -1,4 +1,4 @@
-"""Declared vibrations as they count: along the line of sight, as paired echoes, as phases where they are slow.
+"""Declared vibrations as they count: as paired echoes, along the line of sight, as slow phases, and by spectra.
 
 Of a receiver that hears the transmitter data hold ranges less the direct path: there a vibration counts as what it
 changes of that.

@@ -5,7 +5,7 @@ Both use the measured positions, as a processor must, and give a point scatterer
 
 import math
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from typing import Literal
 
 import numpy as np
@@ -24,24 +24,11 @@ _SPACIOUS = 3 * _HELD["cubic"]
 Kernel = Literal["auto", "numpy", "cubic", "linear"]
 
 
-def differential_range(history: PhaseHistory, points: Floats, pulse: int | slice) -> Floats:
-    """ΔR of points for the measured positions of some pulses, exact. [m]
-
-    Parameters
-    ----------
-    points : (points, 3) ndarray
-        [m]
-    pulse : int or slice
-        Which pulses.
-
-    Returns
-    -------
-    (points,) or (pulses, points) ndarray
-    """
-    total: Floats = np.zeros(())
-    for positions in (history.transmitter[pulse], history.receiver[pulse]):
-        to_points = np.linalg.norm(positions[..., None, :] - points, axis=-1)
-        total = total + to_points - np.linalg.norm(positions, axis=-1)[..., None]
+def differential_range(history: PhaseHistory, points: Floats, pulse: int) -> Floats:
+    """ΔR of points (n, 3) for the measured positions at a pulse, exact, (n,). [m]"""
+    total: Floats = np.zeros(len(points))
+    for position in (history.transmitter[pulse], history.receiver[pulse]):
+        total = total + np.linalg.norm(position - points, axis=-1) - np.linalg.norm(position, axis=-1)
     return total
 
 
@@ -61,7 +48,7 @@ def matched_filter(history: PhaseHistory, points: Floats) -> Complexes:
         Complex image.
     """
     flat = np.reshape(points, (-1, 3))
-    image = direct_sum(history, flat, lambda part, pulse: differential_range(history, part, pulse))
+    image = direct_sum(history, flat, partial(differential_range, history))
     return image.reshape(np.shape(points)[:-1])
 
 

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.analysis.analysis import Analysis, Case
 from bisar_budget.design.varied import scaled
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.sampling.probability import monte_carlo
@@ -144,7 +144,7 @@ class TestTimeTag:
         (location,) = (one for one in found.requirements if one.id == "mission.location_error")
         analysis = Analysis(parse_mission(mission_text(**text)))
         (source,) = analysis.stated
-        does = analysis.does(analysis.full, source)
+        does = Case(analysis).does(analysis.full, source)
         lengths = sorted(math.hypot(*one) for one in (does.displacement, does.opposite))
         assert lengths[0] <= location.sigma <= lengths[1]
 

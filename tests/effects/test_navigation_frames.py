@@ -9,7 +9,7 @@ import math
 import numpy as np
 import pytest
 
-from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.analysis.analysis import Analysis, Case
 from bisar_budget.analysis.scene import differences_at
 from bisar_budget.effects.random_effect import RandomError, SensorCases
 from bisar_budget.effects.random_errors import random_errors
@@ -261,14 +261,14 @@ platforms:
         text = text.replace("TX" if name == "transmitter" else "RX", said).replace("TX", "").replace("RX", "")
         analysis = Analysis(parse_mission(text))
         source = next(one for one in analysis.stated if one.id == f"{name}.time_tag")
-        east, north = analysis.does(analysis.full, source).displacement
+        east, north = Case(analysis).does(analysis.full, source).displacement
         assert math.hypot(east, north) == pytest.approx(moved, abs=0.05e-2)
 
     def test_a_turn(self) -> None:
         """22 cm and −0.055 rad for a millisecond."""
         analysis = Analysis(mission_of("{time_tag: 1 ms}"))
         source = next(one for one in analysis.stated if one.id == "receiver.time_tag")
-        does = analysis.does(analysis.full, source)
+        does = Case(analysis).does(analysis.full, source)
         assert math.hypot(*does.displacement) == pytest.approx(0.22, abs=0.005)
         assert does.qpe == pytest.approx(-0.055, abs=0.001)
         exact = through(analysis.mission, flown(1e-3)[None])
@@ -280,7 +280,7 @@ platforms:
     def test_it_has_a_sign(self, sign: str) -> None:
         analysis = Analysis(mission_of(f"{{time_tag: {sign}1 ms}}"))
         (source,) = analysis.stated
-        does, size = analysis.does(analysis.full, source), float(f"{sign}1e-3")
+        does, size = Case(analysis).does(analysis.full, source), float(f"{sign}1e-3")
         exact = through(analysis.mission, flown(size)[None])
         assert does.displacement == pytest.approx((exact.east[0], exact.north[0]), rel=EXACT)
 
@@ -312,7 +312,7 @@ platforms:
 """
         analysis = Analysis(parse_mission(text))
         (source,) = analysis.stated
-        assert 7 < math.hypot(*analysis.does(analysis.full, source).displacement) < 8
+        assert 7 < math.hypot(*Case(analysis).does(analysis.full, source).displacement) < 8
 
     def test_the_published_model_has_its_tables_along_velocity_and_acceleration(self) -> None:
         """Table II by hand: a velocity error of a·δt, k·(T/2)²·(a·v)/R, which in a level turn is nothing."""
@@ -327,7 +327,7 @@ platforms:
         analysis = Analysis(mission)
         (source,) = analysis.stated
         assert source.id == "common.time_tag"
-        does = analysis.does(analysis.full, source)
+        does = Case(analysis).does(analysis.full, source)
         late = np.broadcast_to(VT * 1e-3, (1, FINE, 3))
         exact = through(mission, flown(1e-3)[None], late)
         assert does.displacement == pytest.approx((exact.east[0], exact.north[0]), rel=EXACT)
@@ -368,7 +368,7 @@ class TestCommonFrames:
         course = size * TIMES**power
         for source, of_tx, of_rx in zip(analysis.stated, *self.axes(frame), strict=True):
             exact = through(mission, (course[:, None] * of_rx)[None], (course[:, None] * of_tx)[None])
-            does = analysis.does(analysis.full, source)
+            does = Case(analysis).does(analysis.full, source)
             assert does.displacement == pytest.approx((exact.east[0], exact.north[0]), rel=EXACT, abs=1e-4)
             # Linear where the second order does not matter, which is off by less than 1 %.
             assert does.qpe == pytest.approx(exact.quadratic[0], rel=0.01, abs=2e-3)
@@ -494,7 +494,7 @@ class TestOtherPlaces:
                 of_tx, of_rx = (2.0 * np.tile(one[index], (FINE, 1)) for one in TestCommonFrames.axes(frame))
             shifts = [np.ascontiguousarray(one[None].T) for one in (of_tx, of_rx)]
             found = followed(exact, np.zeros((FINE, 1)), shifts, np.zeros(1, dtype=int))
-            does = analysis.does(analysis.full, source)
+            does = Case(analysis).does(analysis.full, source)
             assert does.displacement == pytest.approx((found.east[0], found.north[0]), rel=EXACT, abs=1e-4)
             assert does.qpe == pytest.approx(found.quadratic[0], rel=0.01, abs=2e-3)
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bisar_budget.analysis.analysis import Analysis
+from bisar_budget.analysis.analysis import Analysis, Case
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.random_errors import random_errors
 from bisar_budget.effects.spectra import PowerLawPiece, heard_parts, set_parts, tone
@@ -151,7 +151,7 @@ class TestSetting:
         text = (ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml").read_text(encoding="utf-8")
         link = "{interval: 1 s, error: 0 deg, time_error: 10 ns, frequency_error: 1e-11}"
         analysis = Analysis(parse_mission(f"{text}synchronization: {link}\n"))
-        does = analysis.declared(analysis.full)
+        does = {one.id: Case(analysis).does(analysis.full, one) for one in analysis.stated}
         assert math.hypot(*does["timing.time"].displacement) == pytest.approx(1.67, abs=0.005)
         assert math.hypot(*does["timing.frequency"].displacement) == pytest.approx(0.273, abs=0.0005)
 
@@ -159,7 +159,7 @@ class TestSetting:
         """y·H of time and y of slope: what timing_error says of both at once."""
         held = findings(synchronization=HOLDOVER | {"frequency_error": "1e-11"}, allocation={"model": "full"})
         stated = Analysis(parse_mission(mission_text(timing_error={"constant": "0.6 ns", "linear": "1e-11"})))
-        moved = np.sum([one.displacement for one in stated.declared(stated.full).values()], axis=0)
+        moved = np.sum([Case(stated).does(stated.full, one).displacement for one in stated.stated], axis=0)
         assert row(held, "timing.frequency").displacement_m == pytest.approx(tuple(moved), rel=1e-4)
 
     def test_aging_is_a_time_that_grows_with_the_square(self) -> None:
@@ -173,7 +173,7 @@ class TestSetting:
         constant, linear = aging * 60**2 / 2, aging * 60
         terms = {"constant": constant, "linear": linear, "quadratic": aging / 2}
         stated = Analysis(parse_mission(mission_text(timing_error=terms)))
-        moved = np.sum([each.displacement for each in stated.declared(stated.full).values()], axis=0)
+        moved = np.sum([Case(stated).does(stated.full, one).displacement for one in stated.stated], axis=0)
         assert one.declared == pytest.approx(aging)
         assert one.displacement_m == pytest.approx(tuple(moved), rel=1e-4)
         assert one.qpe_published_rad == pytest.approx(math.pi * 10e9 * aging / 2 * 6**2 / 2, rel=1e-6)
