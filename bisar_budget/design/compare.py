@@ -223,14 +223,11 @@ class _PartSearch:
         except MissionError as error:
             fault = error.faults[0]
             return one._replace(reason=f"{fault.key}: {fault.problem}")
-        platform = getattr(mission.platforms, self.platform)
-        if self.section == "oscillator":
-            taken = dict.fromkeys(FIGURES["oscillator"], platform.oscillator.source)
-            taken |= dict(platform.oscillator.of_parts)
-        else:
-            taken = dict(platform.motion_error.of_parts)
-        figures = (figure for figure in FIGURES[one.part.kind] if getattr(one.part, figure))
-        of_part = tuple(figure for figure in figures if taken.get(figure) == evidence(one.part, figure))
+        here = f"platforms.{self.platform}.{self.section}."
+        taken = {
+            each.key.rpartition(".")[2] for each in mission.taken if each.part == one.id and each.key.startswith(here)
+        }
+        of_part = tuple(figure for figure in FIGURES[one.part.kind] if figure in taken)
         return one._replace(judged=judged_mission(Analysis(mission), today), figures=of_part)
 
     def state(self, one: _Candidate, row: str | None, breaks: frozenset[str]) -> PartState:

@@ -99,11 +99,10 @@ class RangeLines:
     def cells(self, centre: GroundVector, bandwidth_hz: float, wavelength_m: float) -> tuple[float, float]:
         """Resolution at a ground point: peak to first null across the lines of equal range, and along them. [m]"""
         by_range, by_doppler = self.gradients(np.asarray(centre, dtype=float))
-        steepness = float(np.hypot(*by_range))
-        along = abs(float(by_doppler @ _left(by_range))) / steepness
-        if not steepness or not along:
+        steepness, area = float(np.hypot(*by_range)), abs(float(by_doppler @ _left(by_range)))
+        if not area:
             raise ValueError("range or Doppler does not change over the ground there: no image plane")
-        return SPEED_OF_LIGHT / (bandwidth_hz * steepness), wavelength_m / along
+        return SPEED_OF_LIGHT / (bandwidth_hz * steepness), wavelength_m / (area / steepness)
 
     def sampled(self, centre: GroundVector, bandwidth_hz: float, wavelength_m: float) -> tuple[float, float]:
         """Cells for pixels to sample: those of `cells`, or finer ones across the lines. [m]

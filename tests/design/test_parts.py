@@ -94,6 +94,19 @@ def test_the_part_of_the_file_is_marked_and_its_figures_are_said() -> None:
     assert by_id["stim300"].silent_on == ()
 
 
+def test_figures_with_a_source_each_are_said(tmp_path: Path) -> None:
+    """Of an oscillator the frequency was left out: its source is not the one of the noise."""
+    (tmp_path / "own.yaml").write_text(
+        "kind: oscillator\nname: Own\nsource: {frequency: plate, phase_noise: sheet}\nfrequency: 10 MHz\n"
+        "phase_noise: {1 Hz: -95 dBc/Hz, 10 Hz: -125 dBc/Hz}\n",
+        encoding="utf-8",
+    )
+    (tmp_path / "m.yaml").write_text(Path(OCXO).read_text(encoding="utf-8"), encoding="utf-8")
+    found = ask(OSCILLATOR, f"{OSCILLATOR}=own.yaml", file=str(tmp_path / "m.yaml"))
+    (own,) = (part for part in found.parts if part.is_given)
+    assert own.figures == ("frequency", "phase_noise")
+
+
 def test_parts_of_the_projects_own_folders_and_files_are_compared(tmp_path: Path, run: Callable) -> None:
     """A folder that the settings name, and a file that the mission names; its velocity error is the mission's."""
     (tmp_path / "pyproject.toml").write_text('[tool.bisar-budget]\nsensors = ["own"]\n', encoding="utf-8")

@@ -12,7 +12,7 @@ from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import Simulation
 from bisar_budget.simulator import point as point_module
 from bisar_budget.simulator.autofocus import phase_gradient_autofocus
-from bisar_budget.simulator.collection import PointCollection
+from bisar_budget.simulator.collection import PointCollection, RangeLines
 from bisar_budget.simulator.image_formation import matched_filter
 from bisar_budget.simulator.impulse_response import line_at, upsampled
 from bisar_budget.simulator.phase_history import cell_centres
@@ -130,6 +130,12 @@ class TestAutofocus:
 
 
 class TestRefusals:
+    def test_a_point_below_both_platforms_has_no_image_plane(self) -> None:
+        """The range does not change over the ground there: it was divided by first."""
+        above = np.array([[0.0, 0.0, 1e3]] * 3)
+        with pytest.raises(ValueError, match="no image plane"):
+            RangeLines(above, above).cells((0.0, 0.0), 1e8, 0.03)
+
     def test_too_few_pulses_alias(self) -> None:
         with pytest.raises(SimulationError, match="aliases below"):
             simulate_point(parse_mission(mission_text(collection__pulses=16)))
