@@ -299,7 +299,7 @@ def _sheet(
 def _specification(
     mission: Mission, one: Specified, value: float, rows: Sequence[RowUse], among: Sequence[Entry]
 ) -> Specification:
-    """What is ordered of an error, by its number as found; nan: nothing limits it."""
+    """The size to order of an error, by its number as found; nan: nothing limits it."""
     declared = one.number.value
     silent = Specification(
         key=one.key,

@@ -140,7 +140,8 @@ def compare_parts(
         why = tried[0].reason if tried else "the catalogue has none of its kind"
         raise QuestionError(f"{key}: no part makes a mission: {why}")
     hold_to_decisions(found, row)
-    if not any(one.figures for one in tried):
+    # A frequency alone makes another scale of what the file states, and no part.
+    if all(set(one.figures) <= {"frequency"} for one in tried):
         raise QuestionError(f"{key}: the file states every figure itself; nothing of a part would be taken")
     states = [search.state(one, row, breaking(target)) for one in tried]
     offered = {figure for one in tried for figure in FIGURES[one.part.kind] if getattr(one.part, figure)}
@@ -227,7 +228,7 @@ class _PartSearch:
         taken = {
             each.key.rpartition(".")[2] for each in mission.taken if each.part == one.id and each.key.startswith(here)
         }
-        of_part = tuple(figure for figure in FIGURES[one.part.kind] if figure in taken)
+        of_part = tuple(figure for figure in FIGURES[one.part.kind] if figure in taken and getattr(one.part, figure))
         return one._replace(judged=judged_mission(Analysis(mission), today), figures=of_part)
 
     def state(self, one: _Candidate, row: str | None, breaks: frozenset[str]) -> PartState:

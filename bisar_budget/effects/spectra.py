@@ -44,7 +44,7 @@ class Parts(NamedTuple):
 
     @property
     def covariance(self) -> Floats:
-        """Of the constant, linear, quadratic and cubic part at the aperture edge, (4, 4, ...)."""
+        """Covariance of the constant, linear, quadratic and cubic part at the aperture edge, (4, 4, ...)."""
         zero = np.zeros(np.shape(self.quadratic))
         both, to_cubic, to_quadratic = (
             part + zero for part in (self.constant_linear, self.constant_cubic, self.linear_quadratic)

@@ -232,8 +232,8 @@ def allocate(
     from bisar_budget.design.offers import offer as offered
 
     today, said = _judged(mission, model, date, outside)
-    if reserve is not None and not 0 <= reserve < 1:
-        raise QuestionError(f"--reserve {100 * reserve:g} %: accepted: from 0 to less than 100 %")
+    if reserve is not None and not (isinstance(reserve, Real) and 0 <= reserve < 1):
+        raise QuestionError(f"reserve {reserve!r}: accepted: a part from 0 to less than 1")
     wanted = _weighted([keys] if isinstance(keys, str) else keys)
     with watched_checks(mission.name) as progress:
         found = allocated(mission, keys=wanted, reserve=reserve, model=model, today=today, progress=progress)

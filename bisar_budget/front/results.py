@@ -315,7 +315,7 @@ class SolveResult(_Answer):
 
 
 class SensitivityResult(_Answer):
-    """What each number does to the worst utilization: `slopes`, ranked."""
+    """Effects of each number on the worst utilization: `slopes`, ranked."""
 
     found: "Sensitivity"
 

@@ -156,7 +156,7 @@ class EarthOrientation(NamedTuple):
 
     @property
     def orientation(self) -> Orientation:
-        """What the figures say; where the pole is not stated, its doubt stays."""
+        """Orientation by the figures; where the pole is not stated, its doubt stays."""
         x, y = self.polar_motion_x, self.polar_motion_y
         pole, doubt = UNKNOWN.pole, UNKNOWN.pole_doubt
         if x is not None and y is not None:

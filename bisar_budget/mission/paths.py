@@ -302,7 +302,7 @@ def _orientation(mission: Mission, center: Instant, read: Beside) -> tuple[Orien
 
 
 def _kept(kept: dict[tuple[object, ...], _T], most: int, key: tuple[object, ...], made: Callable[[], _T]) -> _T:
-    """What follows from a key, as it was made before or made now; so many are kept, the last that were asked for."""
+    """The value of a key, as it was made before or made now; so many are kept, the last that were asked for."""
     found = kept.pop(key, None) or made()
     kept[key] = found
     for old in list(kept)[:-most]:

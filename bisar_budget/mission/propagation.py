@@ -65,7 +65,7 @@ class Propagation(NamedTuple):
             yield Problem("states no delay", accepted)
 
     def leg(self, platform: str) -> LegDelay | None:
-        """What is stated of a platform's leg; None where that of the other alone is."""
+        """The leg of a platform as stated; None where that of the other alone is."""
         if self.transmitter is None and self.receiver is None:
             return LegDelay(self.zenith_delay, self.zenith_electron_content, self.source)
         own: LegDelay | None = getattr(self, platform)

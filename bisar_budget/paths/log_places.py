@@ -1,4 +1,4 @@
-"""What every log of a flight is held to: its scale, its heights, times that rise, a motion that can be flown."""
+"""Places of a flight, whatever log has them: scale, heights, times that rise, a motion that can be flown."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -17,7 +17,7 @@ _LOWEST_M, _HIGHEST_M = -12e3, 100e3  # of what flies; below is the deepest tren
 
 
 class LogKeys(NamedTuple):
-    """What a mission file says of a log.
+    """Keys of a mission file about a log.
 
     The GPS week in which it begins, the scale of its times, and the height of the geoid above the ellipsoid [m].
     """
@@ -31,7 +31,7 @@ NOTHING_SAID = LogKeys()
 
 
 class LogRows(NamedTuple):
-    """What messages call the places of a log: by the line of the file, or by the number of the record."""
+    """Names of a log's places in messages: by the line of the file, or by the number of the record."""
 
     name: str
     lines: NDArray[np.int64] | None = None

@@ -93,7 +93,7 @@ def object_key(text: str) -> str:
 def one_object(
     found: Sequence[_Candidate], name: str, wanted: str | None, number: str = "OBJECT_ID"
 ) -> Sequence[_Candidate]:
-    """What a file has of the object that is wanted, or of the only one.
+    """Blocks of a file about the object that is wanted, or about the only one.
 
     The last of an object's `names` is its own alone; `number` is what messages call it.
     """

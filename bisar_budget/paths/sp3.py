@@ -28,7 +28,7 @@ _GAP = 1.5  # usual intervals; beyond it no polynomial goes
 
 @dataclass
 class _Satellite:
-    """What a file has of one satellite: samples with the lines they stand in, and where a manoeuvre was before."""
+    """Samples of one satellite in a file, with the lines they stand in, and where a manoeuvre was before."""
 
     id: str
     accuracy: float = 0.0  # m
@@ -104,7 +104,7 @@ class _Heading:
 
 
 def _accuracy(exponent: str) -> float:
-    """Of 2ⁿ mm; 0 is not known, and more than 2³⁰ mm is no orbit. [m]"""
+    """Accuracy of 2ⁿ mm; 0 is not known, and more than 2³⁰ mm is no orbit. [m]"""
     text = exponent.strip()
     return 1e-3 * 2 ** int(text) if re.fullmatch(r"\d{1,2}", text, re.ASCII) and 0 < int(text) <= 30 else 0.0
 

@@ -607,7 +607,7 @@ class _PointSearch:
         self.east, self.north, self.measured, self.room = east, north, measured, room
 
     def near(self) -> None:
-        """With the slopes of the centre: a third of the work, where it settles in a few steps."""
+        """Search with the slopes of the centre: a third of the work, where it settles in a few steps."""
         exact, gradient = self.exact, _of(self.exact.gradient, self.of)
         for _ in range(FEW):
             left = exact.fit @ _left(self.measured, self.east, self.north, self.room)
@@ -623,7 +623,7 @@ class _PointSearch:
             gradient = _some(gradient, going)
 
     def anywhere(self) -> None:
-        """With the slopes of each point."""
+        """Search with the slopes of each point."""
         exact, before = self.exact, np.full(self.alive.size, math.inf)
         for _ in range(ITERATIONS):
             seen, nearest = _seen(self.measured, self.east, self.north, self.room)

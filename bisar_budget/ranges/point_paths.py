@@ -291,7 +291,7 @@ class PointPaths:
 
 
 class _SearchState:
-    """What known points tell of searches.
+    """How searches stand by the points that are known.
 
     Attributes
     ----------

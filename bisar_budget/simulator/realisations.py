@@ -94,7 +94,7 @@ _Parts = list[tuple[Floats, Floats]]
 def _drawn_parts(
     mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator
 ) -> dict[str, _Parts]:
-    """What moves each platform, of a unit of the largest axis."""
+    """Motion of each platform by a unit of the largest axis."""
     kind, figure = error.subject.kind, error.subject.axis
     if kind == "random":
         process = process_of(mission, error)
@@ -218,7 +218,7 @@ _Draw = Callable[[Floats, int, np.random.Generator], tuple[Floats, Floats]]
 
 
 def _biased(order: int) -> _Draw:
-    """What a bias makes of a position, and the tilt that goes with it: two integrals less."""
+    """Position error by a bias, and the tilt that goes with it: two integrals less."""
 
     def draw(times: Floats, draws: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
         found: Floats = rng.standard_normal((draws, 1))

@@ -67,7 +67,7 @@ class Moments(NamedTuple):
 
 
 class PlaceMoments(NamedTuple):
-    """What displaces, beside `Moments`: mean squares of orders 0 and 1, and mean products with what defocuses.
+    """Moments of what displaces, beside `Moments`: mean squares of orders 0 and 1, and products with what defocuses.
 
     Of the constant and the linear part at the aperture edge, of constant times quadratic and of linear times cubic
     part. Over time that runs either way alike even and odd orders know nothing of each other.

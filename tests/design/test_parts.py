@@ -95,7 +95,7 @@ def test_the_part_of_the_file_is_marked_and_its_figures_are_said() -> None:
 
 
 def test_figures_with_a_source_each_are_said(tmp_path: Path) -> None:
-    """Of an oscillator the frequency was left out: its source is not the one of the noise."""
+    """The frequency of an oscillator was left out: its source is not the one of the noise."""
     (tmp_path / "own.yaml").write_text(
         "kind: oscillator\nname: Own\nsource: {frequency: plate, phase_noise: sheet}\nfrequency: 10 MHz\n"
         "phase_noise: {1 Hz: -95 dBc/Hz, 10 Hz: -125 dBc/Hz}\n",
@@ -105,6 +105,30 @@ def test_figures_with_a_source_each_are_said(tmp_path: Path) -> None:
     found = ask(OSCILLATOR, f"{OSCILLATOR}=own.yaml", file=str(tmp_path / "m.yaml"))
     (own,) = (part for part in found.parts if part.is_given)
     assert own.figures == ("frequency", "phase_noise")
+
+
+def test_a_frequency_alone_is_no_part() -> None:
+    """The mask is the file's own: every part would show it at another frequency."""
+    mask = "phase_noise: {1 Hz: -95 dBc/Hz, 10 Hz: -125 dBc/Hz, 1 kHz: -150 dBc/Hz}"
+    own = f"platforms.receiver.oscillator={{sensor: gps-3500, {mask}, aging: 1e-10 /day}}"
+    with pytest.raises(QuestionError, match="nothing of a part would be taken"):
+        ask(OSCILLATOR, own, file=OCXO)
+
+
+def test_a_figure_that_the_file_states_is_of_no_part(tmp_path: Path) -> None:
+    """It was said to be the given part's, and all others to be silent on it."""
+    (tmp_path / "own.yaml").write_text(
+        "kind: oscillator\nname: Own\nsource: sheet\nfrequency: 10 MHz\nacceleration_sensitivity: 1e-9 /g\n"
+        "phase_noise: {1 Hz: -95 dBc/Hz, 10 Hz: -125 dBc/Hz}\n",
+        encoding="utf-8",
+    )
+    text = (MISSIONS / "uav_vibrating_ocxo.yaml").read_text(encoding="utf-8")
+    (tmp_path / "m.yaml").write_text(text, encoding="utf-8")  # its receiver states the figure
+    found = ask(OSCILLATOR, f"{OSCILLATOR}=own.yaml", file=str(tmp_path / "m.yaml"))
+    assert found.overridden == ("acceleration_sensitivity",)
+    assert {figure for part in found.parts for figure in (*part.figures, *part.silent_on)} == {
+        "frequency", "phase_noise", "power_law", "allan_deviation",
+    }  # fmt: skip
 
 
 def test_parts_of_the_projects_own_folders_and_files_are_compared(tmp_path: Path, run: Callable) -> None:

@@ -207,3 +207,10 @@ def test_no_name_has_two_meanings() -> None:
     for name, rooms in (*classes.items(), *modules.items()):
         assert len([one for one in rooms if one not in BESIDE]) <= 1, (name, rooms)
         assert len(set(rooms)) == len(rooms), (name, rooms)
+
+
+@pytest.mark.parametrize("path", MODULES, ids=module_name)
+def test_docstrings_say_what_a_thing_is_or_returns(path: Path) -> None:
+    kinds = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
+    said = (ast.get_docstring(node) or "" for node in ast.walk(parsed(path)) if isinstance(node, kinds))
+    assert [text for text in said if text.startswith(("Of ", "What "))] == []

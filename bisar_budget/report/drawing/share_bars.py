@@ -1,4 +1,4 @@
-"""What uses up every row that limits a specification, as stacked bars: errors by their numbers on the sheet."""
+"""Shares of every row that limits a specification, as stacked bars: errors by their numbers on the sheet."""
 
 from bisar_budget.faults import printable
 from bisar_budget.findings.requirement import NAMES

@@ -157,7 +157,7 @@ def _without_arm(analysis: Analysis, error: RandomError) -> RandomError:
 
 
 def _with_arm(analysis: Analysis, error: RandomError) -> Iterator[Step]:
-    """What a tilt does through the lever arm too."""
+    """The part of a tilt that comes through the lever arm."""
     lever = getattr(analysis.mission.platforms, error.owner).motion_error.lever_arm
     if lever is None or lever.arm is None or error.subject.axis not in TILTS:
         return
@@ -231,7 +231,7 @@ def _by_unit(values: Sequence[float], unit: str) -> list[str]:
 
 
 def _by_exact_ranges(mission: Mission, error: RandomError) -> Iterator[Step]:
-    """What the full model makes of a unit, where that differs."""
+    """Effects of a unit by the full model, where they differ."""
     unit, full = error.published, error.full
     if full[:3] == unit[:3]:
         return
@@ -321,7 +321,7 @@ def _written(pieces: Sequence[PowerLawPiece]) -> list[str]:
 
 
 def _setting(pieces: Sequence[PowerLawPiece], mission: Mission, sync: Synchronization) -> Iterator[Step]:
-    """What has come since a clock was set: orders 0 and 1 of its range error, at the radar's centre frequency."""
+    """Drift since a clock was set: orders 0 and 1 of its range error, at the radar's centre frequency."""
     T, age, averaging = (
         np.array([one or 0.0]) for one in (mission.collection.aperture_time, sync.age, sync.averaging)
     )

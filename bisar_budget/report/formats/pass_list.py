@@ -215,7 +215,7 @@ def _degrees(angle: float | None, digits: int = 0) -> str:
 
 
 def _notes(passes: Passes) -> Iterator[str]:
-    """What decides, once for all passes that share it; what was cut, and what is not known."""
+    """Notes below the passes: the deciding rows, once for all that share one, cuts, and unknowns."""
     for text, numbers in _grouped(passes.found, _decided):
         yield f"{sentence(text)}: {numbers}."
     for text, numbers in _grouped(passes.found, lambda one: one.reason and _figureless(one)):
@@ -257,7 +257,7 @@ def _figureless(one: SatellitePass) -> str:
 
 
 def _grouped(found: Sequence[SatellitePass], said: Callable[[SatellitePass], str]) -> Iterator[tuple[str, str]]:
-    """What is said of passes, and the numbers of those of which it is."""
+    """Sentences about passes, each with the numbers of its passes."""
     groups: dict[str, list[int]] = {}
     for one in found:
         if text := said(one):

@@ -191,7 +191,7 @@ def _broken_words(one: Broken) -> list[str]:
 
 
 def _way_out(sheet: SpecificationSheet) -> str:
-    """What can be done where other errors leave no room."""
+    """Remedies where other errors leave no room."""
     used = [math.inf if one.used is None else one.used for one in sheet.broken]
     if max(used) <= 1:
         least = 1 - max(used)
@@ -202,7 +202,7 @@ def _way_out(sheet: SpecificationSheet) -> str:
 
 
 def _remarks(sheet: SpecificationSheet) -> Iterator[str]:
-    """What a reader of a sheet should know of it."""
+    """Remarks for the reader of a sheet."""
     for row in limiting(sheet):
         if row.requirement is None and row.id.startswith("negligible"):
             effect = row.id.partition(".")[2]
@@ -379,7 +379,7 @@ def _title(sheet: SpecificationSheet, one: Specification) -> str:
 
 
 def _statement(one: Specification) -> str:
-    """What is required, by the key of the mission file that says what the number means."""
+    """The requirement, by the key of the mission file that says what the number means."""
     return f"{one.key}, as the mission file counts it, shall be at most {one.text}."
 
 

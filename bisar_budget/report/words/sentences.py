@@ -194,7 +194,7 @@ def aligned(rows: Sequence[Sequence[str]]) -> Iterator[list[str]]:
     """
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
     room = WIDTH - sum(widths[1:]) - len(widths) + 1
-    first = max((len(row[0]) for row in rows if len(row[0]) <= room), default=0)
+    first = max(len(row[0]) for row in rows if len(row[0]) <= max(room, len(rows[0][0])))  # the header stays whole
     for name, *cells in rows:
         numbers = " ".join(cell.rjust(width) for cell, width in zip(cells[:-1], widths[1:-1], strict=True))
         rest = f"{numbers} {cells[-1]}".rstrip()
