@@ -59,9 +59,7 @@ from bisar_budget.mission.readers import (
     either,
 )
 from bisar_budget.mission.vibrations import Vibration
-from bisar_budget.paths.instant import parse_instant
-from bisar_budget.paths.log_places import SCALES
-from bisar_budget.paths.recognised import LOG_FORMATS
+from bisar_budget.paths.instant import SCALES, parse_instant
 
 LEAST_BASELINE = 1.0  # m, between platforms of which one hears the other
 FARTHEST_BY = 3  # times the least baseline, that they move by in half an aperture: so far a fit of 16 nodes is true
@@ -72,6 +70,8 @@ _PLACES = np.linspace(-1, 1, 65)[:, None]
 
 FRAMES = Choice("scene", "track", "look", "ric")
 TIME_TAG = Quantity(units.TIME, ge=-1e3, le=1e3)
+# As of `paths.recognised`, which every check would wait for: it loads the readers of them all.
+_LOG_FORMATS = ("csv", "sbet", "pos", "nmea", "gpx", "ulog")
 PARTS = either(list, TextList(), Reference())
 
 
@@ -268,7 +268,7 @@ class TrajectorySource(NamedTuple):
 
     file: Annotated[str, Key(_FILE, "Beside the mission file.")]
     format: Annotated[
-        str | None, Key(Choice(*LOG_FORMATS), "Omitted: by the content, or else the ending of the name.")
+        str | None, Key(Choice(*_LOG_FORMATS), "Omitted: by the content, or else the ending of the name.")
     ] = None
     week: Annotated[int | None, Key(Whole(0, 9999), "GPS week in which an SBET begins, not rolled over.")] = None
     time_scale: Annotated[

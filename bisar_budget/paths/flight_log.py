@@ -26,10 +26,9 @@ from bisar_budget import units
 from bisar_budget.faults import InvalidValueError, fault_words, shown
 from bisar_budget.paths.earth import Floats, earth_fixed_places
 from bisar_budget.paths.flight import Log, PathFileError, hold_to_bytes
-from bisar_budget.paths.instant import DAY, GPS_EPOCH, WEEK, Instant, parse_instant
+from bisar_budget.paths.instant import DAY, GPS_EPOCH, SCALES, WEEK, Instant, parse_instant
 from bisar_budget.paths.log_places import (
     NOTHING_SAID,
-    SCALES,
     LogKeys,
     LogRows,
     counted,

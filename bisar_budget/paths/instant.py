@@ -76,6 +76,7 @@ _LEAPS = (
 _DAYS = tuple(date.fromisoformat(f"{month}-01").toordinal() - _MJD_OF_ORDINAL for month in _LEAPS.split())
 FIRST_DAY = _DAYS[0]  # before it UTC ran at another rate than TAI
 
+SCALES = {"utc": "UTC", "gps": "GPST", "tai": "TAI"}  # as the mission file has them, and as logs do
 # What TAI is ahead. GPS: IS-GPS-200, 20.3.3.5.2.4, 19 leap seconds at its epoch. TT: IAU 1991, Recommendation IV.
 TAI_LESS = {"TAI": 0.0, "GPS": 19.0, "TT": -32.184}
 

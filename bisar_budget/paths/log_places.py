@@ -8,10 +8,9 @@ from numpy.typing import NDArray
 
 from bisar_budget.paths.earth import Floats, earth_fixed_places
 from bisar_budget.paths.flight import Log, PathFileError
-from bisar_budget.paths.instant import TAI_LESS, UNIX_EPOCH, Instant, tai_less_utc, utc
+from bisar_budget.paths.instant import SCALES, TAI_LESS, UNIX_EPOCH, Instant, tai_less_utc, utc
 from bisar_budget.units import format_quantity
 
-SCALES = {"utc": "UTC", "gps": "GPST", "tai": "TAI"}  # as the mission file has them, and as logs do
 _LEAPS_KNOWN = 61587  # MJD, 2027-07-01: Bulletin C 72 has no leap second before
 _LOWEST_M, _HIGHEST_M = -12e3, 100e3  # of what flies; below is the deepest trench
 

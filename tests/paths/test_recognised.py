@@ -4,6 +4,7 @@ from typing import Any
 
 import pytest
 
+from bisar_budget.mission.platforms import TrajectorySource
 from bisar_budget.paths.flight import PathFileError
 from bisar_budget.paths.log_places import LogKeys
 from bisar_budget.paths.recognised import LOG_FORMATS, log_format, read_log
@@ -86,3 +87,8 @@ def test_an_sbet_says_its_scale_and_heights(keys: dict[str, Any], key: str | Non
     with pytest.raises(PathFileError) as error:
         read_log(FILES["sbet.out"][1], "sbet.out", None, LogKeys(**keys))
     assert error.value.key == (key or "geoid_separation")
+
+
+def test_the_mission_file_knows_every_format() -> None:
+    (key,) = TrajectorySource.__annotations__["format"].__metadata__
+    assert key.reader.names == tuple(LOG_FORMATS)
