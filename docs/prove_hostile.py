@@ -456,7 +456,7 @@ def limits(seeds: range) -> Outcome:
                 (resource.RLIMIT_AS, random.randint(30, 400) << 20),
             )
         )
-        with TemporaryDirectory() as folder, open("/dev/full", "wb") as full:
+        with TemporaryDirectory() as folder, open("/dev/full", "r+b") as full:
             report = Path(folder, "r.html")
             report.write_text("old")
             arguments = random.choice(
