@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+import math
 import re
 import subprocess
 import sys
@@ -20,6 +21,7 @@ from bisar_budget.design import sweep as engine
 from bisar_budget.design.table import Table
 from bisar_budget.front import progress, results
 from bisar_budget.front.missions import Spaced
+from bisar_budget.front.questions import angle_of
 from docs._ext.blocks import blocks
 from tests.conftest import COMPLIES, ROOT, mission_text
 from tests.front.user_script import report
@@ -556,6 +558,16 @@ def test_python_refuses_what_the_command_refuses(ask: Callable[[bb.Mission], obj
     """An empty sweep and an unknown model were errors of indexing; the others were answered."""
     with pytest.raises(bb.QuestionError, match=re.escape(said)):
         ask(bb.load(TANDEM_X))
+
+
+def test_python_takes_what_is_within_by_a_little() -> None:
+    mission = bb.load(TANDEM_X)
+    for reserve in (0.0, 0.99):
+        assert bb.allocate(mission, "timing_error.linear", reserve=reserve).found.reserve == reserve
+    assert bb.allocate(mission, {"timing_error.linear": np.int64(1)}).found.specifications
+    assert angle_of("--min-elevation", "0 deg", 0.0) == 0
+    assert math.degrees(angle_of("--min-elevation", "89.9 deg", 0.0)) == pytest.approx(89.9)
+    assert math.degrees(angle_of("--squint", "-89.9 deg", -90.0)) == pytest.approx(-89.9)
 
 
 def test_a_day_that_is_none_is_refused_by_its_words() -> None:
