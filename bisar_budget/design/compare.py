@@ -144,7 +144,6 @@ def compare_parts(
     if all(set(one.figures) <= {"frequency"} for one in tried):
         raise QuestionError(f"{key}: the file states every figure itself; nothing of a part would be taken")
     states = [search.state(one, row, breaking(target)) for one in tried]
-    offered = {figure for one in tried for figure in FIGURES[one.part.kind] if getattr(one.part, figure)}
     return Comparison(
         file=mission.file,
         name=mission.name,
@@ -154,7 +153,7 @@ def compare_parts(
         model=variation.read().gating_model,
         kinds=search.kinds,
         kept=tuple(search.given) if len(search.given) > 1 else (),
-        overridden=tuple(sorted(offered.difference(*(state.figures for state in states)))),
+        overridden=tuple(sorted({figure for one in tried for figure in one.stated})),
         parts=tuple(sorted(_with_silence(states), key=_order)),
         changes=mission.changes,
     )
@@ -181,13 +180,17 @@ def _order(state: PartState) -> tuple[bool, float, float, str]:
 
 
 class _Candidate(NamedTuple):
-    """A part; of the mission with it what was judged, or why there is none, and the figures that it takes."""
+    """A part; of the mission with it what was judged, or why there is none, and its figures.
+
+    `figures` are those that it takes of the part, `stated` those that the file states in place of the part's.
+    """
 
     id: str
     file: str
     part: Part
     judged: JudgedMission | None = None
     figures: tuple[str, ...] = ()
+    stated: tuple[str, ...] = ()
     reason: str = ""
 
 
@@ -229,7 +232,9 @@ class _PartSearch:
             each.key.rpartition(".")[2] for each in mission.taken if each.part == one.id and each.key.startswith(here)
         }
         of_part = tuple(figure for figure in FIGURES[one.part.kind] if figure in taken and getattr(one.part, figure))
-        return one._replace(judged=judged_mission(Analysis(mission), today), figures=of_part)
+        section = getattr(getattr(mission.platforms, self.platform), self.section)
+        stated = tuple(each.figure for each in section.overridden if each.part == one.part.name)
+        return one._replace(judged=judged_mission(Analysis(mission), today), figures=of_part, stated=stated)
 
     def state(self, one: _Candidate, row: str | None, breaks: frozenset[str]) -> PartState:
         """Say how the mission stands with a part."""

@@ -47,13 +47,15 @@ AngleRandomWalk = Annotated[Vector | None, Key(_ANGLE_WALK, "Noise of the gyros.
 class Overridden(NamedTuple):
     """A figure of a part, or of the accuracy of a log, that something in the file replaces.
 
-    `key` is what replaces it, below the platform, `text` the figure as its file has it.
+    `key` is what replaces it, below the platform, `text` the figure as its file has it. `frequency` is the part's, at
+    which a mask holds that the file states without one.
     """
 
     figure: str
     key: str
     part: str
     text: str
+    frequency: str = ""
 
 
 class TakenFigure(NamedTuple):

@@ -576,7 +576,8 @@ def _with_sensor(oscillator: Oscillator, path: KeyPath, find: Find, report: Repo
     if own is None:
         figures = {form: getattr(part, form), "source": evidence(part, form)}
     else:
-        overridden.append(Overridden(own, f"oscillator.{own}", part.name, f"{form} {written[form]}"))
+        holds_at = "" if own != "phase_noise" or oscillator.frequency else written.get("frequency", "")
+        overridden.append(Overridden(own, f"oscillator.{own}", part.name, f"{form} {written[form]}", holds_at))
     if oscillator.frequency is None:
         figures["frequency"] = part.frequency
     elif part.frequency is not None and oscillator.frequency != part.frequency:

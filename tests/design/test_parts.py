@@ -131,6 +131,19 @@ def test_a_figure_that_the_file_states_is_of_no_part(tmp_path: Path) -> None:
     }  # fmt: skip
 
 
+def test_a_form_of_noise_that_the_file_does_not_state_is_not_said_to_be_stated(tmp_path: Path) -> None:
+    """All forms of the parts were: the file's one form stands in place of whichever form a part has."""
+    (tmp_path / "own.yaml").write_text(
+        "kind: oscillator\nname: Own\nsource: sheet\nfrequency: 10 MHz\nacceleration_sensitivity: 1e-9 /g\n"
+        "phase_noise: {1 Hz: -95 dBc/Hz, 10 Hz: -125 dBc/Hz}\n",
+        encoding="utf-8",
+    )
+    (tmp_path / "m.yaml").write_text(Path(OCXO).read_text(encoding="utf-8"), encoding="utf-8")
+    noise = "platforms.receiver.oscillator.power_law={h0: 1e-24}"
+    found = ask(OSCILLATOR, f"{OSCILLATOR}=own.yaml", noise, file=str(tmp_path / "m.yaml"))
+    assert found.overridden == ("power_law",)
+
+
 def test_parts_of_the_projects_own_folders_and_files_are_compared(tmp_path: Path, run: Callable) -> None:
     """A folder that the settings name, and a file that the mission names; its velocity error is the mission's."""
     (tmp_path / "pyproject.toml").write_text('[tool.bisar-budget]\nsensors = ["own"]\n', encoding="utf-8")

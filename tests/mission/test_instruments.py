@@ -360,6 +360,15 @@ class TestCatalogue:
         (noise,) = (note for note in found.notes if "in place of" in note)
         assert "oscillator.allan_deviation stands in place of power_law h-1: 1.268e-26" in noise
 
+    @pytest.mark.parametrize(("frequency", "said"), [("", True), ("frequency: 5 MHz, ", False)])
+    def test_the_frequency_at_which_a_mask_beside_a_part_holds_is_said(self, frequency: str, said: bool) -> None:
+        """The file's mask was taken at the frequency of the part, and nothing said so."""
+        mask = "phase_noise: {1 Hz: -110 dBc/Hz, 10 Hz: -125 dBc/Hz}"
+        text = f"oscillator: {{sensor: wenzel-5mhz, {frequency}{mask}}}"
+        found = check_mission(parse_mission(receiver(text)), TODAY)
+        (noise,) = (note for note in found.notes if "in place of power_law" in note)
+        assert ("; it states no frequency, and holds at that of the part, 5 MHz" in noise) is said
+
     def test_own_parts_stand_in_a_folder_of_the_project_or_anywhere(self, tmp_path, monkeypatch) -> None:
         monkeypatch.chdir(tmp_path)
         own = 'kind: imu\nname: Ours\naccelerometer_bias: 1 mg\nsource: "test report 7"\n'
