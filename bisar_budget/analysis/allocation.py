@@ -15,28 +15,7 @@ from bisar_budget.ranges.exact_ranges import Floats
 BALANCED_RANGE = (0.05, 0.95)  # neither platform is left without a budget
 
 
-class Split(NamedTuple):
-    """Shares of one budget; they sum to 1. Without a share of its own the clock is held to the receiver's."""
-
-    transmitter: float
-    receiver: float
-    clock: float | None = None
-    reserve: float = 0.0
-
-    def of(self, owner: str) -> float:
-        """Share of an owner; what belongs to nobody is held to the whole budget."""
-        if owner == "clock":
-            return self.receiver if self.clock is None else self.clock
-        if owner == "mission":
-            return 1.0
-        return self.transmitter if owner == "transmitter" else self.receiver
-
-    def includes(self, owner: str, of: str) -> bool:
-        """Whether an owner's errors count against the share of `of`; against the mission's all do."""
-        return of in ("mission", owner) or (owner == "clock" and of == "receiver" and self.clock is None)
-
-
-EQUAL = Split(transmitter=0.5, receiver=0.5)
+EQUAL = Shares(transmitter=0.5, receiver=0.5)
 
 
 class Allocation(NamedTuple):
@@ -46,9 +25,9 @@ class Allocation(NamedTuple):
     """
 
     qpe_total: float
-    qpe: Split
-    pslr: Split
-    islr: Split
+    qpe: Shares
+    pslr: Shares
+    islr: Shares
     n_pull: float | None
     n_pull_stated: float | None
 
@@ -66,7 +45,7 @@ class Allocation(NamedTuple):
 
     def of(self, case: int) -> "Allocation":
         """Those of one of many cases, in plain numbers."""
-        qpe, pslr, islr = (Split._make(_plain(share, case) for share in split) for split in self[1:4])
+        qpe, pslr, islr = (Shares._make(_plain(share, case) for share in split) for split in self[1:4])
         total, n_pull, stated = (_plain(one, case) for one in (self.qpe_total, self.n_pull, self.n_pull_stated))
         return Allocation(total, qpe, pslr, islr, n_pull, stated)
 
@@ -118,15 +97,15 @@ def allocate(mission: Mission, gates: Iterable[Together]) -> Allocation:
     )
     return Allocation(
         qpe_total=mission.requirements.quadratic_phase_error,
-        qpe=_balanced(list(gates)) if qpe == "balanced" else _split(qpe),
-        pslr=_split(pslr),
-        islr=_split(islr),
+        qpe=_balanced(list(gates)) if qpe == "balanced" else _shares(qpe),
+        pslr=_shares(pslr),
+        islr=_shares(islr),
         n_pull=effective_n_pull(mission),
         n_pull_stated=mission.autofocus.n_pull,
     )
 
 
-def _balanced(gates: Sequence[Together]) -> Split:
+def _balanced(gates: Sequence[Together]) -> Shares:
     """Shares as the declared errors need them; by several models the larger phase of each error."""
     weights = []
     for owner in ("transmitter", "receiver"):
@@ -139,7 +118,7 @@ def _balanced(gates: Sequence[Together]) -> Split:
         share: Any = np.where(total == 0, 0.5, np.clip(weights[0] / total, *BALANCED_RANGE))
     if share.size == 1:
         share = float(share[0])
-    return Split(transmitter=share, receiver=1 - share)
+    return Shares(transmitter=share, receiver=1 - share)
 
 
 def _largest(phases: Sequence[Floats]) -> Floats:
@@ -151,5 +130,5 @@ def _largest(phases: Sequence[Floats]) -> Floats:
     return np.asarray(np.take_along_axis(of_all, largest[None], axis=0)[0])
 
 
-def _split(shares: object) -> Split:
-    return Split(*shares) if isinstance(shares, Shares) else EQUAL  # `balanced` weighs phase, not power
+def _shares(split: str | Shares) -> Shares:
+    return EQUAL if isinstance(split, str) else split  # `balanced` weighs phase, not power
