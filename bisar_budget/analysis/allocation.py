@@ -1,4 +1,4 @@
-"""Division of the budgets between transmitter, receiver and clock, and the gain of autofocus."""
+"""Division of the budgets between transmitter, receiver and clock; the gain of autofocus, and how far it goes."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -6,11 +6,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from bisar_budget import evaluators
+from bisar_budget import evaluators, phrases
 from bisar_budget.analysis.together import Together
 from bisar_budget.effects.effect import plain
 from bisar_budget.mission.model import MetricSplits, Mission, Shares
+from bisar_budget.phrases import Note
 from bisar_budget.ranges.exact_ranges import Floats
+from bisar_budget.units import format_quantity
 
 BALANCED_RANGE = (0.05, 0.95)  # neither platform is left without a budget
 
@@ -49,30 +51,13 @@ class Allocation(NamedTuple):
         total, n_pull, stated = (_plain(one, case) for one in (self.qpe_total, self.n_pull, self.n_pull_stated))
         return Allocation(total, qpe, pslr, islr, n_pull, stated)
 
-    def n_pull_needed(self, qpe: float, owner: str) -> float:
-        """Smallest N_pull that makes a QPE pass."""
-        return qpe / (self.qpe.of(owner) * math.pi)
+    def passes_with(self, qpe: float, owner: str, mission: Mission) -> Note:
+        """Say from which N_pull a QPE of an owner would pass, or that no autofocus corrects it."""
+        return needed_sentence(qpe / (self.qpe.of(owner) * math.pi), caps(mission))
 
 
 def _plain(number: Any, case: int) -> Any:
     return None if number is None else plain(number, case)
-
-
-def range_walk_cap(mission: Mission) -> float:
-    """Largest N_pull that counts, f₀/B; a number, or an array of many cases.
-
-    A phase of π·N at the aperture edge walks N·B/2f₀ range cells, of which correction along one dimension takes half
-    a cell (`budget.pull_in`).
-    """
-    return mission.radar.center_frequency / mission.radar.bandwidth
-
-
-def effective_n_pull(mission: Mission) -> float | None:
-    """N_pull that autofocus counts with: the file's, up to the cap of range walk; None: no autofocus is declared."""
-    stated, cap = mission.autofocus.n_pull, range_walk_cap(mission)
-    if stated is None:
-        return None
-    return stated * (stated <= cap) + cap * (stated > cap)  # the smaller one, of arrays too
 
 
 def is_balanced(mission: Mission) -> bool:
@@ -132,3 +117,79 @@ def _largest(phases: Sequence[Floats]) -> Floats:
 
 def _shares(split: str | Shares) -> Shares:
     return EQUAL if isinstance(split, str) else split  # `balanced` weighs phase, not power
+
+
+# ---------------------------------------------------------------------- autofocus
+ROOM = {"pga": 3.0, "map_drift": 1.5}  # patch over smear
+
+
+class Caps(NamedTuple):
+    """Largest N_pull by range walk, f₀/B, and by the scene's size; None where the file gives none.
+
+    No gain goes beyond that of range walk; beyond that of the scene a warning stands.
+
+    A phase of π·N at the aperture edge walks λN/2 in range, N·B/2f₀ cells, and smears a point over 4N cross-range
+    cells. Measured on images of points (`tests/simulate/test_pull_in_caps.py`): one-dimensional autofocus works up to
+    half a cell of walk and beyond, but half a cell costs 0.6 dB that no phase takes out, a whole one 1.3 dB. What
+    makes it give out is the patch, whatever walk and bandwidth: phase gradient needs three times the smear, map drift
+    one and a half; with less they leave the image smeared at a hundredth of a cell of walk as at a third of one.
+    """
+
+    walk: float
+    scene: float | None = None
+
+
+def caps(mission: Mission) -> Caps:
+    """Bounds on N_pull that no autofocus of a mission goes beyond."""
+    walk = range_walk_cap(mission)
+    if mission.scene.radius is None:
+        return Caps(walk)
+    cell = mission.geometry.cross_range_resolution(mission.radar.wavelength, mission.collection.aperture_time)
+    return Caps(walk, 2 * mission.scene.radius / (4 * cell * ROOM[mission.autofocus.algorithm]))
+
+
+def range_walk_cap(mission: Mission) -> float:
+    """Largest N_pull that counts, f₀/B; a number, or an array of many cases."""
+    return mission.radar.center_frequency / mission.radar.bandwidth
+
+
+def effective_n_pull(mission: Mission) -> float | None:
+    """N_pull that autofocus counts with: the file's, up to the cap of range walk; None: no autofocus is declared."""
+    stated, cap = mission.autofocus.n_pull, range_walk_cap(mission)
+    if stated is None:
+        return None
+    return stated * (stated <= cap) + cap * (stated > cap)  # the smaller one, of arrays too
+
+
+def needed_sentence(n_pull: float, caps: Caps) -> Note:
+    """Say from which N_pull an error would pass, or that none can correct it.
+
+    Parameters
+    ----------
+    n_pull : float
+        Smallest N_pull with which the error passes.
+    caps : Caps
+        What `caps` says of the mission.
+    """
+    if caps.scene is not None and caps.scene < min(n_pull, caps.walk):
+        allowed = f"the scene's size allows {rounded_down(caps.scene)}"
+    elif n_pull > caps.walk:
+        allowed = f"range walk allows {rounded_down(caps.walk)}"
+    else:
+        return phrases.passes_from(math.ceil(n_pull * 100 * (1 - 1e-12)) / 100)
+    return phrases.beyond_autofocus(_up(n_pull), allowed)
+
+
+def _up(number: float) -> str:
+    """Three digits, rounded up; whole from a hundred on, with a space between thousands."""
+    if number >= 100:
+        return f"{math.ceil(number * (1 - 1e-12)):,}".replace(",", " ")
+    step = 10.0 ** (math.floor(math.log10(number)) - 2)
+    return f"{math.ceil(number / step * (1 - 1e-12)) * step:.3g}"
+
+
+def rounded_down(number: float) -> str:
+    """Three digits, rounded down; whole from a hundred on, with a space between thousands."""
+    if number >= 100:
+        return f"{math.floor(number * (1 + 1e-12)):,}".replace(",", " ")
+    return format_quantity(number, "", 3, "down")

@@ -16,7 +16,6 @@ from bisar_budget.analysis.spread import noise
 from bisar_budget.analysis.together import Together, cubics, quadratics
 from bisar_budget.budget.judged_requirements import TAKEN_BY, EffectTotal, first_highest
 from bisar_budget.budget.judged_rows import BOUND, CODE, Floats, Judged, Judging, number_of, worded
-from bisar_budget.budget.pull_in import caps, needed_sentence
 from bisar_budget.effects.combined import (
     Phases,
     combined,
@@ -217,7 +216,7 @@ class Aggregate:
             over = phrases.aggregate_over(said.what, size, limit, said.unit, *_largest(case, model, self))
         if what.kind == QUADRATIC:
             if over and size is not None and combine != "each":
-                over = over.then(needed_sentence(allocation.n_pull_needed(size, owner), caps(mission)))
+                over = over.then(allocation.passes_with(size, owner, mission))
         elif over and size is not None and what.kind != LOCATION:
             over = over.then(phrases.no_gain() if what.kind == CUBIC else phrases.one_total())
         doubt = over if what.kind == PULL_IN else NOTHING
