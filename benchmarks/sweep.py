@@ -21,7 +21,7 @@ import numpy as np
 
 from bisar_budget.budget.check import check_mission
 from bisar_budget.constants import SPEED_OF_LIGHT
-from bisar_budget.design.cases import Grid
+from bisar_budget.design.cases import Cases
 from bisar_budget.design.sweep import Asked
 from bisar_budget.evaluators import LEGENDRE_FITS
 from bisar_budget.faults import SetValue
@@ -112,13 +112,13 @@ def of_kinds(runs: int, side: int = 64, few: int = 16) -> None:
         keys = ("collection.aperture_time", "radar.bandwidth")
         numbers = tuple(number_of(tree, key) for key in keys)
         axes = tuple(np.linspace(0.5, 1.5, side) * number.value for number in numbers)
-        cases = Grid(numbers, axes)
+        cases = Cases(numbers, axes, is_grid=True)
 
-        def together(mission: Mission = mission, cases: Grid = cases) -> None:
+        def together(mission: Mission = mission, cases: Cases = cases) -> None:
             for _ in Asked(mission, cases, today=DAY).checked().parts:
                 pass
 
-        def one_by_one(mission: Mission = mission, cases: Grid = cases) -> None:
+        def one_by_one(mission: Mission = mission, cases: Cases = cases) -> None:
             for place in range(0, cases.count, cases.count // few):
                 values = {key: float(one[0]) for key, one in cases.values(place, place + 1).items()}
                 found = [SetValue(one.key, f"{values[one.key]!r} {one.dimension.si}") for one in cases.varied]
@@ -139,7 +139,7 @@ def of_a_million(count: int, runs: int) -> None:
     side = math.isqrt(count)
     axes = (np.radians(np.linspace(10, 170, side)), np.linspace(1, 10, side))
     keys = ("platforms.receiver.azimuth", "collection.aperture_time")
-    cases = Grid(tuple(number_of(tree, key) for key in keys), axes)
+    cases = Cases(tuple(number_of(tree, key) for key in keys), axes, is_grid=True)
     azimuth, T = (axis.ravel() for axis in np.meshgrid(*axes, indexing="ij"))
 
     def swept() -> None:
@@ -166,10 +166,10 @@ def of_a_million(count: int, runs: int) -> None:
         print(
             f"  {label:5} {ours:6.2f} s ÷ {hand:6.2f} s = {ratio:.2f}    a loop of check ÷ sweep = {loop / ours:.0f}"
         )
-    few = Grid(cases.varied, tuple(axis[:: side // 50] for axis in axes))
+    few = Cases(cases.varied, tuple(axis[:: side // 50] for axis in axes), is_grid=True)
     found = Asked(mission, few, today=DAY).checked()
     whole = np.concatenate([part.values["utilization"] for part in found.parts])
-    use, *_ = by_hand(*(axis.ravel() for axis in np.meshgrid(*few.axes, indexing="ij")))
+    use, *_ = by_hand(*(axis.ravel() for axis in np.meshgrid(*few.columns, indexing="ij")))
     print(f"  largest difference of the utilization {np.abs(whole / use - 1).max():.0e} of itself")
     print(f"  peak memory of the sweep {peak:.0f} MB (at most 1000)")
 

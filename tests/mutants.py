@@ -100,7 +100,7 @@ MUTANTS = (
     ),
     Mutant(
         "share of the clock: the transmitter's",
-        "bisar_budget/analysis/allocation.py",
+        "bisar_budget/mission/model.py",
         "return self.receiver if self.clock is None else self.clock",
         "return self.transmitter if self.clock is None else self.clock",
         ("tests/budget/test_check.py::TestAllocation::test_without_a_share_the_clock_is_held_to_the_receivers",),

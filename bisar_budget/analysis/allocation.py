@@ -1,4 +1,4 @@
-"""Division of the budgets between transmitter, receiver and clock, and the gain of autofocus."""
+"""Division of the budgets between transmitter, receiver and clock; the gain of autofocus, and how far it goes."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -6,37 +6,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from bisar_budget import evaluators
+from bisar_budget import evaluators, phrases
 from bisar_budget.analysis.together import Together
 from bisar_budget.effects.effect import plain
 from bisar_budget.mission.model import MetricSplits, Mission, Shares
+from bisar_budget.phrases import Note
 from bisar_budget.ranges.exact_ranges import Floats
+from bisar_budget.units import format_quantity
 
 BALANCED_RANGE = (0.05, 0.95)  # neither platform is left without a budget
 
 
-class Split(NamedTuple):
-    """Shares of one budget; they sum to 1. Without a share of its own the clock is held to the receiver's."""
-
-    transmitter: float
-    receiver: float
-    clock: float | None = None
-    reserve: float = 0.0
-
-    def of(self, owner: str) -> float:
-        """Share of an owner; what belongs to nobody is held to the whole budget."""
-        if owner == "clock":
-            return self.receiver if self.clock is None else self.clock
-        if owner == "mission":
-            return 1.0
-        return self.transmitter if owner == "transmitter" else self.receiver
-
-    def includes(self, owner: str, of: str) -> bool:
-        """Whether an owner's errors count against the share of `of`; against the mission's all do."""
-        return of in ("mission", owner) or (owner == "clock" and of == "receiver" and self.clock is None)
-
-
-EQUAL = Split(transmitter=0.5, receiver=0.5)
+EQUAL = Shares(transmitter=0.5, receiver=0.5)
 
 
 class Allocation(NamedTuple):
@@ -46,9 +27,9 @@ class Allocation(NamedTuple):
     """
 
     qpe_total: float
-    qpe: Split
-    pslr: Split
-    islr: Split
+    qpe: Shares
+    pslr: Shares
+    islr: Shares
     n_pull: float | None
     n_pull_stated: float | None
 
@@ -66,34 +47,17 @@ class Allocation(NamedTuple):
 
     def of(self, case: int) -> "Allocation":
         """Those of one of many cases, in plain numbers."""
-        qpe, pslr, islr = (Split._make(_plain(share, case) for share in split) for split in self[1:4])
+        qpe, pslr, islr = (Shares._make(_plain(share, case) for share in split) for split in self[1:4])
         total, n_pull, stated = (_plain(one, case) for one in (self.qpe_total, self.n_pull, self.n_pull_stated))
         return Allocation(total, qpe, pslr, islr, n_pull, stated)
 
-    def n_pull_needed(self, qpe: float, owner: str) -> float:
-        """Smallest N_pull that makes a QPE pass."""
-        return qpe / (self.qpe.of(owner) * math.pi)
+    def passes_with(self, qpe: float, owner: str, mission: Mission) -> Note:
+        """Say from which N_pull a QPE of an owner would pass, or that no autofocus corrects it."""
+        return needed_sentence(qpe / (self.qpe.of(owner) * math.pi), caps(mission))
 
 
 def _plain(number: Any, case: int) -> Any:
     return None if number is None else plain(number, case)
-
-
-def range_walk_cap(mission: Mission) -> float:
-    """Largest N_pull that counts, f₀/B; a number, or an array of many cases.
-
-    A phase of π·N at the aperture edge walks N·B/2f₀ range cells, of which correction along one dimension takes half
-    a cell (`budget.pull_in`).
-    """
-    return mission.radar.center_frequency / mission.radar.bandwidth
-
-
-def effective_n_pull(mission: Mission) -> float | None:
-    """N_pull that autofocus counts with: the file's, up to the cap of range walk; None: no autofocus is declared."""
-    stated, cap = mission.autofocus.n_pull, range_walk_cap(mission)
-    if stated is None:
-        return None
-    return stated * (stated <= cap) + cap * (stated > cap)  # the smaller one, of arrays too
 
 
 def is_balanced(mission: Mission) -> bool:
@@ -118,15 +82,15 @@ def allocate(mission: Mission, gates: Iterable[Together]) -> Allocation:
     )
     return Allocation(
         qpe_total=mission.requirements.quadratic_phase_error,
-        qpe=_balanced(list(gates)) if qpe == "balanced" else _split(qpe),
-        pslr=_split(pslr),
-        islr=_split(islr),
+        qpe=_balanced(list(gates)) if qpe == "balanced" else _shares(qpe),
+        pslr=_shares(pslr),
+        islr=_shares(islr),
         n_pull=effective_n_pull(mission),
         n_pull_stated=mission.autofocus.n_pull,
     )
 
 
-def _balanced(gates: Sequence[Together]) -> Split:
+def _balanced(gates: Sequence[Together]) -> Shares:
     """Shares as the declared errors need them; by several models the larger phase of each error."""
     weights = []
     for owner in ("transmitter", "receiver"):
@@ -139,7 +103,7 @@ def _balanced(gates: Sequence[Together]) -> Split:
         share: Any = np.where(total == 0, 0.5, np.clip(weights[0] / total, *BALANCED_RANGE))
     if share.size == 1:
         share = float(share[0])
-    return Split(transmitter=share, receiver=1 - share)
+    return Shares(transmitter=share, receiver=1 - share)
 
 
 def _largest(phases: Sequence[Floats]) -> Floats:
@@ -151,5 +115,81 @@ def _largest(phases: Sequence[Floats]) -> Floats:
     return np.asarray(np.take_along_axis(of_all, largest[None], axis=0)[0])
 
 
-def _split(shares: object) -> Split:
-    return Split(*shares) if isinstance(shares, Shares) else EQUAL  # `balanced` weighs phase, not power
+def _shares(split: str | Shares) -> Shares:
+    return EQUAL if isinstance(split, str) else split  # `balanced` weighs phase, not power
+
+
+# ---------------------------------------------------------------------- autofocus
+ROOM = {"pga": 3.0, "map_drift": 1.5}  # patch over smear
+
+
+class Caps(NamedTuple):
+    """Largest N_pull by range walk, f₀/B, and by the scene's size; None where the file gives none.
+
+    No gain goes beyond that of range walk; beyond that of the scene a warning stands.
+
+    A phase of π·N at the aperture edge walks λN/2 in range, N·B/2f₀ cells, and smears a point over 4N cross-range
+    cells. Measured on images of points (`tests/simulate/test_pull_in_caps.py`): one-dimensional autofocus works up to
+    half a cell of walk and beyond, but half a cell costs 0.6 dB that no phase takes out, a whole one 1.3 dB. What
+    makes it give out is the patch, whatever walk and bandwidth: phase gradient needs three times the smear, map drift
+    one and a half; with less they leave the image smeared at a hundredth of a cell of walk as at a third of one.
+    """
+
+    walk: float
+    scene: float | None = None
+
+
+def caps(mission: Mission) -> Caps:
+    """Bounds on N_pull that no autofocus of a mission goes beyond."""
+    walk = range_walk_cap(mission)
+    if mission.scene.radius is None:
+        return Caps(walk)
+    cell = mission.geometry.cross_range_resolution(mission.radar.wavelength, mission.collection.aperture_time)
+    return Caps(walk, 2 * mission.scene.radius / (4 * cell * ROOM[mission.autofocus.algorithm]))
+
+
+def range_walk_cap(mission: Mission) -> float:
+    """Largest N_pull that counts, f₀/B; a number, or an array of many cases."""
+    return mission.radar.center_frequency / mission.radar.bandwidth
+
+
+def effective_n_pull(mission: Mission) -> float | None:
+    """N_pull that autofocus counts with: the file's, up to the cap of range walk; None: no autofocus is declared."""
+    stated, cap = mission.autofocus.n_pull, range_walk_cap(mission)
+    if stated is None:
+        return None
+    return stated * (stated <= cap) + cap * (stated > cap)  # the smaller one, of arrays too
+
+
+def needed_sentence(n_pull: float, caps: Caps) -> Note:
+    """Say from which N_pull an error would pass, or that none can correct it.
+
+    Parameters
+    ----------
+    n_pull : float
+        Smallest N_pull with which the error passes.
+    caps : Caps
+        What `caps` says of the mission.
+    """
+    if caps.scene is not None and caps.scene < min(n_pull, caps.walk):
+        allowed = f"the scene's size allows {rounded_down(caps.scene)}"
+    elif n_pull > caps.walk:
+        allowed = f"range walk allows {rounded_down(caps.walk)}"
+    else:
+        return phrases.passes_from(math.ceil(n_pull * 100 * (1 - 1e-12)) / 100)
+    return phrases.beyond_autofocus(_up(n_pull), allowed)
+
+
+def _up(number: float) -> str:
+    """Three digits, rounded up; whole from a hundred on, with a space between thousands."""
+    if number >= 100:
+        return f"{math.ceil(number * (1 - 1e-12)):,}".replace(",", " ")
+    step = 10.0 ** (math.floor(math.log10(number)) - 2)
+    return f"{math.ceil(number / step * (1 - 1e-12)) * step:.3g}"
+
+
+def rounded_down(number: float) -> str:
+    """Three digits, rounded down; whole from a hundred on, with a space between thousands."""
+    if number >= 100:
+        return f"{math.floor(number * (1 + 1e-12)):,}".replace(",", " ")
+    return format_quantity(number, "", 3, "down")

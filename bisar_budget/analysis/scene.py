@@ -21,11 +21,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bisar_budget import phrases
-from bisar_budget.analysis.allocation import Split
 from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG, MIN_GROUND_GRADIENT, UTILIZATION_TOLERANCE
 from bisar_budget.effects.combined import combined, combined_phase, correlated_errors
 from bisar_budget.effects.declared import DeclaredErrors
 from bisar_budget.geometry import BistaticGeometry, GroundVector
+from bisar_budget.mission.model import Shares
 from bisar_budget.phrases import NOTHING, Note
 from bisar_budget.ranges.exact_ranges import ExactRanges, Floats, Lanes, Places, SmallErrors, Truths
 from bisar_budget.ranges.point_paths import PointPaths
@@ -444,7 +444,7 @@ class SceneEdges:
         return np.asarray((self.over > 0).any(axis=0))
 
 
-def scene_edges(errors: DeclaredErrors, limits: Mapping[str, Floats], split: Split) -> SceneEdges | None:
+def scene_edges(errors: DeclaredErrors, limits: Mapping[str, Floats], split: Shares) -> SceneEdges | None:
     """Evaluate the errors of many cases at the edges of their scenes; None without a declared error.
 
     Parameters
@@ -453,7 +453,7 @@ def scene_edges(errors: DeclaredErrors, limits: Mapping[str, Floats], split: Spl
         Of missions with `scene.radius`.
     limits : mapping of str to (cases,)
         What each owner's phases are held to, autofocus gain included. [rad]
-    split : Split
+    split : Shares
         Whose errors count against whose limit.
     """
     phases = ScenePhases(errors)

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Iterable, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,10 +19,8 @@ from bisar_budget.effects.declared import DeclaredErrors
 from bisar_budget.effects.random_effect import RandomError
 from bisar_budget.effects.vibration import DeclaredPhase
 from bisar_budget.geometry import GroundVector
+from bisar_budget.mission.model import Shares
 from bisar_budget.ranges.exact_ranges import Floats
-
-if TYPE_CHECKING:
-    from bisar_budget.analysis.allocation import Split
 
 
 class Together:
@@ -83,7 +80,7 @@ class Together:
             found.append(DeclaredPhase(error.subject.id, error.subject.owner, does.qpe, cubic, coverage))
         return [*found, *self.own]
 
-    def owed(self, split: "Split", owner: str) -> list[DeclaredPhase]:
+    def owed(self, split: Shares, owner: str) -> list[DeclaredPhase]:
         """Those that count against the share of an owner; against the mission's all."""
         return [one for one in self.phases if split.includes(one.owner, owner)]
 
@@ -91,12 +88,12 @@ class Together:
         """Combine phases by the mission's rule, or another. [rad]"""
         return self.errors.array(combined_phase(phases, rule or self.rule, self.groups))
 
-    def cubics_without_coverage(self, split: "Split", owner: str) -> Phases:
+    def cubics_without_coverage(self, split: Shares, owner: str) -> Phases:
         """Cubic phase of each error that counts against an owner's share, at the declared sigma, signed. [rad]"""
         members = self.owed(split, owner)
         return [(one.row_id, one.cubic_rad / one.coverage) for one in members if one.cubic_rad is not None]
 
-    def cubic_without_coverage(self, split: "Split", owner: str) -> Floats:
+    def cubic_without_coverage(self, split: Shares, owner: str) -> Floats:
         """The same added up: with `combine: sum`, else by root-sum-square, since powers add. [rad]"""
         return self.combined(self.cubics_without_coverage(split, owner), self.rule_of_all)
 

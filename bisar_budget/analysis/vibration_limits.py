@@ -23,11 +23,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget import evaluators
-from bisar_budget.analysis.allocation import Allocation, Split
+from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.spread import Tone, mainlobe_energy, spread_phase
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.vibration import cubic_part, near_groups, quadratic_part, worst_phases
-from bisar_budget.mission.model import Mission
+from bisar_budget.mission.model import Mission, Shares
 
 LARGEST_ECHO = 2.0  # rad; beyond, echoes are above the response
 
@@ -166,13 +166,13 @@ def tone_limits(mission: Mission, allocation: Allocation) -> tuple[str, dict[str
     return "islr", {name: VibrationLimits(root * one.published, root * one.full) for name, one in rms.items()}
 
 
-def amplitude_share(split: Split, name: str) -> Any:
+def amplitude_share(split: Shares, name: str) -> Any:
     """Part of a platform in the amplitude of both: they sum to 1, in the ratio of the roots of power."""
     own, other = split.of(name), split.of(next(one for one in PLATFORMS if one != name))
     return evaluators.amplitude_share(own, other)
 
 
-def power_share(split: Split, name: str) -> Any:
+def power_share(split: Shares, name: str) -> Any:
     """Part of a platform in the rms phase: their squares are the shares of power."""
     return np.sqrt(split.of(name))
 

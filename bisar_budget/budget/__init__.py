@@ -8,7 +8,6 @@ __all__ = [
     "judged_mission",
     "judged_requirements",
     "judged_rows",
-    "pull_in",
     "random_rows",
     "requirement_table",
     "verdicts",

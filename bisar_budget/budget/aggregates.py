@@ -14,9 +14,15 @@ from bisar_budget.analysis.analysis import Analysis, Case
 from bisar_budget.analysis.scene import Corrections, SceneEdge, SceneEdges
 from bisar_budget.analysis.spread import noise
 from bisar_budget.analysis.together import Together, cubics, quadratics
-from bisar_budget.budget.judged_requirements import TAKEN_BY, EffectTotal, first_highest
+from bisar_budget.budget.judged_requirements import (
+    MAKES_UP,
+    SMALL_RAD,
+    TAKEN_BY,
+    TENTH,
+    UntakenEffect,
+    first_highest,
+)
 from bisar_budget.budget.judged_rows import BOUND, CODE, Floats, Judged, Judging, number_of, worded
-from bisar_budget.budget.pull_in import caps, needed_sentence
 from bisar_budget.effects.combined import (
     Phases,
     combined,
@@ -217,7 +223,7 @@ class Aggregate:
             over = phrases.aggregate_over(said.what, size, limit, said.unit, *_largest(case, model, self))
         if what.kind == QUADRATIC:
             if over and size is not None and combine != "each":
-                over = over.then(needed_sentence(allocation.n_pull_needed(size, owner), caps(mission)))
+                over = over.then(allocation.passes_with(size, owner, mission))
         elif over and size is not None and what.kind != LOCATION:
             over = over.then(phrases.no_gain() if what.kind == CUBIC else phrases.one_total())
         doubt = over if what.kind == PULL_IN else NOTHING
@@ -248,18 +254,36 @@ def effect_parts(analysis: Analysis, model: str) -> dict[str, Phases]:
     }
 
 
-def effect_totals(analysis: Analysis) -> list[EffectTotal]:
-    """Add up each effect of all declared errors; by several models that gate the larger of each."""
-    found: dict[str, dict[str, Floats]] = {kind: {} for kind in TAKEN_BY}
-    totals: dict[str, Floats] = {}
-    for model in analysis.gates:
-        together = analysis.together(model)
-        for kind, of_kind in effect_parts(analysis, model).items():
-            total = together.combined(of_kind, together.rule_of_all)
-            totals[kind] = np.fmax(totals.get(kind, 0.0), total)
-            for row_id, size in of_kind:
-                found[kind][row_id] = np.fmax(found[kind].get(row_id, 0.0), np.abs(size))
-    return [EffectTotal(kind, totals[kind], list(of_kind.items())) for kind, of_kind in found.items()]
+def untaken_effects(analysis: Analysis) -> list[UntakenEffect]:
+    """Find the effects that no requirement takes, and the rows that make them up where they are not negligible.
+
+    By several models that gate the larger of each counts.
+    """
+    needs = analysis.mission.requirements
+    level = np.minimum(TENTH * np.asarray(needs.quadratic_phase_error), SMALL_RAD)
+    by_model = [(analysis.together(model), effect_parts(analysis, model)) for model in analysis.gates]
+    found = []
+    for kind, keys in TAKEN_BY.items():
+        if any(getattr(needs, key) is not None for key in keys):
+            continue
+        sum_of_all: Any = 0.0
+        parts: dict[str, Floats] = {}
+        for together, of_kinds in by_model:
+            sum_of_all = np.fmax(sum_of_all, together.combined(of_kinds[kind], together.rule_of_all))
+            for row_id, size in of_kinds[kind]:
+                parts[row_id] = np.fmax(parts.get(row_id, 0.0), np.abs(size))
+        if not parts:
+            continue
+        # One without an image fails by itself.
+        total = np.where(np.isfinite(sum_of_all), sum_of_all, 0.0)
+        parts = {row_id: np.where(np.isfinite(size), size, 0.0) for row_id, size in parts.items()}
+        largest = np.max(list(parts.values()), axis=0)
+        is_above = (total >= level) & (largest > 0)
+        count = np.sum([size > 0 for size in parts.values()], axis=0)
+        least = np.minimum(MAKES_UP * largest, level / np.maximum(count, 1))
+        makers = {row_id: is_above & (size >= least) & (size > 0) for row_id, size in parts.items()}
+        found.append(UntakenEffect(kind, total, (total > 0) & ~is_above, makers, least, parts))
+    return found
 
 
 # ---------------------------------------------------------------------- displacements that no row holds

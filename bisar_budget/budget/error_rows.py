@@ -10,7 +10,6 @@ import numpy as np
 from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Analysis, Case, Model
 from bisar_budget.budget.judged_rows import BOUND, CODE, REQUIREMENTS, Floats, Judged, Judging, number_of, worded
-from bisar_budget.budget.pull_in import caps, needed_sentence
 from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.effects.declared import CUBIC, END_OF_IMAGE, HELD, LOCATION, QUADRATIC, Declared
 from bisar_budget.effects.effect import ErrorSource
@@ -163,7 +162,7 @@ def _over(case: Case, model: Model, row: Judged, source: ErrorSource, mine: Decl
     over = phrases.quadratic_phase_over(qpe, limit, model.equation(source))
     if not math.isfinite(qpe):
         return over
-    return over.then(needed_sentence(case.allocation.n_pull_needed(qpe, source.owner), caps(case.mission)))
+    return over.then(case.allocation.passes_with(qpe, source.owner, case.mission))
 
 
 def _doubt(case: Case, other: Model, source: ErrorSource, limit: float) -> Note:

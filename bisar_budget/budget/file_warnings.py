@@ -7,9 +7,9 @@ of; the line of the key is looked up here, once.
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
+from bisar_budget.analysis.allocation import ROOM, caps, rounded_down
 from bisar_budget.analysis.analysis import Case
 from bisar_budget.budget.doubts import input_doubts
-from bisar_budget.budget.pull_in import ROOM, caps, rounded_down
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.navigation_errors import TILTS
 from bisar_budget.effects.oscillator_acceleration import felt

@@ -17,7 +17,7 @@ from bisar_budget.analysis.analysis import Analysis, Case
 from bisar_budget.analysis.scene import SceneEdges, scene_edges
 from bisar_budget.analysis.spread import noise
 from bisar_budget.budget.acceleration_rows import accelerated_rows
-from bisar_budget.budget.aggregates import Aggregates, JudgedScene, Misplacing, effect_totals, misplacing
+from bisar_budget.budget.aggregates import Aggregates, JudgedScene, Misplacing, misplacing, untaken_effects
 from bisar_budget.budget.doubts import declared_position_error, is_in_doubt, least_doubt
 from bisar_budget.budget.error_rows import ErrorRows
 from bisar_budget.budget.file_warnings import FASTEST_FLIGHT
@@ -31,7 +31,6 @@ from bisar_budget.budget.judged_requirements import (
     missing_declarations,
     requirement_states,
     status_of,
-    untaken_effects,
 )
 from bisar_budget.budget.judged_rows import CODE, REQUIREMENTS, Judged, Judging, Why
 from bisar_budget.budget.random_rows import RandomRows
@@ -135,7 +134,7 @@ class _Judgement:
         of_all = RowStatuses(rows, mission)
         of_all.require_declarations(analysis.geometry)
         of_all.doubt_inputs(self._in_doubt)
-        untaken = untaken_effects(mission, effect_totals(analysis))
+        untaken = untaken_effects(analysis)
         (place,) = (row.declared for row in rows if row.subject.id == f"mission.{LOCATION}")
         displacing = misplacing(analysis.together("full"), place)
         is_misplaced = np.any([displacing.where(self.cases), *self._in_doubt.values()], axis=0)

@@ -42,24 +42,15 @@ _BREAKS = [RANK[name] for name in ("fail", "not_evaluated")]
 _IS_JUDGED = np.array([one.is_judged for one in STATUS.values()])
 
 
-class EffectTotal(NamedTuple):
-    """One kind of effect of all declared errors: its total, and each error's part by row id. [rad]"""
+class UntakenEffect(NamedTuple):
+    """An effect that no requirement takes: where it is negligible, and the rows that make it up where it is not.
+
+    Its total, each error's part by row id, and in `least` the smallest part of a row that makes it up. [rad]
+    """
 
     kind: str  # cubic, spread or tone
     total: Floats
-    parts: Sequence[tuple[str, Floats]]
-
-
-class UntakenEffect(NamedTuple):
-    """An effect that no requirement takes: where it is negligible, and where not, with the rows that make it up.
-
-    `least` is the smallest part of a row that makes it up. [rad]
-    """
-
-    kind: str
-    total: Floats
     is_negligible: Truths
-    is_above: Truths
     makers: Mapping[str, Truths]
     least: Floats
     parts: Mapping[str, Floats]
@@ -93,31 +84,6 @@ def required_keys(mission: Mission) -> tuple[str, ...]:
     """Keys of the requirements that a mission has, the default of the quadratic phase included."""
     needs = mission.requirements
     return tuple(key for key in KEYS if (needs.declare if key == "declare" else getattr(needs, key) is not None))
-
-
-def is_taken(mission: Mission, kind: str) -> bool:
-    """Whether a requirement of the mission takes an effect."""
-    return any(getattr(mission.requirements, key) is not None for key in TAKEN_BY[kind])
-
-
-def untaken_effects(mission: Mission, effects: Sequence[EffectTotal]) -> list[UntakenEffect]:
-    """Find the effects that no requirement takes, and the rows that make them up where they are not negligible."""
-    level = np.minimum(TENTH * np.asarray(mission.requirements.quadratic_phase_error), SMALL_RAD)
-    found = []
-    for effect in effects:
-        if is_taken(mission, effect.kind):
-            continue
-        parts = {row_id: np.where(np.isfinite(size), np.abs(size), 0.0) for row_id, size in effect.parts}
-        total = np.where(np.isfinite(effect.total), effect.total, 0.0)  # one without an image fails by itself
-        if not parts:
-            continue
-        largest = np.max(list(parts.values()), axis=0)
-        is_above = (total >= level) & (largest > 0)
-        count = np.sum([size > 0 for size in parts.values()], axis=0)
-        least = np.minimum(MAKES_UP * largest, level / np.maximum(count, 1))
-        makers = {row_id: is_above & (size >= least) & (size > 0) for row_id, size in parts.items()}
-        found.append(UntakenEffect(effect.kind, total, (total > 0) & ~is_above, is_above, makers, least, parts))
-    return found
 
 
 def status_of(status: Codes, row_id: str, is_limited: Any, untaken: Sequence[UntakenEffect]) -> Codes:

@@ -28,7 +28,6 @@ from bisar_budget.analysis.spread import (
 from bisar_budget.budget.acceleration_rows import evidence, notes_of_acceleration
 from bisar_budget.budget.judged_requirements import SMALL_RAD
 from bisar_budget.budget.judged_rows import BOUND, CODE, REQUIREMENTS, Floats, Judged, Judging, worded
-from bisar_budget.budget.pull_in import caps, needed_sentence
 from bisar_budget.effects.air_delays import CONTENT, dispersion
 from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.effect import PLATFORMS, override_notes, subject
@@ -479,8 +478,8 @@ def _over(mission: Mission, error: RandomError, model: str, binding: str | None,
         level = _levels(mission, model)
         return phrases.spreads_too_much(level(effect.spread * size), level(limits.spread))
     qpe = effect.quadratic * size
-    needed = needed_sentence(allocation.n_pull_needed(qpe, error.owner), caps(mission))
-    return phrases.quadratic_phase_over(qpe, limits.quadratic).then(needed)
+    over = phrases.quadratic_phase_over(qpe, limits.quadratic)
+    return over.then(allocation.passes_with(qpe, error.owner, mission))
 
 
 def _doubt(mission: Mission, error: RandomError, gating: str, binding: str, limit: float) -> Note:

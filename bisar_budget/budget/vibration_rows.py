@@ -23,7 +23,6 @@ from bisar_budget.analysis.vibration_limits import (
     vibration_limits,
 )
 from bisar_budget.budget.judged_rows import BOUND, REQUIREMENTS, Floats, Judged, Judging, worded
-from bisar_budget.budget.pull_in import caps, needed_sentence
 from bisar_budget.effects.declared import CUBIC, QUADRATIC
 from bisar_budget.effects.effect import PLATFORMS, Subject, override_notes, subject
 from bisar_budget.effects.oscillators import spurs_of
@@ -493,7 +492,7 @@ def _slow_row(case: Case, one: VibrationRow, error: MotionError) -> Row:
         limit = float(allocation.qpe_limit(what.owner) * allocation.autofocus_gain)
         over = phrases.slow_quadratic_phase_over(qpe, limit)
         if qpe > limit:
-            over = over.then(needed_sentence(allocation.n_pull_needed(qpe, what.owner), caps(mission)))
+            over = over.then(allocation.passes_with(qpe, what.owner, mission))
     entry = what.entry or 0
     return worded(
         case,

@@ -44,8 +44,8 @@ from bisar_budget.report import FORMATS
 
 if TYPE_CHECKING:
     from bisar_budget.faults import SetValue
-    from bisar_budget.findings.mission import MissionFindings, Option, Report, UnusableMission
-    from bisar_budget.findings.requirement import Outside
+    from bisar_budget.findings.mission import MissionFindings, Report, UnusableMission
+    from bisar_budget.findings.requirement import Outside, Override
     from bisar_budget.report import Style
 
 
@@ -311,9 +311,9 @@ def check(
     sys.exit(0 if exit_zero and code == EXIT_BROKEN else code)
 
 
-def _options(judged_on: date | None, today: datetime | None) -> "Iterator[Option]":
+def _options(judged_on: date | None, today: datetime | None) -> "Iterator[Override]":
     """Say what the options that bear on the result are, and where each came from."""
-    from bisar_budget.findings.mission import Option
+    from bisar_budget.findings.requirement import Override
     from bisar_budget.front.checks import day_origin
 
     context = click.get_current_context()
@@ -339,7 +339,7 @@ def _options(judged_on: date | None, today: datetime | None) -> "Iterator[Option
         elif name in ("strict", "exit_zero", "verifying"):
             said = "yes" if value else "no"
         if said:
-            yield Option(parameter.opts[0], said, origin)
+            yield Override(parameter.opts[0], said, origin)
 
 
 def _check_draws(draws: int | None, scheduler: str | None) -> None:

@@ -42,16 +42,21 @@ _HEADER = re.compile(r"^([^\[\]\s]+(?:\[\d+\][^\[\]\s]*)*)\s*(?:\[([^\[\]]*)\])?
 
 
 @dataclass(frozen=True, eq=False)
-class Grid:
-    """Every combination of the values of each key, in SI, or of its words; the last key is the fastest."""
+class Cases:
+    """Cases, by the keys that vary: a column of values in SI, or of words, for each.
+
+    Of a grid every combination of the values of each key is a case, the last key the fastest; of any other table each
+    case has a value of its own of every key.
+    """
 
     varied: tuple[Varied, ...]
-    axes: tuple[Values, ...]
+    columns: tuple[Values, ...]
+    is_grid: bool = False
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Number of values of each key."""
-        return tuple(axis.size for axis in self.axes)
+        """Number of values of each key of a grid, or of cases."""
+        return tuple(column.size for column in (self.columns if self.is_grid else self.columns[:1]))
 
     @property
     def count(self) -> int:
@@ -60,33 +65,14 @@ class Grid:
 
     def values(self, start: int, stop: int) -> Mapping[str, Values]:
         """Values of some cases: (stop - start,) by the key."""
-        places = np.unravel_index(np.arange(start, stop), self.shape)
-        return {one.key: axis[place] for one, axis, place in zip(self.varied, self.axes, places, strict=True)}
-
-
-@dataclass(frozen=True, eq=False)
-class CaseTable:
-    """Cases of which each has a value of its own of every key: one column, in SI, or words, for each."""
-
-    varied: tuple[Varied, ...]
-    columns: tuple[Values, ...]
-    shape: None = None
-
-    @property
-    def count(self) -> int:
-        """Number of cases."""
-        return self.columns[0].size
-
-    def values(self, start: int, stop: int) -> Mapping[str, Values]:
-        """Values of some cases: (stop - start,) by the key."""
-        return {one.key: column[start:stop] for one, column in zip(self.varied, self.columns, strict=True)}
-
-
-Cases = Grid | CaseTable
+        places: Any = [slice(start, stop)] * len(self.columns)
+        if self.is_grid:
+            places = np.unravel_index(np.arange(start, stop), self.shape)
+        return {one.key: column[place] for one, column, place in zip(self.varied, self.columns, places, strict=True)}
 
 
 # ---------------------------------------------------------------- cases at hand as arrays
-def grid_of(tree: dict[str, Any], values: Mapping[str, ArrayLike]) -> Grid:
+def grid_of(tree: dict[str, Any], values: Mapping[str, ArrayLike]) -> Cases:
     """Every combination of values that are at hand as arrays; the last key is the fastest.
 
     Parameters
@@ -121,7 +107,7 @@ def grid_of(tree: dict[str, Any], values: Mapping[str, ArrayLike]) -> Grid:
         varied.append(choices)
     if not varied:
         raise QuestionError(f"no key: nothing would vary; {_FORMS}")
-    return Grid(tuple(varied), tuple(arrays))
+    return Cases(tuple(varied), tuple(arrays), is_grid=True)
 
 
 def _texts(option: str, choices: Choices, words: Sequence[str]) -> Values:
@@ -155,7 +141,7 @@ class _Asked(NamedTuple):
     is_log: bool = False
 
 
-def grid(tree: dict[str, Any], texts: Sequence[str], name: str = "--vary") -> Grid:
+def grid(tree: dict[str, Any], texts: Sequence[str], name: str = "--vary") -> Cases:
     """Read `KEY=FROM:TO UNIT:COUNT`, with `:log` behind it in equal ratios, or `KEY=VALUE,VALUE,...` of each option.
 
     Keys that have no number take `KEY=WORD,WORD,...`. Ends belong to the range. Values are those that have as few
@@ -176,7 +162,7 @@ def grid(tree: dict[str, Any], texts: Sequence[str], name: str = "--vary") -> Gr
         No such key, no number, no range, an empty or reversed one, values that the key cannot have, a key twice.
     """
     every = [(asked.varied, _axis(asked)) for asked in _all_asked(tree, texts, name)]
-    return Grid(tuple(varied for varied, _ in every), tuple(axis for _, axis in every))
+    return Cases(tuple(varied for varied, _ in every), tuple(axis for _, axis in every), is_grid=True)
 
 
 def _axis(asked: _Asked) -> Values:
@@ -193,7 +179,7 @@ def _axis(asked: _Asked) -> Values:
     return _spread(asked, np.arange(count) / (count - 1))
 
 
-def sample(tree: dict[str, Any], texts: Sequence[str], how: str) -> CaseTable:
+def sample(tree: dict[str, Any], texts: Sequence[str], how: str) -> Cases:
     """Draw a Latin hypercube over ranges: of as many equal parts as there are cases, each has one value of each key.
 
     Parameters
@@ -232,7 +218,7 @@ def sample(tree: dict[str, Any], texts: Sequence[str], how: str) -> CaseTable:
             columns.append(asked.listed[rng.permutation(count) * asked.listed.size // count])
         else:
             raise QuestionError(f"{asked.option}: --sample draws from a range; {_RANGE.format(key=asked.varied.key)}")
-    return CaseTable(tuple(asked.varied for asked in every), tuple(columns))
+    return Cases(tuple(asked.varied for asked in every), tuple(columns))
 
 
 def _all_asked(tree: dict[str, Any], texts: Sequence[str], name: str) -> Iterator[_Asked]:
@@ -324,19 +310,18 @@ def _spread(asked: _Asked, parts: Floats) -> Floats:
 
 
 # ---------------------------------------------------------------- values of cases
-def some_of(cases: Cases, count: int) -> CaseTable:
+def some_of(cases: Cases, count: int) -> Cases:
     """Some cases, spread over all of them in short stretches, that stand for the others."""
     length = max(1, count // _STRETCHES)
     starts = [int((place * _GOLDEN + 0.5) % 1 * (cases.count - length)) for place in range(-(-count // length))]
     found = [cases.values(start, start + length) for start in starts]
     columns = (np.concatenate([values[one.key] for values in found]) for one in cases.varied)
-    return CaseTable(cases.varied, tuple(columns))
+    return Cases(cases.varied, tuple(columns))
 
 
 def words_of(cases: Cases) -> Iterator[tuple[Choices, list[str]]]:
     """Keys that have words, and the words that occur."""
-    values = cases.axes if isinstance(cases, Grid) else cases.columns
-    for one, words in zip(cases.varied, values, strict=True):
+    for one, words in zip(cases.varied, cases.columns, strict=True):
         if isinstance(one, Choices):
             yield one, list(dict.fromkeys(words.tolist()))
 
@@ -359,7 +344,7 @@ def _rounded(values: Floats) -> Floats:
 
 
 # ---------------------------------------------------------------- cases of a file
-def table_file(tree: dict[str, Any], path: str) -> CaseTable:
+def table_file(tree: dict[str, Any], path: str) -> Cases:
     """Read the CSV of cases of a file, as `table` does; a `TableError` too where it is unreadable or too large."""
     try:
         with open(path, encoding="utf-8", newline="") as file:
@@ -372,7 +357,7 @@ def table_file(tree: dict[str, Any], path: str) -> CaseTable:
     return table(tree, text, path)
 
 
-def table(tree: dict[str, Any], text: str, file: str) -> CaseTable:
+def table(tree: dict[str, Any], text: str, file: str) -> Cases:
     """Read a CSV of cases: a header `KEY [unit]` for each column, then one case in each line.
 
     Lines that are empty or start with `#` are left out. A number alone needs no unit, and words have none. Whether a
@@ -425,7 +410,7 @@ def table(tree: dict[str, Any], text: str, file: str) -> CaseTable:
         else:
             factor, divisor = one.scale
             values.append(column * factor / divisor)
-    return CaseTable(varied, tuple(values))
+    return Cases(varied, tuple(values))
 
 
 def _cells(line: str) -> Iterator[tuple[int, str]]:

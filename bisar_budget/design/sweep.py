@@ -157,7 +157,6 @@ class Asked:
             mission_name=self.mission.name,
             mission_sha256=sha256(self.mission.data).hexdigest(),
             varied=tuple(column.name for column in varied),
-            shape=self.cases.shape,
             count=self.cases.count,
             columns=(*varied, *GEOMETRY, *VERDICT, *self.columns, REASON),
             parts=parts,

@@ -66,16 +66,11 @@ class Part(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Swept:
-    """A sweep: what its columns are, and its parts as they are found.
-
-    `shape` is that of the grid of cases, one axis for each key that varies, the last the fastest; None where the
-    cases are a table or a sample. `varied` names the columns that vary, in that order.
-    """
+    """A sweep: what its columns are, those that vary in their order, and its parts as they are found."""
 
     mission_name: str
     mission_sha256: str
     varied: tuple[str, ...]
-    shape: tuple[int, ...] | None
     count: int
     columns: tuple[Column, ...]
     parts: Iterator[Part]

@@ -135,23 +135,16 @@ class UnusableMission(NamedTuple):
     data: bytes | None = None
 
 
-class Option(NamedTuple):
-    """An option of the run that bears on what is found, and where its value came from."""
-
-    name: str
-    value: str
-    origin: str
-
-
 class Report(NamedTuple):
     """The findings about every mission file of a run.
 
-    `day` is the date that somebody gave it, or on which its waivers were judged; None where it decides nothing.
+    `options` are those of the run that bear on it. `day` is the date that somebody gave it, or on which its waivers
+    were judged; None where it decides nothing.
     """
 
     version: str
     missions: tuple[MissionFindings | UnusableMission, ...]
-    options: tuple[Option, ...] = ()
+    options: tuple[Override, ...] = ()
     day: date | None = None
 
     @property

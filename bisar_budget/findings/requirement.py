@@ -1,6 +1,5 @@
 """The table of requirements: what each asks for, what is reached, and which row decides."""
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 from bisar_budget.findings.row import AppliedWaiver
@@ -88,8 +87,3 @@ class Outside(NamedTuple):
 
 
 NOTHING_OUTSIDE = Outside()
-
-
-def unjudged(requirements: Sequence[JudgedRequirement]) -> list[JudgedRequirement]:
-    """Requirements that could not be judged."""
-    return [one for one in requirements if one.status == "not_evaluated"]

@@ -25,7 +25,7 @@ from bisar_budget.resources import cores
 
 if TYPE_CHECKING:
     from bisar_budget.cluster.scheduler import Workers
-    from bisar_budget.design.cases import Cases, Grid
+    from bisar_budget.design.cases import Cases
     from bisar_budget.front.results import CheckResult
     from bisar_budget.report.drawing.trades import Gathered
     from bisar_budget.sampling.draws import Drawing, DrawsPiece, Share, Tally
@@ -318,7 +318,7 @@ def _of(mission: Mission, ask: Callable[..., Any], *arguments: Any) -> Any:
         raise QuestionError(f"{mission.file}: {error}") from None
 
 
-def study_cases(mission: Mission, asked: Sequence[str] | Mapping[str, Any]) -> "Grid":
+def study_cases(mission: Mission, asked: Sequence[str] | Mapping[str, Any]) -> "Cases":
     """Cases of a study: each key has several values, and a page can show them all."""
     from bisar_budget.design.cases import grid
     from bisar_budget.front.missions import grid_of

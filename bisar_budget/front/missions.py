@@ -2,12 +2,12 @@
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from bisar_budget.design.cases import Cases, CaseTable, Grid, grid, table_file
+from bisar_budget.design.cases import Cases, grid, table_file
 from bisar_budget.design.cases import grid_of as grid_of_arrays
 from bisar_budget.design.cases import sample as sample_of
 from bisar_budget.mission.given import is_quantity, magnitude, text_of
@@ -110,14 +110,14 @@ def cases_of(mission: Mission, values: Mapping[str, Any] | str | os.PathLike[str
         return found
     if len(set(found.shape)) > 1:
         raise QuestionError(f"{', '.join(values)}: differ in length; accepted: one value of each for every case")
-    return CaseTable(found.varied, found.axes)
+    return replace(found, is_grid=False)
 
 
-def grid_of(mission: Mission, values: Mapping[str, Any]) -> Grid:
+def grid_of(mission: Mission, values: Mapping[str, Any]) -> Cases:
     """Every combination of values of keys, as `cases_of` takes them."""
     tree = tree_of(mission)
     each = [_axis(tree, key, given) for key, given in values.items()]
-    return Grid(tuple(one.varied[0] for one in each), tuple(one.axes[0] for one in each))
+    return Cases(tuple(one.varied[0] for one in each), tuple(one.columns[0] for one in each), is_grid=True)
 
 
 def cases_of_texts(mission: Mission, texts: Sequence[str], sample: str | None = None) -> Cases:
@@ -126,7 +126,7 @@ def cases_of_texts(mission: Mission, texts: Sequence[str], sample: str | None = 
     return grid(tree, texts) if sample is None else sample_of(tree, texts, sample)
 
 
-def _axis(tree: dict[str, Any], key: str, given: Any) -> Grid:
+def _axis(tree: dict[str, Any], key: str, given: Any) -> Cases:
     """The values of one key."""
     if isinstance(given, Spaced):
         return grid(tree, [given.of(key)], "sweep")

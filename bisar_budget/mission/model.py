@@ -304,6 +304,18 @@ class Shares(NamedTuple):
     clock: Annotated[float | None, Key(SHARE, "Omitted: the clock is held to the receiver's share.")] = None
     reserve: Annotated[float, Key(Quantity(units.RATIO, ge=0, lt=1))] = 0.0
 
+    def of(self, owner: str) -> float:
+        """Share of an owner; what belongs to nobody is held to the whole budget."""
+        if owner == "clock":
+            return self.receiver if self.clock is None else self.clock
+        if owner == "mission":
+            return 1.0
+        return self.transmitter if owner == "transmitter" else self.receiver
+
+    def includes(self, owner: str, of: str) -> bool:
+        """Whether an owner's errors count against the share of `of`; against the mission's all do."""
+        return of in ("mission", owner) or (owner == "clock" and of == "receiver" and self.clock is None)
+
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
         """Hold the sum to 1."""

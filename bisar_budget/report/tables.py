@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from bisar_budget.design.cases import Cases, Grid, Values, in_unit
+from bisar_budget.design.cases import Cases, Values, in_unit
 from bisar_budget.design.table import Column, Part, Swept
 from bisar_budget.faults import changes_words, printable
 from bisar_budget.findings.requirement import Override
@@ -184,7 +184,7 @@ def write_netcdf(described: Described, parts: Iterable[Part], path: str) -> None
         with Dataset(path, "w", format="NETCDF4") as file:
             file.Conventions = "CF-1.11"
             file.setncatts({_TITLES.get(name, name): value for name, value in described.facts.items()})
-            shape = described.cases.shape or (described.cases.count,)
+            shape = described.cases.shape
             columns = _dimensions(file, described)
             names = tuple(file.dimensions)
             variables = [_Variable(file, column, names) for column in columns]
@@ -212,11 +212,11 @@ def _hold_to_room(path: str) -> None:
 def _dimensions(file: Any, described: Described) -> list[Column]:
     """Make the dimensions; what is left are the columns that have a value for each case."""
     cases = described.cases
-    if not isinstance(cases, Grid):
+    if not cases.is_grid:
         file.createDimension("case", cases.count)
         return list(described.columns)
     by_name = {column.name: column for column in described.columns}
-    for one, axis in zip(cases.varied, cases.axes, strict=True):
+    for one, axis in zip(cases.varied, cases.columns, strict=True):
         column = by_name.pop(one.key)
         file.createDimension(one.key, axis.size)
         variable = file.createVariable(one.key, str if column.is_text else "f8", (one.key,))
@@ -357,15 +357,13 @@ def dataset(described: Described, whole: Mapping[str, Any]) -> "Dataset":
         column.name: {"long_name": column.words, **({} if column.is_text else {"units": column.unit or "1"})}
         for column in described.columns
     }
-    is_grid = isinstance(cases, Grid)
-    dimensions = tuple(varied) if is_grid else ("case",)
-    given = cases.axes if isinstance(cases, Grid) else cases.columns
+    dimensions = tuple(varied) if cases.is_grid else ("case",)
     coordinates = {
-        one.key: (one.key if is_grid else "case", described.said(one.key, values), attributes[one.key])
-        for one, values in zip(cases.varied, given, strict=True)
+        one.key: (one.key if cases.is_grid else "case", described.said(one.key, values), attributes[one.key])
+        for one, values in zip(cases.varied, cases.columns, strict=True)
     }
     variables = {
-        name: (dimensions, values.reshape(cases.shape or values.shape), attributes[name])
+        name: (dimensions, values.reshape(cases.shape), attributes[name])
         for name, values in whole.items()
         if name not in coordinates
     }

@@ -271,15 +271,6 @@ def _collected(coefficient: Expr) -> Expr:
     return Add(real(f"beta_{order}tilde"), expand(coefficient - range_error()[order]), evaluate=False)
 
 
-def at_constant_range(expression: Expr) -> Expr:
-    """Replace u by (r + vτ)/R, as (17) has it: u is r/R, u̇ is v/R and the rest vanishes."""
-    for platform in PLATFORMS:
-        held = (platform.position / platform.slant_range, platform.velocity / platform.slant_range)
-        for derivative, value in zip(platform.look, (*held, *[Matrix([0, 0, 0])] * (ORDER - 1)), strict=True):
-            expression = expression.subs(dict(zip(derivative, value, strict=True)))
-    return expand(expression)
-
-
 @cache
 def vibration() -> Table:
     """Vibration from first principles: what a phase of peak φ or rms σ does, and the motion that does it.

@@ -9,10 +9,10 @@ from functools import partial
 
 import numpy as np
 
+from bisar_budget.analysis.allocation import ROOM
 from bisar_budget.analysis.spread import stated_powers
 from bisar_budget.budget.aggregates import Aggregates
 from bisar_budget.budget.judged_rows import Judging
-from bisar_budget.budget.pull_in import ROOM
 from bisar_budget.budget.random_rows import RandomRows
 from bisar_budget.budget.verdicts import rows_worth_showing
 from bisar_budget.effects.declared import QUADRATIC

@@ -3,11 +3,10 @@
 import math
 from typing import Any
 
-from bisar_budget.analysis.allocation import range_walk_cap
+from bisar_budget.analysis.allocation import ROOM, range_walk_cap
 from bisar_budget.analysis.analysis import Case
 from bisar_budget.analysis.vibration_limits import slow_limits
 from bisar_budget.budget.doubts import COARSE_CELL_RAD, phase_across_a_cell
-from bisar_budget.budget.pull_in import ROOM
 from bisar_budget.effects.declared import CUBIC
 from bisar_budget.effects.effect import ErrorSource, Subject
 from bisar_budget.effects.vibration import Line, unit_of_line

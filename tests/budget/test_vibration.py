@@ -8,11 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bisar_budget.analysis import vibration_limits as vibration
-from bisar_budget.analysis.allocation import Split
 from bisar_budget.budget.check import check_mission
 from bisar_budget.effects.vibration import along_line_of_sight, cubic_part, quadratic_part
 from bisar_budget.geometry import PlatformState
 from bisar_budget.mission.load import parse_mission
+from bisar_budget.mission.model import Shares
 from bisar_budget.mission.platforms import MotionError
 from bisar_budget.units import format_limit
 from tests.conftest import TODAY, findings, mission_text, row
@@ -277,7 +277,7 @@ class TestVector:
 
 
 def test_amplitude_shares_of_both_platforms_sum_to_one() -> None:
-    split = Split(transmitter=0.6, receiver=0.2, clock=0.1, reserve=0.1)
+    split = Shares(transmitter=0.6, receiver=0.2, clock=0.1, reserve=0.1)
     assert sum(vibration.amplitude_share(split, p) for p in ("transmitter", "receiver")) == pytest.approx(1)
 
 

@@ -9,7 +9,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from bisar_budget import units
-from bisar_budget.design.cases import MAX_VALUES, CaseTable, TableError, grid, in_unit, sample, some_of, table
+from bisar_budget.design.cases import MAX_VALUES, Cases, TableError, grid, in_unit, sample, some_of, table
 from bisar_budget.mission.quantities import QuestionError
 from bisar_budget.mission.tree import read_tree
 from bisar_budget.units import parse_quantity
@@ -23,8 +23,8 @@ TIME, AZIMUTH = "collection.aperture_time", "platforms.receiver.azimuth"
 def axis(text: str) -> tuple[list[float], str]:
     """Values of one option in SI, and the unit that they are said in."""
     found = grid(TREE, [text])
-    assert found.count == found.axes[0].size
-    return found.axes[0].tolist(), found.varied[0].unit
+    assert found.count == found.columns[0].size
+    return found.columns[0].tolist(), found.varied[0].unit
 
 
 def test_ends_belong_to_a_range_and_one_without_unit_has_that_of_the_other() -> None:
@@ -76,15 +76,15 @@ def test_words() -> None:
     assert (found.shape, [one.unit for one in found.varied]) == ((2, 2), ["", "s"])
     assert found.values(1, 3)["allocation.model"].tolist() == ["full", "published"]
     lists = grid(TREE, ["platforms.receiver.motion_error.sensor=[stim300, mosaic-x5-rtk],stim300"])
-    assert lists.axes[0].tolist() == ["[stim300, mosaic-x5-rtk]", "stim300"]
-    assert grid(TREE, ["collection.pulses=256,512"]).axes[0].tolist() == ["256", "512"]
+    assert lists.columns[0].tolist() == ["[stim300, mosaic-x5-rtk]", "stim300"]
+    assert grid(TREE, ["collection.pulses=256,512"]).columns[0].tolist() == ["256", "512"]
 
 
 def test_a_rule_stands_in_for_shares() -> None:
     """The file has shares; what is asked decides the form that is read."""
     shares = {"allocation": {"split": {"transmitter": "0.5", "receiver": "0.5"}}}
-    assert grid(shares, ["allocation.split=equal,balanced"]).axes[0].tolist() == ["equal", "balanced"]
-    assert grid(shares, ["allocation.split.transmitter=0.4,0.5"]).axes[0].tolist() == [0.4, 0.5]
+    assert grid(shares, ["allocation.split=equal,balanced"]).columns[0].tolist() == ["equal", "balanced"]
+    assert grid(shares, ["allocation.split.transmitter=0.4,0.5"]).columns[0].tolist() == [0.4, 0.5]
     with pytest.raises(QuestionError, match="the file has 'equal' there, which has no 'transmitter'"):
         grid({"allocation": {"split": "equal"}}, ["allocation.split.transmitter=0.4,0.5"])
 
@@ -96,7 +96,7 @@ def test_a_list_of_parts_is_not_replaced_by_one() -> None:
     said = r"sensor\.0=hg1700,imx5 for its first, or lists, .*=\[hg1700, mosaic-x5-rtk\]"
     with pytest.raises(QuestionError, match=said):
         grid(tree, [f"{key}=hg1700,imx5"])
-    assert grid(tree, [f"{key}.0=hg1700,imx5"]).axes[0].tolist() == ["hg1700", "imx5"]
+    assert grid(tree, [f"{key}.0=hg1700,imx5"]).columns[0].tolist() == ["hg1700", "imx5"]
     with pytest.raises(QuestionError, match="the list has 2 entries"):
         grid(tree, [f"{key}.2=hg1700"])
 
@@ -164,7 +164,7 @@ def test_any_option_gives_values_or_says_why_not(text: str) -> None:
         assert str(error)
     else:
         assert found.count >= 1
-        assert ((found.axes[0] >= 1e-6) & (found.axes[0] <= 1e6)).all()
+        assert ((found.columns[0] >= 1e-6) & (found.columns[0] <= 1e6)).all()
 
 
 @given(st.integers(2, 500), st.booleans(), st.floats(1e-6, 1e6), st.floats(1e-6, 1e6))
@@ -183,10 +183,10 @@ def test_values_are_said_as_they_were_written(unit: str, value: float, digits: i
     assume(abs(parse_quantity(f"{text} {unit}", units.ANGLE)) <= 2 * math.pi)
     assume(not 0 < abs(float(text)) < 1e-300)  # such have fewer digits
     found = grid(TREE, [f"{AZIMUTH}={text} {unit}"])
-    assert in_unit(found.varied[0], found.axes[0])[0] == pytest.approx(float(text), rel=5e-16)
+    assert in_unit(found.varied[0], found.columns[0])[0] == pytest.approx(float(text), rel=5e-16)
     if abs(float(text)) > 1e-9:
-        said = in_unit(found.varied[0], found.axes[0])[0]
-        assert parse_quantity(f"{said.item()!r} {unit}", units.ANGLE) == found.axes[0][0]
+        said = in_unit(found.varied[0], found.columns[0])[0]
+        assert parse_quantity(f"{said.item()!r} {unit}", units.ANGLE) == found.columns[0][0]
 
 
 @given(st.integers(1, 300), st.integers(1, 20), st.data())
@@ -195,8 +195,8 @@ def test_some_cases_are_cases_of_all_parts(first: int, second: int, data: st.Dat
     count = data.draw(st.integers(1, cases.count))
     found = some_of(cases, count)
     assert count <= found.count <= count + count // 100
-    assert set(found.columns[0]) <= set(cases.axes[0])
-    assert set(found.columns[1]) <= set(cases.axes[1])
+    assert set(found.columns[0]) <= set(cases.columns[0])
+    assert set(found.columns[1]) <= set(cases.columns[1])
     if count >= 100:
         assert np.ptp(found.columns[0]) >= 0.9 * (first - 1) - 1
 
@@ -208,7 +208,7 @@ class TestTables:
         text = f"\ufeff# of a campaign\r\n\r\n{TIME} [ms], platforms.receiver.azimuth [°],radar.bandwidth[MHz]\r\n"
         text += '1000,-45,150\r\n  # a remark\r\n 2.5e3 , 90, "300"\r\n'
         found = table(TREE, text, "c.csv")
-        assert (found.count, found.shape) == (2, None)
+        assert (found.count, found.is_grid) == (2, False)
         values = found.values(0, 2)
         assert values[TIME].tolist() == [1, 2.5]
         assert values[AZIMUTH].tolist() == [parse_quantity(f"{angle} deg", units.ANGLE) for angle in (-45, 90)]
@@ -282,12 +282,12 @@ class TestSamples:
     """Latin hypercubes."""
 
     @staticmethod
-    def drawn(how: str = "latin:50:1", log: str = "") -> CaseTable:
+    def drawn(how: str = "latin:50:1", log: str = "") -> Cases:
         return sample(TREE, [f"{TIME}=1:10s{log}", f"{AZIMUTH}=0:180deg:7"], how)
 
     def test_each_part_of_each_range_has_one_case(self) -> None:
         found = self.drawn()
-        assert (found.count, found.shape) == (50, None)
+        assert (found.count, found.is_grid) == (50, False)
         for column, low, high in zip(found.columns, (1, 0), (10, math.pi), strict=True):
             assert sorted(np.floor((column - low) / (high - low) * 50)) == list(range(50))
         assert abs(np.corrcoef(*found.columns)[0, 1]) < 0.5  # not the same order: 3.5 sigma of 50 cases

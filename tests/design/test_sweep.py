@@ -11,7 +11,7 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.design.cases import CaseTable, Grid, sample
+from bisar_budget.design.cases import Cases, sample
 from bisar_budget.design.cases import grid as cases_of
 from bisar_budget.design.sweep import Asked
 from bisar_budget.design.table import breaking
@@ -33,12 +33,12 @@ DAY = date(2026, 1, 1)
 NEAR = 1e-9
 
 
-def grid(mission, **axes) -> Grid:
+def grid(mission, **axes) -> Cases:
     """Cases of a mission; dots of keys are written as two underscores."""
     tree = read_tree(mission.data, mission.file)
     apply_changes(tree, mission.changes)
     numbers = tuple(number_of(tree.root, key.replace("__", ".")) for key in axes)
-    return Grid(numbers, tuple(np.asarray(values, dtype=float) for values in axes.values()))
+    return Cases(numbers, tuple(np.asarray(values, dtype=float) for values in axes.values()), is_grid=True)
 
 
 def swept(mission, cases, columns=(), model=None, jobs=1):
@@ -751,7 +751,7 @@ class TestWords:
         for model in ("published", "full"):
             some = whole["allocation.model"] == model
             number = tuple(one for one in cases.varied if one.unit)
-            alone = swept(mission, CaseTable(number, (cases.columns[0][some],)), model=model)
+            alone = swept(mission, Cases(number, (cases.columns[0][some],)), model=model)
             assert alone["utilization"].tolist() == whole["utilization"][some].tolist()
 
     def test_processes_find_the_same(self, monkeypatch) -> None:

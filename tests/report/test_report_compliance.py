@@ -17,7 +17,8 @@ from markdown_it import MarkdownIt
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.faults import Fault, printable
 from bisar_budget.findings.images import ImageEvidence, PointImage, Verdict
-from bisar_budget.findings.mission import MissionFindings, Option, Report, UnusableMission
+from bisar_budget.findings.mission import MissionFindings, Report, UnusableMission
+from bisar_budget.findings.requirement import Override
 from bisar_budget.findings.row import worst_first
 from bisar_budget.mission.load import load_mission
 from bisar_budget.report import Style, pictures, render
@@ -373,7 +374,7 @@ class TestBothLanguages:
         assert len(ids) == len(set(ids))
 
     def test_options_stand_with_their_origin(self, language: str) -> None:
-        options = (Option("--model", "full", "environment, BISAR_BUDGET_MODEL"),)
+        options = (Override("--model", "full", "environment, BISAR_BUDGET_MODEL"),)
         rows = table_with(page_of(language, options=options), "option", "value", "from")
         assert rows == [["--model", "full", "environment, BISAR_BUDGET_MODEL"]]
 

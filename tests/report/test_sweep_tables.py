@@ -56,7 +56,7 @@ def swept(cases: Cases, size: int) -> Swept:
             yield Part(start, stop, {name: values[start:stop] for name, values in found.items()})
 
     keys = tuple(number.key for number in cases.varied)
-    return Swept("A =name", "ab" * 32, keys, cases.shape, 24, columns, parts())
+    return Swept("A =name", "ab" * 32, keys, 24, columns, parts())
 
 
 def written(suffix: str, cases: Cases, tmp_path: Path, size: int = 7) -> Path:

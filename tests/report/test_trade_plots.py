@@ -59,7 +59,7 @@ def trade(*texts: str, column: str | None = None, is_polar: bool = False) -> Tra
         Column("worst_row", "", "row", True),
     )
     keys = tuple(number.key for number in cases.varied)
-    swept = Swept("m", "0" * 64, keys, cases.shape, cases.count, columns, iter(()))
+    swept = Swept("m", "0" * 64, keys, cases.count, columns, iter(()))
     gathered = Gathered(Described(swept, cases, MISSION, "1"), column=column)
     middle = cases.count // 2
     for start, stop in ((0, middle), (middle, cases.count)):

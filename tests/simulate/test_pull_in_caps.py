@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from bisar_budget.budget.pull_in import ROOM, Caps, caps, needed_sentence
+from bisar_budget.analysis.allocation import ROOM, Caps, caps, needed_sentence
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.report.explain.explanation import explain
 from bisar_budget.simulator.autofocus import ALGORITHMS

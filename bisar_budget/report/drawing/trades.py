@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bisar_budget.design.cases import Cases, Grid, Values
+from bisar_budget.design.cases import Cases, Values
 from bisar_budget.design.table import Part
 from bisar_budget.findings.trade import Axis, Trade
 from bisar_budget.mission.quantities import Number, QuestionError, Varied
@@ -33,7 +33,7 @@ def check_plot(cases: Cases, *, is_polar: bool) -> None:
         No grid, more than two keys that vary, or none, too many cases, or no azimuth where a polar map is asked for.
     """
     accepted = "accepted: --vary of one key, or of two"
-    if not isinstance(cases, Grid):
+    if not cases.is_grid:
         raise QuestionError(f"--plot draws a grid; {accepted}. The cases of a table or a sample have no axes")
     varying = varying_keys(cases)
     if not 1 <= len(varying) <= 2:
@@ -47,11 +47,11 @@ def check_plot(cases: Cases, *, is_polar: bool) -> None:
     other = next(one for one in varying if one is not _azimuth(varying))
     if not isinstance(other, Number):
         raise QuestionError(f"--polar draws {other.key} as a radius; accepted: a number")
-    if cases.axes[cases.varied.index(other)].min() < 0:
+    if cases.columns[cases.varied.index(other)].min() < 0:
         raise QuestionError(f"--polar draws {other.key} as a radius; accepted: values from 0")
 
 
-def varying_keys(cases: Grid) -> list[Varied]:
+def varying_keys(cases: Cases) -> list[Varied]:
     """Keys that have more than one value."""
     return [one for one, size in zip(cases.varied, cases.shape, strict=True) if size > 1]
 
@@ -64,7 +64,6 @@ class Gathered:
     """Collects the columns that a plot needs, as the parts of a sweep come."""
 
     def __init__(self, described: Described, names: Sequence[str] = (), column: str | None = None) -> None:
-        assert isinstance(described.cases, Grid)  # seen by `check_plot`
         self.described, self.cases = described, described.cases
         columns = {one.name: one for one in described.columns}
         if column is not None and (column not in columns or columns[column].is_text):
@@ -89,7 +88,7 @@ class Gathered:
         """Lay it out; the azimuth first in a polar map."""
         axes: list[Axis] = []
         varying, fixed, orders = [], [], []
-        for place, (one, values) in enumerate(zip(self.cases.varied, self.cases.axes, strict=True)):
+        for place, (one, values) in enumerate(zip(self.cases.varied, self.cases.columns, strict=True)):
             axis = self._axis(one, values)
             orders.append(np.arange(values.size) if axis.words else np.argsort(axis.values))
             if values.size == 1:

@@ -11,7 +11,7 @@ from bisar_budget.analysis.scene import at, differences_at
 from bisar_budget.analysis.spread import mainlobe_energy
 from bisar_budget.analysis.together import Together, cubics, quadratics
 from bisar_budget.analysis.vibration_limits import amplitude_share, echo_phase, slow_limits
-from bisar_budget.budget.aggregates import effect_parts, effect_totals
+from bisar_budget.budget.aggregates import effect_parts, untaken_effects
 from bisar_budget.budget.doubts import declared_position_error, input_doubts, is_in_doubt
 from bisar_budget.budget.judged_requirements import (
     MAKES_UP,
@@ -19,7 +19,6 @@ from bisar_budget.budget.judged_requirements import (
     TENTH,
     UntakenEffect,
     missing_declarations,
-    untaken_effects,
 )
 from bisar_budget.effects.combined import phase_parts
 from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
@@ -521,7 +520,7 @@ def not_judged(found: MissionFindings, row: Row) -> Iterator[Step]:
     elif code in ("place-is-not-known", "clocks-are-not-set"):
         yield from _displacing(analysis, row, reason)
     else:
-        for one in untaken_effects(mission, effect_totals(analysis)):
+        for one in untaken_effects(analysis):
             if row.id in one.makers and one.makers[row.id][0]:
                 yield from _untaken(analysis, row, one)
 

@@ -5,7 +5,6 @@ from collections.abc import Callable, Sequence
 from functools import cache
 from typing import Any
 
-from bisar_budget.analysis.allocation import Split
 from bisar_budget.faults import Fault
 from bisar_budget.findings.images import Verdict
 from bisar_budget.findings.mission import FileWarning, MissionFindings, UnusableMission
@@ -15,6 +14,7 @@ from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import worst
 from bisar_budget.findings.trade import TradeStudy
 from bisar_budget.geometry import PlatformState
+from bisar_budget.mission.model import Shares
 from bisar_budget.report import Piece, Style
 
 FORMAT = "bisar-budget/check/1"
@@ -223,5 +223,5 @@ def _platform(mission: MissionFindings, name: str) -> dict[str, Any]:
     return found
 
 
-def _shares(split: Split) -> dict[str, float]:
+def _shares(split: Shares) -> dict[str, float]:
     return {"transmitter": split.transmitter, "receiver": split.receiver}
