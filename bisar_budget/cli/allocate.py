@@ -11,14 +11,16 @@ from typing import TYPE_CHECKING
 import click
 
 from bisar_budget import __version__
-from bisar_budget.cli.options import DATE, FILE, MISSIONS, MODEL, OUTPUT, SET, ask_each, root_of_names
+from bisar_budget.cli.options import DATE, FILE, MISSIONS, MODEL, OUTPUT, SET, ask_each, format_option
 from bisar_budget.cli.streams import (
     EXIT_BROKEN,
+    MISSION_SUFFIXES,
     complain,
     deliver,
     expand,
     fail,
     load_all,
+    root_of_names,
     spare,
     wants_color,
     write_file,
@@ -27,9 +29,6 @@ from bisar_budget.cli.streams import (
 if TYPE_CHECKING:
     from bisar_budget.faults import SetValue
     from bisar_budget.report.formats.specification_sheet import Answer
-
-_FORMATS = ("text", "json", "csv", "markdown", "html", "needs", "sdoc")
-_MISSION = (".yaml", ".yml")
 
 
 @click.command()
@@ -54,13 +53,9 @@ _MISSION = (".yaml", ".yml")
 @MODEL
 @SET
 @DATE
-@click.option(
-    "--format",
-    "format_name",
-    type=click.Choice(_FORMATS),
-    default="text",
-    show_default=True,
-    help="Format of the sheet; needs and sdoc are requirements for Sphinx-Needs and StrictDoc.",
+@format_option(
+    ("text", "json", "csv", "markdown", "html", "needs", "sdoc"),
+    "Format of the sheet; needs and sdoc are requirements for Sphinx-Needs and StrictDoc.",
 )
 @OUTPUT
 def allocate(
@@ -85,7 +80,7 @@ def allocate(
     if reserve is not None and math.isnan(reserve):
         raise click.UsageError("--reserve: nan is no part of a limit; accepted: 0 to 100, in percent.")
     files = expand(missions)
-    is_mission = output is not None and output.lower().endswith(_MISSION)
+    is_mission = output is not None and output.lower().endswith(MISSION_SUFFIXES)
     if is_mission and len(files) > 1:
         raise click.UsageError("-o FILE.yaml writes one mission.")
     if other is not None and len(files) > 1:

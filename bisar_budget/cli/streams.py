@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from bisar_budget.faults import Fault, SetValue
     from bisar_budget.mission.model import Mission
 
+MISSION_SUFFIXES = (".yaml", ".yml")
+PICTURE_SUFFIXES = (".svg", ".png", ".pdf")
 _TEMPORARY = (".bisar-budget.", ".tmp")  # how the name of a temporary folder begins and ends
 EXIT_BROKEN, EXIT_USAGE, EXIT_OUR_FAULT, EXIT_INTERRUPTED = 1, 2, 3, 130
 
@@ -71,10 +73,12 @@ def say_faults(file: str, faults: "tuple[Fault, ...]") -> None:
         complain(line)
 
 
-def hold_to_suffixes(name: str | None, suffixes: Sequence[str]) -> None:
-    """Refuse the name of a file whose suffix names no format."""
-    if name is not None and os.path.splitext(name)[1].lower() not in suffixes:
+def suffix_of(name: str | None, suffixes: Sequence[str]) -> str:
+    """Suffix of the name of a file, one of some, or the command ends; empty where there is no name."""
+    suffix = os.path.splitext(name or "")[1].lower()
+    if name is not None and suffix not in suffixes:
         raise click.UsageError(f"{name}: the suffix must be one of {', '.join(suffixes)}")
+    return suffix
 
 
 def spare(files: Sequence[str], targets: Iterable[str | None], folders: Iterable[str] = ()) -> None:
@@ -118,6 +122,16 @@ def _is_same(one: str | int, other: str) -> bool:
         return os.path.isfile(one) and os.path.samestat(os.stat(one), os.stat(other))
     except (OSError, ValueError):  # either is missing
         return False
+
+
+def root_of_names() -> tuple[str, bool]:
+    """Folder that reports name files of no repository from, and whether it is GitHub's checkout."""
+    try:
+        here = os.getcwd()
+    except OSError:  # somebody removed it under us
+        return "", False
+    checkout = os.environ.get("GITHUB_WORKSPACE")
+    return os.path.realpath(checkout or here), bool(checkout)
 
 
 def is_terminal() -> bool:
