@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bisar_budget import __version__
 from bisar_budget.cli.options import (
     DATE,
     FILE,
@@ -119,7 +118,7 @@ def diff(
         comparison = _with_files(files, changes, output, today)
     gate = None if tolerated is None else Gate(tolerated, allowed)
     if format_name == "json":
-        text = difference.as_json(__version__, comparison, gate)
+        text = difference.as_json(comparison, gate)
     else:
         write = difference.as_text if format_name == "text" else difference.as_markdown
         text = write(comparison, gate, all_rows)

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bisar_budget import __version__
 from bisar_budget.cli.options import (
     DATE,
     FILE,
@@ -30,18 +29,18 @@ from bisar_budget.cli.streams import (
     PICTURE_SUFFIXES,
     complain,
     deliver,
+    deliver_found,
     fail,
     read_all,
     say_faults,
     spare,
     suffix_of,
-    wants_color,
     write_file,
 )
 from bisar_budget.constants import MAX_DAYS
 
 if TYPE_CHECKING:
-    from bisar_budget.design.passes import Passes, SatellitePass
+    from bisar_budget.design.passes import SatellitePass
     from bisar_budget.faults import SetValue
     from bisar_budget.front.results import PassesResult
 
@@ -132,6 +131,7 @@ def passes(
     from bisar_budget.front import questions
     from bisar_budget.mission.load import load_mission
     from bisar_budget.mission.quantities import QuestionError
+    from bisar_budget.report.formats import pass_list
 
     judged_on, from_outside = day_and_outside(today)
     with wrong_usage():
@@ -160,19 +160,11 @@ def passes(
         output = None
     if plot is not None:
         write_file(plot, found.plot().of(kind))
-    deliver(_written(found.found, format_name, output, judged_on), output, format_name)
-    sys.exit(0 if found.complying else EXIT_BROKEN)
-
-
-def _written(found: "Passes", format_name: str, output: str | None, stamp: date) -> str:
-    from bisar_budget.report import Style
-    from bisar_budget.report.formats import pass_list
-
     if format_name == "ics":
-        return pass_list.as_ics(__version__, found, stamp)
-    if format_name == "text":
-        return pass_list.as_text(found, Style(color=output is None and wants_color()))
-    return pass_list.as_json(__version__, found) if format_name == "json" else pass_list.as_csv(found)
+        deliver(pass_list.as_ics(found.found, judged_on), output, format_name)
+    else:
+        deliver_found(pass_list, found.found, format_name, output)
+    sys.exit(0 if found.complying else EXIT_BROKEN)
 
 
 # ---------------------------------------------------------------- a mission file for each pass

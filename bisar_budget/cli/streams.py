@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
-from bisar_budget import __version__
 from bisar_budget.faults import MissionError, printable
 from bisar_budget.resources import FILES_READ, locked
 
@@ -232,15 +231,13 @@ def deliver(text: str, output: str | None = None, format_name: str = "text") -> 
         write_file(output, harmless(text, format_name).replace("\n", _LINE_ENDS.get(format_name, "\n")))
 
 
-def deliver_found(form: "ModuleType", found: Sequence[Any], format_name: str, output: str | None) -> None:
-    """Write what was found as JSON, or as text for a person; `form` is the module that makes both of it."""
-    if format_name == "json":
-        text = form.as_json(__version__, found)
-    else:
-        from bisar_budget.report import Style
+def deliver_found(form: "ModuleType", found: Any, format_name: str, output: str | None) -> None:
+    """Write what was found in a format; `form` is the module that has a function for each."""
+    from bisar_budget.report import Style
 
-        text = form.as_text(found, Style(color=output is None and wants_color()))
-    deliver(text, output, format_name)
+    root, is_checkout = root_of_names()
+    style = Style(color=output is None and wants_color(), root=root, is_checkout=is_checkout)
+    deliver(getattr(form, f"as_{format_name}")(found, style), output, format_name)
 
 
 def write_file(path: str, content: str | bytes) -> None:

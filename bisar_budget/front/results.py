@@ -269,7 +269,7 @@ class _Answer:
     def _document(self) -> str:
         from bisar_budget.report.formats.answers import as_json
 
-        return as_json(__version__, [self.found])
+        return as_json([self.found], Style())
 
     def to_dict(self) -> dict[str, Any]:
         """The document of `--format json` of the command."""
@@ -350,9 +350,9 @@ class AllocateResult(_Answer):
         return f"<allocate of {self.found.name!r}: {len(self.found.specifications)} specifications, {said}>"
 
     def _document(self) -> str:
-        from bisar_budget.report.formats import specification_sheet as sheets
+        from bisar_budget.report.formats.specification_sheet import as_json
 
-        return sheets.as_json(__version__, [sheets.Answer(self.found, self.offer)])
+        return as_json([(self.found, self.offer)], Style())
 
     def to_dataframe(self, library: str | None = None) -> Any:
         """The specifications as a data frame; numbers in SI, lists of three where axes differ."""
@@ -381,7 +381,7 @@ class VerifyResult(_Answer):
     def _document(self) -> str:
         from bisar_budget.report.formats.verification import as_json
 
-        return as_json(__version__, [self.found])
+        return as_json([self.found], Style())
 
     def to_dataframe(self, library: str | None = None) -> Any:
         """The verdicts as a data frame."""
@@ -433,7 +433,7 @@ class PassesResult(_Answer):
     def _document(self) -> str:
         from bisar_budget.report.formats.pass_list import as_json
 
-        return as_json(__version__, self.found)
+        return as_json(self.found, Style())
 
     def to_dataframe(self, library: str | None = None) -> Any:
         """The passes as a data frame; angles in radians, lengths in metres, times as texts of UTC."""

@@ -1,6 +1,5 @@
 """Effects of a change on missions, as text, Markdown or JSON `bisar-budget/diff/1`."""
 
-import json
 from collections.abc import Iterable, Iterator
 from typing import Any, NamedTuple
 
@@ -16,11 +15,10 @@ from bisar_budget.report.change.comparison import (
     Moved,
     Refusal,
 )
+from bisar_budget.report.formats.json_document import document_text, outside_item
 from bisar_budget.report.words.requirements import overrides_lines, overrides_words
 from bisar_budget.report.words.sentences import counted, markdown_text, percent, row_size, table, wrapped
 from bisar_budget.units import format_quantity
-
-FORMAT = "bisar-budget/diff/1"
 
 
 def as_text(comparison: ChangeSet, gate: Gate | None, all_rows: bool = False) -> str:
@@ -213,11 +211,9 @@ def _values(change: Change, field: str, mission: MissionChange) -> str:
     return texts[0] if texts[0] == texts[1] else " → ".join(texts)
 
 
-def as_json(version: str, comparison: ChangeSet, gate: Gate | None) -> str:
+def as_json(comparison: ChangeSet, gate: Gate | None) -> str:
     """Write the contract; keys may be added, never changed or removed."""
-    document = {
-        "format": FORMAT,
-        "version": version,
+    content = {
         "tolerated_erosion": None if gate is None else gate.tolerated,
         "allow": [] if gate is None else list(gate.allowed),
         "allow_unused": [] if gate is None else comparison.unused(gate),
@@ -228,7 +224,7 @@ def as_json(version: str, comparison: ChangeSet, gate: Gate | None) -> str:
         "refused": [_refusal(one) for one in _refusals(comparison, gate)],
         "missions": [_mission(mission, gate) for mission in comparison.missions],
     }
-    return json.dumps(document, indent=2, allow_nan=False) + "\n"
+    return document_text("bisar-budget/diff/1", content)
 
 
 def _mission(mission: MissionChange, gate: Gate | None) -> dict[str, Any]:
@@ -239,8 +235,7 @@ def _mission(mission: MissionChange, gate: Gate | None) -> dict[str, Any]:
             name: {
                 "file": found.file,
                 "status": found.status,
-                "set": [change._asdict() for change in found.changes],
-                "overrides": [one._asdict() for one in found.overrides],
+                **outside_item(found),
             }
             for name, found in (("before", mission.before), ("after", mission.after))
         },
