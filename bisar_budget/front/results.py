@@ -24,7 +24,7 @@ from bisar_budget.findings.status import exit_code
 from bisar_budget.mission.model import Mission
 from bisar_budget.report import FORMATS, Style, format_of, pictures, render
 from bisar_budget.report.words.requirements import declared_words, requirement_lines, verdict
-from bisar_budget.report.words.sentences import allowable_words, matters, percent, row_size, shown_use
+from bisar_budget.report.words.sentences import allowable_words, matters, row_size, shown_use, use_words
 
 if TYPE_CHECKING:
     from bisar_budget.design.compare import Comparison
@@ -226,9 +226,9 @@ class CheckResult(Mapping[str, Row]):
         shown = [
             (
                 row.id,
-                "-" if row.declared is None else row_size(row.declared, row, found),
+                row_size(row.declared, row, found),
                 allowable_words(row, found),
-                _percent(shown_use(row)),
+                use_words(shown_use(row)),
                 row.status,
             )
             for row in rows[:_DECIDING]
@@ -244,10 +244,6 @@ class CheckResult(Mapping[str, Row]):
 
 _NESTED = ("displacement_m", "notes")  # of a row: no cells of a table
 _SPECIFIED = ("key", "value", "ordered", "unit", "declared")
-
-
-def _percent(part: float | None) -> str:
-    return "-" if part is None else percent(part)
 
 
 # ---------------------------------------------------------------------- answers to other questions
@@ -301,12 +297,12 @@ class SolveResult(_Answer):
             columns = ("part", "status", "worst row", "use")
             for part in parts:
                 at = part.standing
-                rows.append((part.id, at.status, at.row or part.reason, _percent(at.utilization)))
+                rows.append((part.id, at.status, at.row or part.reason, use_words(at.utilization)))
         else:
             columns = (f"complies at [{self.unit}]", "worst row", "use", "breaks beyond by")
             for one in self.crossings:
                 inside = one.inside
-                rows.append((inside.value, inside.row or "", _percent(inside.utilization), one.outside.row or ""))
+                rows.append((inside.value, inside.row or "", use_words(inside.utilization), one.outside.row or ""))
         title = f"{found.key} of {found.name}"
         return notebook.page(
             notebook.heading(_COMPLIES[found.status != "none"], title, f"{found.status}: {self._said}"),

@@ -14,7 +14,7 @@ from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
 from bisar_budget.report.formats.json_document import document_text, outside_item, verdict_item
 from bisar_budget.report.words.requirements import title_lines
-from bisar_budget.report.words.sentences import BINDING_WORDS, counted, percent, table, wrapped
+from bisar_budget.report.words.sentences import BINDING_WORDS, counted, percent, table, use_words, wrapped
 from bisar_budget.units import format_quantity
 
 _SGR = {"crossing": "32", "all": "32", "some": "32", "none": "1;31"}
@@ -154,11 +154,10 @@ def _lines_of_parts(found: Comparison, style: Style) -> Iterator[str]:
     rows = [["part", *(["kind"] if is_mixed else []), "status", "use", ""]]
     for part in found.parts:
         stands = part.standing
-        use = "-" if stands.utilization is None else percent(stands.utilization)
         row = printable(part.reason) if part.reason else stands.row or _undecided(stands.requirement)
         marks = f"{' *' if part.is_given else ''}{' -' if part.silent_on else ''}"
         kind = [part.kind] if is_mixed else []
-        rows.append([f"{part.id}{marks}", *kind, STATUS[stands.status].text, use, row])
+        rows.append([f"{part.id}{marks}", *kind, STATUS[stands.status].text, use_words(stands.utilization), row])
     yield from table(rows)
     yield ""
     if any(part.is_given for part in found.parts):

@@ -18,7 +18,7 @@ from bisar_budget.report.formats.csv_table import csv_text
 from bisar_budget.report.formats.json_document import document_text, outside_item
 from bisar_budget.report.words.identity import digest
 from bisar_budget.report.words.requirements import title_lines
-from bisar_budget.report.words.sentences import percent, sentence, spreadsheet_text, wrapped
+from bisar_budget.report.words.sentences import percent, sentence, spaced, spreadsheet_text, use_words, wrapped
 from bisar_budget.units import format_quantity
 
 
@@ -169,16 +169,12 @@ def _table(found: Sequence[SatellitePass], style: Style) -> Iterator[str]:
     heads = [tuple(head[place] for head in _HEADS) for place in (0, 1)]
     widths = [max(len(row[column]) for row in (*heads, *cells)) for column in range(len(_HEADS))]
     widths[0] = 8  # as in every table
+    sides = "".join(head[2] for head in _HEADS)
     for head in heads:
-        yield _row(head, widths)
+        yield spaced(head, widths, sides).rstrip()
     for one, row in zip(found, cells, strict=True):
-        line = _row(row, widths)
+        line = spaced(row, widths, sides).rstrip()
         yield style.coloured(line[:8], STATUS[one.status].sgr) + line[8:]
-
-
-def _row(cells: Sequence[str], widths: Sequence[int]) -> str:
-    each = zip(cells, widths, _HEADS, strict=True)
-    return " ".join(f"{cell:{head[2]}{width}}" for cell, width, head in each).rstrip()
 
 
 def _cells(one: SatellitePass) -> tuple[str, ...]:
@@ -197,7 +193,7 @@ def _cells(one: SatellitePass) -> tuple[str, ...]:
         _degrees(one.gradient_angle, 1),
         " x ".join(map(_metres, sizes)) if None not in sizes else "-",
         "-" if one.doubt is None else format_quantity(one.doubt, "m"),
-        "-" if one.utilization is None else percent(one.utilization),
+        use_words(one.utilization),
     )
 
 

@@ -143,7 +143,7 @@ def _verdict(sheet: SpecificationSheet) -> str:
         return "no specification can be found: other errors leave no room"
     number = sum(one.value is not None for one in sheet.specifications)
     count = counted(number, "specification")
-    stands = STATUS[sheet.status].text if sheet.status in STATUS else sheet.status
+    stands = STATUS[sheet.status].text
     if not number:
         return f"no requirement limits any of these errors: check says {stands}"
     if not sheet.complies:
@@ -163,11 +163,10 @@ def _line(one: Specification) -> list[str]:
 
 
 def _offered(offer: Offer) -> str:
-    stands = STATUS[offer.status].text if offer.status in STATUS else offer.status
     outside = sum(one.is_inside is False for one in offer.figures)
     of_all = f"of {counted(len(offer.figures), 'figure')} {outside} {'is' if outside == 1 else 'are'} outside"
     other = f"; it differs in {', '.join(offer.notes)} too" if offer.notes else ""
-    return f"Offer {printable(offer.file)}: the mission as a whole says {stands}; {of_all}{other}."
+    return f"Offer {printable(offer.file)}: the mission as a whole says {STATUS[offer.status].text}; {of_all}{other}."
 
 
 def _parts_words(one: Specification) -> str:
