@@ -1,4 +1,4 @@
-"""Physical constants and the fixed tolerances of the tool, each with its unit and origin."""
+"""Physical constants and the fixed tolerances of the tool, each with its unit and origin; words of its options."""
 
 SPEED_OF_LIGHT = 299_792_458.0  # m/s, exact (SI, CGPM 1983)
 STANDARD_GRAVITY = 9.80665  # m/s², exact (CGPM 1901); data sheets state accelerometer bias in g
@@ -24,3 +24,7 @@ MAX_DRAWS = 10**12  # shared out between many
 EARTH_GRAVITATIONAL_PARAMETER = 3.986004418e14  # m³/s², GM of WGS-84, atmosphere included
 EARTH_RADIUS = 6.371e6  # m, mean radius; how far the Earth's centre is below the scene
 MAX_DAYS = 366.0  # in which passes of a satellite are looked for
+
+# Here, since the command line says them without a mission, and a mission is read without the command line.
+GATING_MODELS = ("published", "full", "strictest")  # each asks for more than the one before it
+TARGETS = ("fail", "warn")  # of solve: what must not happen

@@ -72,7 +72,7 @@ _GATE = Gate(0.1, ("receiver.*",))
 _DIFFERENCES: dict[str, Callable[..., str]] = {
     "text": partial(difference.as_text, gate=_GATE, all_rows=True),
     "markdown": partial(difference.as_markdown, gate=_GATE, all_rows=True),
-    "json": partial(difference.as_json, "", gate=_GATE),
+    "json": partial(difference.as_json, gate=_GATE),
 }
 _TABLES = ("csv", "parquet", "nc")
 _VARY = ("--vary", "collection.aperture_time=1:6s:300")

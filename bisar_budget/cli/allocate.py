@@ -10,26 +10,22 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bisar_budget import __version__
-from bisar_budget.cli.options import DATE, FILE, MISSIONS, MODEL, OUTPUT, SET, ask_each, root_of_names
+from bisar_budget.cli.options import DATE, FILE, MISSIONS, MODEL, OUTPUT, SET, ask_each, format_option
 from bisar_budget.cli.streams import (
     EXIT_BROKEN,
+    MISSION_SUFFIXES,
     complain,
-    deliver,
+    deliver_found,
     expand,
     fail,
     load_all,
     spare,
-    wants_color,
     write_file,
 )
 
 if TYPE_CHECKING:
     from bisar_budget.faults import SetValue
-    from bisar_budget.report.formats.specification_sheet import Answer
-
-_FORMATS = ("text", "json", "csv", "markdown", "html", "needs", "sdoc")
-_MISSION = (".yaml", ".yml")
+    from bisar_budget.findings.specification import SpecificationSheet
 
 
 @click.command()
@@ -54,13 +50,9 @@ _MISSION = (".yaml", ".yml")
 @MODEL
 @SET
 @DATE
-@click.option(
-    "--format",
-    "format_name",
-    type=click.Choice(_FORMATS),
-    default="text",
-    show_default=True,
-    help="Format of the sheet; needs and sdoc are requirements for Sphinx-Needs and StrictDoc.",
+@format_option(
+    ("text", "json", "csv", "markdown", "html", "needs", "sdoc"),
+    "Format of the sheet; needs and sdoc are requirements for Sphinx-Needs and StrictDoc.",
 )
 @OUTPUT
 def allocate(
@@ -85,7 +77,7 @@ def allocate(
     if reserve is not None and math.isnan(reserve):
         raise click.UsageError("--reserve: nan is no part of a limit; accepted: 0 to 100, in percent.")
     files = expand(missions)
-    is_mission = output is not None and output.lower().endswith(_MISSION)
+    is_mission = output is not None and output.lower().endswith(MISSION_SUFFIXES)
     if is_mission and len(files) > 1:
         raise click.UsageError("-o FILE.yaml writes one mission.")
     if other is not None and len(files) > 1:
@@ -95,37 +87,21 @@ def allocate(
     if (twice := next((key for place, key in enumerate(keys) if key in keys[:place]), None)) is not None:
         raise click.UsageError(f"--for {twice}: stands twice; each key once.")
     from bisar_budget.front import questions
-    from bisar_budget.report.formats.specification_sheet import Answer
+    from bisar_budget.report.formats import specification_sheet
 
     offer = None if other is None else load_all([other], model, changes)[0]
     kept_free = None if reserve is None else reserve / 100
     ask = partial(questions.allocate, keys=keys, reserve=kept_free, offer=offer)
-    found = [Answer(one.found, one.offer) for one in ask_each(loaded, model, today, ask)]
+    found = [(one.found, one.offer) for one in ask_each(loaded, model, today, ask)]
     if is_mission and output is not None:  # first: one that cannot be written leaves no output at all
-        _write_mission(found[0], output, model)
+        _write_mission(found[0][0], output, model)
         output = None
-    deliver(_written(found, format_name, output), output, format_name)
-    is_broken = any(not one.sheet.complies or (one.offer is not None and not one.offer.complies) for one in found)
-    sys.exit(EXIT_BROKEN if is_broken else 0)
+    deliver_found(specification_sheet, found, format_name, output)
+    complies = all(sheet.complies and (of_offer is None or of_offer.complies) for sheet, of_offer in found)
+    sys.exit(0 if complies else EXIT_BROKEN)
 
 
-def _written(answers: "Sequence[Answer]", format_name: str, output: str | None) -> str:
-    from bisar_budget.report import Style
-    from bisar_budget.report.formats import specification_sheet as sheets
-
-    if format_name == "text":
-        return sheets.as_text(answers, Style(color=output is None and wants_color()))
-    if format_name == "csv":
-        return sheets.as_csv(answers)
-    written = getattr(sheets, f"as_{format_name}")
-    if format_name in ("needs", "sdoc"):
-        root, is_checkout = root_of_names()
-        written = partial(written, style=Style(root=root, is_checkout=is_checkout))
-    text: str = written(__version__, answers)
-    return text
-
-
-def _write_mission(answer: "Answer", output: str, model: str | None) -> None:
+def _write_mission(sheet: "SpecificationSheet", output: str, model: str | None) -> None:
     """Write the mission with what is ordered in place and as specifications; nothing where there are none.
 
     It is read first as it will lie there, with the files that it names.
@@ -134,7 +110,7 @@ def _write_mission(answer: "Answer", output: str, model: str | None) -> None:
     from bisar_budget.mission.edited import in_folder, with_section, with_values
     from bisar_budget.mission.load import parse_mission
 
-    sheet, findings = answer.sheet, answer.sheet.findings
+    findings = sheet.findings
     if sheet.broken or findings is None or findings.mission is None:
         complain(f"{output} is not written: there are no specifications.")
         return

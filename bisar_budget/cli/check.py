@@ -17,11 +17,11 @@ from bisar_budget.cli.options import (
     SET,
     ParamType,
     date_option,
-    day,
+    day_and_outside,
+    format_option,
     model_option,
     origin_of,
-    outside,
-    root_of_names,
+    output_option,
     scheduler_options,
     settings_here,
 )
@@ -33,6 +33,7 @@ from bisar_budget.cli.streams import (
     fail,
     is_terminal,
     load_all,
+    root_of_names,
     say_faults,
     spare,
     wants_color,
@@ -122,18 +123,12 @@ class _Draws(ParamType[int]):
 
 @click.command(cls=_Gate)
 @MISSIONS
-@click.option(
-    "--format",
-    "format_name",
+@format_option(
+    FORMATS,
+    f"Format of the report; {', '.join(f'{one.name}: {one.about}' for one in FORMATS.values() if one.about)}.",
     envvar="BISAR_BUDGET_FORMAT",
-    type=click.Choice(list(FORMATS)),
-    default="text",
-    show_default=True,
-    help=f"Format of the report; {', '.join(f'{one.name}: {one.about}' for one in FORMATS.values() if one.about)}.",
 )
-@click.option(
-    "-o", "--output", type=FILE, metavar="FILE", help="Write the report to FILE instead of standard output."
-)
+@output_option("Write the report to FILE instead of standard output.")
 @click.option(
     "--report",
     "reports",
@@ -261,11 +256,11 @@ def check(
                 "--explain writes text; it cannot be combined with --format, --report, --monte-carlo, --scheduler or "
                 "--sweep."
             )
-        _explain(files, explain, day(today), model, output, changes, outside(today))
+        _explain(files, explain, model, output, changes, *day_and_outside(today))
         return
     _check_sweep(swept, formats)
     illustrated = any(FORMATS[name].is_illustrated for name in formats)
-    judged_on, from_outside = day(today), outside(today)
+    judged_on, from_outside = day_and_outside(today)
     use_color = color == "always" or (color == "auto" and output is None and wants_color())
     verbosity = -1 if quiet else 1 if verbose else 0
     root, is_checkout = root_of_names()
@@ -370,10 +365,10 @@ def _check_sweep(texts: Sequence[str], formats: Sequence[str]) -> None:
 def _explain(
     files: Sequence[str],
     row_id: str,
-    today: date,
     model: str | None,
     output: str | None,
     changes: "Sequence[SetValue]",
+    today: date,
     from_outside: "Outside",
 ) -> None:
     """Explain a row, or a requirement, in every mission that has it."""

@@ -4,6 +4,7 @@ import sys
 
 import click
 
+from bisar_budget.cli.options import format_option
 from bisar_budget.cli.streams import EXIT_BROKEN, complain, deliver, write_file
 
 
@@ -22,14 +23,7 @@ from bisar_budget.cli.streams import EXIT_BROKEN, complain, deliver, write_file
     metavar="N",
     help="One equation of the paper, 1 to 31, in place of a table.",
 )
-@click.option(
-    "--format",
-    "format_name",
-    type=click.Choice(["text", "latex", "markdown", "mathml"]),
-    default="text",
-    show_default=True,
-    help="How to write it.",
-)
+@format_option(("text", "latex", "markdown", "mathml"), "How to write it.")
 @click.option("--check", "check_only", is_flag=True, help="Fail if a generated file is not what it gives.")
 @click.option("--write", is_flag=True, help="Rewrite the generated files: evaluators and formulas.")
 def derive(table: str, number: int | None, format_name: str, check_only: bool, write: bool) -> None:

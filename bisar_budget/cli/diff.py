@@ -9,15 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bisar_budget import __version__
 from bisar_budget.cli.options import (
     DATE,
     FILE,
     GATING_MODEL,
     OUTPUT,
     ParamType,
-    day,
-    outside,
+    day_and_outside,
+    format_option,
     set_option,
     settings_here,
 )
@@ -71,14 +70,7 @@ class _Part(ParamType[float]):
     help="With --fail-on-erosion: let this through. ID is as the comparison names it, or a pattern; FILE:ID is that "
     "of one mission. Repeatable.",
 )
-@click.option(
-    "--format",
-    "format_name",
-    type=click.Choice(["text", "markdown", "json"]),
-    default="text",
-    show_default=True,
-    help="Format of the comparison.",
-)
+@format_option(("text", "markdown", "json"), "Format of the comparison.")
 @click.option("--all", "all_rows", is_flag=True, help="Also show rows that moved by less than 1 %.")
 @OUTPUT
 @DATE
@@ -126,7 +118,7 @@ def diff(
         comparison = _with_files(files, changes, output, today)
     gate = None if tolerated is None else Gate(tolerated, allowed)
     if format_name == "json":
-        text = difference.as_json(__version__, comparison, gate)
+        text = difference.as_json(comparison, gate)
     else:
         write = difference.as_text if format_name == "text" else difference.as_markdown
         text = write(comparison, gate, all_rows)
@@ -198,7 +190,7 @@ def _compared(before: Sequence[_Read], after: Sequence[_Read], today: datetime |
     from bisar_budget.report.change.comparison import compare
 
     missions = read_all(read for pair in zip(before, after, strict=True) for read in pair)
-    judged_on, from_outside = day(today), outside(today)
+    judged_on, from_outside = day_and_outside(today)
     found = [check(mission, date=judged_on, outside=from_outside).findings for mission in missions]
     return tuple(compare(*pair) for pair in zip(found[::2], found[1::2], strict=True))
 

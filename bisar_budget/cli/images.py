@@ -1,13 +1,22 @@
 """`bisar-budget verify` and `simulate`: images at the limits, and with the declared errors."""
 
-import os
 import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import click
 
-from bisar_budget.cli.options import FILE, MISSIONS, OUTPUT, SET, TEXT_OR_JSON, scheduler_options
+from bisar_budget.cli.options import (
+    FILE,
+    MISSIONS,
+    OUTPUT,
+    SET,
+    TEXT_OR_JSON,
+    output_option,
+    plot_option,
+    scheduler_options,
+    wrong_usage,
+)
 from bisar_budget.cli.streams import (
     EXIT_BROKEN,
     EXIT_USAGE,
@@ -16,9 +25,9 @@ from bisar_budget.cli.streams import (
     deliver_found,
     expand,
     fail,
-    hold_to_suffixes,
     load_all,
     spare,
+    suffix_of,
     write_file,
 )
 from bisar_budget.faults import changes_words, printable
@@ -61,17 +70,13 @@ def verify(
     """
     from bisar_budget.front.imaging import verify_all
     from bisar_budget.front.progress import workers_of
-    from bisar_budget.mission.quantities import QuestionError
     from bisar_budget.report.formats import verification
 
     files = expand(missions)
     spare(files, [output])
     loaded = load_all(files, changes=changes)
-    try:
-        with workers_of(scheduler, patience) as workers:
-            verified = verify_all(loaded, only, jobs, workers)
-    except QuestionError as error:
-        raise click.UsageError(str(error)) from None
+    with wrong_usage(), workers_of(scheduler, patience) as workers:
+        verified = verify_all(loaded, only, jobs, workers)
     deliver_found(verification, verified, format_name, output)
     doubts = [mission for mission in verified if mission.doubt]
     for mission in doubts:
@@ -83,16 +88,8 @@ def verify(
 
 @click.command()
 @click.argument("mission", type=FILE)
-@click.option(
-    "--plot", type=FILE, metavar="FILE", help="Draw Figures 3 to 7 of the paper for this mission: .png, .svg or .pdf."
-)
-@click.option(
-    "-o",
-    "--output",
-    type=FILE,
-    metavar="FILE",
-    help="Save the images and what explains them for NumPy: .npz. Or write the phase history alone: .cphd.",
-)
+@plot_option("Draw Figures 3 to 7 of the paper for this mission: .png, .svg or .pdf.")
+@output_option("Save the images and what explains them for NumPy: .npz. Or write the phase history alone: .cphd.")
 @click.option(
     "--image-former",
     type=click.Choice(["backprojection", "polar_format", "matched_filter", "far_field"]),
@@ -127,19 +124,15 @@ def simulate(
     FILE.cphd is the phase history for an image former of your own, as CPHD 1.1.0: the signal has the true ranges, its
     vectors have the measured places. No image is formed then. It needs the extra `formats`.
     """
-    hold_to_suffixes(plot, (".png", ".svg", ".pdf"))
-    hold_to_suffixes(output, (".npz", ".cphd"))
-    is_phase_history = output is not None and output.lower().endswith(".cphd")
+    kind = suffix_of(plot, (".png", ".svg", ".pdf"))[1:]
+    is_phase_history = suffix_of(output, (".npz", ".cphd")) == ".cphd"
     if is_phase_history and plot is not None:
         raise click.UsageError("--plot draws images, and none is formed for a .cphd file.")
     spare([mission], [plot, output])
     from bisar_budget.front import imaging
-    from bisar_budget.mission.quantities import QuestionError
 
-    try:
+    with wrong_usage():
         standing = imaging.standing(targets)
-    except QuestionError as error:
-        raise click.UsageError(str(error)) from None
     (loaded,) = load_all([mission], changes=changes)
     if is_phase_history:
         _export(mission, loaded, str(output), standing)
@@ -154,7 +147,7 @@ def simulate(
         write_file(output, point_plot.archive(found, changes))
     if plot is not None:
         title = f"{loaded.name} {changes_words(changes)}".rstrip()
-        write_file(plot, point_plot.drawn(found, title, os.path.splitext(plot)[1][1:].lower()))
+        write_file(plot, point_plot.drawn(found, title, kind))
     deliver(point_plot.summary(found, loaded))
 
 

@@ -9,12 +9,13 @@ from bisar_budget.cli.options import FILE, OUTPUT
 from bisar_budget.cli.streams import complain, deliver, fail
 
 _SEEN = 20  # of a wavelength: what a place is off the path turns the phase by 0.3 rad
+_FORCE = click.option("--force", is_flag=True, help="Replace an existing file.")
 
 
 @click.command()
 @click.argument("file", type=FILE, default="mission.yaml")
 @click.option("--name", default="My bistatic mission", show_default=True, help="Name of the mission.")
-@click.option("--force", is_flag=True, help="Replace an existing file.")
+@_FORCE
 def init(file: str, name: str, force: bool) -> None:
     """Write a commented mission file to start from.
 
@@ -62,7 +63,7 @@ def schema(is_of_part: bool, output: str | None) -> None:
 @click.argument("file", type=FILE)
 @OUTPUT
 @click.option("--channel", metavar="ID", help="Channel of CPHD or CRSD; without it the file's reference channel.")
-@click.option("--force", is_flag=True, help="Replace an existing file.")
+@_FORCE
 def import_file(file: str, output: str | None, channel: str | None, force: bool) -> None:
     """Write a mission file from CPHD, CRSD or SICD.
 

@@ -1,7 +1,8 @@
 """Options that commands share; where values come from: the command line, the environment, a project's settings."""
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from datetime import date, datetime
 from typing import TYPE_CHECKING, Any
 
@@ -9,6 +10,7 @@ import click
 from click.core import ParameterSource
 
 from bisar_budget.cli.streams import fail
+from bisar_budget.constants import GATING_MODELS
 from bisar_budget.faults import printable
 from bisar_budget.resources import DISK, Files
 
@@ -30,6 +32,7 @@ else:
 
 
 COMMAND_LINE = "command line"
+_Option = Callable[[Callable[..., Any]], Callable[..., Any]]  # it is put on a command
 _BEARING = ("model", "strict", "exit_zero")  # on the verdict, besides the day and --set
 
 
@@ -47,7 +50,26 @@ class FileName(click.types.StringParamType):
 
 FILE = FileName()
 MISSIONS = click.argument("missions", type=FILE, nargs=-1, required=True, metavar="MISSION...")
-OUTPUT = click.option("-o", "--output", type=FILE, metavar="FILE", help="Write to FILE instead of standard output.")
+
+
+def output_option(words: str = "Write to FILE instead of standard output.", metavar: str = "FILE") -> _Option:
+    """Give the option `--output`."""
+    return click.option("-o", "--output", type=FILE, metavar=metavar, help=words)
+
+
+def plot_option(words: str) -> _Option:
+    """Give the option `--plot`."""
+    return click.option("--plot", type=FILE, metavar="FILE", help=words)
+
+
+def format_option(formats: Iterable[str], words: str, **more: Any) -> _Option:
+    """Give the option `--format`, of which text is the default."""
+    given: dict[str, Any] = {"default": "text", "show_default": True, **more}
+    return click.option("--format", "format_name", type=click.Choice([*formats]), help=words, **given)
+
+
+OUTPUT = output_option()
+TEXT_OR_JSON = format_option(("text", "json"), "Format of the output.")
 
 
 def _read_changes(ctx: click.Context, param: click.Parameter, texts: tuple[str, ...]) -> "tuple[SetValue, ...]":
@@ -62,7 +84,7 @@ def _read_changes(ctx: click.Context, param: click.Parameter, texts: tuple[str, 
         raise click.UsageError(f"--set: {error.problem.words}.") from None
 
 
-def set_option(what: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+def set_option(what: str) -> _Option:
     """Give the option `--set`; `what` says what it does with the value.
 
     It is no setting of a project, nor of the environment: a gate judges the file that is in the repository.
@@ -80,25 +102,16 @@ def set_option(what: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
 
 SET = set_option("Put a value in place of the mission's own, or beside it")
 
-TEXT_OR_JSON = click.option(
-    "--format",
-    "format_name",
-    type=click.Choice(["text", "json"]),
-    default="text",
-    show_default=True,
-    help="Format of the output.",
-)
-
-GATING_MODEL = click.Choice(["published", "full", "strictest"])
+GATING_MODEL = click.Choice(GATING_MODELS)
 
 
-def model_option(variable: str | None = None) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+def model_option(variable: str | None = None) -> _Option:
     """Give the option `--model`, which a variable of the environment may stand in for."""
     words = "Model that decides, instead of the mission file's."
     return click.option("--model", envvar=variable, type=GATING_MODEL, help=words)
 
 
-def date_option(more: str = "") -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+def date_option(more: str = "") -> _Option:
     """Give the option `--date`; `more` is what else there is to say."""
     words = "Day on which waivers are judged (default: SOURCE_DATE_EPOCH, else today, UTC)." + more
     return click.option("--date", "today", type=click.DateTime(["%Y-%m-%d"]), help=words)
@@ -107,7 +120,7 @@ def date_option(more: str = "") -> Callable[[Callable[..., Any]], Callable[..., 
 MODEL, DATE = model_option(), date_option()
 
 
-def scheduler_options(doing: str, more: str = "") -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+def scheduler_options(doing: str, more: str = "") -> _Option:
     """Give `--scheduler` and its time-out; `doing` says what workers are for, `more` what else there is to say."""
     named = click.option(
         "--scheduler",
@@ -152,10 +165,18 @@ def settings_here(files: Files = DISK) -> "Settings | None":
         return None
 
 
-def outside(today: datetime | None) -> "Outside":
-    """Gather the options of the command that bear on verdicts; `today` is the value of --date."""
+def day_and_outside(today: datetime | None) -> "tuple[date, Outside]":
+    """Day on which waivers are judged, and the options of the command that bear on verdicts.
+
+    `today` is the value of --date; without it the day is that of SOURCE_DATE_EPOCH, else today, UTC.
+    """
     from bisar_budget.findings.requirement import Outside, Override
-    from bisar_budget.front.checks import day_origin
+    from bisar_budget.front.checks import day_of, day_origin
+
+    try:
+        judged_on = day_of(today)
+    except ValueError as error:
+        raise click.UsageError(str(error)) from None
 
     context, found = click.get_current_context(), []
     for parameter in context.command.params:
@@ -164,16 +185,17 @@ def outside(today: datetime | None) -> "Outside":
         if name in _BEARING and origin != "default" and value is not None:
             said = ("yes" if value else "no") if isinstance(value, bool) else value
             found.append(Override(parameter.opts[0], said, origin))
-    return Outside(tuple(found), day_origin(today, COMMAND_LINE), today is not None)
+    return judged_on, Outside(tuple(found), day_origin(today, COMMAND_LINE), today is not None)
 
 
-def day(today: datetime | None) -> date:
-    """Day on which waivers are judged: that of --date, else of SOURCE_DATE_EPOCH, else today, UTC."""
-    from bisar_budget.front.checks import day_of
+@contextmanager
+def wrong_usage() -> Iterator[None]:
+    """Take a question that cannot be asked, whatever the mission, for wrong usage of the command."""
+    from bisar_budget.mission.quantities import QuestionError
 
     try:
-        return day_of(today)
-    except ValueError as error:
+        yield
+    except QuestionError as error:
         raise click.UsageError(str(error)) from None
 
 
@@ -183,19 +205,9 @@ def ask_each(
     """Ask each mission in turn; exits where one cannot be asked."""
     from bisar_budget.mission.quantities import QuestionError
 
-    judged_on, from_outside = day(today), outside(today)
+    judged_on, from_outside = day_and_outside(today)
     for mission in missions:
         try:
             yield ask(mission, model=model, date=judged_on, outside=from_outside)
         except QuestionError as error:
             fail(f"{mission.file}: {error}")
-
-
-def root_of_names() -> tuple[str, bool]:
-    """Folder that reports name files of no repository from, and whether it is GitHub's checkout."""
-    try:
-        here = os.getcwd()
-    except OSError:  # somebody removed it under us
-        return "", False
-    checkout = os.environ.get("GITHUB_WORKSPACE")
-    return os.path.realpath(checkout or here), bool(checkout)

@@ -11,30 +11,40 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bisar_budget import __version__
-from bisar_budget.cli.options import DATE, FILE, MODEL, SET, day, outside
+from bisar_budget.cli.options import (
+    DATE,
+    FILE,
+    MODEL,
+    SET,
+    day_and_outside,
+    format_option,
+    output_option,
+    plot_option,
+    wrong_usage,
+)
 from bisar_budget.cli.streams import (
     EXIT_BROKEN,
     EXIT_USAGE,
+    MISSION_SUFFIXES,
+    PICTURE_SUFFIXES,
     complain,
     deliver,
+    deliver_found,
     fail,
-    hold_to_suffixes,
     read_all,
     say_faults,
     spare,
-    wants_color,
+    suffix_of,
     write_file,
 )
 from bisar_budget.constants import MAX_DAYS
 
 if TYPE_CHECKING:
-    from bisar_budget.design.passes import Passes, SatellitePass
+    from bisar_budget.design.passes import SatellitePass
     from bisar_budget.faults import SetValue
     from bisar_budget.front.results import PassesResult
 
 _FORMATS = {".txt": "text", ".json": "json", ".csv": "csv", ".ics": "ics"}  # by the suffix of -o
-_MISSION = (".yaml", ".yml")
 
 
 @click.command()
@@ -76,21 +86,18 @@ _MISSION = (".yaml", ".yml")
 @MODEL
 @SET
 @DATE
-@click.option(
-    "--format",
-    "format_name",
-    type=click.Choice(list(_FORMATS.values())),
-    help="Format of the list; ics is a calendar (default: that of -o's suffix, else text).",
+@format_option(
+    _FORMATS.values(),
+    "Format of the list; ics is a calendar (default: that of -o's suffix, else text).",
+    default=None,
+    show_default=False,
 )
-@click.option(
-    "-o",
-    "--output",
-    type=FILE,
-    metavar="FILE|DIR",
-    help="Write to FILE: .txt, .json, .csv or .ics. Into a folder DIR, or a name that ends in /, go mission files, "
+@output_option(
+    "Write to FILE: .txt, .json, .csv or .ics. Into a folder DIR, or a name that ends in /, go mission files, "
     "one for each pass that complies.",
+    metavar="FILE|DIR",
 )
-@click.option("--plot", type=FILE, metavar="FILE", help="Draw tracks in the sky and resolutions: .svg, .png or .pdf.")
+@plot_option("Draw tracks in the sky and resolutions: .svg, .png or .pdf.")
 def passes(
     mission: str,
     start: str | None,
@@ -114,24 +121,22 @@ def passes(
     """
     if math.isnan(days):
         raise click.UsageError(f"--days: nan is no number of days; accepted: more than 0, up to {MAX_DAYS:g}.")
-    hold_to_suffixes(plot, (".svg", ".png", ".pdf"))
+    kind = suffix_of(plot, PICTURE_SUFFIXES)[1:]
     is_folder = output is not None and (output.endswith(("/", os.sep)) or os.path.isdir(output))
     if format_name is None:
-        if output not in (None, "-") and not is_folder:
-            hold_to_suffixes(output, tuple(_FORMATS))
-        format_name = _FORMATS.get(os.path.splitext(output or "")[1].lower() if not is_folder else "", "text")
+        is_file = output not in (None, "-") and not is_folder
+        format_name = _FORMATS[suffix_of(output, tuple(_FORMATS))] if is_file else "text"
     spare([mission], [None if is_folder else output, plot])
     from bisar_budget.faults import MissionError
     from bisar_budget.front import questions
     from bisar_budget.mission.load import load_mission
     from bisar_budget.mission.quantities import QuestionError
+    from bisar_budget.report.formats import pass_list
 
-    judged_on = day(today)
-    try:
+    judged_on, from_outside = day_and_outside(today)
+    with wrong_usage():
         least = questions.angle_of("--min-elevation", min_elevation, 0.0)
         wanted = questions.angle_of("--squint", squint, -90.0)
-    except QuestionError as error:
-        raise click.UsageError(str(error)) from None
     (loaded,) = read_all([partial(load_mission, mission, model, changes, is_placed=False)])
     try:
         found = questions.passes(
@@ -143,7 +148,7 @@ def passes(
             squint=wanted,
             model=model,
             date=judged_on,
-            outside=outside(today),
+            outside=from_outside,
         )
     except QuestionError as error:
         fail(f"{mission}: {error}")
@@ -154,20 +159,12 @@ def passes(
         _write_missions(found, output, judged_on)
         output = None
     if plot is not None:
-        write_file(plot, found.plot().of(os.path.splitext(plot)[1][1:].lower()))
-    deliver(_written(found.found, format_name, output, judged_on), output, format_name)
-    sys.exit(0 if found.complying else EXIT_BROKEN)
-
-
-def _written(found: "Passes", format_name: str, output: str | None, stamp: date) -> str:
-    from bisar_budget.report import Style
-    from bisar_budget.report.formats import pass_list
-
+        write_file(plot, found.plot().of(kind))
     if format_name == "ics":
-        return pass_list.as_ics(__version__, found, stamp)
-    if format_name == "text":
-        return pass_list.as_text(found, Style(color=output is None and wants_color()))
-    return pass_list.as_json(__version__, found) if format_name == "json" else pass_list.as_csv(found)
+        deliver(pass_list.as_ics(found.found, judged_on), output, format_name)
+    else:
+        deliver_found(pass_list, found.found, format_name, output)
+    sys.exit(0 if found.complying else EXIT_BROKEN)
 
 
 # ---------------------------------------------------------------- a mission file for each pass
@@ -200,7 +197,7 @@ def _write_missions(found: "PassesResult", folder: str, today: date) -> None:
 def _name(one: "SatellitePass", file: str) -> str:
     """Name of the file of a pass: that of the mission, and the mid-time."""
     stem, suffix = os.path.splitext(os.path.basename(file) if file != "-" else "mission.yaml")
-    stem, suffix = (stem, suffix) if suffix.lower() in _MISSION else (stem + suffix, _MISSION[0])
+    stem, suffix = (stem, suffix) if suffix.lower() in MISSION_SUFFIXES else (stem + suffix, MISSION_SUFFIXES[0])
     time = "" if one.center is None else one.center.as_text()[:19].replace("-", "").replace(":", "")
     return f"{stem}_{time}Z{suffix}"
 

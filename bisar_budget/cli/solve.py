@@ -1,6 +1,5 @@
 """`bisar-budget solve` and `sensitivity`: where a number of a mission begins to comply, and what each number does."""
 
-import os
 import sys
 from collections.abc import Sequence
 from datetime import datetime
@@ -9,16 +8,28 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bisar_budget.cli.options import DATE, FILE, MISSIONS, MODEL, OUTPUT, SET, TEXT_OR_JSON, ask_each
+from bisar_budget.cli.options import (
+    DATE,
+    MISSIONS,
+    MODEL,
+    OUTPUT,
+    SET,
+    TEXT_OR_JSON,
+    ask_each,
+    plot_option,
+    wrong_usage,
+)
 from bisar_budget.cli.streams import (
     EXIT_BROKEN,
+    PICTURE_SUFFIXES,
     deliver_found,
     expand,
-    hold_to_suffixes,
     load_all,
     spare,
+    suffix_of,
     write_file,
 )
+from bisar_budget.constants import TARGETS
 
 if TYPE_CHECKING:
     from bisar_budget.faults import SetValue
@@ -47,8 +58,8 @@ if TYPE_CHECKING:
 @click.option("--row", metavar="ID", help="The row that has to comply, instead of the whole mission.")
 @click.option(
     "--target",
-    type=click.Choice(["fail", "warn"]),
-    default="fail",
+    type=click.Choice(TARGETS),
+    default=TARGETS[0],
     show_default=True,
     help="What must not happen: fail, or also warn and what check --strict breaks on.",
 )
@@ -81,13 +92,10 @@ def solve(
     an unusable mission file.
     """
     from bisar_budget.front import questions
-    from bisar_budget.mission.quantities import QuestionError
     from bisar_budget.report.formats import answers
 
-    try:
+    with wrong_usage():
         questions.hold_to_parts(key, between, is_scale)
-    except QuestionError as error:
-        raise click.UsageError(str(error)) from None
     files = expand(missions)
     spare(files, [output])
     ask = partial(questions.solve, key=key, between=between, scale=is_scale, row=row, target=target, verify=is_imaged)
@@ -105,7 +113,7 @@ def solve(
 @DATE
 @TEXT_OR_JSON
 @OUTPUT
-@click.option("--plot", type=FILE, metavar="FILE", help="Draw the effects of a mission as bars: .svg, .png, .pdf.")
+@plot_option("Draw the effects of a mission as bars: .svg, .png, .pdf.")
 def sensitivity(
     missions: Sequence[str],
     row: str | None,
@@ -127,7 +135,7 @@ def sensitivity(
     from bisar_budget.front import questions
     from bisar_budget.report.formats import answers
 
-    hold_to_suffixes(plot, (".svg", ".png", ".pdf"))
+    kind = suffix_of(plot, PICTURE_SUFFIXES)[1:]
     files = expand(missions)
     if plot is not None and len(files) > 1:
         raise click.UsageError("--plot draws one mission.")
@@ -137,5 +145,5 @@ def sensitivity(
     if plot is not None:
         from bisar_budget.report.drawing.tornado import tornado
 
-        write_file(plot, tornado(found[0], os.path.splitext(plot)[1][1:].lower()))
+        write_file(plot, tornado(found[0], kind))
     deliver_found(answers, found, format_name, output)

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
-from bisar_budget import __version__
 from bisar_budget.faults import MissionError, printable
 from bisar_budget.resources import FILES_READ, locked
 
@@ -21,6 +20,8 @@ if TYPE_CHECKING:
     from bisar_budget.faults import Fault, SetValue
     from bisar_budget.mission.model import Mission
 
+MISSION_SUFFIXES = (".yaml", ".yml")
+PICTURE_SUFFIXES = (".svg", ".png", ".pdf")
 _TEMPORARY = (".bisar-budget.", ".tmp")  # how the name of a temporary folder begins and ends
 EXIT_BROKEN, EXIT_USAGE, EXIT_OUR_FAULT, EXIT_INTERRUPTED = 1, 2, 3, 130
 
@@ -71,10 +72,12 @@ def say_faults(file: str, faults: "tuple[Fault, ...]") -> None:
         complain(line)
 
 
-def hold_to_suffixes(name: str | None, suffixes: Sequence[str]) -> None:
-    """Refuse the name of a file whose suffix names no format."""
-    if name is not None and os.path.splitext(name)[1].lower() not in suffixes:
+def suffix_of(name: str | None, suffixes: Sequence[str]) -> str:
+    """Suffix of the name of a file, one of some, or the command ends; empty where there is no name."""
+    suffix = os.path.splitext(name or "")[1].lower()
+    if name is not None and suffix not in suffixes:
         raise click.UsageError(f"{name}: the suffix must be one of {', '.join(suffixes)}")
+    return suffix
 
 
 def spare(files: Sequence[str], targets: Iterable[str | None], folders: Iterable[str] = ()) -> None:
@@ -118,6 +121,16 @@ def _is_same(one: str | int, other: str) -> bool:
         return os.path.isfile(one) and os.path.samestat(os.stat(one), os.stat(other))
     except (OSError, ValueError):  # either is missing
         return False
+
+
+def root_of_names() -> tuple[str, bool]:
+    """Folder that reports name files of no repository from, and whether it is GitHub's checkout."""
+    try:
+        here = os.getcwd()
+    except OSError:  # somebody removed it under us
+        return "", False
+    checkout = os.environ.get("GITHUB_WORKSPACE")
+    return os.path.realpath(checkout or here), bool(checkout)
 
 
 def is_terminal() -> bool:
@@ -218,15 +231,13 @@ def deliver(text: str, output: str | None = None, format_name: str = "text") -> 
         write_file(output, harmless(text, format_name).replace("\n", _LINE_ENDS.get(format_name, "\n")))
 
 
-def deliver_found(form: "ModuleType", found: Sequence[Any], format_name: str, output: str | None) -> None:
-    """Write what was found as JSON, or as text for a person; `form` is the module that makes both of it."""
-    if format_name == "json":
-        text = form.as_json(__version__, found)
-    else:
-        from bisar_budget.report import Style
+def deliver_found(form: "ModuleType", found: Any, format_name: str, output: str | None) -> None:
+    """Write what was found in a format; `form` is the module that has a function for each."""
+    from bisar_budget.report import Style
 
-        text = form.as_text(found, Style(color=output is None and wants_color()))
-    deliver(text, output, format_name)
+    root, is_checkout = root_of_names()
+    style = Style(color=output is None and wants_color(), root=root, is_checkout=is_checkout)
+    deliver(getattr(form, f"as_{format_name}")(found, style), output, format_name)
 
 
 def write_file(path: str, content: str | bytes) -> None:

@@ -8,16 +8,26 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bisar_budget.cli.options import DATE, FILE, MODEL, SET, day, outside, scheduler_options
+from bisar_budget.cli.options import (
+    DATE,
+    FILE,
+    MODEL,
+    SET,
+    day_and_outside,
+    output_option,
+    plot_option,
+    scheduler_options,
+)
 from bisar_budget.cli.streams import (
     EXIT_BROKEN,
+    PICTURE_SUFFIXES,
     complain,
     deliver_parts,
     fail,
-    hold_to_suffixes,
     load_all,
     replacing,
     spare,
+    suffix_of,
     write_file,
 )
 from bisar_budget.faults import printable
@@ -58,13 +68,8 @@ MAX_CASES = 100_000_000  # that are started without being asked twice: tens of g
     metavar="ROW.FIELD",
     help="A column more, such as receiver.velocity.x.allowable. Repeatable.",
 )
-@click.option("-o", "--output", type=FILE, metavar="FILE", help="Write to FILE: .csv, .parquet or .nc (NetCDF).")
-@click.option(
-    "--plot",
-    type=FILE,
-    metavar="FILE",
-    help="Draw one key as curves of utilization, two as a map: .svg, .png or .pdf.",
-)
+@output_option("Write to FILE: .csv, .parquet or .nc (NetCDF).")
+@plot_option("Draw one key as curves of utilization, two as a map: .svg, .png or .pdf.")
 @click.option("--plot-column", metavar="NAME", help="Draw this column instead of utilization and status.")
 @click.option("--polar", "is_polar", is_flag=True, help="Draw the map over an azimuth as seen from above.")
 @MODEL
@@ -105,10 +110,10 @@ def sweep(
     reason. CSV goes to standard output without -o and --plot. Statuses do not change the exit code, as long as some
     case is judged: 0; 1 if none is; 2 for wrong usage or an unusable mission file.
     """
-    hold_to_suffixes(None if output == "-" else output, (".csv", ".parquet", ".nc"))
+    suffix_of(None if output == "-" else output, (".csv", ".parquet", ".nc"))
     if plot == "-":
         raise click.UsageError("--plot needs the name of a file.")
-    hold_to_suffixes(plot, (".svg", ".png", ".pdf"))
+    suffix_of(plot, PICTURE_SUFFIXES)
     if plot is None and (plot_column is not None or is_polar):
         raise click.UsageError("--plot-column and --polar say how to draw; --plot says to which file.")
     if (cases_file is None) == (not varied):
@@ -128,7 +133,7 @@ def sweep(
         cases = cases_of_texts(loaded, varied, sample) if cases_file is None else cases_of(loaded, cases_file)
         if plot is not None:
             check_plot(cases, is_polar=is_polar)
-        judged_on, from_outside = day(today), outside(today)
+        judged_on, from_outside = day_and_outside(today)
         is_kept = scheduler is not None or is_resumed
         if is_kept:
             if output is None or output == "-":

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.budget.waivers import overrides
+from bisar_budget.constants import GATING_MODELS, TARGETS
 from bisar_budget.faults import InvalidValueError, closed, printable, shown
 from bisar_budget.findings.requirement import Outside, Override
 from bisar_budget.front.checks import day_of, drawn_here, outside_of
@@ -24,7 +25,7 @@ from bisar_budget.front.results import (
 from bisar_budget.front.sweeps import SweepResult
 from bisar_budget.mission.given import text_of
 from bisar_budget.mission.load import load_mission
-from bisar_budget.mission.model import GATING_MODELS, Mission
+from bisar_budget.mission.model import Mission
 from bisar_budget.mission.quantities import QuestionError
 from bisar_budget.mission.readers import Quantity
 from bisar_budget.resources import cores
@@ -35,9 +36,6 @@ if TYPE_CHECKING:
     from bisar_budget.design.cases import Cases
     from bisar_budget.design.compare import Comparison
     from bisar_budget.design.solve import Solution
-
-
-TARGETS = ("fail", "warn")  # what must not happen
 
 
 def _judged(

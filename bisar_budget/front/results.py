@@ -24,7 +24,7 @@ from bisar_budget.findings.status import exit_code
 from bisar_budget.mission.model import Mission
 from bisar_budget.report import FORMATS, Style, format_of, pictures, render
 from bisar_budget.report.words.requirements import declared_words, requirement_lines, verdict
-from bisar_budget.report.words.sentences import allowable_words, matters, percent, row_size, shown_use
+from bisar_budget.report.words.sentences import allowable_words, matters, row_size, shown_use, use_words
 
 if TYPE_CHECKING:
     from bisar_budget.design.compare import Comparison
@@ -226,9 +226,9 @@ class CheckResult(Mapping[str, Row]):
         shown = [
             (
                 row.id,
-                "-" if row.declared is None else row_size(row.declared, row, found),
+                row_size(row.declared, row, found),
                 allowable_words(row, found),
-                _percent(shown_use(row)),
+                use_words(shown_use(row)),
                 row.status,
             )
             for row in rows[:_DECIDING]
@@ -244,10 +244,6 @@ class CheckResult(Mapping[str, Row]):
 
 _NESTED = ("displacement_m", "notes")  # of a row: no cells of a table
 _SPECIFIED = ("key", "value", "ordered", "unit", "declared")
-
-
-def _percent(part: float | None) -> str:
-    return "-" if part is None else percent(part)
 
 
 # ---------------------------------------------------------------------- answers to other questions
@@ -269,7 +265,7 @@ class _Answer:
     def _document(self) -> str:
         from bisar_budget.report.formats.answers import as_json
 
-        return as_json(__version__, [self.found])
+        return as_json([self.found], Style())
 
     def to_dict(self) -> dict[str, Any]:
         """The document of `--format json` of the command."""
@@ -301,12 +297,12 @@ class SolveResult(_Answer):
             columns = ("part", "status", "worst row", "use")
             for part in parts:
                 at = part.standing
-                rows.append((part.id, at.status, at.row or part.reason, _percent(at.utilization)))
+                rows.append((part.id, at.status, at.row or part.reason, use_words(at.utilization)))
         else:
             columns = (f"complies at [{self.unit}]", "worst row", "use", "breaks beyond by")
             for one in self.crossings:
                 inside = one.inside
-                rows.append((inside.value, inside.row or "", _percent(inside.utilization), one.outside.row or ""))
+                rows.append((inside.value, inside.row or "", use_words(inside.utilization), one.outside.row or ""))
         title = f"{found.key} of {found.name}"
         return notebook.page(
             notebook.heading(_COMPLIES[found.status != "none"], title, f"{found.status}: {self._said}"),
@@ -350,9 +346,9 @@ class AllocateResult(_Answer):
         return f"<allocate of {self.found.name!r}: {len(self.found.specifications)} specifications, {said}>"
 
     def _document(self) -> str:
-        from bisar_budget.report.formats import specification_sheet as sheets
+        from bisar_budget.report.formats.specification_sheet import as_json
 
-        return sheets.as_json(__version__, [sheets.Answer(self.found, self.offer)])
+        return as_json([(self.found, self.offer)], Style())
 
     def to_dataframe(self, library: str | None = None) -> Any:
         """The specifications as a data frame; numbers in SI, lists of three where axes differ."""
@@ -381,7 +377,7 @@ class VerifyResult(_Answer):
     def _document(self) -> str:
         from bisar_budget.report.formats.verification import as_json
 
-        return as_json(__version__, [self.found])
+        return as_json([self.found], Style())
 
     def to_dataframe(self, library: str | None = None) -> Any:
         """The verdicts as a data frame."""
@@ -433,7 +429,7 @@ class PassesResult(_Answer):
     def _document(self) -> str:
         from bisar_budget.report.formats.pass_list import as_json
 
-        return as_json(__version__, self.found)
+        return as_json(self.found, Style())
 
     def to_dataframe(self, library: str | None = None) -> Any:
         """The passes as a data frame; angles in radians, lengths in metres, times as texts of UTC."""

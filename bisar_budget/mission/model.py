@@ -6,7 +6,7 @@ from datetime import date
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 from bisar_budget import units
-from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.constants import GATING_MODELS, SPEED_OF_LIGHT
 from bisar_budget.faults import Changed, KeyPath, Place, Problem, SetValue, changes_words, shown, upwards
 from bisar_budget.geometry import BistaticGeometry, PlatformState
 from bisar_budget.mission.instruments import SYNCHRONIZATION, Synchronization, TakenFigure
@@ -346,9 +346,6 @@ def _form_of_split(value: Any) -> Reader:
     if not isinstance(value, dict):
         return RULE
     return SHARES if value.keys().isdisjoint(METRIC_SPLITS.keys) else METRIC_SPLITS
-
-
-GATING_MODELS = ("published", "full", "strictest")
 
 
 class AllocationRules(NamedTuple):

@@ -46,7 +46,7 @@ def test_every_sentence_of_a_verdict_has_its_code(name: str) -> None:
     path = ROOT / "specs" / "missions" / f"{name}.yaml"
     verified = verify_mission(load_mission(str(path)), "mission.*")
     assert verified.rows
-    (mission,) = json.loads(verification.as_json("1", [verified]))["missions"]
+    (mission,) = json.loads(verification.as_json([verified], Style()))["missions"]
     for verdict, written in zip(verified.rows, mission["rows"], strict=True):
         codes = [None if reason is None else reason.code for reason in (verdict.reason, verdict.reason_autofocus)]
         assert [written["reason_code"], written["reason_autofocus_code"]] == codes

@@ -126,7 +126,7 @@ def test_a_use_without_a_number_is_null_and_one_pass_is_said_as_one(tmp_path: Pa
     (one,) = found.found
     assert pass_list.verdict(found).startswith("one pass, which complies: transmitter above 20 deg and at broadside,")
     lost = found._replace(found=(one._replace(utilization=math.inf, status="fail", requirement=None, row=None),))
-    assert json.loads(pass_list.as_json("0", lost))["passes"][0]["utilization"] is None
+    assert json.loads(pass_list.as_json(lost, Style()))["passes"][0]["utilization"] is None
     text = pass_list.as_text(lost, Style())
     assert text.startswith("one pass, which does not comply:")
     assert ">1e5 %" in text

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from fnmatch import fnmatchcase
 from typing import Any, NamedTuple
 
-from bisar_budget.constants import UTILIZATION_TOLERANCE
+from bisar_budget.constants import GATING_MODELS, UTILIZATION_TOLERANCE
 from bisar_budget.effects.effect import MOTION, PLATFORMS
 from bisar_budget.faults import Changed, KeyPath
 from bisar_budget.findings.mission import MissionFindings
@@ -13,7 +13,7 @@ from bisar_budget.findings.requirement import NAMES
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.changes import parts_of
-from bisar_budget.mission.model import GATING_MODELS, Mission, Requirements, Waiver
+from bisar_budget.mission.model import Mission, Requirements, Waiver
 from bisar_budget.mission.parts import figure_text
 from bisar_budget.report.words.sentences import dotted, percent
 from bisar_budget.settings import TABLE

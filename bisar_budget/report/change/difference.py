@@ -1,11 +1,9 @@
 """Effects of a change on missions, as text, Markdown or JSON `bisar-budget/diff/1`."""
 
-import json
 from collections.abc import Iterable, Iterator
 from typing import Any, NamedTuple
 
-from bisar_budget.faults import changes_words, printable
-from bisar_budget.findings.mission import MissionFindings
+from bisar_budget.faults import printable
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report.change.comparison import (
@@ -16,11 +14,18 @@ from bisar_budget.report.change.comparison import (
     Moved,
     Refusal,
 )
-from bisar_budget.report.words.requirements import overrides_lines, overrides_words
-from bisar_budget.report.words.sentences import counted, markdown_text, percent, row_size, table, wrapped
+from bisar_budget.report.formats.json_document import document_text, outside_item
+from bisar_budget.report.words.requirements import file_words, overrides_lines, overrides_words
+from bisar_budget.report.words.sentences import (
+    counted,
+    markdown_row,
+    markdown_text,
+    percent,
+    row_size,
+    table,
+    wrapped,
+)
 from bisar_budget.units import format_quantity
-
-FORMAT = "bisar-budget/diff/1"
 
 
 def as_text(comparison: ChangeSet, gate: Gate | None, all_rows: bool = False) -> str:
@@ -107,7 +112,7 @@ def _arrows(words: str) -> str:
 
 
 def _text(mission: MissionChange, gate: Gate | None, all_rows: bool) -> list[str]:
-    lines = [*wrapped(printable(f"{mission.before.file} -> {_named(mission.after)}"), "  ")]
+    lines = [*wrapped(printable(f"{mission.before.file} -> {file_words(mission.after)}"), "  ")]
     lines += [*overrides_lines(mission.after), ""]
     for block in _blocks(_changed(mission, gate)):
         lines += [*block, ""]
@@ -120,11 +125,6 @@ def _text(mission: MissionChange, gate: Gate | None, all_rows: bool) -> list[str
     if refused := _refused_lines(mission, gate):
         lines += [*refused, ""]
     return [*lines, *wrapped(_summary(mission, gate, all_rows), "  ")]
-
-
-def _named(found: MissionFindings) -> str:
-    """Name a mission by its file and the options that changed it."""
-    return f"{found.file} {changes_words(found.changes)}".rstrip()
 
 
 def _shown(mission: MissionChange, gate: Gate | None, all_rows: bool) -> list[Change]:
@@ -174,19 +174,21 @@ def _summary(mission: MissionChange, gate: Gate | None, all_rows: bool) -> str:
     return text
 
 
+_COLUMNS = ("row", "declared", "allowable", "use before", "use after", "erosion", "status")  # of a pull request
+
+
 def as_markdown(comparison: ChangeSet, gate: Gate | None, all_rows: bool = False) -> str:
     """Write the same for the comment of a pull request, with declared and allowable values."""
     lines: list[str] = []
     for mission in comparison.missions:
-        lines += [f"### {markdown_text(_named(mission.after))}: {_summary(mission, gate, all_rows)}", ""]
+        lines += [f"### {markdown_text(file_words(mission.after))}: {_summary(mission, gate, all_rows)}", ""]
         if outside := overrides_words(mission.after, with_changes=False):
             lines += [f"From outside the file: {markdown_text(outside)}", ""]
         lines += [*_items(_changed(mission, gate)), *_items(_refused(mission, gate))]
         lines += [""] if lines[-1] else []
         changes = _shown(mission, gate, all_rows)
         if changes:
-            lines.append("| row | declared | allowable | use before | use after | erosion | status |")
-            lines.append("| --- | --- | --- | --- | --- | --- | --- |")
+            lines += [markdown_row(_COLUMNS), markdown_row("---" for _ in _COLUMNS)]
         for change in changes:
             cells = (
                 markdown_text(change.id),
@@ -197,7 +199,7 @@ def as_markdown(comparison: ChangeSet, gate: Gate | None, all_rows: bool = False
                 _erosion(change),
                 _statuses(change).replace("->", "→"),
             )
-            lines.append(f"| {' | '.join(cells)} |")
+            lines.append(markdown_row(cells))
         lines += [""] if changes else []
     lines += _items(_refused(comparison, gate))
     lines += [f"- {markdown_text(text)}" for text in _of_no_mission(comparison, gate)]
@@ -209,15 +211,13 @@ def _values(change: Change, field: str, mission: MissionChange) -> str:
     for row, found in ((change.before, mission.before), (change.after, mission.after)):
         value = getattr(row, field, None)
         rounding = "down" if field == "allowable" else "nearest"
-        texts.append("-" if row is None or value is None else row_size(value, row, found, rounding))
+        texts.append("-" if row is None else row_size(value, row, found, rounding))
     return texts[0] if texts[0] == texts[1] else " → ".join(texts)
 
 
-def as_json(version: str, comparison: ChangeSet, gate: Gate | None) -> str:
+def as_json(comparison: ChangeSet, gate: Gate | None) -> str:
     """Write the contract; keys may be added, never changed or removed."""
-    document = {
-        "format": FORMAT,
-        "version": version,
+    content = {
         "tolerated_erosion": None if gate is None else gate.tolerated,
         "allow": [] if gate is None else list(gate.allowed),
         "allow_unused": [] if gate is None else comparison.unused(gate),
@@ -228,7 +228,7 @@ def as_json(version: str, comparison: ChangeSet, gate: Gate | None) -> str:
         "refused": [_refusal(one) for one in _refusals(comparison, gate)],
         "missions": [_mission(mission, gate) for mission in comparison.missions],
     }
-    return json.dumps(document, indent=2, allow_nan=False) + "\n"
+    return document_text("bisar-budget/diff/1", content)
 
 
 def _mission(mission: MissionChange, gate: Gate | None) -> dict[str, Any]:
@@ -239,8 +239,7 @@ def _mission(mission: MissionChange, gate: Gate | None) -> dict[str, Any]:
             name: {
                 "file": found.file,
                 "status": found.status,
-                "set": [change._asdict() for change in found.changes],
-                "overrides": [one._asdict() for one in found.overrides],
+                **outside_item(found),
             }
             for name, found in (("before", mission.before), ("after", mission.after))
         },

@@ -6,6 +6,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from bisar_budget.findings.status import STATUS
 from bisar_budget.report.explain.notation import WorkedEquation
 
 
@@ -34,6 +35,11 @@ class Badge:
     """The word of a status, or of the verdict of an image, with its mark and colour."""
 
     status: str
+
+    @property
+    def words(self) -> str:
+        """Its word on a page."""
+        return STATUS[self.status].words if self.status in STATUS else self.status
 
 
 @dataclass(frozen=True, slots=True)

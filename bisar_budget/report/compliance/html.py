@@ -72,8 +72,7 @@ def _text(text: doc.Text) -> Markup:
         case doc.Styled(style, inner):
             return Markup('<span class="{}">{}</span>').format(style, _text(inner))
         case doc.Badge(status):
-            words = STATUS[status].words if status in STATUS else status
-            return Markup('<span class="status {}">{}</span>').format(status, words)
+            return Markup('<span class="status {}">{}</span>').format(status, text.words)
         case doc.Use(part, status):
             if part is None:
                 return Markup("")

@@ -6,13 +6,12 @@ from html import escape, unescape
 
 from bisar_budget.faults import printable
 from bisar_budget.findings.mission import Report
-from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
 from bisar_budget.report.compliance import document as doc
 from bisar_budget.report.compliance.summary import compliance
 from bisar_budget.report.explain import notation
 from bisar_budget.report.explain.notation import Sum, WorkedEquation
-from bisar_budget.report.words.sentences import markdown_text, uri
+from bisar_budget.report.words.sentences import markdown_row, markdown_text, uri
 
 _BAR, _LIMIT = 20, 16  # characters of a bar, and of a use as large as its limit
 _BRACKETED = {"own-id": " ({})", "origin": "({})"}
@@ -52,8 +51,8 @@ def _text(text: doc.Text, badge: str = "**{}**") -> str:
             return markdown_text(words)
         case doc.Styled(style, inner):
             return _BRACKETED.get(style, "{}").format(_text(inner, badge))
-        case doc.Badge(status):
-            return badge.format(STATUS[status].words if status in STATUS else markdown_text(status))
+        case doc.Badge():
+            return badge.format(markdown_text(text.words))
         case doc.Use(part):
             return "" if part is None else f" {_use(part)}"
         case doc.Bar(part):
@@ -149,7 +148,7 @@ def _table(table: doc.TextTable) -> str:
     heads = [_text(head.text) for head in table.heads]
     rules = ["---:" if head.style == "number" else "---" for head in table.heads]
     rows = [[_text(cell, badge="{}") for cell in row] for row in table.rows]
-    return "\n".join(f"| {' | '.join(cells)} |" for cells in (heads, rules, *rows))
+    return "\n".join(map(markdown_row, (heads, rules, *rows)))
 
 
 def _formulas(parts: Iterable[WorkedEquation | str | doc.Equality]) -> Iterator[str]:

@@ -25,6 +25,7 @@ from bisar_budget.report.words.sentences import (
     row_size,
     sentence,
     shown_use,
+    use_words,
 )
 from bisar_budget.units import format_in, format_quantity
 
@@ -117,8 +118,8 @@ def matrix_table(page: Page, rows: Iterable[Row], label: str, caption: str) -> d
             (
                 (name, doc.Styled("own-id", doc.Name(row.requirement_id))) if row.requirement_id else name,
                 doc.Badge(row.status),
-                (use_text(row), doc.Use(use, row.status)),
-                "–" if row.declared is None else row_size(row.declared, row, page.found),
+                (dashed(use_words(use)), doc.Use(use, row.status)),
+                dashed(row_size(row.declared, row, page.found)),
                 dashed(allowable_words(row, page.found)),
                 "–" if row.status == "not_evaluated" else margin(row),
                 what_sets_it(page, row),
@@ -155,12 +156,6 @@ def all_remarks(page: Page) -> Iterator[tuple[str, Sequence[str]]]:
     """Remarks of each row of the matrix, besides its numbers."""
     for row in page.matrix:
         yield row.id, [text for text in (row.reason, *row.remarks, *row.refuted) if text]
-
-
-def use_text(row: Row) -> str:
-    """Utilization of a row in words."""
-    use = shown_use(row)
-    return "–" if use is None else percent(use)
 
 
 def limit_words(value: float, unit: str) -> str:
@@ -231,7 +226,7 @@ def method(row: Row, verdict: str | None) -> str:
     analysis = f"analysis: {row.equation}"
     if verdict is None:
         return analysis
-    return f"{analysis}; simulation: {STATUS[verdict].words if verdict in STATUS else verdict}"
+    return f"{analysis}; simulation: {doc.Badge(verdict).words}"
 
 
 # ---------------------------------------------------------------------- contributions

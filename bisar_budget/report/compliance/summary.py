@@ -22,7 +22,6 @@ from bisar_budget.report.compliance.rows import (
     matrix_table,
     page_of,
     undeclared_table,
-    use_text,
 )
 from bisar_budget.report.drawing.geometry_views import geometry_elevation, geometry_plan
 from bisar_budget.report.words.identity import (
@@ -47,10 +46,12 @@ from bisar_budget.report.words.sentences import (
     counted,
     dashed,
     measure,
+    own_id,
     phase_limit,
     requirement_size,
     sentence,
     shown_use,
+    use_words,
 )
 from bisar_budget.units import format_quantity
 
@@ -185,10 +186,10 @@ def _index_line(page: Page) -> doc.Line:
     worst = judged[0].id if judged else ""
     if decides and not (judged and judged[0].status == found.status):
         worst = decides[0]
-    use = use_text(judged[0]) if judged and worst == judged[0].id else "–"
+    use = shown_use(judged[0]) if judged and worst == judged[0].id else None
     counts = ", ".join(f"{count} {STATUS[status].words}" for status, count in found.summary.items())
-    name = doc.Name(page.name, page.anchor)
-    return name, doc.Name(page.file), doc.Badge(found.status), doc.Name(worst) if worst else "–", use, counts
+    name, decided = doc.Name(page.name, page.anchor), doc.Name(worst) if worst else "–"
+    return name, doc.Name(page.file), doc.Badge(found.status), decided, dashed(use_words(use)), counts
 
 
 def _made(report: Report) -> doc.Chapter:
@@ -308,11 +309,10 @@ def _drivers(page: Page) -> Iterator[Row]:
 
 
 def _driver(row: Row, found: MissionFindings) -> tuple[doc.Text, doc.Text]:
-    own_id = f" [{row.requirement_id}]" if row.requirement_id else ""
     said = f"{sentence(measure(row, found))}."
     said += f" {sentence('; '.join(row.decisive))}." if row.decisive else ""
     bar = doc.Use(shown_use(row), row.status)
-    return (doc.Styled("id", doc.Name(row.id)), own_id, " ", doc.Badge(row.status), " ", bar), said
+    return (doc.Styled("id", doc.Name(row.id)), own_id(row), " ", doc.Badge(row.status), " ", bar), said
 
 
 def _matrix(page: Page) -> Iterator[doc.Block]:

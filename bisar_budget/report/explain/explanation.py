@@ -59,7 +59,7 @@ from bisar_budget.report.explain.explained_spreading import (
 )
 from bisar_budget.report.explain.notation import Step, Sum, WorkedEquation, number, step, with_unit
 from bisar_budget.report.words.requirements import requirement_finding, requirement_id
-from bisar_budget.report.words.sentences import percent, row_limit, row_size, wrapped
+from bisar_budget.report.words.sentences import own_id, percent, row_limit, row_size, wrapped
 
 _DEEPER = 3  # a broken equation goes on; no symbol has the width that would put its equals sign there
 _LONGEST_UNIT = 16  # letters, of what may follow a number
@@ -68,8 +68,7 @@ _LONGEST_UNIT = 16  # letters, of what may follow a number
 def explain(mission: Mission, found: MissionFindings, row_id: str) -> str:
     """Write the chain of equations of one row of a mission, with the numbers put in."""
     row = next(row for row in found.rows if row.id == row_id)
-    own_id = f" [{printable(row.requirement_id)}]" if row.requirement_id else ""
-    title = f"{STATUS[row.status].text} {printable(row.id)}{own_id}"
+    title = f"{STATUS[row.status].text} {printable(f'{row.id}{own_id(row)}')}"
     steps = [line for step in _to_utilization(mission, found, row) for line in step.lines]
     if row.declared is not None and row.allowable is not None and row.utilization is not None:
         steps.append(f"                = {percent(row.utilization)}")  # under the sum of the last step
@@ -467,7 +466,7 @@ def _verdict(row: Row, found: MissionFindings) -> Iterator[str]:
     yield ""
     texts = [text for text in (row.reason, *row.notes) if text]
     declared = "" if row.declared is None else f", declared {row_size(row.declared, row, found)}"
-    allowable = "" if row.allowable is None else f", allowable {row_limit(row.allowable, row, found)}"
+    allowable = "" if row.allowable is None else f", allowable {row_limit(row, found)}"
     yield f"{STATUS[row.status].text}{declared}{allowable}"
     yield from (f"    {printable(text)}" for text in texts)
 

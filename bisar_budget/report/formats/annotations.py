@@ -21,6 +21,7 @@ from bisar_budget.report.words.sentences import (
     command_text,
     counted,
     finding,
+    markdown_row,
     markdown_text,
     percent,
     uri,
@@ -97,7 +98,7 @@ def step_summary(report: Report, style: Style) -> str:
     """Write the table that GitHub shows on the page of the run, as Markdown."""
     missions = counted(len(report.missions), "mission")
     lines = [f"### bisar-budget: {STATUS[report.status].text}, {missions}", ""]
-    lines += ["| status | mission | worst row | use |", "| --- | --- | --- | --- |"]
+    lines += [markdown_row(("status", "mission", "worst row", "use")), markdown_row(["---"] * 4)]
     for mission in report.missions:
         file = markdown_text(source_path(mission.file, style))
         if isinstance(mission, UnusableMission):
@@ -112,7 +113,7 @@ def step_summary(report: Report, style: Style) -> str:
         if outside := overrides_words(mission, with_changes=False):
             file += "; from outside the file: " + markdown_text(outside)
         status = STATUS[mission.status].text + ("; each error alone" if mission.combine == "each" else "")
-        lines.append(f"| {status} | {file} | {markdown_text(row.id)} | {use} |")
+        lines.append(markdown_row((status, file, markdown_text(row.id), use)))
     usable = [mission for mission in report.missions if isinstance(mission, MissionFindings)]
     broken = [requirement_finding(one) for found in usable for one in found.requirements if STATUS[one.status].fails]
     broken += [finding(row, found) for found in usable for row in found.rows if STATUS[row.status].fails]

@@ -1,6 +1,5 @@
 """Answers of solve and sensitivity, as text for reading and as JSON: `solve/1` and `sensitivity/1`."""
 
-import json
 import math
 import re
 from collections.abc import Iterator, Sequence
@@ -13,34 +12,21 @@ from bisar_budget.faults import printable
 from bisar_budget.findings.requirement import NAMES
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
-from bisar_budget.report.formats.json_document import verdict_item
+from bisar_budget.report.formats.json_document import document_text, outside_item, verdict_item
 from bisar_budget.report.words.requirements import title_lines
-from bisar_budget.report.words.sentences import BINDING_WORDS, counted, percent, table, wrapped
+from bisar_budget.report.words.sentences import BINDING_WORDS, counted, percent, table, use_words, wrapped
 from bisar_budget.units import format_quantity
 
-_FORMATS = {"solve": "bisar-budget/solve/1", "sensitivity": "bisar-budget/sensitivity/1"}
 _SGR = {"crossing": "32", "all": "32", "some": "32", "none": "1;31"}
-
 
 Answer = Solution | Comparison | Sensitivity
 
 
-def as_json(version: str, answers: Sequence[Answer]) -> str:
+def as_json(answers: Sequence[Answer], style: Style) -> str:
     """Write the contract of the command that was asked; values in SI, null where there is none."""
     command = "sensitivity" if isinstance(answers[0], Sensitivity) else "solve"
-    missions = [_head(one) | _document(one) for one in answers]
-    document = {"format": _FORMATS[command], "version": version, "missions": missions}
-    return json.dumps(document, indent=2, allow_nan=False) + "\n"
-
-
-def _head(found: Answer) -> dict[str, Any]:
-    """The keys that every answer begins with."""
-    return {
-        "file": found.file,
-        "name": found.name,
-        "set": [change._asdict() for change in found.changes],
-        "overrides": [one._asdict() for one in found.overrides],
-    }
+    missions = [{"file": one.file, "name": one.name, **outside_item(one), **_document(one)} for one in answers]
+    return document_text(f"bisar-budget/{command}/1", {"missions": missions})
 
 
 def _document(found: Answer) -> dict[str, Any]:
@@ -168,11 +154,10 @@ def _lines_of_parts(found: Comparison, style: Style) -> Iterator[str]:
     rows = [["part", *(["kind"] if is_mixed else []), "status", "use", ""]]
     for part in found.parts:
         stands = part.standing
-        use = "-" if stands.utilization is None else percent(stands.utilization)
         row = printable(part.reason) if part.reason else stands.row or _undecided(stands.requirement)
         marks = f"{' *' if part.is_given else ''}{' -' if part.silent_on else ''}"
         kind = [part.kind] if is_mixed else []
-        rows.append([f"{part.id}{marks}", *kind, STATUS[stands.status].text, use, row])
+        rows.append([f"{part.id}{marks}", *kind, STATUS[stands.status].text, use_words(stands.utilization), row])
     yield from table(rows)
     yield ""
     if any(part.is_given for part in found.parts):

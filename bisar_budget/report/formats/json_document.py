@@ -1,9 +1,9 @@
 """The report as JSON, `bisar-budget/check/1`. Keys may be added, never changed or removed."""
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from bisar_budget.faults import Fault
 from bisar_budget.findings.images import Verdict
@@ -16,6 +16,9 @@ from bisar_budget.findings.trade import TradeStudy
 from bisar_budget.geometry import PlatformState
 from bisar_budget.mission.model import Shares
 from bisar_budget.report import Piece, Style
+
+if TYPE_CHECKING:
+    from bisar_budget.report.words.requirements import AboutMission
 
 FORMAT = "bisar-budget/check/1"
 
@@ -66,6 +69,19 @@ def _indented(value: Any, levels: int, margin: str = "") -> str:
         else:
             content = between.join([_indented(item, levels - 1, inner) for item in value])
     return f"{opening}\n{inner}{content}\n{margin}{closing}"
+
+
+def document_text(form: str, content: Mapping[str, Any]) -> str:
+    """A document of the contract `form` of another command; a number that is not finite is refused."""
+    return json.dumps({"format": form, "version": __version__, **content}, indent=2, allow_nan=False) + "\n"
+
+
+def outside_item(found: "AboutMission") -> dict[str, Any]:
+    """Changes from outside the file of a mission, as every contract has them."""
+    return {
+        "set": [change._asdict() for change in found.changes],
+        "overrides": [one._asdict() for one in found.overrides],
+    }
 
 
 def fault_item(fault: Fault) -> dict[str, Any]:

@@ -1,6 +1,5 @@
 """Passes of a satellite as text for reading, as `passes/1`, CSV, and as events of a calendar (RFC 5545)."""
 
-import json
 import math
 import re
 from collections import Counter
@@ -8,6 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from datetime import UTC, date, datetime
 from typing import Any
 
+from bisar_budget import __version__
 from bisar_budget.design.passes import Passes, SatellitePass
 from bisar_budget.faults import printable
 from bisar_budget.findings.requirement import NAMES
@@ -15,20 +15,17 @@ from bisar_budget.findings.status import STATUS
 from bisar_budget.paths.instant import DAY, Instant
 from bisar_budget.report import Style
 from bisar_budget.report.formats.csv_table import csv_text
+from bisar_budget.report.formats.json_document import document_text, outside_item
 from bisar_budget.report.words.identity import digest
 from bisar_budget.report.words.requirements import title_lines
-from bisar_budget.report.words.sentences import percent, sentence, spreadsheet_text, wrapped
+from bisar_budget.report.words.sentences import percent, sentence, spaced, spreadsheet_text, use_words, wrapped
 from bisar_budget.units import format_quantity
-
-FORMAT = "bisar-budget/passes/1"
 
 
 # ---------------------------------------------------------------- for programs
-def as_json(version: str, passes: Passes) -> str:
+def as_json(passes: Passes, style: Style) -> str:
     """Write the contract; values in SI and radians, null where there is none."""
-    document = {
-        "format": FORMAT,
-        "version": version,
+    content = {
         "file": passes.file,
         "name": passes.name,
         "model": passes.model,
@@ -37,8 +34,7 @@ def as_json(version: str, passes: Passes) -> str:
         "until": passes.stop.as_text(),
         "min_elevation_rad": passes.min_elevation,
         "asked_squint_rad": passes.squint,
-        "set": [change._asdict() for change in passes.changes],
-        "overrides": [one._asdict() for one in passes.overrides],
+        **outside_item(passes),
         "without_orbit": [
             {
                 "platform": one.platform,
@@ -50,7 +46,7 @@ def as_json(version: str, passes: Passes) -> str:
         ],
         "passes": [_item(one) for one in passes.found],
     }
-    return json.dumps(document, indent=2, allow_nan=False) + "\n"
+    return document_text("bisar-budget/passes/1", content)
 
 
 def _item(one: SatellitePass) -> dict[str, Any]:
@@ -91,7 +87,7 @@ def direction(one: SatellitePass) -> str:
     return "ascending" if one.is_ascending else "descending"
 
 
-def as_csv(passes: Passes) -> str:
+def as_csv(passes: Passes, style: Style) -> str:
     """Write a line for each pass, values in SI and radians, empty where there is none."""
     whose = [spreadsheet_text(text) for text in (passes.file, passes.name, passes.platform)]
     lines: list[list[object]] = [["file", "name", "platform", *_item(_NO_PASS)]]
@@ -173,16 +169,12 @@ def _table(found: Sequence[SatellitePass], style: Style) -> Iterator[str]:
     heads = [tuple(head[place] for head in _HEADS) for place in (0, 1)]
     widths = [max(len(row[column]) for row in (*heads, *cells)) for column in range(len(_HEADS))]
     widths[0] = 8  # as in every table
+    sides = "".join(head[2] for head in _HEADS)
     for head in heads:
-        yield _row(head, widths)
+        yield spaced(head, widths, sides).rstrip()
     for one, row in zip(found, cells, strict=True):
-        line = _row(row, widths)
+        line = spaced(row, widths, sides).rstrip()
         yield style.coloured(line[:8], STATUS[one.status].sgr) + line[8:]
-
-
-def _row(cells: Sequence[str], widths: Sequence[int]) -> str:
-    each = zip(cells, widths, _HEADS, strict=True)
-    return " ".join(f"{cell:{head[2]}{width}}" for cell, width, head in each).rstrip()
 
 
 def _cells(one: SatellitePass) -> tuple[str, ...]:
@@ -201,7 +193,7 @@ def _cells(one: SatellitePass) -> tuple[str, ...]:
         _degrees(one.gradient_angle, 1),
         " x ".join(map(_metres, sizes)) if None not in sizes else "-",
         "-" if one.doubt is None else format_quantity(one.doubt, "m"),
-        "-" if one.utilization is None else percent(one.utilization),
+        use_words(one.utilization),
     )
 
 
@@ -283,13 +275,13 @@ _HALF_HOUR = 1800.0  # s; no satellite passes twice in it, and newer elements mo
 _OCTETS = 75  # of a line, its end not counted
 
 
-def as_ics(version: str, passes: Passes, stamp: date) -> str:
+def as_ics(passes: Passes, stamp: date) -> str:
     """Write an event for each pass (RFC 5545), made on the day `stamp` of UTC.
 
     Lines end with a line feed, in whose place a calendar has CR and LF. An event keeps its UID with newer elements,
     as long as the pass stays in its half hour.
     """
-    lines = ["BEGIN:VCALENDAR", "VERSION:2.0", f"PRODID:-//bisar-budget//passes {version}//EN"]
+    lines = ["BEGIN:VCALENDAR", "VERSION:2.0", f"PRODID:-//bisar-budget//passes {__version__}//EN"]
     seen: Counter[str] = Counter()
     made = _stamp(datetime(stamp.year, stamp.month, stamp.day, tzinfo=UTC))
     for one in passes.found:

@@ -3,11 +3,11 @@
 Its specifications are also requirements below those of the mission, for Sphinx-Needs and for StrictDoc.
 """
 
-import json
 import math
 from collections.abc import Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
+from bisar_budget import __version__
 from bisar_budget.design.offers import Offer, OfferedFigure
 from bisar_budget.faults import printable
 from bisar_budget.findings.requirement import NAMES
@@ -18,29 +18,24 @@ from bisar_budget.report import Style
 from bisar_budget.report.compliance import document as doc
 from bisar_budget.report.drawing.share_bars import LIMITS, limiting, share_bars
 from bisar_budget.report.formats.csv_table import csv_text
+from bisar_budget.report.formats.json_document import document_text, outside_item
 from bisar_budget.report.formats.text_table import requirement_table
 from bisar_budget.report.formats.traceability import identifier, needs_document
 from bisar_budget.report.words.identity import Identity, distinct, identities
 from bisar_budget.report.words.requirements import overrides_words, requirement_lines, title_lines
 from bisar_budget.report.words.sentences import counted, need_text, percent, rst_text, table, wrapped
 
-_FORMAT = "bisar-budget/allocate/1"
 _LISTED = 3  # parts of the catalogue that a table names
 _COLUMNS = ("file", "key", "value", "ordered", "unit", "text", "declared", "weight", "parts")
 
 
-class Answer(NamedTuple):
-    """A sheet, and the offer that is held to it, if any."""
-
-    sheet: SpecificationSheet
-    offer: Offer | None = None
+Answer = tuple[SpecificationSheet, Offer | None]  # the offer is what is held to the sheet, if any
 
 
 # ---------------------------------------------------------------- for programs
-def as_json(version: str, answers: Sequence[Answer]) -> str:
+def as_json(answers: Sequence[Answer], style: Style) -> str:
     """Write the contract; values in SI, null where there is none."""
-    document = {"format": _FORMAT, "version": version, "missions": [_document(one) for one in answers]}
-    return json.dumps(document, indent=2, allow_nan=False) + "\n"
+    return document_text("bisar-budget/allocate/1", {"missions": [_document(one) for one in answers]})
 
 
 def _document(answer: Answer) -> dict[str, Any]:
@@ -48,8 +43,7 @@ def _document(answer: Answer) -> dict[str, Any]:
     return {
         "file": sheet.file,
         "name": sheet.name,
-        "set": [change._asdict() for change in sheet.changes],
-        "overrides": [one._asdict() for one in sheet.overrides],
+        **outside_item(sheet),
         "status": sheet.status,
         "complies": sheet.complies,
         "model": sheet.model,
@@ -98,7 +92,7 @@ def _offer(offer: Offer) -> dict[str, Any]:
     }
 
 
-def as_csv(answers: Sequence[Answer]) -> str:
+def as_csv(answers: Sequence[Answer], style: Style) -> str:
     """Write a line for each specification, values in SI; what each takes of a requirement stands behind the rest."""
     shares = [key for key in NAMES if any(key in one.shares for sheet, _ in answers for one in sheet.specifications)]
     lines: list[list[object]] = [[*_COLUMNS, *(f"share of {key}" for key in shares)]]
@@ -149,7 +143,7 @@ def _verdict(sheet: SpecificationSheet) -> str:
         return "no specification can be found: other errors leave no room"
     number = sum(one.value is not None for one in sheet.specifications)
     count = counted(number, "specification")
-    stands = STATUS[sheet.status].text if sheet.status in STATUS else sheet.status
+    stands = STATUS[sheet.status].text
     if not number:
         return f"no requirement limits any of these errors: check says {stands}"
     if not sheet.complies:
@@ -169,11 +163,10 @@ def _line(one: Specification) -> list[str]:
 
 
 def _offered(offer: Offer) -> str:
-    stands = STATUS[offer.status].text if offer.status in STATUS else offer.status
     outside = sum(one.is_inside is False for one in offer.figures)
     of_all = f"of {counted(len(offer.figures), 'figure')} {outside} {'is' if outside == 1 else 'are'} outside"
     other = f"; it differs in {', '.join(offer.notes)} too" if offer.notes else ""
-    return f"Offer {printable(offer.file)}: the mission as a whole says {stands}; {of_all}{other}."
+    return f"Offer {printable(offer.file)}: the mission as a whole says {STATUS[offer.status].text}; {of_all}{other}."
 
 
 def _parts_words(one: Specification) -> str:
@@ -224,30 +217,30 @@ def _side(figure: OfferedFigure) -> str:
 
 
 # ---------------------------------------------------------------- for a board, and a supplier
-def as_markdown(version: str, answers: Sequence[Answer]) -> str:
+def as_markdown(answers: Sequence[Answer], style: Style) -> str:
     """Write the sheets as Markdown, without drawings."""
     from bisar_budget.report.compliance.markdown import written
 
-    return written(_sheets(version, answers), "")
+    return written(_sheets(answers), "")
 
 
-def as_html(version: str, answers: Sequence[Answer]) -> str:
+def as_html(answers: Sequence[Answer], style: Style) -> str:
     """Write the sheets as a page of their own."""
     from bisar_budget.report.compliance.html import page
 
-    return page(_sheets(version, answers))
+    return page(_sheets(answers))
 
 
-def _sheets(version: str, answers: Sequence[Answer]) -> doc.Compliance:
+def _sheets(answers: Sequence[Answer]) -> doc.Compliance:
     chapters = [_chapter(one, f"sheet-{number}") for number, one in enumerate(answers, 1)]
     names = [printable(sheet.name) for sheet, _ in answers]
-    facts = doc.Facts([("Tool", f"bisar-budget {version}")])
+    facts = doc.Facts([("Tool", f"bisar-budget {__version__}")])
     margins = [
-        doc.Margins(chapter.anchor, name, "", printable(one.sheet.file))
-        for chapter, name, one in zip(chapters, names, answers, strict=True)
+        doc.Margins(chapter.anchor, name, "", printable(sheet.file))
+        for chapter, name, (sheet, _) in zip(chapters, names, answers, strict=True)
     ]
     subject = names[0] if len(names) == 1 else f"{len(names)} missions"
-    return doc.Compliance(version, subject, facts, margins, chapters, title="Specification sheet")
+    return doc.Compliance(__version__, subject, facts, margins, chapters, title="Specification sheet")
 
 
 def _chapter(answer: Answer, anchor: str) -> doc.Chapter:
@@ -331,7 +324,7 @@ ELEMENTS:
 """
 
 
-def as_needs(version: str, answers: Sequence[Answer], style: Style) -> str:
+def as_needs(answers: Sequence[Answer], style: Style) -> str:
     """Write each specification as a need of the type `req`, with links to the ids of what it derives from."""
     found: list[tuple[tuple[str, ...], dict[str, Any]]] = []
     for sheet, identity, one in _specified(answers, style):
@@ -345,15 +338,15 @@ def as_needs(version: str, answers: Sequence[Answer], style: Style) -> str:
             "content": "\n\n".join(rst_text(text) for text in content),
         }
         found.append((identity.of(one.key), need))
-    return needs_document(version, _PREFIX, found)
+    return needs_document(__version__, _PREFIX, found)
 
 
-def as_sdoc(version: str, answers: Sequence[Answer], style: Style) -> str:
+def as_sdoc(answers: Sequence[Answer], style: Style) -> str:
     """Write each specification as a requirement of a document that StrictDoc reads, its parents by their UIDs."""
     found = list(_specified(answers, style))
     names = [identity.of(one.key) for _, identity, one in found]
     uids = distinct([identifier(_PREFIX, name) for name in names], names)
-    lines = ["[DOCUMENT]", f"TITLE: specifications, by bisar-budget {version}", "", _GRAMMAR]
+    lines = ["[DOCUMENT]", f"TITLE: specifications, by bisar-budget {__version__}", "", _GRAMMAR]
     for uid, (sheet, _, one) in zip(uids, found, strict=True):
         lines += ["[REQUIREMENT]", f"UID: {uid}", f"TITLE: {printable(_title(sheet, one))}"]
         lines += [f"STATEMENT: {printable(_statement(one))}", f"RATIONALE: {printable(_rationale(sheet, one))}"]

@@ -34,9 +34,11 @@ from bisar_budget.report.words.sentences import (
     binding_words,
     counted,
     matters,
-    percent,
+    own_id,
     row_size,
     shown_use,
+    spaced,
+    use_words,
     wrapped,
     wrapped_counts,
 )
@@ -113,8 +115,7 @@ def requirement_table(mission: MissionFindings, style: Style) -> Iterator[str]:
     found = list(requirement_lines(mission))
     cells = [COLUMNS[:4], *((one.name, one.allowed, one.reached, one.use) for one in found)]
     widths = [max(len(line[column]) for line in cells) for column in range(4)]
-    numbers = (f"{COLUMNS[0]:<{widths[0]}}", *_right(COLUMNS[1:4], widths[1:]))
-    yield f"{' '.join(numbers)} {COLUMNS[4]:<{_STATUS}} {COLUMNS[5]}"
+    yield spaced(COLUMNS, [*widths, _STATUS, 0], "<>>><<")
     for one in found:
         yield from _requirement(one, widths, style)
 
@@ -130,17 +131,13 @@ def _requirements(mission: MissionFindings, style: Style) -> Iterator[str]:
 
 def _requirement(one: RequirementLine, widths: Sequence[int], style: Style) -> Iterator[str]:
     """One line; what decides stands below it where it is too long."""
-    start = " ".join((f"{one.name:<{widths[0]}}", *_right((one.allowed, one.reached, one.use), widths[1:])))
+    start = spaced((one.name, one.allowed, one.reached, one.use), widths, "<>>>")
     decided = ", ".join(filter(None, (one.decided_by, one.remark)))
     if len(start) + 10 + len(decided) <= WIDTH:
         yield f"{start} {_word(one.status, style, _STATUS)} {decided}"
     else:
         yield f"{start} {_word(one.status, style)}"
         yield from wrapped(f"    {decided}", "    ")
-
-
-def _right(cells: Sequence[str], widths: Sequence[int]) -> list[str]:
-    return [cell.rjust(width) for cell, width in zip(cells, widths, strict=True)]
 
 
 def _head(mission: MissionFindings, style: Style) -> Iterator[tuple[str, str]]:
@@ -220,11 +217,8 @@ def _table_key(rows: Sequence[Row], hidden: Sequence[Row]) -> str:
 
 
 def _row(row: Row, mission: MissionFindings) -> tuple[str, ...]:
-    size = "-" if row.declared is None else row_size(row.declared, row, mission)
-    use = shown_use(row)
-    used = "-" if use is None else percent(use)
-    name = f"{STATUS[row.status].text:<{_STATUS}} {row.id}"
-    return name, size, allowable_words(row, mission), used, _limited_by(row)
+    name, size = f"{STATUS[row.status].text:<{_STATUS}} {row.id}", row_size(row.declared, row, mission)
+    return name, size, allowable_words(row, mission), use_words(shown_use(row)), _limited_by(row)
 
 
 def _limited_by(row: Row) -> str:
@@ -263,9 +257,8 @@ def _detail(rows: Sequence[Row], texts: Sequence[str], mission: MissionFindings,
     file = printable(mission.file)
     names = []
     for row in rows:
-        own_id = f" [{row.requirement_id}]" if row.requirement_id else ""
         place = f"{file}:{row.line}" if row.line is not None else file
-        names.append(f"{row.id}{own_id} ({place})")
+        names.append(f"{row.id}{own_id(row)} ({place})")
     first, *rest = wrapped(f"{STATUS[rows[0].status].text} {', '.join(names)}", "  ")
     yield _lead(first, rows[0].status, style)
     yield from rest

@@ -1,18 +1,16 @@
 """Verdicts of the images on the limits: text for reading, JSON `bisar-budget/verify/1`."""
 
-import json
 import math
 from collections.abc import Iterator, Sequence
 
 from bisar_budget.faults import printable
 from bisar_budget.findings.images import Verdict, VerifiedMission
 from bisar_budget.report import Style
-from bisar_budget.report.formats.json_document import verdict_item
+from bisar_budget.report.formats.json_document import document_text, outside_item, verdict_item
 from bisar_budget.report.words.requirements import file_words, overrides_lines
 from bisar_budget.report.words.sentences import table, wrapped, wrapped_counts
 from bisar_budget.units import format_limit, format_quantity
 
-FORMAT = "bisar-budget/verify/1"
 WORDS = {
     "optimistic": "optimistic",
     "confirmed": "confirmed",
@@ -23,25 +21,20 @@ _OTHER = {"published": "full", "full": "II", "strictest": "other"}
 _ANSI = {"optimistic": "1;31", "confirmed": "32", "conservative": "33", "not_evaluated": "35"}
 
 
-def as_json(version: str, missions: Sequence[VerifiedMission]) -> str:
-    """Write the contract; a number that is not finite is refused."""
-    document = {
-        "format": FORMAT,
-        "version": version,
-        "missions": [
-            {
-                "file": mission.file,
-                "name": mission.name,
-                "status": mission.status,
-                "set": [change._asdict() for change in mission.changes],
-                "overrides": [one._asdict() for one in mission.overrides],
-                "conditions": mission.conditions,
-                "rows": [verdict_item(row) for row in mission.rows],
-            }
-            for mission in missions
-        ],
-    }
-    return json.dumps(document, indent=2, allow_nan=False) + "\n"
+def as_json(missions: Sequence[VerifiedMission], style: Style) -> str:
+    """Write the contract."""
+    found = [
+        {
+            "file": mission.file,
+            "name": mission.name,
+            "status": mission.status,
+            **outside_item(mission),
+            "conditions": mission.conditions,
+            "rows": [verdict_item(row) for row in mission.rows],
+        }
+        for mission in missions
+    ]
+    return document_text("bisar-budget/verify/1", {"missions": found})
 
 
 def as_text(missions: Sequence[VerifiedMission], style: Style) -> str:

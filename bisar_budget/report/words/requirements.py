@@ -12,7 +12,7 @@ from bisar_budget.findings.requirement import DeclaredKinds, JudgedRequirement, 
 from bisar_budget.findings.row import SPECIFICATION, Row
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
-from bisar_budget.report.words.sentences import percent, requirement_size, wrapped
+from bisar_budget.report.words.sentences import requirement_size, use_words, wrapped
 from bisar_budget.units import format_quantity
 
 COLUMNS = ("requirement", "allowed", "reached", "use", "status", "decided by")
@@ -77,7 +77,7 @@ def requirement_lines(mission: MissionFindings) -> Iterator[RequirementLine]:
             name=one.name,
             allowed=requirement_size(allowed, one, "down"),
             reached=requirement_size(reached, one),
-            use="-" if one.utilization is None or one.allowed is None or is_open else percent(one.utilization),
+            use=use_words(None if one.allowed is None or is_open else one.utilization),
             status=one.status,
             decided_by=(_short(one.reason) if is_open and one.reason else one.row) or ("" if remark else "-"),
             remark=remark,

@@ -3,7 +3,7 @@
 import math
 import os
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 from bisar_budget.faults import KeyPath, Place, printable
 from bisar_budget.findings.mission import MissionFindings
@@ -56,6 +56,16 @@ def percent(ratio: float) -> str:
     return f"{value} %"
 
 
+def use_words(use: float | None) -> str:
+    """A utilization in percent; a dash where there is none."""
+    return "-" if use is None else percent(use)
+
+
+def own_id(row: Row) -> str:
+    """Requirement of the project that a row concerns, in brackets behind its id; empty where the file names none."""
+    return f" [{row.requirement_id}]" if row.requirement_id else ""
+
+
 def measure(row: Row, mission: MissionFindings) -> str:
     """Say what is declared, what is allowed and how much of it is used."""
     if row.metric == DECLARE:
@@ -63,7 +73,7 @@ def measure(row: Row, mission: MissionFindings) -> str:
     declared = "not declared" if row.declared is None else f"declared {row_size(row.declared, row, mission)}"
     if row.allowable is None:
         return declared
-    text = f"{declared}, allowable {row_limit(row.allowable, row, mission)}"
+    text = f"{declared}, allowable {row_limit(row, mission)}"
     if binding := binding_words(row):
         text += f" (limited by the {binding})"
     return text if row.utilization is None else f"{text}, {percent(row.utilization)} of it used"
@@ -77,8 +87,7 @@ def cause(row: Row) -> str:
 def finding(row: Row, mission: MissionFindings) -> str:
     """Say both, and which requirement of the project it concerns."""
     why = cause(row)
-    own_id = f" [{row.requirement_id}]" if row.requirement_id else ""
-    return f"{row.id}{own_id}: {measure(row, mission)}{f'. {sentence(why)}' if why else ''}"
+    return f"{row.id}{own_id(row)}: {measure(row, mission)}{f'. {sentence(why)}' if why else ''}"
 
 
 def counted(count: int, noun: str) -> str:
@@ -106,26 +115,28 @@ _PHASE_UNIT = "deg"  # of the phase requirement that a file does not state
 _OF_PHASES = ("quadratic_phase_error", "cubic_phase_error", "spatial_variance")  # rows that add phases up
 
 
-def row_size(value: float, row: Row, mission: MissionFindings, rounding: str = "nearest") -> str:
+def row_size(value: float | None, row: Row, mission: MissionFindings, rounding: str = "nearest") -> str:
     """Write a number of a row: in the unit of its value in the file, of phases together in that of their requirement.
 
-    Without a unit there, with a prefix that keeps it readable.
+    Without a unit there, with a prefix that keeps it readable; a dash where there is none.
     """
+    if value is None:
+        return "-"
     given = _given(row.line, row.unit)
     if not given and row.unit == "rad" and row.subject.kind in _OF_PHASES:
         given = phase_unit(mission)
     return format_in(value, row.unit, given, 3, rounding)
 
 
-def row_limit(value: float, row: Row, mission: MissionFindings) -> str:
-    """Write an allowable of a row, rounded down, so that copied from the page into a file it passes."""
-    return row_size(value, row, mission, "down")
+def row_limit(row: Row, mission: MissionFindings) -> str:
+    """Write the allowable of a row, rounded down, so that copied from the page into a file it passes."""
+    return row_size(row.allowable, row, mission, "down")
 
 
 def allowable_words(row: Row, mission: MissionFindings) -> str:
     """The allowable of a row; a dash where it was not judged, or where its metric has no limit of its own."""
     if row.allowable is not None:
-        return row_limit(row.allowable, row, mission)
+        return row_limit(row, mission)
     is_open = row.status in ("not_evaluated", "info") or row.metric in ("pslr", "islr", DECLARE)
     return "-" if is_open else "no limit"
 
@@ -182,6 +193,11 @@ def wrapped_counts(text: str) -> list[str]:
     return [line.replace("\u00a0", " ") for line in wrapped(joined, "  ")]
 
 
+def spaced(cells: Sequence[str], widths: Sequence[int], sides: str) -> str:
+    """Cells in columns of some widths, each to the left `<` or to the right `>` of its own."""
+    return " ".join(f"{cell:{side}{width}}" for cell, width, side in zip(cells, widths, sides, strict=True))
+
+
 def table(rows: Sequence[Sequence[str]]) -> list[str]:
     """Align rows of cells, the header first."""
     return [line for lines in aligned(rows) for line in lines]
@@ -196,8 +212,7 @@ def aligned(rows: Sequence[Sequence[str]]) -> Iterator[list[str]]:
     room = WIDTH - sum(widths[1:]) - len(widths) + 1
     first = max(len(row[0]) for row in rows if len(row[0]) <= max(room, len(rows[0][0])))  # the header stays whole
     for name, *cells in rows:
-        numbers = " ".join(cell.rjust(width) for cell, width in zip(cells[:-1], widths[1:-1], strict=True))
-        rest = f"{numbers} {cells[-1]}".rstrip()
+        rest = f"{spaced(cells[:-1], widths[1:-1], '>' * (len(cells) - 1))} {cells[-1]}".rstrip()
         yield [f"{name:<{first}} {rest}"] if len(name) <= first else [name, f"{'':<{first}} {rest}"]
 
 
@@ -231,6 +246,11 @@ def markdown_text(text: str) -> str:
     """Escape for Markdown, also in a table or at the start of a line."""
     escaped = _MARKDOWN_SPECIAL.sub(_markdown_escape, printable(text))
     return _MARKDOWN_NUMBER.sub(lambda match: f"{match[1]}&#{ord(match[2])};", escaped)
+
+
+def markdown_row(cells: Iterable[str]) -> str:
+    """A line of a table in Markdown."""
+    return f"| {' | '.join(cells)} |"
 
 
 def command_text(text: str) -> str:
