@@ -140,14 +140,11 @@ def ground_history() -> tuple[Matrix, ...]:
     return tuple(Matrix([sum(u[axis] for u in both) for axis in range(2)]) for both in looks)
 
 
-def ground_matrix() -> Matrix:
-    """Q = −[s; ṡ], (2, 2): takes a ground point to its constant and linear range. [-], [1/s]"""
-    s, rate, *_ = ground_history()
-    return -Matrix([list(s), list(rate)])
-
-
 def gradient_inverse() -> tuple[tuple[Symbol, ...], Matrix, Expr]:
-    """Gradients s_x, s_y, ṡ_x, ṡ_y on the ground, and adjugate (2, 2) and determinant of their Q = −[s; ṡ]."""
+    """Gradients s_x, s_y, ṡ_x, ṡ_y on the ground, and adjugate (2, 2) and determinant of their Q = −[s; ṡ].
+
+    Q takes a ground point to its constant and linear range. [-], [1/s]
+    """
     s, rate = Matrix([real("s_x"), real("s_y")]), Matrix([real("sdot_x"), real("sdot_y")])
     Q = -Matrix([list(s), list(rate)])
     return (*s, *rate), Q.adjugate(), Q.det()
@@ -269,15 +266,6 @@ def _collected(coefficient: Expr) -> Expr:
     """Write β̃ₙ for what the table has, and keep what the displacement adds."""
     order = 2 + effective_coefficients().index(coefficient)
     return Add(real(f"beta_{order}tilde"), expand(coefficient - range_error()[order]), evaluate=False)
-
-
-def at_constant_range(expression: Expr) -> Expr:
-    """Replace u by (r + vτ)/R, as (17) has it: u is r/R, u̇ is v/R and the rest vanishes."""
-    for platform in PLATFORMS:
-        held = (platform.position / platform.slant_range, platform.velocity / platform.slant_range)
-        for derivative, value in zip(platform.look, (*held, *[Matrix([0, 0, 0])] * (ORDER - 1)), strict=True):
-            expression = expression.subs(dict(zip(derivative, value, strict=True)))
-    return expand(expression)
 
 
 @cache
