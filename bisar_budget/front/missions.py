@@ -10,10 +10,16 @@ import numpy as np
 from bisar_budget.design.cases import Cases, grid, table_file
 from bisar_budget.design.cases import grid_of as grid_of_arrays
 from bisar_budget.design.cases import sample as sample_of
-from bisar_budget.mission.given import is_quantity, magnitude, text_of
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.mission.model import Mission
-from bisar_budget.mission.quantities import QuestionError, number_of, tree_of
+from bisar_budget.mission.quantities import (
+    QuestionError,
+    is_quantity,
+    magnitude,
+    number_of,
+    text_of,
+    tree_of,
+)
 
 
 def load(path: str | os.PathLike[str]) -> Mission:

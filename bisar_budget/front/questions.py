@@ -23,10 +23,9 @@ from bisar_budget.front.results import (
     SolveResult,
 )
 from bisar_budget.front.sweeps import SweepResult
-from bisar_budget.mission.given import text_of
 from bisar_budget.mission.load import load_mission
 from bisar_budget.mission.model import Mission
-from bisar_budget.mission.quantities import QuestionError
+from bisar_budget.mission.quantities import QuestionError, text_of
 from bisar_budget.mission.readers import Quantity
 from bisar_budget.resources import cores
 from bisar_budget.sampling.probability import monte_carlo as monte_carlo_of

@@ -5,7 +5,6 @@ __all__ = [
     "changes",
     "covariance",
     "edited",
-    "given",
     "instruments",
     "load",
     "model",

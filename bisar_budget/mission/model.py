@@ -513,8 +513,8 @@ class Mission(NamedTuple):
         return not self == other
 
     def replace(self, values: Mapping[str, Any]) -> "Mission":
-        """A mission with other values in place of the file's; arguments and faults are those of `given.changed`."""
-        from bisar_budget.mission.given import changed  # which reads a mission
+        """A mission with other values in place of the file's; see `quantities.changed`."""
+        from bisar_budget.mission.quantities import changed  # which reads a mission
 
         return changed(self, values)
 

@@ -34,16 +34,16 @@ from bisar_budget.paths.flight import (
     Orbit,
     PathDoubt,
     PathFileError,
+    around_aperture,
     interpolated,
     slow_times,
     smoothed,
     stretch_around,
 )
 from bisar_budget.paths.instant import DAY, Instant
-from bisar_budget.paths.log_places import LogKeys, around_aperture, hold_to_motion
-from bisar_budget.paths.orbit_formats import ORBIT_FORMATS, hold_to_format, hold_to_log
+from bisar_budget.paths.log_places import LogKeys, hold_to_motion
 from bisar_budget.paths.orientation import UNKNOWN, Orientation, read_finals
-from bisar_budget.paths.recognised import read_log
+from bisar_budget.paths.path_formats import ORBIT_FORMATS, hold_to_format, hold_to_log, read_log
 from bisar_budget.paths.sbet import read_accuracy
 from bisar_budget.resources import DISK, Files, UnreadableError
 from bisar_budget.units import format_quantity

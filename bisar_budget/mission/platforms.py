@@ -70,7 +70,7 @@ _PLACES = np.linspace(-1, 1, 65)[:, None]
 
 FRAMES = Choice("scene", "track", "look", "ric")
 TIME_TAG = Quantity(units.TIME, ge=-1e3, le=1e3)
-# As of `paths.recognised`, which every check would wait for: it loads the readers of them all.
+# As of `paths.path_formats`, which every check would wait for: it loads the readers of them all.
 _LOG_FORMATS = ("csv", "sbet", "pos", "nmea", "gpx", "ulog")
 PARTS = either(list, TextList(), Reference())
 

@@ -6,9 +6,8 @@ __all__ = [
     "flight",
     "instant",
     "log_places",
-    "orbit_formats",
     "orientation",
-    "recognised",
+    "path_formats",
     "sbet",
     "visibility",
 ]

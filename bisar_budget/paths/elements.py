@@ -1,23 +1,47 @@
-"""Mean elements of an orbit, propagated by SGP4.
+"""Mean elements of orbits: two-line sets and orbit mean-elements messages (OMM), propagated by SGP4.
 
 SGP4 places a satellite about 1 km off at the epoch of its elements, and 1 to 3 km more with each day from it
 (documentation of the package sgp4; Vallado and others, Revisiting Spacetrack Report #3, AIAA 2006-6753). Constants
 are those of WGS-72, which the elements are made with. Places in the true equator and mean equinox of date turn to the
 Earth by the mean sidereal time of 1982.
+
+Two-line sets are those of Hoots & Roehrich, Spacetrack Report No. 3, 1980, section 12, with Space-Track's alpha-5
+catalogue numbers. Messages are those of CCSDS 502.0-B, as text of keywords and values, as XML, JSON or CSV. JSON and
+CSV have the message's keywords. CelesTrak leaves those out there that can have one value only; Space-Track writes all
+of them.
 """
 
+import csv
+import io
+import json
 import math
-from collections.abc import Callable, Sequence
+import re
+from calendar import isleap
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
+from bisar_budget.faults import shown
 from bisar_budget.geometry import Vector
 from bisar_budget.paths.flight import Orbit, PathDoubt, PathFileError, Sample, interpolate
-from bisar_budget.paths.instant import DAY, Instant
-from bisar_budget.paths.messages import object_key, one_object
-from bisar_budget.paths.orientation import INSTALL, Orientation, from_teme
+from bisar_budget.paths.instant import DAY, Instant, day_of_year
+from bisar_budget.paths.messages import (
+    EARLIEST,
+    LATEST,
+    decoded,
+    epoch_in,
+    hold_to_size,
+    is_markup,
+    number_in,
+    object_key,
+    one_object,
+    parse_markup,
+)
+from bisar_budget.paths.orientation import INSTALL, UNKNOWN, Orientation, from_teme
 
-PLAIN_TYPES = ("", "0", "2")  # CCSDS 502.0-B-3, EPHEMERIS_TYPE; 0 is SGP4 in all that is distributed, 4 is SGP4-XP
+# CCSDS 502.0-B-3, EPHEMERIS_TYPE; 0 is SGP4 in all that is distributed, 4 is SGP4-XP. Two-line sets have a digit.
+_PROPAGATED = ("", "0", "2", "SGP4")
 _DAY_OF_1950 = 33281  # modified Julian day of 1949-12-31, from which SGP4 counts days
 _NODES, _STEP_S = 8, 30.0
 _FRESH_DAYS = 7.0
@@ -132,23 +156,8 @@ def orbit_of(
 ) -> Orbit:
     """Orbit of one object, by the elements whose epoch is nearest; of two that are as near the last of the file.
 
-    Parameters
-    ----------
-    found : sequence of Elements
-        What the file has.
-    name : str
-        What messages call the file.
-    wanted : str, optional
-        Name or catalogue number of the object.
-    center : Instant
-        Middle of the aperture.
-    orientation : Orientation
-        What places are turned to the Earth with.
-
-    Raises
-    ------
-    PathFileError
-        There are no elements, or those of several objects; SGP4 is missing or refuses.
+    All but the elements of a file are arguments of its reader; `wanted` is a name or a catalogue number. A
+    `PathFileError` says that there are no elements, or those of several objects; that SGP4 is missing or refuses.
     """
     if not found:
         raise PathFileError(f"{name}: has no element set")
@@ -186,15 +195,309 @@ def _failure(error: int) -> str:
     return _FAILURES.get(error, "it gives no number")
 
 
-def angle_of(degrees: float, most: float, called: str, where: str) -> float:
+def _hold_to_type(kind: str, where: str) -> None:
+    if kind not in _PROPAGATED:
+        raise PathFileError(f"{where}: the elements are of type {shown(kind)}, which SGP4 does not propagate")
+
+
+def _angle(degrees: float, most: float, called: str, where: str) -> float:
     """An angle of a file, in rad, which must be within its range."""
     if not 0 <= degrees <= most:
         raise PathFileError(f"{where}: {called} must be from 0 to {most:g} degrees (got {degrees:g})")
     return math.radians(degrees)
 
 
-def motion_of(turns: float, where: str) -> float:
+def _mean_motion(turns: float, where: str) -> float:
     """From revolutions a day, to rad/min."""
     if not 0 < turns < 20:
         raise PathFileError(f"{where}: mean motion must be more than 0 and less than 20 a day (got {turns:g})")
     return turns * 2 * math.pi / 1440
+
+
+# ---------------------------------------------------------------------- two-line sets
+_COLUMNS = 69
+_DECIMAL = r"\d+\.\d*"
+
+
+def read_tle(
+    data: bytes, name: str, wanted: str | None, center: Instant, orientation: Orientation = UNKNOWN
+) -> Orbit:
+    """Orbit from two-line element sets, as every reader of `ORBIT_FORMATS` gives it.
+
+    A line of the name may stand above each. Blank lines, and those that begin with `#`, are no part of the file.
+    """
+    hold_to_size(len(data), name)
+    return orbit_of(list(element_sets(decoded(data, name), name)), name, wanted, center, orientation)
+
+
+def element_sets(text: str, name: str) -> Iterator[Elements]:
+    """The element sets of a file."""
+    above: tuple[int, str] | None = None
+    first: tuple[int, str] | None = None
+    for at, line in enumerate(text.removeprefix("\ufeff").split("\n"), 1):
+        line = line.rstrip(" \t\r")
+        if not line or line.startswith("#"):
+            continue
+        where = f"{name}:{at}"
+        if not line.isascii() or not line.isprintable():
+            wrong = next(one for one in line if not one.isascii() or not one.isprintable())
+            raise PathFileError(f"{where}: has a character that element sets do not have (got {shown(wrong)})")
+        if first is not None:
+            if not _begins(line, "2"):
+                raise PathFileError(f"{where}: must be line 2 of the set that begins in line {first[0]}{_got(line)}")
+            yield _from_lines(first, (at, line), above[1] if above else "", name)
+            above = first = None
+        elif _begins(line, "1"):
+            first = (at, line)
+        elif _begins(line, "2"):
+            raise PathFileError(f"{where}: is line 2 of an element set; its line 1 must come before it")
+        elif above is not None:
+            raise PathFileError(f"{where}: must be line 1 of the set that line {above[0]} names{_got(line)}")
+        else:
+            above = (at, shown(line.removeprefix("0 ").strip()))
+    if first is not None:
+        raise PathFileError(f"{name}:{first[0]}: line 1 of an element set has no line 2 after it")
+    if above is not None:
+        raise PathFileError(
+            f"{name}:{above[0]}: must be line 1 of an element set, or a name above one{_got(above[1])}"
+        )
+
+
+def _got(line: str) -> str:
+    return f" (got {shown(line)})"
+
+
+def _begins(line: str, number: str) -> bool:
+    return line[0] == number and line[1:2] in ("", " ")
+
+
+def _from_lines(first: tuple[int, str], second: tuple[int, str], object_name: str, name: str) -> Elements:
+    lines = {}
+    for at, line in (first, second):
+        where = f"{name}:{at}"
+        if len(line) != _COLUMNS:
+            raise PathFileError(f"{where}: has {len(line)} columns, a line of an element set has {_COLUMNS}")
+        digits = (sum(n * line.count(str(n), 0, -1) for n in range(1, 10)) + line.count("-", 0, -1)) % 10
+        if line[-1] != str(digits):
+            raise PathFileError(f"{where}: the checksum is {line[-1]}, its digits give {digits}")
+        lines[line[0]] = (where, line)
+    (where_1, line_1), (where_2, line_2) = lines["1"], lines["2"]
+    number, again = _catalogue_number(line_1, where_1), _catalogue_number(line_2, where_2)
+    if number != again:
+        raise PathFileError(f"{where_2}: is of object {again}, line 1 above it of {number}")
+    _hold_to_type(line_1[62].strip(), where_1)
+
+    def angle(start: int, end: int, most: float, called: str) -> float:
+        """Angle in columns of line 2, counted from 1."""
+        return _angle(_column(line_2, where_2, start, end, called, _DECIMAL), most, called, where_2)
+
+    return Elements(
+        name=object_name,
+        number=number,
+        epoch=_epoch(line_1, where_1),
+        mean_motion=_mean_motion(_column(line_2, where_2, 53, 63, "mean motion", _DECIMAL), where_2),
+        eccentricity=_column(line_2, where_2, 27, 33, "eccentricity", r"\d{7}", "0."),
+        inclination=angle(9, 16, 180, "inclination"),
+        node=angle(18, 25, 360, "ascending node"),
+        perigee=angle(35, 42, 360, "argument of perigee"),
+        anomaly=angle(44, 51, 360, "mean anomaly"),
+        drag=_drag(line_1, where_1),
+        kind="two-line elements",
+        where=where_1,
+    )
+
+
+def _column(line: str, where: str, start: int, end: int, called: str, form: str, before: str = "") -> float:
+    text = line[start - 1 : end].strip()
+    if not re.fullmatch(form, text, re.ASCII):
+        raise PathFileError(f"{where}: {called} must be a number in columns {start} to {end} (got {shown(text)})")
+    return float(before + text)
+
+
+def _catalogue_number(line: str, where: str) -> int:
+    """Five digits, or a letter for ten thousands from 10 on, without I and O, and four digits."""
+    text = line[2:7].strip()
+    if re.fullmatch(r"\d{1,5}", text, re.ASCII):
+        return int(text)
+    if re.fullmatch(r"[A-HJ-NP-Z]\d{4}", text, re.ASCII):
+        return (10 + "ABCDEFGHJKLMNPQRSTUVWXYZ".index(text[0])) * 10000 + int(text[1:])
+    raise PathFileError(f"{where}: the catalogue number must be in columns 3 to 7 (got {shown(text)})")
+
+
+def _epoch(line: str, where: str) -> Instant:
+    year = int(_column(line, where, 19, 20, "epoch year", r"\d\d"))
+    year += 1900 if year >= 57 else 2000
+    called = "epoch day"
+    _column(line, where, 21, 32, called, r"\d{1,3}\.\d+")
+    day, fraction = line[20:32].strip().split(".")
+    found = day_of_year(year, int(day))
+    if found is None:
+        raise PathFileError(f"{where}: {called} must be from 1 to {365 + isleap(year)} (got {day}.{fraction})")
+    return Instant(found, float(f"0.{fraction}") * DAY)
+
+
+def _drag(line: str, where: str) -> float:
+    """B*: five digits behind a decimal point that is not written, and an exponent of a sign and a digit."""
+    text = line[53:61].strip()
+    match = re.fullmatch(r"([+-]?)\.?(\d{1,5})\s?([+-]\d)", text, re.ASCII)
+    if match is None:
+        raise PathFileError(f"{where}: B* must be a number in columns 54 to 61 (got {shown(text)})")
+    return float(f"{match[1]}0.{match[2]}e{match[3]}")
+
+
+# ---------------------------------------------------------------------- orbit mean-elements messages
+_VERSION = "CCSDS_OMM_VERS"
+_Records = Iterator[tuple[str, Mapping[str, Any]]]
+_MANDATORY = {
+    "MEAN_ELEMENT_THEORY": ("SGP4", "SGP/SGP4"),  # the second in examples of CCSDS 502.0-B
+    "REF_FRAME": ("TEME",),
+    "TIME_SYSTEM": ("UTC",),
+    "CENTER_NAME": ("EARTH",),
+}
+
+
+def read_omm(
+    data: bytes, name: str, wanted: str | None, center: Instant, orientation: Orientation = UNKNOWN
+) -> Orbit:
+    """Orbit from orbit mean-elements messages, as every reader of `ORBIT_FORMATS` gives it."""
+    hold_to_size(len(data), name)
+    if is_markup(data):
+        records = _from_markup(data, name)
+    else:
+        text = decoded(data, name)
+        begins = text.lstrip()
+        if begins[:1] in ("[", "{"):
+            records = _from_json(text, name)
+        else:
+            records = _from_keywords(text, name) if begins.startswith(_VERSION) else _from_csv(text, name)
+    found = [_from_message(record, where) for where, record in records]
+    return orbit_of(found, name, wanted, center, orientation)
+
+
+def _from_markup(data: bytes, name: str) -> _Records:
+    for message in parse_markup(data, name).all("omm"):
+        leaves = {}
+        for block in ("metadata", "meanElements", "tleParameters"):
+            for found in message.all(block):
+                leaves.update({one.name: one.text.strip() for one in found.children})
+        yield _complete(leaves, f"{name}:{message.line}")
+
+
+def _from_keywords(text: str, name: str) -> _Records:
+    """Messages of a text that has a keyword and a value in each line; each begins with its version."""
+    leaves: dict[str, str] = {}
+    began = 0
+    for at, line in enumerate(text.split("\n"), 1):
+        line = line.strip()
+        if not line or line.startswith("COMMENT"):
+            continue
+        key, equals, value = (part.strip() for part in line.partition("="))
+        if not equals:
+            raise PathFileError(f"{name}:{at}: must be a keyword, = and its value (got {shown(line)})")
+        if key == _VERSION:
+            if began:
+                yield _complete(leaves, f"{name}:{began}")
+            leaves, began = {}, at
+        elif key in leaves:
+            raise PathFileError(f"{name}:{at}: {shown(key)} is there twice in the message of line {began}")
+        else:
+            leaves[key] = value.partition("[")[0].strip()  # a unit, in brackets, is the standard's own
+    if began:
+        yield _complete(leaves, f"{name}:{began}")
+
+
+def _complete(leaves: Mapping[str, Any], where: str) -> tuple[str, Mapping[str, Any]]:
+    """A message of the standard, which may not leave out what it is about."""
+    for key in _MANDATORY:
+        _value(leaves, key, where)
+    return where, leaves
+
+
+def _from_json(text: str, name: str) -> _Records:
+    try:
+        found = json.loads(text)
+    except json.JSONDecodeError as error:
+        raise PathFileError(f"{name}:{error.lineno}: is not JSON: {error.msg}") from None
+    except (RecursionError, ValueError):  # brackets without end, digits without end
+        raise PathFileError(f"{name}: is not JSON of orbit mean-elements messages") from None
+    records = found if isinstance(found, list) else [found]
+    for count, record in enumerate(records, 1):
+        where = f"{name}: record {count}" if records is found else name
+        if not isinstance(record, dict):
+            raise PathFileError(f"{where}: must have keywords and values")
+        # A list or a mapping is no value of any keyword.
+        yield where, {key: value for key, value in record.items() if isinstance(value, str | int | float)}
+
+
+def _from_csv(text: str, name: str) -> _Records:
+    lines = csv.reader(io.StringIO(text, newline=""))
+    try:
+        header = next(lines, [])
+        if "NORAD_CAT_ID" not in header and "EPOCH" not in header:
+            said = "is empty" if not text.strip() else "is no orbit mean-elements message"
+            raise PathFileError(f"{name}: {said}; accepted: text of keywords, XML, JSON, CSV with a line of keywords")
+        for line in lines:
+            if not line:
+                continue
+            where = f"{name}:{lines.line_num}"
+            if len(line) != len(header):
+                raise PathFileError(f"{where}: has {len(line)} values, line 1 has {len(header)} keywords")
+            yield where, dict(zip(header, line, strict=True))
+    except csv.Error as error:
+        raise PathFileError(f"{name}:{lines.line_num}: is not CSV: {error}") from None
+
+
+def _value(record: Mapping[str, Any], key: str, where: str) -> Any:
+    value = record.get(key)
+    if value is None or value == "":
+        raise PathFileError(f"{where}: has no {key}")
+    return value
+
+
+def _from_message(record: Mapping[str, Any], where: str) -> Elements:
+    for key, accepted in _MANDATORY.items():
+        value = record.get(key)
+        if value not in (None, "") and str(value).strip().upper() not in accepted:
+            raise PathFileError(f"{where}: {key} must be {accepted[0]} (got {shown(str(value))})")
+    _hold_to_type(str(record.get("EPHEMERIS_TYPE", "")).strip(), where)
+
+    def number(key: str) -> float:
+        value = _value(record, key, where)
+        found = number_in(value)
+        if found is None:
+            raise PathFileError(f"{where}: {key} must be a number (got {shown(str(value))})")
+        return found
+
+    def angle(key: str, most: float) -> float:
+        return _angle(number(key), most, key, where)
+
+    catalogue = number("NORAD_CAT_ID")
+    if not 0 <= catalogue <= 999_999_999 or catalogue != int(catalogue):
+        raise PathFileError(
+            f"{where}: NORAD_CAT_ID must be a whole number of up to nine digits"
+            f" (got {shown(str(record['NORAD_CAT_ID']))})"
+        )
+    written = str(_value(record, "EPOCH", where))
+    epoch = epoch_in(written)
+    if epoch is None or not EARLIEST <= epoch.day < LATEST:
+        raise PathFileError(
+            f"{where}: EPOCH must be an instant such as 2026-05-31T10:12:13.123 (got {shown(written)})"
+        )
+    eccentricity = number("ECCENTRICITY")
+    if not 0 <= eccentricity < 1:
+        raise PathFileError(f"{where}: ECCENTRICITY must be from 0 to less than 1 (got {eccentricity:g})")
+    object_name = record.get("OBJECT_NAME")
+    return Elements(
+        name=shown(" ".join(str(object_name).split())) if object_name is not None else "",
+        number=int(catalogue),
+        epoch=epoch,
+        mean_motion=_mean_motion(number("MEAN_MOTION"), where),
+        eccentricity=eccentricity,
+        inclination=angle("INCLINATION", 180),
+        node=angle("RA_OF_ASC_NODE", 360),
+        perigee=angle("ARG_OF_PERICENTER", 360),
+        anomaly=angle("MEAN_ANOMALY", 360),
+        drag=number("BSTAR"),
+        kind="orbit mean elements",
+        where=where,
+    )

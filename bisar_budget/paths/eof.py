@@ -35,18 +35,9 @@ _ACCURACY = {"AUX_POEORB": 0.05, "AUX_RESORB": 0.10}  # m
 def read_eof(
     data: bytes, name: str, wanted: str | None, center: Instant, orientation: Orientation = UNKNOWN
 ) -> Orbit:
-    """Orbit from an orbit file of a Sentinel, interpolated after Hermite, degree 7.
+    """Orbit from an orbit file of a Sentinel, as every reader of `ORBIT_FORMATS` gives it: after Hermite, degree 7.
 
-    Parameters
-    ----------
-    data, name, wanted, center, orientation
-        As of every reader of `ORBIT_FORMATS`. The satellite is `Sentinel-1A` or `S1A`. The orientation is not needed:
-        the axes are those of the Earth.
-
-    Raises
-    ------
-    PathFileError
-        The file is no such file, is of other axes, or has times that do not rise, or as of `orbit_through`.
+    The satellite is `Sentinel-1A` or `S1A`. The orientation is not needed: the axes are those of the Earth.
     """
     hold_to_size(len(data), name, "time")
     if not is_markup(data):

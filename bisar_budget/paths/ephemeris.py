@@ -84,24 +84,8 @@ def orbit_through(
     Of several the one that holds the most around it is taken, for all instants. The error of an interpolation is
     estimated by one of two more degrees, and doubted from 1 m on.
 
-    Parameters
-    ----------
-    segments : sequence of Segment
-        Of any objects.
-    name : str
-        What messages call the file.
-    wanted : str, optional
-        A name of the object.
-    center : Instant
-        Middle of the aperture.
-    orientation : Orientation
-        What `turn` of the segments turns with; its doubts are those of the orbit.
-
-    Raises
-    ------
-    PathFileError
-        The file does not say which object, has no place at `center`, or is too sparse there. `Orbit.place` raises it
-        outside the span.
+    All but the segments of a file are arguments of its reader. A `PathFileError` says that the file does not say
+    which object, has no place at `center`, or is too sparse there; `Orbit.place` raises it outside the span.
     """
     if not segments:
         raise PathFileError(f"{name}: has no ephemeris")

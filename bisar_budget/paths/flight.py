@@ -240,6 +240,16 @@ def _leverage(at: Floats, where: Floats, order: int) -> Floats:
     return np.minimum(found, 1 - 1e-9) if where is at else found
 
 
+def around_aperture(times: Floats, aperture_time_s: float) -> slice:
+    """Which places are in the aperture or next to it, of slow times (n,) [s].
+
+    The largest sigma of them counts: a mean would declare less error than the log has at some time of the aperture.
+    """
+    half = aperture_time_s / 2
+    first = max(int(np.searchsorted(times, -half, "right")) - 1, 0)
+    return slice(first, int(np.searchsorted(times, half, "left")) + 1)
+
+
 def slow_times(
     log: Log, center: Instant | None, center_seconds: float | None, aperture_time_s: float, name: str
 ) -> Floats:
@@ -284,8 +294,7 @@ def slow_times(
 
     slow, half = times - middle, aperture_time_s / 2
     # The interval before the aperture and the one behind it lead into it.
-    first = max(int(np.searchsorted(slow, -half, "right")) - 1, 0)
-    inside = slow[first : int(np.searchsorted(slow, half, "left")) + 1]
+    inside = slow[around_aperture(slow, aperture_time_s)]
     steps = np.diff(inside)
     # A gap as long as the aperture is the only step in it.
     usual = min(float(np.median(steps)), float(np.median(np.diff(slow)))) if steps.size else 0.0

@@ -141,22 +141,9 @@ def is_csv(data: bytes) -> bool:
 
 
 def read_csv(data: bytes, name: str, keys: LogKeys = NOTHING_SAID) -> Log:
-    """Read a log of a flight.
+    """Read a log of a flight, UTF-8 of at most `LARGEST` bytes, as every reader of `LOG_FORMATS` does.
 
-    Parameters
-    ----------
-    data, name, keys
-        As of every reader of `LOG_FORMATS`; UTF-8, at most `LARGEST` bytes.
-
-    Returns
-    -------
-    Log
-        Geodetic places become Earth-fixed ones. Instants become seconds after the first of them.
-
-    Raises
-    ------
-    PathFileError
-        Names the file and the line of the fault: `flight.csv:17: ...`.
+    Geodetic places become Earth-fixed ones. Instants become seconds after the first of them.
     """
     lines = _dataflash_as_csv(_text(data, name).split("\n"))
     header = _header(lines, name, keys)

@@ -31,18 +31,7 @@ def is_gpx(data: bytes) -> bool:
 
 
 def read_gpx(data: bytes, name: str, keys: LogKeys) -> Log:
-    """Read the track of a file.
-
-    Parameters
-    ----------
-    data, name, keys
-        As of every reader of `LOG_FORMATS`; with the `time_scale` utc a time needs no zone.
-
-    Raises
-    ------
-    PathFileError
-        Names the file and the line of the fault.
-    """
+    """Read the track of a file, as every reader of `LOG_FORMATS` does; by the time scale utc a time needs no zone."""
     hold_to_scale("utc", keys, name)
     hold_to_size(len(data), name, "track")
     top = parse_markup(data, name)

@@ -203,16 +203,6 @@ def geodetic_log(
     return Log(times, earth_fixed_places(latitude, longitude, height), True, words, in_utc, sigmas)
 
 
-def around_aperture(times: Floats, aperture_time_s: float) -> slice:
-    """Which places are in the aperture or next to it, of slow times (n,) [s].
-
-    The largest sigma of them counts: a mean would declare less error than the log has at some time of the aperture.
-    """
-    half = aperture_time_s / 2
-    first = max(int(np.searchsorted(times, -half, "right")) - 1, 0)
-    return slice(first, int(np.searchsorted(times, half, "left")) + 1)
-
-
 def counted(number: int, noun: str = "place") -> str:
     """A number with its noun."""
     return f"{number} {noun}" + "s" * (number != 1)

@@ -58,20 +58,10 @@ def is_nmea(data: bytes) -> bool:
 
 
 def read_nmea(data: bytes, name: str, keys: LogKeys) -> Log:
-    """Read a log of NMEA 0183.
+    """Read a log of NMEA 0183 of at most `LARGEST` bytes, as every reader of `LOG_FORMATS` does; needs pynmea2.
 
     Of GGA and GNS those count of which there are more. Where several talkers have a place at one time, those of the
     talker with most count.
-
-    Parameters
-    ----------
-    data, name, keys
-        As of every reader of `LOG_FORMATS`; at most `LARGEST` bytes.
-
-    Raises
-    ------
-    PathFileError
-        Names the file and the line of the fault. The package pynmea2 is not installed.
     """
     hold_to_scale("utc", keys, name)
     hold_to_bytes(data, LARGEST, name)

@@ -52,22 +52,13 @@ class _EphemerisBlock:
 def read_oem(
     data: bytes, name: str, wanted: str | None, center: Instant, orientation: Orientation = UNKNOWN
 ) -> Orbit:
-    """Orbit from an orbit ephemeris message.
+    """Orbit from an orbit ephemeris message, as every reader of `ORBIT_FORMATS` gives it.
 
     A message that names no interpolation is interpolated after Hermite, degree 7, where its velocities are those of
     its places, and otherwise after Lagrange, degree 7. An interpolation of degree n goes through n + 1 places of
     Lagrange, or half as many of Hermite.
 
-    Parameters
-    ----------
-    data, name, wanted, center, orientation
-        As of every reader of `ORBIT_FORMATS`. An object is named by OBJECT_NAME or OBJECT_ID.
-
-    Raises
-    ------
-    PathFileError
-        The message is not what the standard asks for, has axes, a time system or an interpolation that is not known
-        here, or as of `orbit_through`.
+    An object is named by OBJECT_NAME or OBJECT_ID.
     """
     hold_to_size(len(data), name, "time")
     blocks = list(_from_markup(data, name) if is_markup(data) else _from_keywords(decoded(data, name), name))

@@ -66,22 +66,9 @@ def is_solution(data: bytes) -> bool:
 
 
 def read_solution(data: bytes, name: str, keys: LogKeys) -> Log:
-    """Read a solution.
+    """Read a solution of at most `LARGEST` bytes, as every reader of `LOG_FORMATS` does.
 
-    Parameters
-    ----------
-    data, name, keys
-        As of every reader of `LOG_FORMATS`; at most `LARGEST` bytes.
-
-    Returns
-    -------
-    Log
-        With the standard deviations of each place along east, north and up, where the file has some that are not 0.
-
-    Raises
-    ------
-    PathFileError
-        Names the file and the line of the fault.
+    The log has standard deviations of each place along east, north and up, where the file has some that are not 0.
     """
     hold_to_bytes(data, LARGEST, name)
     header: _Columns | None = None

@@ -18,12 +18,11 @@ import numpy as np
 
 from bisar_budget.geometry import Vector
 from bisar_budget.paths.earth import Floats, curvature_radii
-from bisar_budget.paths.flight import Log, PathFileError, hold_to_bytes, slow_times
+from bisar_budget.paths.flight import Log, PathFileError, around_aperture, hold_to_bytes, slow_times
 from bisar_budget.paths.instant import GPS_EPOCH, WEEK, Instant
 from bisar_budget.paths.log_places import (
     LogKeys,
     LogRows,
-    around_aperture,
     geodetic_log,
     hold_to_ellipsoid,
     hold_to_scale,
@@ -80,26 +79,11 @@ def is_sbet(data: bytes) -> bool:
 
 
 def read_sbet(data: bytes, name: str, keys: LogKeys) -> Log:
-    """Read a trajectory.
+    """Read a trajectory of at most `LARGEST` bytes, as every reader of `LOG_FORMATS` does.
 
     Places come from latitude, longitude and height. Velocities, turned out of the wander frame, have to agree with
-    them.
-
-    Parameters
-    ----------
-    data, name, keys
-        As of every reader of `LOG_FORMATS`; at most `LARGEST` bytes. Without a `week` times are seconds of the week,
-        without a start.
-
-    Returns
-    -------
-    Log
-        Earth-fixed. Times rise over the end of a week. A leap second within the file is not counted.
-
-    Raises
-    ------
-    PathFileError
-        Names the file, and the record or byte of the fault.
+    them. Without a `week` times are seconds of the week, without a start. They rise over the end of a week; a leap
+    second within the file is not counted.
     """
     hold_to_scale("gps", keys, name)
     hold_to_ellipsoid(keys, name)

@@ -41,22 +41,12 @@ class _Satellite:
 def read_sp3(
     data: bytes, name: str, wanted: str | None, center: Instant, orientation: Orientation = UNKNOWN
 ) -> Orbit:
-    """Orbit of one satellite of a file.
+    """Orbit of one satellite of a file, such as `G05`, as every reader of `ORBIT_FORMATS` gives it.
 
     Between a satellite's places that are missing, and over a manoeuvre that the file flags, nothing is interpolated.
     Places with velocities of their own are interpolated after Hermite, degree 7; places alone after Lagrange, of the
-    degree from 7 to 15 that is nearest to one of two more degrees around the aperture.
-
-    Parameters
-    ----------
-    data, name, wanted, center, orientation
-        As of every reader of `ORBIT_FORMATS`. A satellite is `G05`, say. The orientation is not needed: the axes are
-        those of the Earth.
-
-    Raises
-    ------
-    PathFileError
-        The file is not what the format asks for, or as of `orbit_through`.
+    degree from 7 to 15 that is nearest to one of two more degrees around the aperture. The orientation is not needed:
+    the axes are those of the Earth.
     """
     hold_to_size(len(data), name, "time")
     lines = decoded(data, name).split("\n")

@@ -98,20 +98,10 @@ def is_ulog(data: bytes) -> bool:
 
 
 def read_ulog(data: bytes, name: str, keys: LogKeys) -> Log:
-    """Read the places of a flight.
+    """Read the places of a flight, as every reader of `LOG_FORMATS` does.
 
     Of the GPS topic and the global position those count of which there are more. A receiver is taken that has most
     fixes.
-
-    Parameters
-    ----------
-    data, name, keys
-        As of every reader of `LOG_FORMATS`.
-
-    Raises
-    ------
-    PathFileError
-        Names the file, and the record or byte of the fault.
     """
     hold_to_scale("utc", keys, name)
     if not is_ulog(data):

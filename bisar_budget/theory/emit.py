@@ -16,7 +16,6 @@ from sympy.printing.precedence import precedence
 from sympy.printing.pycode import PythonCodePrinter
 
 from bisar_budget.theory import differential_range as dr
-from bisar_budget.theory import equations as paper
 from bisar_budget.theory import full, published, random_errors
 from bisar_budget.theory.published import Equation, Table
 from bisar_budget.theory.render import as_latex, as_mathml_content, as_text
@@ -370,7 +369,7 @@ _SHOWN = ("(11)", "(19)", "(22)", "(25)", "(30)", "(31)")
 
 def equations() -> tuple[Equation, ...]:
     """Return the equations that a report shows, the paper's first; of (30) the one at mid-aperture."""
-    shown = (one for one in paper.equations() if one.number in _SHOWN and not one.right.has(paper.tau_i))
+    shown = (one for one in published.equations() if one.number in _SHOWN and not one.right.has(published.tau_i))
     return (*shown, *full.equations())
 
 

@@ -140,14 +140,11 @@ def ground_history() -> tuple[Matrix, ...]:
     return tuple(Matrix([sum(u[axis] for u in both) for axis in range(2)]) for both in looks)
 
 
-def ground_matrix() -> Matrix:
-    """Q = −[s; ṡ], (2, 2): takes a ground point to its constant and linear range. [-], [1/s]"""
-    s, rate, *_ = ground_history()
-    return -Matrix([list(s), list(rate)])
-
-
 def gradient_inverse() -> tuple[tuple[Symbol, ...], Matrix, Expr]:
-    """Gradients s_x, s_y, ṡ_x, ṡ_y on the ground, and adjugate (2, 2) and determinant of their Q = −[s; ṡ]."""
+    """Gradients s_x, s_y, ṡ_x, ṡ_y on the ground, and adjugate (2, 2) and determinant of their Q = −[s; ṡ].
+
+    Q takes a ground point to its constant and linear range. [-], [1/s]
+    """
     s, rate = Matrix([real("s_x"), real("s_y")]), Matrix([real("sdot_x"), real("sdot_y")])
     Q = -Matrix([list(s), list(rate)])
     return (*s, *rate), Q.adjugate(), Q.det()

@@ -1,15 +1,48 @@
-"""The limits of Rigling & Moses: Table I, Table II, vibration, pull-in, derived row by row in print order."""
+"""Rigling & Moses as published: every numbered equation, (1) to (31), Tables I and II, vibration and pull-in.
+
+Equations are defined as the paper does, or derived from those before; tables are derived row by row in print order.
+What the print gets wrong is said where it occurs, and the equation is the right one. Sums keep their indices: i
+counts frequencies, k pulses, m scatterers, k_x and k_y the samples of the rectangular grid.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 
-from sympy import Abs, Eq, Expr, Function, Integer, Rational, Symbol, diff, pi, solve
+from sympy import (
+    Abs,
+    Add,
+    Eq,
+    Expr,
+    Function,
+    I,
+    ImmutableMatrix,
+    IndexedBase,
+    Integer,
+    Inverse,
+    MatMul,
+    Matrix,
+    MatrixBase,
+    MatrixSymbol,
+    Mul,
+    Rational,
+    Sum,
+    Symbol,
+    cos,
+    diff,
+    exp,
+    expand,
+    pi,
+    simplify,
+    sin,
+    solve,
+)
 
 from bisar_budget.theory import differential_range as dr
 from bisar_budget.theory.symbols import (
     AXES,
     PLATFORMS,
+    TRANSMITTER,
     PlatformSymbols,
     T,
     c,
@@ -17,6 +50,7 @@ from bisar_budget.theory.symbols import (
     clock_coefficients,
     islr,
     n_pull,
+    point,
     positive,
     pslr,
     real,
@@ -27,8 +61,7 @@ from bisar_budget.theory.symbols import (
 )
 
 KINDS = ("position", "velocity", "acceleration")
-TOTAL_QPE = pi / 4  # monostatic custom, Section V
-EQUAL_SHARE_QPE = pi / 8  # per platform, Section V
+EQUAL_SHARE_QPE = pi / 8  # per platform, half of the monostatic custom, Section V
 
 
 @dataclass(frozen=True)
@@ -207,3 +240,332 @@ def sensitivity(expression: Expr, error: Symbol) -> Expr:
     if slope.has(error):
         raise ValueError(f"not linear in {error}")
     return slope
+
+
+# ---------------------------------------------------------------------- equations
+DEFINED = "defined"
+
+i, k, m = (Symbol(name, integer=True) for name in "ikm")
+frequency, slow_time, reflectivity = IndexedBase("f"), IndexedBase("tau"), IndexedBase("A")
+frequencies, pulses, scatterers = (Symbol(f"N_{name}", integer=True, positive=True) for name in ("f", "tau", "m"))
+f_i, tau_k, A_m = frequency[i], slow_time[k], reflectivity[m]
+
+# The rectangular grid (13) of the rotated frame. f₀ is the lower edge of the projected band there.
+k_x, k_y = (Symbol(f"k_{axis}", integer=True) for axis in "xy")
+N_x, N_y = (Symbol(f"N_{axis}", integer=True, positive=True) for axis in "xy")
+B_x, B_y, f_0 = positive("B_x"), positive("B_y"), positive("f_0")
+x_turned, y_turned = real("xprime"), real("yprime")
+x_of, y_of = IndexedBase("xprime"), IndexedBase("yprime")  # of the scatterers
+
+phi_b = real("phi_b")
+beta = tuple(real(f"beta_{n}") for n in range(2))
+beta_error = tuple(real(f"beta_{n}tilde") for n in range(4))
+tau_i = real("tau_i")
+piece = tuple(real(f"betatilde_{n}i") for n in range(2))
+piece_range = tuple(real(f"beta_{n}i") for n in range(2))
+
+
+def phase(differential_range: Expr) -> Expr:
+    """Return (2): phase of a sample whose scatterer has a differential range. [rad]"""
+    return -2 * pi * f_i * differential_range / c
+
+
+def in_slow_time(expression: Expr, at: Expr = tau_k) -> Expr:
+    """Put φ_t(τ_k) for φ̄_t, and so on: angles at any time for those of the aperture's middle."""
+    for platform in PLATFORMS:
+        s = platform.subscript
+        expression = expression.subs(
+            {platform.azimuth: Function(f"phi_{s}")(at), platform.elevation: Function(f"theta_{s}")(at)}
+        )
+    return expression
+
+
+def spatial_frequencies() -> Matrix:
+    """Return (8), (3,): −f/2 times the gradient of (6). [Hz]"""
+    return Matrix([f_i / 2 * expand(-diff(dr.far_field_in_angles(), x)) for x in point])
+
+
+def rotation(x: Expr, y: Expr) -> Matrix:
+    """Return (9), (10), (2,): components along the look direction φ_b and 90° counter-clockwise of it."""
+    return Matrix([x * cos(phi_b) + y * sin(phi_b), -x * sin(phi_b) + y * cos(phi_b)])
+
+
+def unrotated(x: Expr, y: Expr) -> Matrix:
+    """Undo `rotation`, (2,)."""
+    return rotation(x, y).subs(phi_b, -phi_b)
+
+
+def exponent(products: Expr) -> Expr:
+    """Exponent of a far-field filter, −jΦ by (2), where x·f_x + y·f_y + z·f_z stands for −f·ΔR/2 by (6) and (8)."""
+    together = real("products")
+    return (-I * phase(-2 * together / f_i)).subs(together, products)
+
+
+def turned_products(f_x: Expr, f_y: Expr) -> Expr:
+    """x·f_x + y·f_y in the rotated coordinates of (9) and (10): x′·f′_x + y′·f′_y."""
+    return simplify(unrotated(x_turned, y_turned).dot(unrotated(f_x, f_y)))
+
+
+def summed(over_frequencies_and_pulses: Expr) -> Expr:
+    """Mean of (4) over frequencies and pulses."""
+    inner = Sum(over_frequencies_and_pulses, (i, 1, frequencies), (k, 1, pulses))
+    return inner / (frequencies * pulses)
+
+
+def received() -> Expr:
+    """Samples S(f_i, τ_k) as a function of both."""
+    return Function("S")(f_i, tau_k)
+
+
+def grid() -> tuple[Expr, Expr]:
+    """Return (13): the rectangular grid of the projected frequencies. [Hz]"""
+    return f_0 + B_x * k_x / N_x, -B_y / 2 + B_y * k_y / N_y
+
+
+def half_angle(theta: Expr) -> Expr:
+    """1 − exp(−jθ) as a phase and a sine: exp(−jθ/2)·2j·sin(θ/2)."""
+    angle = real("theta")
+    chord = expand(exp(I * angle / 2) - exp(-I * angle / 2), complex=True)
+    return (exp(-I * angle / 2) * chord).subs(angle, theta)
+
+
+def geometric_sum(step: Expr, count: Expr) -> tuple[Expr, Expr]:
+    """Σ exp(−j·step·n), n = 0 … count − 1, as the exponent of a phase and a quotient of sines."""
+    total = half_angle(count * step) / half_angle(step)  # Σ qⁿ = (1 − q^N)/(1 − q)
+    turns = [factor for factor in total.args if factor.func is exp]
+    return Add(*(turn.args[0] for turn in turns)), total / Mul(*turns)
+
+
+def response() -> Expr:
+    """Return (16): the filter (14) of the samples (15), its sums done: two Dirichlet kernels for each scatterer."""
+    # Of one scatterer the sums part: exp(−j(4π/c)(x′ − x′_m)(f₀ + B_x k_x/N_x)), and the same in y′.
+    whole, kernels = [], []
+    for offset, start, band, count in (
+        (x_turned - x_of[m], f_0, B_x, N_x),
+        (y_turned - y_of[m], -B_y / 2, B_y, N_y),
+    ):
+        turn, kernel = geometric_sum(4 * pi / c * offset * band / count, count)
+        phase_of_it = -4 * I * pi / c * offset * start + turn
+        # What multiplies the offset: 2f₀ + B_x − B_x/N_x, and B_y/N_y, which is left of −B_y + B_y.
+        whole.append(offset * expand(simplify(phase_of_it / offset / (-2 * I * pi / c))))
+        kernels.append(kernel)
+    turned = exp(-2 * I * pi / c * (whole[0] + whole[1]))
+    return Sum(A_m * turned * kernels[0] * kernels[1], (m, 1, scatterers)) / (N_x * N_y)
+
+
+def general_matrix() -> Matrix:
+    """Return the matrix of (18), (2, 3): a point of space to (β₀, β₁). [-], [1/s]"""
+    return Matrix(dr.linear_differential_range()).jacobian(point)
+
+
+def observed_polynomial() -> tuple[Expr, ...]:
+    """β̂₀ … β̂₃ of (24): what (17) and (23) add up to, order by order."""
+    scatterer = beta[0] + beta[1] * tau
+    error = sum(coefficient * tau**n for n, coefficient in enumerate(beta_error))
+    return dr.coefficients(scatterer + error)
+
+
+def tangent() -> tuple[Expr, Expr]:
+    """Return (27), (28): value and slope at τ_i of the range error as a cubic. [m], [m/s]"""
+    error = sum(coefficient * tau**n for n, coefficient in enumerate(beta_error))
+    return error.subs(tau, tau_i), diff(error, tau).subs(tau, tau_i)
+
+
+@cache
+def piece_inverse() -> tuple[Matrix, Expr]:
+    """Adjugate (2, 2) and determinant of Q_i, platforms where they are at τ_i and their ranges held: (30)."""
+    moved = {
+        coordinate: coordinate + speed * tau_i
+        for platform in PLATFORMS
+        for coordinate, speed in zip(platform.position, platform.velocity, strict=True)
+    }
+    adjugate, determinant = dr.ground_inverse()
+    return adjugate.subs(moved, simultaneous=True), determinant.subs(moved, simultaneous=True)
+
+
+def column(*names: str) -> Matrix:
+    """Column of symbols."""
+    return Matrix([real(name) for name in names])
+
+
+def product(*factors: Expr) -> Expr:
+    """Matrices side by side, not multiplied out."""
+    return MatMul(*(ImmutableMatrix(f) if isinstance(f, MatrixBase) else f for f in factors), evaluate=False)
+
+
+@cache
+def equations() -> tuple[Equation, ...]:
+    """Return every numbered equation of the paper in its order, and the gain by autofocus of Section VI."""
+    return (*_data(), *_images(), *_point_response(), *_ground_point(), *_errors(), *_effects())
+
+
+def _data() -> tuple[Equation, ...]:
+    observed = Function("DeltaRhat_m")(tau)
+    at_k, phi_m = Function("DeltaRhat_m")(tau_k), Function("Phi_m")(f_i, tau_k)
+    noise = Function("w")(f_i, tau_k)
+    return (
+        Equation("(1)", "Delay of a scatterer's echo", Function("t")(tau), observed / c, DEFINED),
+        Equation("(1)", "Observed differential range", observed, dr.observed_differential_range(), DEFINED),
+        Equation("(2)", "Phase of a sample", phi_m, phase(at_k), DEFINED),
+        Equation("(3)", "Phase history", received(), Sum(A_m * exp(I * phi_m), (m, 1, scatterers)) + noise, DEFINED),
+    )
+
+
+def _images() -> tuple[Equation, ...]:
+    x, y, z = point
+    at_k, image = Function("DeltaR")(tau_k), Function("P")
+    tested = Function("Phi_xyz")(f_i, tau_k)
+    f_x, f_y, f_z = (Function(f"f_{axis}")(f_i, tau_k) for axis in AXES)
+    turned = [Function(f"fprime_{axis}")(f_i, tau_k) for axis in "xy"]
+    projected = rotation(real("f_x"), real("f_y"))
+    place = rotation(x, y)
+    grid_x, grid_y = grid()
+    filtered = Function("S")(k_x, k_y) * exp(exponent(x_turned * grid_x + y_turned * grid_y))
+    return (
+        Equation("(4)", "Matched filter", image(x, y, z), summed(received() * exp(-I * tested)), DEFINED),
+        Equation("(5)", "First-order differential range", Function("DeltaR")(tau), dr.far_field_differential_range()),
+        Equation("(6)", "The same in angles", at_k, in_slow_time(dr.far_field_in_angles())),
+        Equation(
+            "(7)",
+            "Far-field filter: (4) with the phase (2) of (6)",
+            image(x, y, z),
+            summed(received() * exp(exponent(x * f_x + y * f_y + z * f_z))),
+        ),
+        *(
+            Equation("(8)", f"Spatial frequency along {axis}", one, in_slow_time(value))
+            for axis, one, value in zip(AXES, (f_x, f_y, f_z), spatial_frequencies(), strict=True)
+        ),
+        *(
+            Equation("(9)", f"Spatial frequency along {axis}′", real(f"fprime_{axis}"), value, DEFINED)
+            for axis, value in zip("xy", projected, strict=True)
+        ),
+        *(
+            Equation("(10)", f"Coordinate {axis}′", real(f"{axis}prime"), value, DEFINED)
+            for axis, value in zip("xy", place, strict=True)
+        ),
+        Equation(
+            "(11)",
+            "Bistatic look angle",
+            phi_b,
+            dr.look_azimuth(),
+            slip="an arctangent of a quotient loses the quadrant: atan2. Section VI calls it (10)",
+        ),
+        Equation(
+            "(12)",
+            "Far-field filter of the ground in rotated coordinates: (7) with (9) and (10)",
+            image(x, y, 0),
+            summed(received() * exp(exponent(turned_products(*turned)))),
+        ),
+        *(
+            Equation(
+                "(13)",
+                f"Rectangular grid along {axis}′",
+                real(f"fprime_{axis}"),
+                value,
+                DEFINED,
+                "" if axis == "y" else "f₀ is the lower edge of the projected band, not of the transmitted one",
+            )
+            for axis, value in zip("xy", (grid_x, grid_y), strict=True)
+        ),
+        Equation(
+            "(14)",
+            "Polar format: (12) on the grid (13)",
+            image(x_turned, y_turned, 0),
+            Sum(filtered, (k_x, 0, N_x - 1), (k_y, 0, N_y - 1)) / (N_x * N_y),
+        ),
+    )
+
+
+def _point_response() -> tuple[Equation, ...]:
+    samples = A_m * exp(-exponent(x_of[m] * grid()[0] + y_of[m] * grid()[1]))
+    return (
+        Equation(
+            "(15)",
+            "Phase history on the grid: (3) with (2), (6), (13)",
+            Function("S")(k_x, k_y),
+            Sum(samples, (m, 1, scatterers)),
+            slip="a bracket is lost; B_x·k_x/N_x stands with f₀ under x′_m",
+        ),
+        Equation(
+            "(16)",
+            "Response of scatterers: the sums of (14) over (15)",
+            Function("P")(x_turned, y_turned, 0),
+            response(),
+            slip="1/(N_x·N_y) is lost, and the minus of the phase",
+        ),
+    )
+
+
+def _ground_point() -> tuple[Equation, ...]:
+    beta_0, beta_1 = dr.linear_differential_range()
+    return (
+        Equation(
+            "(17)",
+            "Differential range, linear in slow time",
+            Function("DeltaR")(tau),
+            real("beta_0") + real("beta_1") * tau,
+            slip="the + between its two brackets is lost",
+        ),
+        Equation("(17)", "Constant coefficient", real("beta_0"), beta_0),
+        Equation("(17)", "Linear coefficient", real("beta_1"), beta_1),
+        Equation("(18)", "Point to coefficients", column("beta_0", "beta_1"), product(general_matrix(), point)),
+        Equation("(19)", "Ground point to coefficients", Symbol("Q"), dr.ground_matrix()),
+        Equation(
+            "(20)",
+            "Coefficients to ground point",
+            Matrix(point[:2]),
+            product(Inverse(MatrixSymbol("Q", 2, 2)), column("beta_0", "beta_1")),
+        ),
+    )
+
+
+def _errors() -> tuple[Equation, ...]:
+    s = TRANSMITTER.subscript
+    slow, fast = Function(f"gtilde_{s}")(tau), Function(f"htilde_{s}")(tau)
+    return (
+        Equation("(21)", "Position error: slow and fast part", Function(f"rtilde_{s}")(tau), slow + fast, DEFINED),
+        Equation("(22)", "Slow part, a quadratic", slow, dr.error_polynomial(TRANSMITTER), DEFINED),
+        Equation("(23)", "Error of the differential range", Function("DeltaRtilde")(tau), dr.range_error_of_tracks()),
+        Equation("(23)", "The same with (22)", Function("DeltaRtilde")(tau), dr.range_error()),
+        Equation(
+            "(24)",
+            "Observed differential range: (17) and (23)",
+            Function("DeltaRhat")(tau),
+            sum(coefficient * tau**n for n, coefficient in enumerate(observed_polynomial())),
+        ),
+    )
+
+
+def _effects() -> tuple[Equation, ...]:
+    adjugate, determinant = dr.ground_inverse()
+    moved = Matrix([real("beta_0tilde"), real("beta_1tilde")])
+    value, slope = tangent()
+    error = Function("DeltaRtilde")(tau)
+    inverse, determinant_i = piece_inverse()
+    observed = Matrix([a + b for a, b in zip(piece_range, piece, strict=True)])
+    Q_i = MatrixSymbol("Q_i", 2, 2)
+    return (
+        Equation(
+            "(25)",
+            "Displacement of the image, times the determinant of Q",
+            Symbol("detQ") * Matrix([real("xtilde"), real("ytilde")]),
+            adjugate * moved,
+        ),
+        Equation(
+            "(26)",
+            "Range error about τ_i, a piece of a line",
+            error,
+            piece[0] + piece[1] * (tau - tau_i),
+            slip="the slope multiplies τ; with (27) and (28) it multiplies τ − τ_i",
+        ),
+        Equation("(27)", "Value of a piece", piece[0], value),
+        Equation("(28)", "Slope of a piece", piece[1], slope),
+        Equation("(29)", "Point that a piece indicates", column("xhat_i", "yhat_i"), product(Inverse(Q_i), observed)),
+        Equation("(30)", "Determinant of Q", Symbol("detQ"), determinant),
+        Equation("(30)", "Inverse of Q, times its determinant", Symbol("adjQ"), adjugate),
+        Equation("(30)", "Determinant of Q at τ_i", Symbol("detQ_i"), determinant_i),
+        Equation("(30)", "Inverse of Q at τ_i, times its determinant", Symbol("adjQ_i"), inverse),
+        Equation("(30)", "The same in angles at τ_i", Symbol("adjQ_i"), in_slow_time(dr.in_angles(adjugate), tau_i)),
+        Equation("(31)", "Smear direction", Symbol("v_defocus"), dr.smear_direction()),
+        Equation("Section VI", "Gain of the limits by autofocus", real("G"), pull_in_factor()),
+    )

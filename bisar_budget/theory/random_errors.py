@@ -122,10 +122,9 @@ def constant(order: int) -> Moments:
     """Squares of τⁿ/n! for T = 1: a constant acceleration (2) or its rate (3)."""
     history = (_x / 2) ** order / factorial(order)
     squares = tuple(
-        (Rational(2 * n + 1, 2) * Poly(history * legendre(n, _x), _x).integrate()(1)
-         - Rational(2 * n + 1, 2) * Poly(history * legendre(n, _x), _x).integrate()(-1)) ** 2
+        (Rational(2 * n + 1, 2) * integrate(expand(history * legendre(n, _x)), (_x, -1, 1))) ** 2
         for n in range(ORDERS)
-    )  # fmt: skip
+    )
     return moments(squares, integrate(history**2, (_x, -1, 1)) / 2)
 
 

@@ -13,7 +13,6 @@ from sympy.printing.latex import LatexPrinter
 from sympy.printing.mathml import MathMLPresentationPrinter
 from sympy.printing.str import StrPrinter
 
-from bisar_budget.theory import equations as paper
 from bisar_budget.theory import full, published, random_errors
 from bisar_budget.theory.published import Equation, Table
 
@@ -274,7 +273,7 @@ def derivation(selection: str, format_name: str) -> str:
     }
     blocks = []
     if selection in ("all", "equations"):
-        blocks.append(_EQUATIONS[format_name](_TITLE, paper.equations()))
+        blocks.append(_EQUATIONS[format_name](_TITLE, published.equations()))
     for name, table in tables.items():
         if selection in ("all", name):
             if name == "random":
@@ -290,7 +289,7 @@ def derivation(selection: str, format_name: str) -> str:
 
 def numbered(number: int, format_name: str) -> str:
     """Write one equation of the paper, all its parts."""
-    return _EQUATIONS[format_name](_TITLE, tuple(e for e in paper.equations() if e.number == f"({number})"))
+    return _EQUATIONS[format_name](_TITLE, tuple(e for e in published.equations() if e.number == f"({number})"))
 
 
 _TITLE = "Equations of Rigling & Moses"

@@ -188,7 +188,7 @@ for name in [one.name for one in FORMATS.values() if one.is_illustrated == {is_f
 """
     loaded = loaded_after(code)
     assert not loaded & ({*HEAVY} - ({"jinja2"} if is_for_people else set()))
-    assert "bisar_budget.paths.recognised" not in loaded  # the readers of logs: 5 % of the start
+    assert "bisar_budget.paths.path_formats" not in loaded  # the readers of logs: 5 % of the start
 
 
 # Rooms whose modules are beside those of another: the command, the derivation.

@@ -20,9 +20,9 @@ from bisar_budget.geometry import Vector
 from bisar_budget.mission import paths
 from bisar_budget.mission.load import load_mission
 from bisar_budget.paths import earth
+from bisar_budget.paths.elements import read_tle
 from bisar_budget.paths.instant import Instant
 from bisar_budget.paths.oem import read_oem
-from bisar_budget.paths.tle import read_tle
 from bisar_budget.units import format_quantity
 from tests.conftest import TODAY, mission_text
 from tests.paths.flown import flight, geodetic_csv, sbet, smrmsg

@@ -17,7 +17,7 @@ from skyfield.api import EarthSatellite, wgs84
 import bisar_budget as bb
 from bisar_budget.front.results import PassesResult
 from bisar_budget.paths import elements
-from bisar_budget.paths.tle import element_sets, read_tle
+from bisar_budget.paths.elements import element_sets, read_tle
 from tests.conftest import ROOT, TODAY
 from tests.outside.record import compare
 from tests.paths.orbit_files import CENTER

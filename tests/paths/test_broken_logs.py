@@ -9,7 +9,7 @@ import pytest
 
 from bisar_budget.paths.flight import PathFileError
 from bisar_budget.paths.log_places import NOTHING_SAID
-from bisar_budget.paths.recognised import log_format, read_log
+from bisar_budget.paths.path_formats import log_format, read_log
 from tests.hostile_commands import log_read
 from tests.paths.log_files import message
 

@@ -9,16 +9,14 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from bisar_budget.paths import messages
+from bisar_budget.paths.elements import read_omm, read_tle
 from bisar_budget.paths.eof import read_eof
 from bisar_budget.paths.flight import PathFileError
 from bisar_budget.paths.instant import Instant
 from bisar_budget.paths.oem import read_oem
-from bisar_budget.paths.omm import read_omm
-from bisar_budget.paths.orbit_formats import ORBIT_FORMATS, hold_to_format, hold_to_log, orbit_format
 from bisar_budget.paths.orientation import read_finals
-from bisar_budget.paths.recognised import LOG_FORMATS
+from bisar_budget.paths.path_formats import LOG_FORMATS, ORBIT_FORMATS, hold_to_format, hold_to_log, orbit_format
 from bisar_budget.paths.sp3 import read_sp3
-from bisar_budget.paths.tle import read_tle
 from tests.conftest import ROOT
 from tests.paths.flown import flight, geodetic_csv
 from tests.paths.log_files import every_format

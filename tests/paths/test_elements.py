@@ -12,10 +12,9 @@ from skyfield.framelib import itrs
 from bisar_budget.geometry import Vector
 from bisar_budget.paths import elements
 from bisar_budget.paths.earth import Geodetic, axes_at
+from bisar_budget.paths.elements import element_sets, read_omm, read_tle
 from bisar_budget.paths.flight import Orbit, PathFileError, interpolated
 from bisar_budget.paths.instant import Instant
-from bisar_budget.paths.omm import read_omm
-from bisar_budget.paths.tle import element_sets, read_tle
 from tests.paths.orbit_files import (
     CENTER,
     CONSTANTS,

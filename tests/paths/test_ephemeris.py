@@ -14,10 +14,10 @@ from skyfield.positionlib import Geocentric
 from bisar_budget.geometry import Vector
 from bisar_budget.paths import elements
 from bisar_budget.paths.earth import Geodetic, axes_at
+from bisar_budget.paths.elements import element_sets, read_tle
 from bisar_budget.paths.flight import Orbit, PathFileError, interpolated
 from bisar_budget.paths.instant import Instant, has_leap_second, tai, tai_less_utc, utc
 from bisar_budget.paths.oem import read_oem
-from bisar_budget.paths.tle import element_sets, read_tle
 from tests.conftest import ROOT
 from tests.paths.orbit_files import CENTER, RADIUS, START, TLE, TURN_RATE, instant, oem, oem_xml, on_circle
 from tests.paths.test_elements import skyfield_time, turned_by_ut1

@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bisar_budget.paths.elements import read_tle
 from bisar_budget.paths.flight import PathFileError
 from bisar_budget.paths.instant import DAY, Instant
 from bisar_budget.paths.oem import read_oem
 from bisar_budget.paths.orientation import UNKNOWN, Orientation, from_teme, read_finals
-from bisar_budget.paths.tle import read_tle
 from tests.paths.orbit_files import CENTER, START, TLE, oem, on_circle
 
 erfa = pytest.importorskip("erfa")

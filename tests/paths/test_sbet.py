@@ -15,7 +15,7 @@ from bisar_budget.paths.flight import PathFileError, slow_times
 from bisar_budget.paths.flight_log import read_csv
 from bisar_budget.paths.instant import Instant, parse_instant
 from bisar_budget.paths.log_places import NOTHING_SAID, LogKeys, utc_of
-from bisar_budget.paths.recognised import LOG_FORMATS
+from bisar_budget.paths.path_formats import LOG_FORMATS
 from bisar_budget.paths.sbet import WEEK, of_gps, read_accuracy, read_sbet
 from tests.paths.flown import SECOND, START, Flight, flight, geodetic_csv, sbet, smrmsg, stamp
 from tests.paths.flown import WEEK as GPS_WEEK

@@ -14,7 +14,7 @@ from bisar_budget.simulator.far_field import far_field_filter
 from bisar_budget.simulator.image_formation import matched_filter
 from bisar_budget.simulator.phase_history import PathError, PhaseHistory, path, phase_history
 from bisar_budget.theory import differential_range as dr
-from bisar_budget.theory import equations as paper
+from bisar_budget.theory import published as paper
 from bisar_budget.theory.symbols import PLATFORMS, c, clock_coefficients, point, scatterer, tau
 
 # Neither broadside nor level, azimuths in different quadrants, so that no term is zero by chance.

@@ -196,4 +196,4 @@ def test_range_error_is_first_order_in_the_exact_ranges() -> None:
 
 
 def test_equal_share_is_half_the_total() -> None:
-    assert Rational(1, 2) * published.TOTAL_QPE == published.EQUAL_SHARE_QPE
+    assert Rational(1, 2) * (pi / 4) == published.EQUAL_SHARE_QPE

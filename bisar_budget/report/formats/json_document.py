@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
+from bisar_budget import __version__
 from bisar_budget.faults import Fault
 from bisar_budget.findings.images import Verdict
 from bisar_budget.findings.mission import FileWarning, MissionFindings, UnusableMission

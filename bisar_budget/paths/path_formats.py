@@ -1,19 +1,24 @@
-"""Formats of orbits: how each is told by its content, what messages call it, and who reads it."""
+"""Formats of orbits and of logs: how each is told by its content, what messages call it, and who reads it."""
 
 import re
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
+from bisar_budget.paths.elements import read_omm, read_tle
 from bisar_budget.paths.eof import read_eof
-from bisar_budget.paths.flight import Orbit, PathFileError
+from bisar_budget.paths.flight import Log, Orbit, PathFileError
+from bisar_budget.paths.flight_log import is_csv, read_csv
+from bisar_budget.paths.gpx import is_gpx, read_gpx
 from bisar_budget.paths.instant import Instant
+from bisar_budget.paths.log_places import LogKeys
 from bisar_budget.paths.messages import is_markup
+from bisar_budget.paths.nmea import is_nmea, read_nmea
 from bisar_budget.paths.oem import read_oem
-from bisar_budget.paths.omm import read_omm
 from bisar_budget.paths.orientation import Orientation
-from bisar_budget.paths.recognised import LOG_FORMATS, log_format
+from bisar_budget.paths.rtklib import is_solution, read_solution
+from bisar_budget.paths.sbet import is_sbet, read_sbet
 from bisar_budget.paths.sp3 import read_sp3
-from bisar_budget.paths.tle import read_tle
+from bisar_budget.paths.ulog import is_ulog, read_ulog
 
 
 class OrbitFormat(NamedTuple):
@@ -21,6 +26,8 @@ class OrbitFormat(NamedTuple):
 
     The reader takes the bytes of a whole file, what messages call it, the object that is wanted (needed where there
     are several), the middle of the aperture, and the orientation that axes of the stars are turned to the Earth with.
+    A `PathFileError` of it says what in the file is not as its format asks for, that it has several objects or none
+    of the name, or no place at the middle of the aperture.
     """
 
     words: str
@@ -87,3 +94,79 @@ def _refuse(data: bytes, name: str, found: str | None, accepted: str) -> None:
     for sign, words, remedy in _OTHERS:
         if sign.search(data[:_BEGINNING]):
             raise PathFileError(f"{name}: is {words}", accepted, remedy)
+
+
+# ---------------------------------------------------------------------- logs of flights
+class LogFormat(NamedTuple):
+    """A format: its words, endings of names of its files, whether bytes are one, and its reader.
+
+    The reader takes the bytes, what messages call the file, and what the mission file says of it. A `PathFileError`
+    of it names the file and the line, byte or record of the fault.
+    """
+
+    words: str
+    endings: tuple[str, ...]
+    is_one: Callable[[bytes], bool]
+    read: Callable[[bytes, str, LogKeys], Log]
+
+
+# By the word of the mission file, in the order of the schema. What is told by more stands behind.
+LOG_FORMATS: dict[str, LogFormat] = {
+    "csv": LogFormat("CSV with a header", (".csv",), is_csv, read_csv),
+    "sbet": LogFormat("an SBET of records of 136 bytes", (".out", ".sbet"), is_sbet, read_sbet),
+    "pos": LogFormat("a solution of RTKLIB", (".pos",), is_solution, read_solution),
+    "nmea": LogFormat("sentences of NMEA 0183", (".nmea",), is_nmea, read_nmea),
+    "gpx": LogFormat("a GPX track", (".gpx",), is_gpx, read_gpx),
+    "ulog": LogFormat("a PX4 ULog", (".ulg",), is_ulog, read_ulog),
+}
+_WITH_WEEK = ("sbet",)
+
+
+def log_format(data: bytes) -> str | None:
+    """Format of a log by its content; None where it is none of `LOG_FORMATS`."""
+    return next((name for name in reversed(LOG_FORMATS) if LOG_FORMATS[name].is_one(data)), None)
+
+
+def read_log(data: bytes, name: str, stated: str | None, keys: LogKeys) -> Log:
+    """Read a log.
+
+    Parameters
+    ----------
+    data : bytes
+        The file.
+    name : str
+        What messages call it.
+    stated : str or None
+        Its format by the mission file; None: by its content, or else by the ending of its name.
+    keys : LogKeys
+        What else the mission file says of it.
+
+    Raises
+    ------
+    PathFileError
+        The content is that of another format, or of none; or what its reader says.
+    """
+    found = log_format(data)
+    if stated is not None and found not in (None, stated):
+        raise PathFileError(
+            f"{name}: is {LOG_FORMATS[found].words}",
+            f"accepted: {LOG_FORMATS[stated].words}",
+            f"trajectory.format: {found} reads it",
+            key="format",
+        )
+    by_ending = (one for one, format in LOG_FORMATS.items() if name.lower().endswith(format.endings))
+    chosen = stated or found or next(by_ending, None)
+    if chosen is None:
+        known = ", ".join(f"{format.words} ({one})" for one, format in LOG_FORMATS.items())
+        raise PathFileError(
+            f"{name}: is no log that is known by its content",
+            f"accepted: {known}",
+            "trajectory.format: csv says what is wrong with a header" if b"\0" not in data[:10_000] else "",
+        )
+    if keys.week is not None and chosen not in _WITH_WEEK:
+        raise PathFileError(
+            f"is for an SBET; {name} is {LOG_FORMATS[chosen].words}",
+            hint="Leave trajectory.week out",
+            key="week",
+        )
+    return LOG_FORMATS[chosen].read(data, name, keys)

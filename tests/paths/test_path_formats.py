@@ -7,7 +7,7 @@ import pytest
 from bisar_budget.mission.platforms import TrajectorySource
 from bisar_budget.paths.flight import PathFileError
 from bisar_budget.paths.log_places import LogKeys
-from bisar_budget.paths.recognised import LOG_FORMATS, log_format, read_log
+from bisar_budget.paths.path_formats import LOG_FORMATS, log_format, read_log
 from tests.paths.flown import earth_fixed_csv, flight, geodetic_csv, sbet, smrmsg
 from tests.paths.log_files import every_format
 from tests.paths.orbit_files import TLE, oem, oem_xml, omm_json, omm_xml
