@@ -876,10 +876,9 @@ def images_formed(conditions: str) -> str:
 
 
 @phrase
-def overrides_a_part(key: str, text: str, part: str, frequency: str) -> str:
+def overrides_a_part(key: str, text: str, part: str) -> str:
     """Said of a figure of a part that the file replaces; of its rows and of a mission."""
-    at = f"; it states no frequency, and holds at that of the part, {frequency}" if frequency else ""
-    return f"{key} stands in place of {text} of {part}{at}"
+    return f"{key} stands in place of {text} of {part}"
 
 
 # ---------------------------------------------------------------------- the collection

@@ -59,6 +59,7 @@ def file_warnings(
         *_of_instruments(case),
         *_of_lever_arms(mission),
         *_of_calm_oscillators(mission),
+        *_of_masks(mission),
         *_of_autofocus(mission, resolution),
         *_nothing_declared(rows),
     )
@@ -231,6 +232,25 @@ def nothing_shakes_the_oscillator(platform: str) -> str:
     return (
         f"platforms.{platform}.oscillator.acceleration_sensitivity: vibration and turns act on it, and the file has "
         "none: add oscillator.vibration, or sinusoidal or spectrum to motion_error.vibration"
+    )
+
+
+def _of_masks(mission: Mission) -> Iterator[_Warned]:
+    """Masks that the file states without their frequency, beside a part that states its own."""
+    for name in PLATFORMS:
+        oscillator = getattr(mission.platforms, name).oscillator
+        for one in () if oscillator is None else oscillator.overridden:
+            if one.frequency:
+                key = ("platforms", name, "oscillator", one.figure)
+                yield _Warned(key, mask_at_the_frequency_of_a_part(name, one.frequency, one.part))
+
+
+@phrase
+def mask_at_the_frequency_of_a_part(platform: str, frequency: str, part: str) -> str:
+    """Said of phase noise that the file states without a frequency, beside a part."""
+    return (
+        f"platforms.{platform}.oscillator.phase_noise: states no frequency, and is taken at {frequency}, that of "
+        f"{part}: add oscillator.frequency"
     )
 
 

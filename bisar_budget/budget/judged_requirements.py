@@ -150,7 +150,9 @@ def requirement_states(
         else:  # autofocus corrects a quadratic phase alone
             levels = np.where(levels == RANK["pass_with_autofocus"], RANK["pass"], levels)
         worst = levels.min(axis=0)
-        decider = first_highest(np.where(levels == worst, used, -1.0))
+        # What passes by itself may come nearer to breaking the requirement than what autofocus brings to pass.
+        is_met = (worst == RANK["pass_with_autofocus"]) & (levels == RANK["pass"])
+        decider = first_highest(np.where((levels == worst) | is_met, used, -1.0))
         utilization = np.take_along_axis(used, decider[None], axis=0)[0]
         is_unjudged = ~mine.any(axis=0)
         decider = np.where(is_unjudged, -1, decider)
@@ -159,8 +161,8 @@ def requirement_states(
         if key == LOCATION:
             is_unjudged = is_unjudged | np.asarray(is_misplaced)
         status = np.where(is_unjudged & (worst != RANK["fail"]), RANK["not_evaluated"], worst)
-        if waived.get(key):
-            status = np.where(np.isin(status, _BREAKS), RANK["waived"], status)
+        if waived.get(key):  # a row that breaks it has a waiver of its own, or none
+            status = np.where(np.isin(status, _BREAKS) & ~np.isin(worst, _BREAKS), RANK["waived"], status)
         found.append(RequirementState(key, status.astype(np.int8), decider, utilization, mine))
     return found
 

@@ -251,6 +251,9 @@ class _PartSearch:
         found = one.judged
         if found is None:
             return state
+        if not one.figures or one.figures == ("frequency",):
+            taken = "nothing" if not one.figures else "no more than its frequency"
+            return state._replace(reason=f"{taken} would be taken of it: the file states the rest")
         stands = standing(found, row, breaks)
         if row is not None and not STATUS[stands.status].is_judged:
             reason = f"{row} is {STATUS[stands.status].words} with it"

@@ -66,7 +66,7 @@ NOWHERE: Vector = (0.0, 0.0, 0.0)  # direction of what is no motion
 def override_notes(platform: str, overridden: Sequence["Overridden"], *figures: str) -> tuple[Note, ...]:
     """Say which figures of parts the file replaces, of these or of all."""
     return tuple(
-        phrases.overrides_a_part(f"platforms.{platform}.{one.key}", one.text, one.part, one.frequency)
+        phrases.overrides_a_part(f"platforms.{platform}.{one.key}", one.text, one.part)
         for one in overridden
         if not figures or one.figure in figures
     )

@@ -323,7 +323,7 @@ class Shares(NamedTuple):
             return
         total = sum(values[name] or 0.0 for name in Shares._fields)
         if abs(total - 1) > WHOLE:
-            yield Problem(f"shares must sum to 1, these sum to {total:.6g}")
+            yield Problem(f"shares must sum to 1, these sum to {total:.9g}")
 
 
 RULE = Choice("equal", "balanced")

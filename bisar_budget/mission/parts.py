@@ -576,6 +576,7 @@ def _with_sensor(oscillator: Oscillator, path: KeyPath, find: Find, report: Repo
     if own is None:
         figures = {form: getattr(part, form), "source": evidence(part, form)}
     else:
+        # A power law is of fractional frequency, the same at any.
         holds_at = "" if own != "phase_noise" or oscillator.frequency else written.get("frequency", "")
         overridden.append(Overridden(own, f"oscillator.{own}", part.name, f"{form} {written[form]}", holds_at))
     if oscillator.frequency is None:
@@ -586,7 +587,8 @@ def _with_sensor(oscillator: Oscillator, path: KeyPath, find: Find, report: Repo
             problem = f"the phase noise of {shown(part.name)} is stated at its own frequency, {at}"
             report(path, Problem(problem, "accepted: no frequency, or phase_noise beside it", at=("frequency",)))
             return INVALID
-        overridden.append(Overridden("frequency", "oscillator.frequency", part.name, at))
+        if oscillator.needs_frequency:
+            overridden.append(Overridden("frequency", "oscillator.frequency", part.name, at))
     for figure in BESIDE_NOISE:
         value = getattr(part, figure)
         if value is not None and getattr(oscillator, figure) is None:

@@ -13,7 +13,7 @@ from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.findings.status import exit_code
 from bisar_budget.mission.load import parse_mission
-from bisar_budget.report.words.requirements import unjudged_effects
+from bisar_budget.report.words.requirements import requirement_lines, unjudged_effects
 from tests import reference
 from tests.conftest import findings, mission_text, row
 
@@ -127,6 +127,22 @@ def test_autofocus_is_not_said_to_correct_another_requirement() -> None:
     found = check(requirements=needs, autofocus={"n_pull": 10}, **changes)
     assert requirement(found, "quadratic_phase_error").status == "pass_with_autofocus"
     assert {requirement(found, key).status for key in needs} == {"pass"}
+
+
+@pytest.mark.parametrize(
+    ("n_pull", "decider"), [(20, "mission.spatial_variance"), (3, "receiver.quadratic_phase_error")]
+)
+def test_what_passes_by_itself_may_decide_beside_what_autofocus_corrects(n_pull: int, decider: str) -> None:
+    """The table said that little was used by what autofocus corrects, and hid the scene's edge near its limit."""
+    changes = {RECEIVER: {"velocity": [0, "0.2 m/s", 0]}, "scene": {"radius": "300 m"}}
+    found = check(autofocus={"n_pull": n_pull}, **changes)
+    rows = [row(found, one) for one in requirement(found, "quadratic_phase_error").rows]
+    largest = max(rows, key=lambda one: one.utilization or 0.0)
+    said = requirement(found, "quadratic_phase_error")
+    assert (said.row, said.status) == (decider, "pass_with_autofocus")
+    assert (largest.id, largest.utilization) == (decider, said.utilization)
+    (line,) = (one for one in requirement_lines(found) if one.requirement is said)
+    assert line.remark == ("" if decider == "mission.spatial_variance" else "share of 45 deg with autofocus")
 
 
 @pytest.mark.parametrize(
@@ -450,6 +466,18 @@ def test_a_waiver_covers_the_quadratic_requirement_though_each_error_stands_alon
     allocation = {"combine": "each", "model": "published"}
     assert code(check(allocation=allocation, **changes)) == 1
     assert code(check(allocation=allocation, waivers=[waiver("mission.quadratic_phase_error")], **changes)) == 0
+
+
+def test_a_waiver_of_a_requirement_does_not_cover_the_row_that_breaks_it() -> None:
+    """The table had the receiver's row as waived, which fails."""
+    changes = {RECEIVER: {"velocity": [0, "0.3 m/s", 0]}, "waivers": [waiver("mission.quadratic_phase_error")]}
+    found = check(**changes)
+    said = requirement(found, "quadratic_phase_error")
+    assert (said.row, said.status, said.waivers) == ("receiver.quadratic_phase_error", "fail", ())
+    assert row(found, "receiver.quadratic_phase_error").status == "fail"
+    both = [*changes["waivers"], waiver("receiver.quadratic_phase_error")]
+    assert requirement(check(**changes | {"waivers": both}), "quadratic_phase_error").status == "waived"
+    assert code(check(**changes | {"waivers": both})) == 0
 
 
 def test_an_expired_waiver_covers_nothing() -> None:

@@ -142,6 +142,10 @@ def test_a_form_of_noise_that_the_file_does_not_state_is_not_said_to_be_stated(t
     noise = "platforms.receiver.oscillator.power_law={h0: 1e-24}"
     found = ask(OSCILLATOR, f"{OSCILLATOR}=own.yaml", noise, file=str(tmp_path / "m.yaml"))
     assert found.overridden == ("power_law",)
+    # Nothing or a frequency could be taken of the others: they are no answer.
+    assert [part.id for part in found.parts if part.standing.status != "error"] == ["own.yaml"]
+    reasons = {part.figures: part.reason.partition(" would")[0] for part in found.parts if part.id != "own.yaml"}
+    assert reasons == {(): "nothing", ("frequency",): "no more than its frequency"}
 
 
 def test_parts_of_the_projects_own_folders_and_files_are_compared(tmp_path: Path, run: Callable) -> None:

@@ -360,14 +360,24 @@ class TestCatalogue:
         (noise,) = (note for note in found.notes if "in place of" in note)
         assert "oscillator.allan_deviation stands in place of power_law h-1: 1.268e-26" in noise
 
-    @pytest.mark.parametrize(("frequency", "said"), [("", True), ("frequency: 5 MHz, ", False)])
-    def test_the_frequency_at_which_a_mask_beside_a_part_holds_is_said(self, frequency: str, said: bool) -> None:
+    @pytest.mark.parametrize(
+        ("noise", "said"),
+        [
+            ("phase_noise: {1 Hz: -110 dBc/Hz, 10 Hz: -125 dBc/Hz}", True),
+            ("frequency: 5 MHz, phase_noise: {1 Hz: -110 dBc/Hz, 10 Hz: -125 dBc/Hz}", False),
+            ("allan_deviation: {1 s: 1e-12}", False),
+        ],
+    )
+    def test_the_frequency_at_which_a_mask_beside_a_part_holds_is_said(self, noise: str, said: bool) -> None:
         """The file's mask was taken at the frequency of the part, and nothing said so."""
-        mask = "phase_noise: {1 Hz: -110 dBc/Hz, 10 Hz: -125 dBc/Hz}"
-        text = f"oscillator: {{sensor: wenzel-5mhz, {frequency}{mask}}}"
+        found = check_mission(parse_mission(receiver(f"oscillator: {{sensor: wenzel-5mhz, {noise}}}")), TODAY)
+        warned = f"states no frequency, and is taken at 5 MHz, that of {_name('wenzel-5mhz')}"
+        assert any(warned in one.message for one in found.warnings) is said
+
+    def test_a_frequency_replaces_nothing_where_noise_is_the_same_at_any(self) -> None:
+        text = "oscillator: {sensor: wenzel-5mhz, frequency: 10 MHz}"
         found = check_mission(parse_mission(receiver(text)), TODAY)
-        (noise,) = (note for note in found.notes if "in place of power_law" in note)
-        assert ("; it states no frequency, and holds at that of the part, 5 MHz" in noise) is said
+        assert not [note for note in found.notes if "in place of" in note]
 
     def test_own_parts_stand_in_a_folder_of_the_project_or_anywhere(self, tmp_path, monkeypatch) -> None:
         monkeypatch.chdir(tmp_path)

@@ -95,7 +95,9 @@ def _remarks(one: JudgedRequirement, mission: MissionFindings) -> Iterator[str]:
         gain = mission.allocation.autofocus_gain if one.key == "quadratic_phase_error" else 1.0
         is_share = abs(one.allowed - gain * one.value) > 1e-9 * abs(one.value)
         is_gained = gain > 1 and abs(one.allowed - one.value) > 1e-9 * one.value
-        if is_share or is_gained:
+        if one.row == "mission.autofocus_pull_in":
+            yield "all that autofocus pulls in"
+        elif (is_share or is_gained) and one.row != "mission.spatial_variance":
             value = requirement_size(one.value, one)
             yield f"{'share of ' if is_share else ''}{value}{' with autofocus' if is_gained else ''}"
     yield from (waiver.words for waiver in one.waivers)
