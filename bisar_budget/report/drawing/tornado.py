@@ -51,7 +51,7 @@ def tornado_drawing(found: Sensitivity) -> str:
             bar = svg.Box(start, y - _HALF, end, y + _HALF)
             canvas.boxes([bar], ("worse" if value > 0 else "better") + _PARTS[part])
         canvas.text((frame.left - 6, y + 4), [label], "axis", "end")
-    canvas.lines([((zero, frame.top), (zero, frame.bottom))], "line")
+    canvas.lines([frame.upright(zero)], "line")
     if not shown:
         canvas.text((zero, middle), ["no number changes it"], "", "middle")
     bottom = svg.x_axis(canvas, frame, along, "percentage points")
