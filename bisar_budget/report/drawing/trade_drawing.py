@@ -171,9 +171,8 @@ def _curves(
     all_values = np.concatenate([values for *_, values in curves])
     up = _value_scale(all_values, frame.bottom, frame.top, is_use=not trade.column)
     statuses = [] if by_word else trade.statuses
-    for run in () if by_word else runs(axis, trade.values["status"]):
-        box = svg.Box(across.at(run.low), frame.top, across.at(run.high), frame.bottom)
-        canvas.boxes([box], f"is-{run.status}")
+    for status, low, high in () if by_word else runs(axis, trade.values["status"]):
+        canvas.boxes([svg.Box(across.at(low), frame.top, across.at(high), frame.bottom)], f"is-{status}")
     svg.grid(canvas, frame, None, up)
     entries = []
     for word, style, values in curves:
