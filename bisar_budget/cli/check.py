@@ -376,7 +376,8 @@ def _explain(
     from bisar_budget.front.checks import DAY_OF_RUN
     from bisar_budget.front.checks import check as ask
     from bisar_budget.report.explain.explanation import explain, explain_requirement
-    from bisar_budget.report.words.requirements import overrides_lines, requirement_id
+    from bisar_budget.report.words.heading import overrides_lines
+    from bisar_budget.report.words.requirements import requirement_id
 
     texts: list[str] = []
     known: dict[str, None] = {}

@@ -141,9 +141,7 @@ def sensitivity(
         raise click.UsageError("--plot draws one mission.")
     spare(files, [output, plot])
     ask = partial(questions.sensitivity, row=row)
-    found = [one.found for one in ask_each(load_all(files, model, changes), model, today, ask)]
+    found = [*ask_each(load_all(files, model, changes), model, today, ask)]
     if plot is not None:
-        from bisar_budget.report.drawing.tornado import tornado
-
-        write_file(plot, tornado(found[0], kind))
-    deliver_found(answers, found, format_name, output)
+        write_file(plot, found[0].plot().of(kind))
+    deliver_found(answers, [one.found for one in found], format_name, output)

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date
-from functools import cached_property
+from functools import cached_property, partial
 from importlib import import_module
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
@@ -322,9 +322,10 @@ class SensitivityResult(_Answer):
 
     def plot(self) -> Picture:
         """The effects as bars."""
+        from bisar_budget.report.drawing.figure import drawing_file
         from bisar_budget.report.drawing.tornado import tornado
 
-        return Picture(f"sensitivity of {self.found.name}", lambda kind: tornado(self.found, kind))
+        return Picture(f"sensitivity of {self.found.name}", partial(drawing_file, tornado(self.found)))
 
     def _repr_html_(self) -> str:
         return self.plot()._repr_html_()
@@ -442,8 +443,7 @@ class PassesResult(_Answer):
         from bisar_budget.report.formats.pass_list import verdict
 
         title = f"Passes over the scene of {self.found.name}"
-        svg = sky_plot(self.found, title, verdict(self.found))
-        return Picture(title, lambda kind: drawing_file(svg, kind))
+        return Picture(title, partial(drawing_file, sky_plot(self.found, title, verdict(self.found))))
 
     def _repr_html_(self) -> str:
         return self.plot()._repr_html_()

@@ -409,7 +409,7 @@ def test_a_plot_is_a_file_of_its_kind_and_the_same_each_time(run: Callable, tmp_
 def test_the_bars_are_the_slopes() -> None:
     """A larger number to the side of its slope, strong; a smaller one to the other, pale; in percentage points."""
     found = ask()
-    drawing = Drawing(tornado.tornado_drawing(found))
+    drawing = Drawing(tornado.tornado(found))
     labels = drawing.texts[3:]
     assert labels[0] == "collection.aperture_time = 6 s, 1 %"
     numbers = {text: drawing.place(text)[0] for text in labels if re.fullmatch(r"−?[\d.]+", text)}

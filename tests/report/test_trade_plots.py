@@ -279,7 +279,7 @@ class TestPlots:
         assert [10 ** ((end - limit) / decade) for end in ends] == pytest.approx([0.5, 1.5], rel=READ)
         dots = [10 ** ((x - limit) / decade) for x, _ in drawing.circles("dot0")][:2]
         assert dots == pytest.approx([0.1, 0.2], rel=READ)
-        assert [(run.low, run.high) for run in runs(axis, shown.values["status"])] == [(-0.5, 0.5), (0.5, 1.5)]
+        assert [(low, high) for _, low, high in runs(axis, shown.values["status"])] == [(-0.5, 0.5), (0.5, 1.5)]
 
     def test_a_column_of_words(self) -> None:
         """Bars from 0, to both sides."""

@@ -15,7 +15,7 @@ from bisar_budget.report.change.comparison import (
     Refusal,
 )
 from bisar_budget.report.formats.json_document import document_text, outside_item
-from bisar_budget.report.words.requirements import file_words, overrides_lines, overrides_words
+from bisar_budget.report.words.heading import file_words, overrides_lines, overrides_words
 from bisar_budget.report.words.sentences import (
     counted,
     markdown_row,

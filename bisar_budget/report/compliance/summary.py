@@ -24,20 +24,20 @@ from bisar_budget.report.compliance.rows import (
     undeclared_table,
 )
 from bisar_budget.report.drawing.geometry_views import geometry_elevation, geometry_plan
-from bisar_budget.report.words.identity import (
+from bisar_budget.report.words.heading import (
     document_words,
     doubtful_model,
     head,
     multiple_of_pi,
     narrow_gradients,
     path_words,
-    source_path,
+    rule_words,
 )
+from bisar_budget.report.words.identity import source_path
 from bisar_budget.report.words.requirements import (
     kind_names,
     requirement_id,
     requirement_lines,
-    rule_words,
     unjudged_effects,
     unseen,
     verdict,

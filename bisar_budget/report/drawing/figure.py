@@ -7,7 +7,6 @@ from io import BytesIO
 from typing import Any
 from xml.etree import ElementTree
 
-KINDS = ("png", "svg", "pdf")
 _POINT, _INCH = 0.75, 96.0  # points of a pixel of an SVG drawing, pixels of an inch
 
 
@@ -26,7 +25,7 @@ def new_figure(**settings: Any) -> Any:
 
 
 def figure_file(figure: Any, kind: str, dpi: int = 110) -> bytes:
-    """Give the file of a figure, of a kind of `KINDS`: of the same input the same bytes."""
+    """Give the file of a figure, `png`, `svg` or `pdf`: of the same input the same bytes."""
     undated = {"png": {"Software": None}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}
     file = BytesIO()
     figure.savefig(file, format=kind, dpi=dpi, metadata=undated[kind])
@@ -34,7 +33,7 @@ def figure_file(figure: Any, kind: str, dpi: int = 110) -> bytes:
 
 
 def drawing_file(svg: str, kind: str, dpi: int = 192) -> bytes:
-    """Give the file of a drawing of `svg.Canvas`, of a kind of `KINDS`: PNG and PDF as on white paper."""
+    """Give the file of a drawing of `svg.Canvas`, `png`, `svg` or `pdf`: PNG and PDF as on white paper."""
     if kind == "svg":
         return svg.encode()
     drawing = ElementTree.fromstring(svg)

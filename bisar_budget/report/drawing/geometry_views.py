@@ -205,11 +205,8 @@ class _Panel(NamedTuple):
     scale: float
 
     def pixel(self, place: Place) -> svg.Point:
-        middle = ((self.frame.left + self.frame.right) / 2, (self.frame.top + self.frame.bottom) / 2)
-        return (
-            middle[0] + (place[0] - self.centre[0]) * self.scale,
-            middle[1] - (place[1] - self.centre[1]) * self.scale,
-        )
+        x, y = self.frame.middle
+        return x + (place[0] - self.centre[0]) * self.scale, y - (place[1] - self.centre[1]) * self.scale
 
 
 def _drawing(view: _View, kind: str, side: str, description: str, note: str = "") -> str:
@@ -319,7 +316,7 @@ def _axes(canvas: svg.Canvas, panel: _Panel, view: _View) -> None:
     for value in svg.ticks(panel.centre[0] - half[0], panel.centre[0] + half[0], step):
         x, _ = panel.pixel((value, 0.0))
         if frame.left + 1 < x < frame.right - 1:
-            canvas.polyline([(x, frame.top), (x, frame.bottom)], "grid", is_obstacle=False)
+            canvas.polyline(frame.upright(x), "grid", is_obstacle=False)
         shown = value if view.is_plan else abs(value)
         text = svg.axis_number(shown / unit)
         if x + svg.text_width(text) / 2 < _WIDTH:
@@ -329,12 +326,11 @@ def _axes(canvas: svg.Canvas, panel: _Panel, view: _View) -> None:
         if not view.is_plan and value < 0:
             continue
         if frame.top + 1 < y < frame.bottom - 1:
-            canvas.polyline([(frame.left, y), (frame.right, y)], "grid", is_obstacle=False)
+            canvas.polyline(frame.level(y), "grid", is_obstacle=False)
         canvas.text((frame.left - 5, y + 3.5), [svg.axis_number(value / unit)], "axis", "end")
-    middle = (frame.left + frame.right) / 2
     across, up = ("east", "north") if view.is_plan else ("ground distance", "height")
-    canvas.text((middle, frame.bottom + 28), [f"{across} [{name}]"], "axis", "middle")
-    canvas.upright_text((11, (frame.top + frame.bottom) / 2), f"{up} [{name}]", "axis")
+    canvas.text((frame.middle[0], frame.bottom + 28), [f"{across} [{name}]"], "axis", "middle")
+    canvas.upright_text((11, frame.middle[1]), f"{up} [{name}]", "axis")
     svg.outline(canvas, frame, "grid")
 
 
@@ -360,8 +356,7 @@ def _draw_panel(canvas: svg.Canvas, panel: _Panel, view: _View, is_detail: bool,
             circle = [_turned(scene, radius, 2 * math.pi * index / 96) for index in range(97)]
             canvas.polyline(circle, "thin", frame)
     else:
-        ground = [(frame.left, scene[1]), (frame.right, scene[1])]
-        canvas.polyline(ground, "line", frame)
+        canvas.polyline(frame.level(scene[1]), "line", frame)
         if view.radius * panel.scale >= 3:
             ends = [panel.pixel((sign * view.radius, 0.0)) for sign in (-1, 1)]
             canvas.polyline(ends, "line path", frame)

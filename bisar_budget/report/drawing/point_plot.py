@@ -78,14 +78,6 @@ class ImagePanel(NamedTuple):
         return left, right, bottom, top
 
 
-class Cut(NamedTuple):
-    """A cross-range cut: where along y′ [m], and its power over the error-free peak. [dB]"""
-
-    label: str
-    place: Floats
-    level_db: Floats
-
-
 class Sheet(NamedTuple):
     """All that is drawn.
 
@@ -103,7 +95,7 @@ class Sheet(NamedTuple):
     rotated: ImagePanel
     focused: ImagePanel
     rotated_back: ImagePanel
-    cuts: tuple[Cut, ...]
+    cuts: tuple[Curve, ...]
 
 
 def sheet(images: PointImages) -> Sheet:
@@ -196,19 +188,20 @@ def _decibels(samples: Complexes, peak: float) -> Floats:
     return level
 
 
-def _cuts_of(images: PointImages, turned: Floats, part: tuple[slice, slice], peak: float) -> tuple[Cut, ...]:
+def _cuts_of(images: PointImages, turned: Floats, part: tuple[slice, slice], peak: float) -> tuple[Curve, ...]:
     """Lines through the peaks, over y′."""
     columns = np.arange(part[1].start * _FINE_CUT, (part[1].stop - 1) * _FINE_CUT + 1)
     cuts = []
     shown = (
-        (images.error_free, "without error"),
-        (images.rotated, "with the declared errors"),
-        (images.focused, "after autofocus"),
+        (images.error_free, "without error", WITHOUT_ERROR),
+        (images.rotated, "with the declared errors", WITH_ERRORS),
+        (images.focused, "after autofocus", FOCUSED),
     )
-    for row, (image, label) in zip(images.rows, shown, strict=True):
+    for row, (image, name, style) in zip(images.rows, shown, strict=True):
         line = line_at(image, row)
         place = between(turned, np.full(columns.size, row), columns / _FINE_CUT)[:, 1]
-        cuts.append(Cut(label, place, _decibels(upsampled(line, _FINE_CUT)[columns], peak)))
+        level = _decibels(upsampled(line, _FINE_CUT)[columns], peak)
+        cuts.append(Curve(name, place.tolist(), level.tolist(), style))
     return tuple(cuts)
 
 
@@ -475,12 +468,8 @@ def _point_to(panel: Any, place: Floats, middle: Floats, color: str) -> None:
 def _cuts_drawing(drawn: Sheet) -> str:
     """The cross-range cuts, as a report draws them."""
     canvas = Canvas()
-    styles = (WITHOUT_ERROR, WITH_ERRORS, FOCUSED)
-    curves = [
-        Curve(cut.label, cut.place.tolist(), cut.level_db.tolist(), style)
-        for cut, style in zip(drawn.cuts, styles, strict=True)
-    ]
-    bottom = cut_panel(canvas, 0.0, *_CUT_SIZE, "Cross-range cuts", [*curves[1:], curves[0]])
+    curves = [*drawn.cuts[1:], drawn.cuts[0]]  # none covers the one without error
+    bottom = cut_panel(canvas, 0.0, *_CUT_SIZE, "Cross-range cuts", curves)
     return canvas.document((_CUT_SIZE[0], bottom + 4), "cuts", "Cross-range cuts", "Power along y′.")
 
 

@@ -48,14 +48,14 @@ def share_bars(sheet: SpecificationSheet) -> str:
             if box.right - box.left > 0.5:
                 number = 0 if name == "fixed" else keys.index(name) + 1
                 canvas.boxes([box], "fixed" if not number else f"t{(number - 1) % _TONES}")
-                canvas.lines([((box.right, box.top), (box.right, box.bottom))], "grid")
+                canvas.lines([box.upright(box.right)], "grid")
                 if box.right - box.left >= _LEAST:
                     said = str(number) if number else "fixed" if box.right - box.left > 40 else ""
-                    canvas.text(((box.left + box.right) / 2, middle + 4), [said], "", "middle")
+                    canvas.text((box.middle[0], middle + 4), [said], "", "middle")
             start = end
         canvas.text((frame.left - 8, middle + 4), [svg.short(_name(row), _LEFT - 16)], "axis", "end")
     if not rows:
-        canvas.text(((frame.left + frame.right) / 2, top + _ROW / 2 + 4), ["no row limits anything"], "", "middle")
+        canvas.text((frame.middle[0], top + _ROW / 2 + 4), ["no row limits anything"], "", "middle")
     bottom = svg.x_axis(canvas, frame, along, "part of what the row may use [%]")
     for number, one in enumerate(sheet.specifications, 1):
         if any(one.key in row.shares for row in rows):

@@ -63,15 +63,13 @@ def _style(statuses: Sequence[str], width: float) -> str:
         ".between{fill:none;stroke-width:1;stroke-opacity:.55}",
         ".frame{fill:none;stroke:var(--muted,#595f66);stroke-width:1}",
     ]
-    tones = [svg.tone_of(name) for name in statuses]
-    for place, (name, tone) in enumerate(zip(statuses, tones, strict=True)):
-        dashes = _DASHES[min(tones[:place].count(tone), len(_DASHES) - 1)]
-        colour = f"var(--{tone},{light[tone]})"
+    for name, dashes in svg.marks_within_colours(statuses, _DASHES).items():
+        colour = f"var(--{svg.tone_of(name)},{light[svg.tone_of(name)]})"
         rules.append(f".track.is-{name}{{stroke:{colour}{f';stroke-dasharray:{dashes}' if dashes else ''}}}")
         rules.append(f".between.is-{name}{{stroke:{colour}}}")
         rules.append(f".open.is-{name}{{stroke:{colour}}}")
         rules += [f".{kind}.is-{name}{{fill:{colour}}}" for kind in ("dot", "solid", "head")]
-    return svg.style_sheet(rules, tones)
+    return svg.style_sheet(rules, map(svg.tone_of, statuses))
 
 
 # ---------------------------------------------------------------- the sky
@@ -146,19 +144,18 @@ def _resolutions(canvas: svg.Canvas, frame: svg.Box, passes: Passes) -> None:
     svg.grid(canvas, frame, None, up)
     for time, words in _dates(passes.start, span, frame.right - frame.left):
         x = across.at(time)
-        canvas.lines([((x, frame.top), (x, frame.bottom))], "grid")
+        canvas.lines([frame.upright(x)], "grid")
         canvas.lines([((x, frame.bottom), (x, frame.bottom + 4))], "thin")
         canvas.text((x, frame.bottom + 15), [words], "axis", "middle")
-    canvas.text(((frame.left + frame.right) / 2, frame.bottom + 31), ["mid-time, UTC"], "small", "middle")
+    canvas.text((frame.middle[0], frame.bottom + 31), ["mid-time, UTC"], "small", "middle")
     for gap in passes.unknown:
         ends = (across.at(instant.since(passes.start)) for instant in (gap.start, gap.stop))
-        canvas.lines([((x, frame.top), (x, frame.bottom)) for x in ends], "thin dotted")
+        canvas.lines(map(frame.upright, ends), "thin dotted")
     svg.outline(canvas, frame, "frame")
     svg.y_axis(canvas, frame, up, "")
-    canvas.upright_text((frame.left - 46, (frame.top + frame.bottom) / 2), "resolution on the ground [m]", "small")
+    canvas.upright_text((frame.left - 46, frame.middle[1]), "resolution on the ground [m]", "small")
     if not shown:
-        middle = (frame.left + frame.right) / 2, (frame.top + frame.bottom) / 2
-        canvas.text(middle, ["no pass has an image"], "small", "middle")
+        canvas.text(frame.middle, ["no pass has an image"], "small", "middle")
     for one, (first, second) in shown:
         x = across.at(one.center.since(passes.start)) if one.center is not None else frame.left
         range_at, cross_at = (x, up.at(first)), (x, up.at(second))

@@ -12,7 +12,7 @@ from functools import cache
 from hashlib import sha256
 from itertools import pairwise
 from textwrap import wrap
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 from bisar_budget.faults import printable
 from bisar_budget.findings.status import STATUS
@@ -21,6 +21,7 @@ from bisar_budget.resources import resource
 
 Point = tuple[float, float]  # x to the right, y down [px]
 Segment = tuple[Point, Point]
+Mark = TypeVar("Mark")
 
 FONT = 12.0  # px
 LINE_HEIGHT = 14.5  # px
@@ -67,6 +68,19 @@ class Box(NamedTuple):
     top: float
     right: float
     bottom: float
+
+    @property
+    def middle(self) -> Point:
+        """Its centre."""
+        return (self.left + self.right) / 2, (self.top + self.bottom) / 2
+
+    def upright(self, x: float) -> Segment:
+        """Line through it from above to below."""
+        return (x, self.top), (x, self.bottom)
+
+    def level(self, y: float) -> Segment:
+        """Line through it from left to right."""
+        return (self.left, y), (self.right, y)
 
     def covered_by(self, other: "Box") -> float:
         """Area shared with another. [px²]"""
@@ -210,7 +224,7 @@ class Canvas:
             place = best[index]
             box = place.box
             self.obstacles.append(box)
-            x = {"start": box.left + _MARGIN, "middle": (box.left + box.right) / 2, "end": box.right - _MARGIN}
+            x = {"start": box.left + _MARGIN, "middle": box.middle[0], "end": box.right - _MARGIN}
             self.text((x[place.anchor], box.top + 0.8 * LINE_HEIGHT), label.lines, anchor=place.anchor)
 
     def _options(self, label: "DrawnLabel") -> list["_Place"]:
@@ -412,7 +426,7 @@ def x_axis(canvas: Canvas, frame: Box, scale: Scale, label: str, words: Sequence
         x = scale.at(value)
         canvas.lines([((x, bottom), (x, bottom + 4))], "thin")
         canvas.text((x, bottom + 15), [axis_number(value)], "axis", "middle")
-    canvas.text(((frame.left + frame.right) / 2, bottom + 31), [label], "small", "middle")
+    canvas.text((frame.middle[0], bottom + 31), [label], "small", "middle")
     return bottom + 31
 
 
@@ -425,7 +439,7 @@ def y_axis(canvas: Canvas, frame: Box, scale: Scale, label: str, words: Sequence
         canvas.lines([((frame.left - 4, y), (frame.left, y))], "thin")
         canvas.text((frame.left - 7, y + 3.5), [axis_number(value)], "axis", "end")
     label = short(label, 1.3 * (frame.bottom - frame.top))
-    canvas.upright_text((12, (frame.top + frame.bottom) / 2), label, "small")
+    canvas.upright_text((12, frame.middle[1]), label, "small")
 
 
 def outline(canvas: Canvas, frame: Box, style: str) -> None:
@@ -437,11 +451,9 @@ def outline(canvas: Canvas, frame: Box, style: str) -> None:
 def grid(canvas: Canvas, frame: Box, across: Scale | None, up: Scale | None) -> None:
     """Draw lines at the ticks of one scale or both."""
     if across is not None:
-        places = [across.at(value) for value in across.ticks(_ROOM["x"])]
-        canvas.lines([((x, frame.top), (x, frame.bottom)) for x in places], "grid")
+        canvas.lines([frame.upright(across.at(value)) for value in across.ticks(_ROOM["x"])], "grid")
     if up is not None:
-        places = [up.at(value) for value in up.ticks(_ROOM["y"])]
-        canvas.lines([((frame.left, y), (frame.right, y)) for y in places], "grid")
+        canvas.lines([frame.level(up.at(value)) for value in up.ticks(_ROOM["y"])], "grid")
 
 
 class LegendLine(NamedTuple):
@@ -487,8 +499,7 @@ def legend(canvas: Canvas, top: float, width: float, entries: Sequence[LegendLin
     return y + 6
 
 
-ROWS = ("transmitter", "receiver", "clock", "pass", "mission", "doubt", "reserve")  # of curves, in their order
-EMPTY = "reserve"  # of what is no mission
+EMPTY = "reserve"  # colour of what is no mission
 
 
 @cache
@@ -523,12 +534,8 @@ def status_words(status: str) -> str:
     return "no such mission" if has_no_mission(status) else STATUS[status].words
 
 
-def strengths(statuses: Sequence[str], parts: Sequence[float]) -> Mapping[str, float]:
-    """The part of each status: of those that share a colour the first, the worst, has the first of `parts`."""
-    used: dict[str, int] = {}
-    found: dict[str, float] = {}
-    for name in statuses:
-        count = used.get(tone_of(name), 0)
-        used[tone_of(name)] = count + 1
-        found[name] = parts[min(count, len(parts) - 1)]
-    return found
+def marks_within_colours(statuses: Sequence[str], marks: Sequence[Mark]) -> Mapping[str, Mark]:
+    """A mark for each status: of those that share a colour the first, the worst, has the first of `marks`."""
+    tones = [tone_of(name) for name in statuses]
+    places = (tones[:place].count(tone) for place, tone in enumerate(tones))
+    return {name: marks[min(place, len(marks) - 1)] for name, place in zip(statuses, places, strict=True)}

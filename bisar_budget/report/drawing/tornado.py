@@ -6,7 +6,6 @@ All bars are for the same part: 1 % of a number, of a radian, of a power, of the
 from bisar_budget.design.sensitivity import EVEN, Sensitivity, Slope
 from bisar_budget.faults import changes_words, printable
 from bisar_budget.report.drawing import svg
-from bisar_budget.report.drawing.figure import drawing_file
 from bisar_budget.report.words.sentences import percent
 
 MOST = 20  # bars
@@ -20,13 +19,8 @@ _STYLE = (
 _PARTS = {"larger": "", "smaller": " pale"}  # what a number becomes, and how its bar is drawn
 
 
-def tornado(found: Sensitivity, kind: str) -> bytes:
-    """Draw the numbers with the largest effects, as a `png`, `svg` or `pdf` file."""
-    return drawing_file(tornado_drawing(found), kind)
-
-
-def tornado_drawing(found: Sensitivity) -> str:
-    """Draw the bars as SVG.
+def tornado(found: Sensitivity) -> str:
+    """Draw the numbers with the largest effects as SVG.
 
     Strong is what a larger number does, pale what a smaller one does; both are the same slope.
     """
@@ -51,7 +45,7 @@ def tornado_drawing(found: Sensitivity) -> str:
             bar = svg.Box(start, y - _HALF, end, y + _HALF)
             canvas.boxes([bar], ("worse" if value > 0 else "better") + _PARTS[part])
         canvas.text((frame.left - 6, y + 4), [label], "axis", "end")
-    canvas.lines([((zero, frame.top), (zero, frame.bottom))], "line")
+    canvas.lines([frame.upright(zero)], "line")
     if not shown:
         canvas.text((zero, middle), ["no number changes it"], "", "middle")
     bottom = svg.x_axis(canvas, frame, along, "percentage points")

@@ -31,6 +31,7 @@ _RIM = 165.0  # px, of a polar map
 _HEAT_BAR = 70.0  # px beside a map
 _DECADE, _LEAST = 10.0, 0.1  # % of the limit: an axis shows the one; what is smaller than the other is of no interest
 _STRENGTHS = (0.24, 0.13, 0.36)  # opacity of the first, second and third status of one colour
+_ROWS = ("transmitter", "receiver", "clock", "pass", "mission", "doubt", "reserve")  # colours of curves
 _DASHES = ("", "7 3", "2 3", "9 3 2 3", "5 5", "1 4", "12 4")
 _CELLS = 60  # of a map that have room for words of their own
 _DOTS = 40  # values of a curve that are seen one by one
@@ -99,11 +100,11 @@ def _style(trade: Trade) -> str:
     """Rules for what only these drawings have."""
     light, _ = svg.colours()
     rules = []
-    for place, (name, dashes) in enumerate(zip(svg.ROWS, _DASHES, strict=True)):
+    for place, (name, dashes) in enumerate(zip(_ROWS, _DASHES, strict=True)):
         rules.append(f".row{place}{{fill:none;stroke:var(--{name},{light[name]});stroke-width:1.8")
         rules[-1] += f";stroke-dasharray:{dashes}}}" if dashes else "}"
         rules.append(f".dot{place}{{fill:var(--{name},{light[name]});stroke:var(--paper,#fff);stroke-width:.8}}")
-    for name, strength in svg.strengths(trade.statuses, _STRENGTHS).items():
+    for name, strength in svg.marks_within_colours(trade.statuses, _STRENGTHS).items():
         tone = svg.tone_of(name)
         rules.append(
             f".is-{name}{{fill:var(--{tone},{light[tone]});fill-opacity:{strength};shape-rendering:crispEdges}}"
@@ -122,7 +123,7 @@ def _style(trade: Trade) -> str:
     rules.append(".own{fill:var(--paper,#fff);stroke:var(--ink,#222);stroke-width:1.6}")
     rules.append(".frame{fill:none;stroke:var(--muted,#595f66);stroke-width:1}")
     rules.append(".at{fill:none;stroke:var(--ink,#222);stroke-width:1.1;stroke-dasharray:1.5 3}")
-    return svg.style_sheet(rules, [name for name in (*svg.ROWS, "fail") if name not in ("transmitter", "receiver")])
+    return svg.style_sheet(rules, [name for name in (*_ROWS, "fail") if name not in ("transmitter", "receiver")])
 
 
 def _heat_colour(part: float) -> str:
@@ -170,20 +171,18 @@ def _curves(
     all_values = np.concatenate([values for *_, values in curves])
     up = _value_scale(all_values, frame.bottom, frame.top, is_use=not trade.column)
     statuses = [] if by_word else trade.statuses
-    for run in () if by_word else runs(axis, trade.values["status"]):
-        box = svg.Box(across.at(run.low), frame.top, across.at(run.high), frame.bottom)
-        canvas.boxes([box], f"is-{run.status}")
+    for status, low, high in () if by_word else runs(axis, trade.values["status"]):
+        canvas.boxes([svg.Box(across.at(low), frame.top, across.at(high), frame.bottom)], f"is-{status}")
     svg.grid(canvas, frame, None, up)
     entries = []
     for word, style, values in curves:
         _curve(canvas, frame, across, up, axis.values, values, style)
         entries.append(svg.line_entry(canvas, word, style))
     if not trade.column:
-        canvas.lines([((frame.left, up.at(100.0)), (frame.right, up.at(100.0)))], "limit")
+        canvas.lines([frame.level(up.at(100.0))], "limit")
         entries.append(svg.line_entry(canvas, "limit", "limit"))
     if axis.own is not None and axis.values[0] <= axis.own <= axis.values[-1]:
-        x = across.at(axis.own)
-        canvas.lines([((x, frame.top), (x, frame.bottom))], "at")
+        canvas.lines([frame.upright(across.at(axis.own))], "at")
         entries.append(svg.line_entry(canvas, "this mission", "at"))
     svg.outline(canvas, frame, "frame")
     svg.y_axis(canvas, frame, up, trade.heading or ("worst utilization [%]" if by_word else "utilization [%]"))
@@ -254,7 +253,7 @@ def _bars(canvas: svg.Canvas, top: float, trade: Trade, rows: Mapping[str, Float
         canvas.text((beside + 6, y + 4), [said], "small")
     entries = []
     if is_use:
-        canvas.lines([((limit, frame.top), (limit, frame.bottom))], "limit")
+        canvas.lines([frame.upright(limit)], "limit")
         entries.append(svg.line_entry(canvas, "limit", "limit"))
     for number, (row, uses) in enumerate(rows.items() if is_use else ()):
         shown = [(along.at(100 * use), down.at(place)) for place, use in enumerate(uses.tolist()) if use > 0]
@@ -399,7 +398,7 @@ def _heat(
         canvas.boxes([svg.Box(left, bottom - step, left + 12, bottom)], f"heat{place}")
     for value in scale.ticks(26.0):
         canvas.text((left + 16, scale.at(value) + 3.5), [svg.axis_number(value)], "axis")
-    canvas.upright_text((_WIDTH - 4, (frame.top + frame.bottom) / 2), svg.short(trade.heading, 420.0), "small")
+    canvas.upright_text((_WIDTH - 4, frame.middle[1]), svg.short(trade.heading, 420.0), "small")
 
 
 def _in_cells(canvas: svg.Canvas, trade: Trade, columns: Sequence[float], lines: Sequence[float]) -> None:
@@ -464,7 +463,7 @@ def _from_above(around: Axis, radius: Axis, frame: svg.Box) -> _Plane:
     return _Plane(
         svg.Scale(first, last, first * around.scale, last * around.scale),
         svg.Scale(inner, float(rim), 0.0, _RIM),
-        ((frame.left + frame.right) / 2, frame.top + 24 + _RIM),
+        (frame.middle[0], frame.top + 24 + _RIM),
     )
 
 

@@ -44,7 +44,8 @@ def check_plot(cases: Cases, *, is_polar: bool) -> None:
         return
     if len(varying) != 2 or not any(one.reader is DIRECTION for one in varying):
         raise QuestionError("--polar draws a key over an azimuth; accepted: --vary of an azimuth and of another key")
-    other = next(one for one in varying if one is not _azimuth(varying))
+    azimuth = next(one for one in varying if one.reader is DIRECTION)
+    other = next(one for one in varying if one is not azimuth)
     if not isinstance(other, Number):
         raise QuestionError(f"--polar draws {other.key} as a radius; accepted: a number")
     if cases.columns[cases.varied.index(other)].min() < 0:
@@ -54,10 +55,6 @@ def check_plot(cases: Cases, *, is_polar: bool) -> None:
 def varying_keys(cases: Cases) -> list[Varied]:
     """Keys that have more than one value."""
     return [one for one, size in zip(cases.varied, cases.shape, strict=True) if size > 1]
-
-
-def _azimuth(varied: Sequence[Varied]) -> Varied:
-    return next(one for one in varied if one.reader is DIRECTION)
 
 
 class Gathered:
@@ -70,8 +67,8 @@ class Gathered:
             known = [name for name, one in columns.items() if not one.is_text and name not in described.numbers]
             raise QuestionError(f"--plot-column {column}: is no column of numbers; accepted: {', '.join(known)}")
         self.column, self.heading = column or "", columns[column].heading if column is not None else ""
-        self.names = dict.fromkeys((*_NEEDED, *names, *((column,) if column is not None else ())))
-        self.found: dict[str, list[NDArray[Any]]] = {name: [] for name in self.names}
+        needed = (*_NEEDED, *names, *((column,) if column is not None else ()))
+        self.found: dict[str, list[NDArray[Any]]] = {name: [] for name in needed}
 
     def add(self, part: Part) -> None:
         """Take what is needed of a part."""
@@ -178,19 +175,11 @@ def stretches(begins: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
     return pairwise([0, *(np.flatnonzero(begins) + 1).tolist(), begins.size + 1])
 
 
-class Run(NamedTuple):
-    """Neighbouring values with one status, from edge to edge."""
-
-    status: str
-    low: float
-    high: float
-
-
-def runs(axis: Axis, statuses: NDArray[Any]) -> Iterator[Run]:
-    """Stretches of one axis with one status each."""
+def runs(axis: Axis, statuses: NDArray[Any]) -> Iterator[tuple[str, float, float]]:
+    """Stretches of one axis with one status each, from edge to edge."""
     edges = cell_edges(axis)
     for start, stop in stretches(statuses[1:] != statuses[:-1]):
-        yield Run(str(statuses[start]), edges[start], edges[stop])
+        yield str(statuses[start]), edges[start], edges[stop]
 
 
 class MapRegion(NamedTuple):

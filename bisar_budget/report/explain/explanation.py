@@ -69,18 +69,20 @@ def explain(mission: Mission, found: MissionFindings, row_id: str) -> str:
     """Write the chain of equations of one row of a mission, with the numbers put in."""
     row = next(row for row in found.rows if row.id == row_id)
     title = f"{STATUS[row.status].text} {printable(f'{row.id}{own_id(row)}')}"
-    steps = [line for step in _to_utilization(mission, found, row) for line in step.lines]
+    steps = _lines(_to_utilization(mission, found, row))
     if row.declared is not None and row.allowable is not None and row.utilization is not None:
         steps.append(f"                = {percent(row.utilization)}")  # under the sum of the last step
-    steps += [line for step in not_judged(found, row) for line in step.lines]
-    return _text(mission, title, [*steps, *_verdict(row, found)])
+    return _text(mission, title, [*steps, *_lines(not_judged(found, row)), *_verdict(row, found)])
 
 
 def explain_requirement(mission: Mission, found: MissionFindings, one: JudgedRequirement) -> str:
     """Write how a requirement of a mission stands, and the rows that judge it."""
     title = f"{STATUS[one.status].text} {requirement_id(one)}"
-    steps = [line for step in finding_of(mission, found, one) for line in step.lines]
-    return _text(mission, title, [*steps, "", requirement_finding(one)])
+    return _text(mission, title, [*_lines(finding_of(mission, found, one)), "", requirement_finding(one)])
+
+
+def _lines(steps: Iterable[Step]) -> list[str]:
+    return [line for one in steps for line in one.lines]
 
 
 def _text(mission: Mission, title: str, body: Iterable[str]) -> str:

@@ -14,8 +14,9 @@ from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.findings.row import AppliedWaiver, Row, worst_first
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
+from bisar_budget.report.words.heading import overrides_words
 from bisar_budget.report.words.identity import Identity, digest, identities, source_path
-from bisar_budget.report.words.requirements import overrides_words, requirement_finding, requirement_id, unseen
+from bisar_budget.report.words.requirements import requirement_finding, requirement_id, unseen
 from bisar_budget.report.words.sentences import (
     command_property,
     command_text,

@@ -13,7 +13,7 @@ from bisar_budget.findings.requirement import NAMES
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
 from bisar_budget.report.formats.json_document import document_text, outside_item, verdict_item
-from bisar_budget.report.words.requirements import title_lines
+from bisar_budget.report.words.heading import title_lines
 from bisar_budget.report.words.sentences import BINDING_WORDS, counted, percent, table, use_words, wrapped
 from bisar_budget.units import format_quantity
 

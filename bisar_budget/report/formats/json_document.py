@@ -19,7 +19,7 @@ from bisar_budget.mission.model import Shares
 from bisar_budget.report import Piece, Style
 
 if TYPE_CHECKING:
-    from bisar_budget.report.words.requirements import AboutMission
+    from bisar_budget.report.words.heading import AboutMission
 
 FORMAT = "bisar-budget/check/1"
 

@@ -16,8 +16,8 @@ from bisar_budget.paths.instant import DAY, Instant
 from bisar_budget.report import Style
 from bisar_budget.report.formats.csv_table import csv_text
 from bisar_budget.report.formats.json_document import document_text, outside_item
+from bisar_budget.report.words.heading import title_lines
 from bisar_budget.report.words.identity import digest
-from bisar_budget.report.words.requirements import title_lines
 from bisar_budget.report.words.sentences import percent, sentence, spaced, spreadsheet_text, use_words, wrapped
 from bisar_budget.units import format_quantity
 

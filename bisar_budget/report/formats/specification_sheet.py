@@ -21,8 +21,9 @@ from bisar_budget.report.formats.csv_table import csv_text
 from bisar_budget.report.formats.json_document import document_text, outside_item
 from bisar_budget.report.formats.text_table import requirement_table
 from bisar_budget.report.formats.traceability import identifier, needs_document
+from bisar_budget.report.words.heading import overrides_words, title_lines
 from bisar_budget.report.words.identity import Identity, distinct, identities
-from bisar_budget.report.words.requirements import overrides_words, requirement_lines, title_lines
+from bisar_budget.report.words.requirements import requirement_lines
 from bisar_budget.report.words.sentences import counted, need_text, percent, rst_text, table, wrapped
 
 _LISTED = 3  # parts of the catalogue that a table names

@@ -12,18 +12,23 @@ from bisar_budget.findings.row import Row, worst_first
 from bisar_budget.findings.status import STATUS, worst
 from bisar_budget.report import Piece, Style
 from bisar_budget.report.formats.verification import evidence
-from bisar_budget.report.words.identity import document_words, doubtful_model, head, narrow_gradients
+from bisar_budget.report.words.heading import (
+    document_words,
+    doubtful_model,
+    file_words,
+    head,
+    narrow_gradients,
+    overrides_lines,
+    overrides_words,
+    rule_words,
+)
 from bisar_budget.report.words.requirements import (
     COLUMNS,
     RequirementLine,
     declared_words,
-    file_words,
     is_said_with_the_table,
-    overrides_lines,
-    overrides_words,
     probabilities,
     requirement_lines,
-    rule_words,
     unjudged_effects,
     verdict,
 )

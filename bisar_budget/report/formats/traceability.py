@@ -13,13 +13,9 @@ from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
+from bisar_budget.report.words.heading import overrides_words
 from bisar_budget.report.words.identity import Identity, distinct, identities, stem
-from bisar_budget.report.words.requirements import (
-    declared_words,
-    overrides_words,
-    requirement_finding,
-    requirement_id,
-)
+from bisar_budget.report.words.requirements import declared_words, requirement_finding, requirement_id
 from bisar_budget.report.words.sentences import cause, counted, measure, need_text, rst_text, xml_text
 
 

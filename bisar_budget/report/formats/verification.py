@@ -7,7 +7,7 @@ from bisar_budget.faults import printable
 from bisar_budget.findings.images import Verdict, VerifiedMission
 from bisar_budget.report import Style
 from bisar_budget.report.formats.json_document import document_text, outside_item, verdict_item
-from bisar_budget.report.words.requirements import file_words, overrides_lines
+from bisar_budget.report.words.heading import file_words, overrides_lines
 from bisar_budget.report.words.sentences import table, wrapped, wrapped_counts
 from bisar_budget.units import format_limit, format_quantity
 

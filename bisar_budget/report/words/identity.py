@@ -1,26 +1,17 @@
-"""Names that a mission and its findings keep wherever the command runs, and words about a mission as a whole.
-
-Names are ids of needs, fingerprints, test cases.
+"""Names that a mission and its findings keep wherever the command runs: ids of needs, fingerprints, test cases.
 
 A mission is named by the number of its document, else by its path within its repository, else by the file's name.
 The path is that of the file itself: given from the root of the repository, from a folder, absolutely or through a
 symbolic link, it is one.
 """
 
-import math
 import os
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from bisar_budget.findings.mission import MissionFindings, UnusableMission
-from bisar_budget.geometry import BistaticGeometry, PlatformState
-from bisar_budget.mission.model import Document
-from bisar_budget.mission.platforms import FlownPath
 from bisar_budget.report import Style
-from bisar_budget.report.words.requirements import RULES
-from bisar_budget.report.words.sentences import phase_limit, sentence
-from bisar_budget.units import format_quantity
 
 _STANDARD_INPUT = "standard input"
 
@@ -185,112 +176,3 @@ def _shared_requirements(
     uses = Counter((requirement_id, row_id) for requirement_id, row_id, _ in used)
     taken = set(names.values())
     return frozenset(pair for pair, count in uses.items() if count > 1 or pair[0] in taken)
-
-
-_MODELS = {
-    "published": "published (Rigling & Moses, Tables I and II)",
-    "full": "full (exact ranges, displacement included)",
-    "strictest": "strictest (the stricter of published and full for each row)",
-}
-_NARROW_DEG = 30.0  # between range and Doppler gradients; below it the verdict says what that does
-
-
-def document_words(document: Document) -> str:
-    """Number and issue of a document; empty where the file gives neither."""
-    return ", ".join(filter(None, (document.number, document.issue and f"issue {document.issue}")))
-
-
-def narrow_gradients(geometry: BistaticGeometry) -> str:
-    """Say what range and Doppler gradients close to parallel do to displacements; nothing from 30 degrees on."""
-    angle = geometry.gradient_angle
-    if math.degrees(angle) >= _NARROW_DEG:
-        return ""
-    return (
-        f"Range and Doppler gradients are only {_degrees(angle)} apart: displacements are {1 / math.sin(angle):.2g} "
-        "times those at right angles."
-    )
-
-
-def doubtful_model(mission: MissionFindings) -> str:
-    """Say where the published model judges and does not hold, as a sentence; nothing if it does hold."""
-    said = mission.model_doubt
-    return f"{sentence(said)}." if said else ""
-
-
-def head(mission: MissionFindings) -> Iterator[tuple[str, str]]:
-    """Say in a few lines what was checked: geometry, resolution, budget, model."""
-    geometry, allocation = mission.geometry, mission.allocation
-    is_first = True  # the first squint says what one is
-    for name, state in (("Transmitter", geometry.transmitter), ("Receiver", geometry.receiver)):
-        yield name, _platform(state, is_first)
-        is_first = is_first and state.squint is None
-    if mission.place:
-        yield "Place", mission.place
-    for name, path in mission.paths:
-        yield "Path", f"{name}: {path_words(path)}"
-    yield (
-        "Geometry",
-        f"bistatic angle {_degrees(geometry.bistatic_angle)}, look azimuth {_degrees(geometry.look_azimuth)}, "
-        f"range and Doppler gradients {_degrees(geometry.gradient_angle)} apart, "
-        f"wavelength {format_quantity(mission.wavelength, 'm', 4)}",
-    )
-    yield (
-        "Resolution",
-        f"{format_quantity(mission.resolution.range, 'm')} range, "
-        f"{format_quantity(mission.resolution.cross_range, 'm')} cross range (peak to null, on ground)",
-    )
-    split = allocation.qpe
-    shares = f"transmitter {split.transmitter:.3g}, receiver {split.receiver:.3g}"
-    shares += f", clock {split.clock:.3g}" if split.clock is not None else ""
-    shares += f", reserve {split.reserve:.3g}" if split.reserve else ""
-    gain = ""
-    if allocation.n_pull is not None:
-        gain = (
-            f"; autofocus pulls in (corrects) up to {multiple_of_pi(allocation.n_pull)} rad: limits times "
-            f"{allocation.autofocus_gain:.3g}"
-        )
-    yield "Budget", f"quadratic phase error (QPE) {phase_limit(allocation.qpe_total, mission)}: {shares}{gain}"
-    yield "Model", f"{_MODELS[mission.model]}, {RULES[mission.combine]}"
-    if mission.scene is not None and not mission.scene.degeneracy:
-        radius = format_quantity(mission.scene.radius, "m")
-        yield (
-            "Scene",
-            f"radius {radius}; one autofocus correction of the declared errors serves {mission.scene.served}",
-        )
-    if mission.coverage_factor != 1:
-        yield "Coverage", f"navigation and clock: declared is {mission.coverage_factor:g} times the file's value"
-
-
-def path_words(path: FlownPath) -> str:
-    """Say where a path comes from, and how far the polynomial that stands for it is from what the file has."""
-    said = path.source if path.file is None else f"{path.file}: {path.source}"
-    if path.age is not None:
-        when = "old" if path.age >= 0 else "ahead"
-        said += f", {format_quantity(abs(path.age) / 86400, '')} days {when}"
-    if path.order is None or path.farthest is None or path.rms is None:
-        return said
-    said += f"; flown as a polynomial of order {path.order}"
-    if path.samples:
-        rms, farthest = (format_quantity(one, "m") for one in (path.rms, path.farthest))
-        within = "" if path.stretch is None else f" in {format_quantity(path.stretch, 's')}"
-        return f"{said} through {path.samples} places{within}, {rms} rms and at most {farthest} from them"
-    return f"{said}, at most {format_quantity(path.farthest, 'm')} from it"
-
-
-def multiple_of_pi(factor: float) -> str:
-    """Write 2 as 2π, 1 as π."""
-    return "π" if factor == 1 else f"{factor:g}π"
-
-
-def _platform(state: PlatformState, explains_squint: bool) -> str:
-    squint = "still"
-    if state.squint is not None:
-        squint = f"squint {_degrees(state.squint)}" + (" off broadside" if explains_squint else "")
-    return (
-        f"{format_quantity(state.slant_range, 'm', 4)} away, azimuth {_degrees(state.azimuth)}, "
-        f"elevation {_degrees(state.elevation)}, {squint}"
-    )
-
-
-def _degrees(angle: float) -> str:
-    return f"{math.degrees(angle):.1f}°".replace("-0.0°", "0.0°")

@@ -2,44 +2,20 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 from bisar_budget import phrases
-from bisar_budget.faults import SetValue, changes_words, printable
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.monte_carlo import MonteCarlo, Requirement
-from bisar_budget.findings.requirement import DeclaredKinds, JudgedRequirement, Override
+from bisar_budget.findings.requirement import DeclaredKinds, JudgedRequirement
 from bisar_budget.findings.row import SPECIFICATION, Row
 from bisar_budget.findings.status import STATUS
-from bisar_budget.report import Style
 from bisar_budget.report.words.sentences import requirement_size, use_words, wrapped
 from bisar_budget.units import format_quantity
 
 COLUMNS = ("requirement", "allowed", "reached", "use", "status", "decided by")
-MODELS = {"published": "published model", "full": "full model", "strictest": "stricter of both models"}
-RULES = {"each": "each error alone", "sum": "worst-case sum", "rss": "root-sum-square"}
 _BREAKS = ("fail", "not_evaluated")
 _UNKNOWN_PLACE = "place-is-not-known"  # a reason that rows say at length
-
-
-class AboutMission(Protocol):
-    """Findings about a mission, by a check or another study."""
-
-    @property
-    def file(self) -> str:
-        """Its file."""
-
-    @property
-    def name(self) -> str:
-        """Its name."""
-
-    @property
-    def changes(self) -> tuple[SetValue, ...]:
-        """Values that options put in place of the file's."""
-
-    @property
-    def overrides(self) -> tuple[Override, ...]:
-        """Settings from outside the file that bear on the mission."""
 
 
 class RequirementLine(NamedTuple):
@@ -218,45 +194,6 @@ def kind_names(kinds: Sequence[str]) -> list[str]:
         owner = "both" if len(of) > 1 else of[0]
         names.append(f"{what} ({owner})" if owner else what)
     return names
-
-
-def rule_words(mission: MissionFindings) -> str:
-    """Say by which model, and by which rule, a mission is judged."""
-    return f"{MODELS[mission.model]}, {RULES[mission.combine]}"
-
-
-def overrides_words(found: AboutMission, *, with_changes: bool = True) -> str:
-    """Say what from outside the file bears on the verdict; empty if nothing does. `--set` may be said elsewhere."""
-    said = [
-        f"{one.name} {printable(one.value)} ({one.origin})"
-        for one in found.overrides
-        if with_changes or one.name != "--set"
-    ]
-    return "; ".join(said)
-
-
-def overrides_lines(found: AboutMission) -> list[str]:
-    """The same for a terminal, beside `--set`; no line if there is nothing."""
-    said = overrides_words(found, with_changes=False)
-    return wrapped(f"From outside the file: {said}", "  ") if said else []
-
-
-def file_words(found: AboutMission) -> str:
-    """File of a mission, with the options that changed what it says."""
-    return f"{printable(found.file)} {changes_words(found.changes)}" if found.changes else printable(found.file)
-
-
-def title_lines(
-    found: AboutMission, said: str, sgr: str, style: Style, *, more: Sequence[str] = (), remark: str = ""
-) -> Iterator[str]:
-    """An answer in a sentence, coloured on a terminal, more about it, and of which mission it is."""
-    first, *rest = wrapped(said, "  ")
-    yield style.coloured(first, sgr)
-    yield from rest
-    for text in (*more, f"{file_words(found)}, {printable(found.name)}{remark}"):
-        yield from wrapped(text, "  ")
-    yield from overrides_lines(found)
-    yield ""
 
 
 _WIDTH = 33  # of the ids

@@ -1,4 +1,4 @@
-"""Words of every format: how much of its limit a row uses and why, sizes of files, widths of lines, escaped texts."""
+"""Words of every format: how much of its limit a row uses and why, sizes in units of the file, lines, escapes."""
 
 import math
 import os
