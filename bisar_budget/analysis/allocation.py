@@ -45,6 +45,10 @@ class Allocation(NamedTuple):
         """QPE that an owner may use, before autofocus. [rad]"""
         return self.qpe.of(owner) * self.qpe_total
 
+    def qpe_allowed(self, owner: str) -> Any:
+        """QPE that an owner may have, autofocus included. [rad]"""
+        return self.qpe_limit(owner) * self.autofocus_gain
+
     def of(self, case: int) -> "Allocation":
         """Those of one of many cases, in plain numbers."""
         qpe, pslr, islr = (Shares._make(_plain(share, case) for share in split) for split in self[1:4])

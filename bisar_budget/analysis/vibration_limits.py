@@ -201,6 +201,6 @@ def slow_limits(mission: Mission, allocation: Allocation, name: str, cycles: Any
     required, to the whole requirement without gain.
     """
     wavenumber = 2 * math.pi / mission.radar.wavelength
-    quadratic = allocation.qpe_limit(name) * allocation.autofocus_gain / (wavenumber * quadratic_part(cycles))
+    quadratic = allocation.qpe_allowed(name) / (wavenumber * quadratic_part(cycles))
     required = mission.requirements.cubic_phase_error
     return SlowLimits(quadratic, None if required is None else required / (wavenumber * cubic_part(cycles)))

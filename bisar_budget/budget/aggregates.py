@@ -22,13 +22,13 @@ from bisar_budget.budget.judged_requirements import (
     UntakenEffect,
     first_highest,
 )
-from bisar_budget.budget.judged_rows import BOUND, CODE, Floats, Judged, Judging, number_of, worded
+from bisar_budget.budget.judged_rows import BOUND, CODE, FamilyRow, Floats, Judging, number_of, worded
 from bisar_budget.effects.combined import (
     Phases,
     combined,
     correlation_notes,
 )
-from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
+from bisar_budget.effects.declared import CUBIC, LOCATION, OTHER_MODEL, QUADRATIC
 from bisar_budget.effects.effect import Subject, subject
 from bisar_budget.effects.vibration import DeclaredPhase
 from bisar_budget.faults import KeyPath
@@ -36,7 +36,6 @@ from bisar_budget.findings.row import Row
 from bisar_budget.phrases import NOTHING, Note
 
 PULL_IN = "autofocus_pull_in"
-_OTHER = {"published": "full", "full": "published"}
 
 Truths = NDArray[np.bool_]
 
@@ -51,7 +50,7 @@ class Aggregates:
 
     def rows(self, model: str) -> Iterator["Aggregate"]:
         """Every row by one model, which the other may doubt, in the order of the contract."""
-        mine, theirs = self.together(model), self.together(_OTHER[model])
+        mine, theirs = self.together(model), self.together(OTHER_MODEL[model])
         if self.combine == "each":
             yield self._largest_quadratic(mine, theirs)
         else:
@@ -191,15 +190,14 @@ class Aggregates:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Aggregate:
-    """One row of errors together, by a model, in many cases; `is_there` are the cases that have it.
+class Aggregate(FamilyRow):
+    """One row of errors together, by a model, in many cases.
 
     `rule` combines the `phases`; those of displacements are none. `by_other` is the sum by the model that does not
     gate, `of_all` the root-sum-square where the row is the largest part; where either breaks the limit, a pass is a
     warning.
     """
 
-    judged: Judged
     rule: str
     phases: Phases
     by_other: Any
@@ -207,7 +205,6 @@ class Aggregate:
     is_over_by_other: Any = False
     is_over_of_all: Any = False
     without_autofocus: Any = 0.0
-    is_there: Any = True
 
     def in_words(self, case: Case, model: str) -> Row:
         """The row of one case, by the model that judges it."""
@@ -234,7 +231,7 @@ class Aggregate:
             path=said.path,
             equation=said.equation[model != "published"],
             over=over,
-            doubt=doubt or _doubt(case, _OTHER[model], self, said, limit),
+            doubt=doubt or _doubt(case, OTHER_MODEL[model], self, said, limit),
             no_limit=phrases.no_requirement(),
             not_evaluated=case.degeneracy(model) or phrases.no_image_to_place(),
             info=phrases.no_requirement(),
@@ -402,12 +399,10 @@ class JudgedScene:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SceneRow:
+class SceneRow(FamilyRow):
     """The row of the scene's edge in many cases."""
 
-    judged: Judged
     scene: JudgedScene
-    is_there: bool = True
 
     def in_words(self, case: Case, model: str) -> Row:
         """The row of one case, by the model that judges it."""

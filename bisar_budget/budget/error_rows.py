@@ -1,4 +1,4 @@
-"""One row for each error: the largest size that every requirement allows, and what is declared against it."""
+"""Rows of errors: what is declared against the largest size that requirements allow, and that is specified."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -9,12 +9,24 @@ import numpy as np
 
 from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Analysis, Case, Model
-from bisar_budget.budget.judged_rows import BOUND, CODE, REQUIREMENTS, Floats, Judged, Judging, number_of, worded
+from bisar_budget.budget.judged_rows import (
+    BOUND,
+    CODE,
+    REQUIREMENTS,
+    FamilyRow,
+    Floats,
+    Judged,
+    Judging,
+    number_of,
+    worded,
+)
 from bisar_budget.constants import UTILIZATION_TOLERANCE
-from bisar_budget.effects.declared import CUBIC, END_OF_IMAGE, HELD, LOCATION, QUADRATIC, Declared
-from bisar_budget.effects.effect import ErrorSource
-from bisar_budget.findings.row import Row
+from bisar_budget.effects.declared import CUBIC, END_OF_IMAGE, HELD, LOCATION, OTHER_MODEL, QUADRATIC, Declared
+from bisar_budget.effects.effect import PLATFORMS, ErrorSource, subject
+from bisar_budget.findings.row import SPECIFICATION, Row
 from bisar_budget.geometry import FRAME_AXES
+from bisar_budget.mission.changes import name_of_error, parts_of
+from bisar_budget.mission.quantities import Number, largest_at
 from bisar_budget.phrases import NOTHING, Note
 
 _BINDING = np.array([REQUIREMENTS.index(name) for name in (*HELD, END_OF_IMAGE)] + [-1], dtype=np.int8)
@@ -38,13 +50,14 @@ class ErrorRows:
         self.gain = judging.array(analysis.allocation.autofocus_gain)
         self.is_of_sums = analysis.is_of_sums
 
-    def rows(self, gating: str, other: str) -> Iterator["ErrorRow"]:
+    def rows(self, gating: str) -> Iterator["ErrorRow"]:
         """Rows by one model, which the other may doubt."""
         for place in range(len(self.errors.blocks)):
-            yield from self._of_block(place, gating, other)
+            yield from self._of_block(place, gating)
 
-    def _of_block(self, place: int, gating: str, other: str) -> Iterator["ErrorRow"]:
+    def _of_block(self, place: int, gating: str) -> Iterator["ErrorRow"]:
         errors, block, is_whole = self.errors, self.errors.blocks[place], self.judging.is_whole
+        other = OTHER_MODEL[gating]
         needs, sources = errors.mission.requirements, block.sources
         limit = np.array([self.limits[source.owner] for source in sources])
         held = (limit, needs.cubic_phase_error, needs.location_error)
@@ -96,13 +109,11 @@ def _is_over(does: Declared, held: tuple[Floats, float | None, float | None], is
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ErrorRow:
+class ErrorRow(FamilyRow):
     """One error as judged in many cases; `limit` is the quadratic phase that it may have. [rad]"""
 
-    judged: Judged
     source: ErrorSource
     limit: Floats
-    is_there: bool = True
 
     def in_words(self, case: Case, gating: str) -> Row:
         """The row of one case, by the model that judges it."""
@@ -205,3 +216,50 @@ def _cause(source: ErrorSource) -> Note:
 def _stated_elsewhere(case: Case, source: ErrorSource) -> Note:
     frame = getattr(case.mission.platforms, source.owner).motion_error.frame
     return phrases.stated_along_other_axes([axis.replace("_", " ") for axis in FRAME_AXES[frame]])
+
+
+# ---------------------------------------------------------------------- specifications
+def specification_rows(judging: Judging, analysis: Analysis) -> Iterator["SpecificationRow"]:
+    """Judge each specification: no more may be declared, of three axes in the largest; coverage does not count.
+
+    An error that is specified and not declared is not evaluated. All of a specification may be used, without warning.
+    """
+    for number in analysis.mission.specifications.values():
+        most, found = judging.array(number.value), judging.array(largest_at(analysis.mission, number))
+        what = subject(_owner(number.key), SPECIFICATION, name_of_error(number.key))
+        of_amplitudes = _amplitude if number.is_level else np.asarray
+        judged = judging._replace(warn_above=1.0).row(what, of_amplitudes(found), of_amplitudes(most))
+        status = np.where(np.isnan(found), CODE["not_evaluated"], judged.status).astype(np.int8)
+        judged = judged._replace(status=status, declared=found, allowable=most, metric=SPECIFICATION)
+        yield SpecificationRow(judged, number)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SpecificationRow(FamilyRow):
+    """One specification in many cases."""
+
+    number: Number
+
+    def in_words(self, case: Case, model: str) -> Row:
+        """The row of one case; models do not differ in it."""
+        return worded(
+            case,
+            self.judged,
+            unit=self.number.dimension.si,
+            path=("specifications", self.number.key),
+            equation="declared against specified",
+            over=phrases.more_than_specified(),
+            not_evaluated=phrases.specified_and_not_declared(self.number.key),
+            is_independent=False,
+        )
+
+
+def _amplitude(level: Any) -> Any:
+    return 10 ** (level / 20)
+
+
+def _owner(key: str) -> str:
+    section, name, *_ = (*parts_of(key), "")
+    if section == "platforms":
+        return name if name in PLATFORMS else "mission"
+    return "clock" if section in ("timing_error", "synchronization") else "mission"

@@ -8,18 +8,17 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bisar_budget.analysis.analysis import Analysis, Case
+from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.scene import SceneEdges, scene_edges
 from bisar_budget.analysis.spread import noise
-from bisar_budget.budget.acceleration_rows import accelerated_rows
 from bisar_budget.budget.aggregates import Aggregates, JudgedScene, Misplacing, misplacing, untaken_effects
 from bisar_budget.budget.doubts import declared_position_error, is_in_doubt, least_doubt
-from bisar_budget.budget.error_rows import ErrorRows
+from bisar_budget.budget.error_rows import ErrorRows, specification_rows
 from bisar_budget.budget.file_warnings import FASTEST_FLIGHT
 from bisar_budget.budget.judged_requirements import (
     DECLARATIONS,
@@ -32,14 +31,14 @@ from bisar_budget.budget.judged_requirements import (
     requirement_states,
     status_of,
 )
-from bisar_budget.budget.judged_rows import CODE, REQUIREMENTS, Judged, Judging, Why
+from bisar_budget.budget.judged_rows import CODE, REQUIREMENTS, FamilyRow, Judged, Judging, Why
 from bisar_budget.budget.random_rows import RandomRows
-from bisar_budget.budget.specification_rows import specification_rows
-from bisar_budget.budget.vibration_rows import Vibrations, pslr_row, spur_rows
+from bisar_budget.budget.tone_rows import accelerated_rows, pslr_row, spur_rows
+from bisar_budget.budget.vibration_rows import Vibrations
 from bisar_budget.budget.waivers import is_waived
 from bisar_budget.effects.declared import END_OF_IMAGE, LOCATION, MODELS
 from bisar_budget.effects.effect import PLATFORMS, subject
-from bisar_budget.findings.row import DECLARE, SPECIFICATION, Row
+from bisar_budget.findings.row import DECLARE, SPECIFICATION
 from bisar_budget.findings.status import STATUS
 from bisar_budget.geometry import BistaticGeometry, norm
 from bisar_budget.mission.model import Mission
@@ -51,21 +50,6 @@ _OWNERS = (*PLATFORMS, "clock", "mission")
 
 Codes = NDArray[np.int8]
 Truths = NDArray[np.bool_]
-
-
-class FamilyRow(Protocol):
-    """A row as its family judges it by a model."""
-
-    @property
-    def judged(self) -> Judged:
-        """The row in all cases."""
-
-    @property
-    def is_there(self) -> Any:
-        """Cases that have it."""
-
-    def in_words(self, case: Case, model: str) -> Row:
-        """The row of one case."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,8 +156,8 @@ class _Judgement:
     # ---------------------------------------------------------------- rows of the families
     def _families(self, model: str) -> Iterator[FamilyRow]:
         """Every row by a model, in the order of the contract."""
-        other, needs = "published" if model == "full" else "full", self.mission.requirements
-        yield from self._errors.rows(model, other)
+        needs = self.mission.requirements
+        yield from self._errors.rows(model)
         if self._vibrates or self._shows_vibration:
             yield from self._vibrations.rows(model)
         yield from self._random.rows(model)
@@ -214,8 +198,7 @@ class _Judgement:
     def _limits(self) -> Mapping[str, Any]:
         """Quadratic phase that each owner is held to, gain of autofocus included. [rad]"""
         allocation = self.analysis.allocation
-        gain = allocation.autofocus_gain
-        return {owner: self.judging.array(allocation.qpe_limit(owner) * gain) for owner in _OWNERS}
+        return {owner: self.judging.array(allocation.qpe_allowed(owner)) for owner in _OWNERS}
 
     @cached_property
     def _vibrations(self) -> Vibrations:

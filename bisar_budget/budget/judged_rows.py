@@ -1,7 +1,9 @@
 """A row of the budget in many cases at once, and how it is judged; a check is one case."""
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from enum import IntEnum
 from operator import attrgetter
 from typing import Any, NamedTuple
@@ -115,6 +117,10 @@ class Judged(NamedTuple):
         """The row with the requirement that sets its allowable."""
         return self._replace(metric=key, binding=np.full_like(self.binding, REQUIREMENTS.index(key)))
 
+    def allowable_by(self, model: str) -> Floats:
+        """The allowable by a model, whichever gates."""
+        return self.allowable_published if model == "published" else self.allowable_full
+
     def requirement(self, case: Case) -> str | None:
         """The requirement that sets the allowable in a case; None: its metric does."""
         place = self.binding[case.place]
@@ -211,6 +217,18 @@ class Judging(NamedTuple):
 
 
 # ---------------------------------------------------------------------- one case in words
+@dataclass(frozen=True, slots=True, eq=False)
+class FamilyRow(ABC):
+    """A row as its family judges it by a model, in many cases; `is_there` are those that have it."""
+
+    judged: Judged
+    is_there: Any = field(default=True, kw_only=True)
+
+    @abstractmethod
+    def in_words(self, case: Case, model: str) -> Row:
+        """The row of one case, by the model that judges it."""
+
+
 _STATUSES = tuple(STATUS)
 
 

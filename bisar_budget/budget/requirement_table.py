@@ -9,7 +9,7 @@ from bisar_budget.analysis.analysis import Case
 from bisar_budget.analysis.spread import islr_db, mainlobe_energy, spread_limit
 from bisar_budget.analysis.vibration_limits import level_of, tone_limits
 from bisar_budget.budget.doubts import input_doubts, is_in_doubt
-from bisar_budget.budget.judged_mission import FamilyRow, JudgedMission
+from bisar_budget.budget.judged_mission import JudgedMission
 from bisar_budget.budget.judged_requirements import (
     DECLARATIONS,
     TAKEN_BY,
@@ -18,7 +18,7 @@ from bisar_budget.budget.judged_requirements import (
     is_asked_for,
     missing_declarations,
 )
-from bisar_budget.budget.judged_rows import Judged, Why
+from bisar_budget.budget.judged_rows import FamilyRow, Judged, Why
 from bisar_budget.budget.waivers import Waived
 from bisar_budget.effects.declared import CUBIC, LOCATION, MODELS, QUADRATIC
 from bisar_budget.findings.requirement import JudgedRequirement
@@ -171,8 +171,7 @@ def _sizes(row: Row, key: str, case: Case) -> tuple[float | None, float | None]:
         return row.allowable, row.declared
     if key == QUADRATIC:
         qpe = row.qpe_full_rad if row.model == "full" else row.qpe_published_rad
-        limit = allocation.qpe_limit(row.owner) * allocation.autofocus_gain
-        return limit, None if qpe is None else abs(qpe)
+        return allocation.qpe_allowed(row.owner), None if qpe is None else abs(qpe)
     if key == CUBIC:
         return mission.requirements.cubic_phase_error, row.cubic_rad
     if key == LOCATION:

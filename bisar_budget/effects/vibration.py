@@ -43,6 +43,7 @@ from bisar_budget.units import format_quantity
 
 NEAR_CYCLES = 2.5  # per aperture; farther apart, two equal lines raise each other's echo by less than 1.1 dB
 SLOWEST = 1.0  # cycles per aperture; what is slower makes no echoes
+ECHO_CYCLES = 3.0  # likewise; below, echoes lie beside the mainlobe and the motion is a quadratic phase as well
 
 _STEPS = (0.1, 0.02)  # of the search, in cells
 _REACH = np.arange(-6, 7)[:, None, None]
