@@ -142,14 +142,15 @@ def vibration_limits(mission: Mission, allocation: Allocation, metric: str) -> d
         return {}
     power: Any = 10 ** (requirement_db / 10)  # -30 dB is 10⁻³: PSLR and ISLR are power ratios
     if metric == "pslr":
-        all_of_it, part = echo_phase(np.sqrt(power * (split.transmitter + split.receiver))), amplitude_share
+        largest = echo_phase(np.sqrt(power * (split.transmitter + split.receiver)))
     else:
-        all_of_it, part = spread_phase(power, "full", mainlobe_energy(mission)), power_share
+        largest = spread_phase(power, "full", mainlobe_energy(mission))
     wavelength, found = mission.radar.wavelength, {}
     for name in PLATFORMS:
+        # The squares of rms phases are the shares of power.
+        part = amplitude_share(split, name) if metric == "pslr" else np.sqrt(split.of(name))
         published = evaluators.vibration_limit(wavelength, power, split.of(name))
-        full = evaluators.motion_of_phase(wavelength, all_of_it * part(split, name))
-        found[name] = VibrationLimits(published, full)
+        found[name] = VibrationLimits(published, evaluators.motion_of_phase(wavelength, largest * part))
     return found
 
 
@@ -170,11 +171,6 @@ def amplitude_share(split: Shares, name: str) -> Any:
     """Part of a platform in the amplitude of both: they sum to 1, in the ratio of the roots of power."""
     own, other = split.of(name), split.of(next(one for one in PLATFORMS if one != name))
     return evaluators.amplitude_share(own, other)
-
-
-def power_share(split: Shares, name: str) -> Any:
-    """Part of a platform in the rms phase: their squares are the shares of power."""
-    return np.sqrt(split.of(name))
 
 
 class SlowLimits(NamedTuple):

@@ -7,7 +7,6 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Analysis, Case
@@ -22,7 +21,7 @@ from bisar_budget.budget.judged_requirements import (
     UntakenEffect,
     first_highest,
 )
-from bisar_budget.budget.judged_rows import BOUND, CODE, FamilyRow, Floats, Judging, number_of, worded
+from bisar_budget.budget.judged_rows import BOUND, CODE, FamilyRow, Judging, number_of, worded
 from bisar_budget.effects.combined import (
     Phases,
     combined,
@@ -34,10 +33,9 @@ from bisar_budget.effects.vibration import DeclaredPhase
 from bisar_budget.faults import KeyPath
 from bisar_budget.findings.row import Row
 from bisar_budget.phrases import NOTHING, Note
+from bisar_budget.ranges.exact_ranges import Floats, Truths
 
 PULL_IN = "autofocus_pull_in"
-
-Truths = NDArray[np.bool_]
 
 
 class Aggregates:

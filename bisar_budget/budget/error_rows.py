@@ -14,13 +14,11 @@ from bisar_budget.budget.judged_rows import (
     CODE,
     REQUIREMENTS,
     FamilyRow,
-    Floats,
     Judged,
     Judging,
     number_of,
     worded,
 )
-from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.effects.declared import CUBIC, END_OF_IMAGE, HELD, LOCATION, OTHER_MODEL, QUADRATIC, Declared
 from bisar_budget.effects.effect import PLATFORMS, ErrorSource, subject
 from bisar_budget.findings.row import SPECIFICATION, Row
@@ -28,6 +26,7 @@ from bisar_budget.geometry import FRAME_AXES
 from bisar_budget.mission.changes import name_of_error, parts_of
 from bisar_budget.mission.quantities import Number, largest_at
 from bisar_budget.phrases import NOTHING, Note
+from bisar_budget.ranges.exact_ranges import Floats
 
 _BINDING = np.array([REQUIREMENTS.index(name) for name in (*HELD, END_OF_IMAGE)] + [-1], dtype=np.int8)
 
@@ -191,7 +190,7 @@ def _doubt(case: Case, other: Model, source: ErrorSource, limit: float) -> Note:
             if required is not None
         ]
     size, allowed, binding = max(held, key=lambda one: one[0] / one[1])
-    if size <= allowed * (1 + UTILIZATION_TOLERANCE) or other.is_blind:
+    if size <= allowed * BOUND or other.is_blind:
         return NOTHING
     if binding == LOCATION:
         return phrases.other_model_fails(other.name, moved, allowed, "m", "displacement")

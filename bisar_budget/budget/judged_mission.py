@@ -11,7 +11,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.scene import SceneEdges, scene_edges
@@ -31,7 +30,7 @@ from bisar_budget.budget.judged_requirements import (
     requirement_states,
     status_of,
 )
-from bisar_budget.budget.judged_rows import CODE, REQUIREMENTS, FamilyRow, Judged, Judging, Why
+from bisar_budget.budget.judged_rows import CODE, REQUIREMENTS, Codes, FamilyRow, Judged, Judging, Why
 from bisar_budget.budget.random_rows import RandomRows
 from bisar_budget.budget.tone_rows import accelerated_rows, pslr_row, spur_rows
 from bisar_budget.budget.vibration_rows import Vibrations
@@ -39,17 +38,14 @@ from bisar_budget.budget.waivers import is_waived
 from bisar_budget.effects.declared import END_OF_IMAGE, LOCATION, MODELS
 from bisar_budget.effects.effect import PLATFORMS, subject
 from bisar_budget.findings.row import DECLARE, SPECIFICATION
-from bisar_budget.findings.status import STATUS
+from bisar_budget.findings.status import BROKEN, STATUS
 from bisar_budget.geometry import BistaticGeometry, norm
 from bisar_budget.mission.model import Mission
+from bisar_budget.ranges.exact_ranges import Truths
 
-_STATUSES = tuple(STATUS)
-BROKEN = [CODE["fail"], CODE["not_evaluated"]]  # what a waiver covers
+_BROKEN = [CODE[name] for name in BROKEN]
 _GATES = np.array([one.gates for one in STATUS.values()])
 _OWNERS = (*PLATFORMS, "clock", "mission")
-
-Codes = NDArray[np.int8]
-Truths = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +128,7 @@ class _Judgement:
         states = requirement_states(
             mission,
             # A requirement judges effects by itself, and is waived where its row is.
-            np.where((after == CODE["waived"]) & np.isin(own, BROKEN), CODE["waived"], own),
+            np.where((after == CODE["waived"]) & np.isin(own, _BROKEN), CODE["waived"], own),
             np.array([row.utilization for row in rows]),
             of_all.judges(),
             np.array([row.quadratic_use for row in rows]),
@@ -341,7 +337,7 @@ class RowStatuses:
         is_named = np.array([[is_waived(self.mission, today, [what.id])] for what in self.subjects])
         if is_waived(self.mission, today, [DECLARATIONS.id]):
             is_named = is_named | (self.why == Why.NOT_DECLARED_AS_REQUIRED)
-        return np.where(is_named & np.isin(self.status, BROKEN), CODE["waived"], self.status)
+        return np.where(is_named & np.isin(self.status, _BROKEN), CODE["waived"], self.status)
 
     def judges(self) -> Codes:
         """Place in `KEYS` of the requirement that judges each row, -1: none, since it is not declared."""
@@ -378,13 +374,3 @@ def _stricter(full: Mapping[str, Judged], published: Mapping[str, Judged] | None
         is_other |= tie & is_same & ~is_as_high(size[1], size[0])
         found.append(one.where(is_other, other))
     return [*found, *others.values()]  # an aggregate that only one of them has
-
-
-def statuses(codes: Codes) -> NDArray[np.object_]:
-    """Names of statuses by their codes."""
-    return np.array(_STATUSES, dtype=object)[codes]
-
-
-def field(row: Judged, name: str) -> Any:
-    """One field of a row, (cases,)."""
-    return statuses(row.status) if name == "status" else getattr(row, name)

@@ -14,18 +14,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bisar_budget.constants import UTILIZATION_TOLERANCE
+from bisar_budget.budget.judged_rows import BOUND, Codes
 from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.findings.requirement import DeclaredKinds
 from bisar_budget.findings.row import DECLARE
-from bisar_budget.findings.status import RANK, STATUS
+from bisar_budget.findings.status import BROKEN, RANK, STATUS
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import Platform
-
-Codes = NDArray[np.int8]  # places of statuses in STATUS: the worst has the lowest
-Floats = NDArray[np.float64]
-Truths = NDArray[np.bool_]
+from bisar_budget.ranges.exact_ranges import Floats, Truths
 
 KEYS = (QUADRATIC, CUBIC, LOCATION, "pslr", "islr", "declare")
 UNITS = {QUADRATIC: "rad", CUBIC: "rad", LOCATION: "m", "pslr": "dB", "islr": "dB", "declare": ""}
@@ -38,8 +35,7 @@ MAKES_UP = 0.1
 TAKEN_BY = {"cubic": (CUBIC, "islr"), "spread": ("islr",), "tone": ("pslr", "islr")}
 
 _NONE = np.int8(len(STATUS))  # of a row that judges nothing
-_BREAKS = [RANK[name] for name in ("fail", "not_evaluated")]
-_IS_JUDGED = np.array([one.is_judged for one in STATUS.values()])
+IS_JUDGED = np.array([one.is_judged for one in STATUS.values()])
 
 
 class UntakenEffect(NamedTuple):
@@ -138,12 +134,12 @@ def requirement_states(
     """
     uses, found = np.nan_to_num(utilization, nan=0.0, posinf=np.inf), []
     for key in required_keys(mission):
-        mine = _IS_JUDGED[codes] & (judges == KEYS.index(key))
+        mine = IS_JUDGED[codes] & (judges == KEYS.index(key))
         levels, used = np.where(mine, codes, _NONE), uses
         if key == QUADRATIC:  # a row that another requirement binds is held to this one too
-            is_other = _IS_JUDGED[codes] & ~mine & (codes != RANK["waived"]) & ~np.isnan(quadratic_use)
+            is_other = IS_JUDGED[codes] & ~mine & (codes != RANK["waived"]) & ~np.isnan(quadratic_use)
             by_autofocus = np.where(codes == RANK["pass_with_autofocus"], codes, RANK["pass"])
-            breaks = np.nan_to_num(quadratic_use) > 1 + UTILIZATION_TOLERANCE
+            breaks = np.nan_to_num(quadratic_use) > BOUND
             levels = np.where(is_other, np.where(breaks, RANK["fail"], by_autofocus), levels)
             used = np.where(is_other, quadratic_use, uses)
             mine = mine | is_other
@@ -160,7 +156,7 @@ def requirement_states(
             is_unjudged = is_unjudged | np.asarray(is_misplaced)
         status = np.where(is_unjudged & (worst != RANK["fail"]), RANK["not_evaluated"], worst)
         if waived.get(key):
-            status = np.where(np.isin(status, _BREAKS), RANK["waived"], status)
+            status = np.where(np.isin(status, [RANK[name] for name in BROKEN]), RANK["waived"], status)
         found.append(RequirementState(key, status.astype(np.int8), decider, utilization, mine))
     return found
 

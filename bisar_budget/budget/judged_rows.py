@@ -20,12 +20,13 @@ from bisar_budget.faults import KeyPath
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import RANK, STATUS
 from bisar_budget.phrases import NOTHING, Note
+from bisar_budget.ranges.exact_ranges import Floats
 
-Floats = NDArray[np.float64]
-Codes = NDArray[np.int8]
+Codes = NDArray[np.int8]  # places of statuses in STATUS: the worst has the lowest
 
 BOUND = 1 + UTILIZATION_TOLERANCE
 CODE = {name: np.int8(rank) for name, rank in RANK.items()}
+_NAMES = np.array(list(STATUS), dtype=object)
 REQUIREMENTS = (QUADRATIC, CUBIC, LOCATION, "pslr", "islr", END_OF_IMAGE)
 
 WHOLE = ("allowable_published", "allowable_full", "qpe_full_rad", "qpe_exact_rad", "islr_db")  # see `Judging`
@@ -40,6 +41,11 @@ NUMBERS = (
 )  # of columns
 _columns_of_numbers = attrgetter(*NUMBERS)
 _IN_UNIT = ("declared", "allowable", "allowable_published", "allowable_full")  # columns in the unit of their row
+
+
+def statuses(codes: Any) -> Any:
+    """Name of a status by its code, or names by codes."""
+    return _NAMES[codes]
 
 
 class Why(IntEnum):
@@ -229,9 +235,6 @@ class FamilyRow(ABC):
         """The row of one case, by the model that judges it."""
 
 
-_STATUSES = tuple(STATUS)
-
-
 def worded(
     case: Case,
     row: Judged,
@@ -248,7 +251,7 @@ def worded(
     **others: Any,  # further fields of the row
 ) -> Row:
     """Put a row as judged, in one case, into words: they follow from its status, and decide nothing."""
-    mission, status, numbers = case.mission, _STATUSES[row.status[case.place]], row.numbers(case.place)
+    mission, status, numbers = case.mission, statuses(row.status[case.place]), row.numbers(case.place)
     allowable, utilization, full = numbers["allowable"], numbers["utilization"], numbers["qpe_full_rad"]
     reason, remarks = no_limit if allowable is None else NOTHING, tuple[Note, ...](others.pop("remarks", ()))
     if status == "info":

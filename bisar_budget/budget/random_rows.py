@@ -26,7 +26,7 @@ from bisar_budget.analysis.spread import (
     stated_powers,
 )
 from bisar_budget.budget.judged_requirements import SMALL_RAD
-from bisar_budget.budget.judged_rows import BOUND, CODE, REQUIREMENTS, FamilyRow, Floats, Judging, worded
+from bisar_budget.budget.judged_rows import BOUND, CODE, REQUIREMENTS, FamilyRow, Judging, worded
 from bisar_budget.budget.tone_rows import evidence, notes_of_acceleration
 from bisar_budget.effects.air_delays import CONTENT, dispersion
 from bisar_budget.effects.declared import CUBIC, LOCATION, OTHER_MODEL, QUADRATIC
@@ -43,12 +43,11 @@ from bisar_budget.mission.platforms import MotionError
 from bisar_budget.mission.readers import SortedPoints
 from bisar_budget.mission.vibrations import Vibration
 from bisar_budget.phrases import NOTHING, Note
+from bisar_budget.ranges.exact_ranges import Floats, Truths
 
 ISLR = "islr"
 HELD = (QUADRATIC, CUBIC, ISLR, LOCATION)  # requirements, in the order of what an error does
 _GOOD_FIT = 0.005  # of an Allan deviation, up to which a power law needs no word
-
-Truths = NDArray[np.bool_]
 
 
 class Limits(NamedTuple):

@@ -18,15 +18,13 @@ from bisar_budget.budget.judged_requirements import (
     is_asked_for,
     missing_declarations,
 )
-from bisar_budget.budget.judged_rows import FamilyRow, Judged, Why
+from bisar_budget.budget.judged_rows import FamilyRow, Judged, Why, statuses
 from bisar_budget.budget.waivers import Waived
 from bisar_budget.effects.declared import CUBIC, LOCATION, MODELS, QUADRATIC
 from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.findings.row import DECLARE, Row
-from bisar_budget.findings.status import STATUS
 from bisar_budget.phrases import NOTHING, Note
 
-_STATUSES = tuple(STATUS)
 _EXAMPLES = {CUBIC: "22.5 deg", "islr": "-20 dB", "pslr": "-30 dB"}
 
 
@@ -47,7 +45,7 @@ def rows_in_words(judged: JudgedMission, case: Case) -> Iterator[Row]:
         found = families.get((model, one.subject.id))
         if found is None:  # only other cases have it
             continue
-        row, status = found.in_words(case, model), _STATUSES[one.status[case.place]]
+        row, status = found.in_words(case, model), statuses(one.status[case.place])
         changes: dict[str, Any] = {"model": model, "status": status}
         if status != row.status and status == "info":
             changes |= {"utilization": None, "margin": None}
@@ -63,7 +61,7 @@ def _declarations(case: Case, one: Judged) -> Row:
         DECLARATIONS,
         DECLARE,
         unit="",
-        status=_STATUSES[one.status[case.place]],
+        status=statuses(one.status[case.place]),
         line=mission.line(("requirements", "declare")),
         reason=phrases.declarations_are_missing([one.key for one in missing]) if missing else None,
         equation="requirements.declare",
@@ -126,7 +124,7 @@ def _entry(
     mission, key = case.mission, state.key
     value = getattr(mission.requirements, key)
     utilization = case.number(state.utilization)  # an error without an image has no phase to compare
-    status = _STATUSES[state.status[case.place]]
+    status = statuses(state.status[case.place])
     place = state.decider[case.place]
     decider = rows[place] if place >= 0 else None
     allowed, reached = _sizes(decider, key, case) if decider is not None else (None, None)

@@ -7,7 +7,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Analysis, Case
@@ -20,7 +19,7 @@ from bisar_budget.analysis.vibration_limits import (
     tone_limits,
     vibration_limits,
 )
-from bisar_budget.budget.judged_rows import BOUND, REQUIREMENTS, FamilyRow, Floats, Judged, Judging, worded
+from bisar_budget.budget.judged_rows import BOUND, REQUIREMENTS, FamilyRow, Judged, Judging, worded
 from bisar_budget.effects.declared import CUBIC, OTHER_MODEL, QUADRATIC
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.spectra import tone
@@ -38,11 +37,10 @@ from bisar_budget.effects.vibration import (
 from bisar_budget.findings.row import Row
 from bisar_budget.mission.platforms import MotionError
 from bisar_budget.phrases import NOTHING, Note
+from bisar_budget.ranges.exact_ranges import Floats, Truths
 from bisar_budget.units import format_quantity
 
 _ROUNDING_DB = 1e-6  # by which a level may be above what is required
-
-Truths = NDArray[np.bool_]
 
 
 class Vibrations:

@@ -9,8 +9,9 @@ import numpy as np
 from bisar_budget.effects.effect import subject
 from bisar_budget.effects.oscillators import noise_of
 from bisar_budget.effects.random_effect import RandomEffect, RandomError, SensorCases
-from bisar_budget.effects.spectra import Floats, Parts, PowerLawPiece, heard_parts, left_parts, link_parts, set_parts
+from bisar_budget.effects.spectra import Parts, PowerLawPiece, heard_parts, left_parts, link_parts, set_parts
 from bisar_budget.mission.instruments import Oscillator
+from bisar_budget.ranges.exact_ranges import Floats
 
 
 def oscillator_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:

@@ -20,13 +20,13 @@ from bisar_budget.effects.declared import ImagePlane, published_planes
 from bisar_budget.effects.effect import PLATFORMS, Subject, plain
 from bisar_budget.effects.oscillators import Noise
 from bisar_budget.effects.sources import exact_ranges
-from bisar_budget.effects.spectra import Floats, Parts
+from bisar_budget.effects.spectra import Parts
 from bisar_budget.faults import KeyPath
 from bisar_budget.geometry import BistaticGeometry, PlatformState
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
 from bisar_budget.phrases import NOTHING, Note
-from bisar_budget.ranges.exact_ranges import ExactRanges
+from bisar_budget.ranges.exact_ranges import ExactRanges, Floats
 
 NODES = 16  # a walk has a covariance with an edge, which fewer nodes miss by a percent
 _CANCELS = ROUNDING * 1e-2  # of a square: below it, its root is rounding
