@@ -21,7 +21,7 @@ from bisar_budget.budget.judged_requirements import (
     UntakenEffect,
     first_highest,
 )
-from bisar_budget.budget.judged_rows import BOUND, CODE, FamilyRow, Judging, number_of, worded
+from bisar_budget.budget.judged_rows import BOUND, CODE, FamilyRow, Judging, worded
 from bisar_budget.effects.combined import (
     Phases,
     combined,
@@ -208,7 +208,8 @@ class Aggregate(FamilyRow):
         """The row of one case, by the model that judges it."""
         mission, allocation, what = case.mission, case.allocation, self.judged.subject
         groups, combine, owner = case.analysis.groups, mission.allocation.combine, what.owner
-        size, limit = number_of(case, self.judged.declared), number_of(case, self.judged.allowable)
+        numbers = map(case.number, (self.judged.declared, self.judged.allowable))
+        size, limit = (None if math.isnan(one) else one for one in numbers)
         said, over, notes = _said_of(what, self.rule), NOTHING, tuple[Note, ...]()
         if combine != "each" and what.kind != PULL_IN:
             notes = correlation_notes(combine, [group for group in groups if owner in (group.platform, "mission")])

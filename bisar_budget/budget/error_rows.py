@@ -9,16 +9,7 @@ import numpy as np
 
 from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Analysis, Case, Model
-from bisar_budget.budget.judged_rows import (
-    BOUND,
-    CODE,
-    REQUIREMENTS,
-    FamilyRow,
-    Judged,
-    Judging,
-    number_of,
-    worded,
-)
+from bisar_budget.budget.judged_rows import BOUND, CODE, REQUIREMENTS, FamilyRow, Judged, Judging, worded
 from bisar_budget.effects.declared import CUBIC, END_OF_IMAGE, HELD, LOCATION, OTHER_MODEL, QUADRATIC, Declared
 from bisar_budget.effects.effect import PLATFORMS, ErrorSource, subject
 from bisar_budget.findings.row import SPECIFICATION, Row
@@ -119,7 +110,7 @@ class ErrorRow(FamilyRow):
         mission, row, source = case.mission, self.judged, self.source
         model, other = case.analysis.models(gating)
         gain, status = case.allocation.autofocus_gain, row.status[case.place]
-        limit = number_of(case, self.limit) or 0.0
+        limit = case.number(self.limit)
         over = doubt = info = NOTHING
         notes, fields = source.notes, dict[str, Any]()
         qpe = 0.0

@@ -278,9 +278,3 @@ def worded(
         "requirement_id": mission.requirement_ids.get(row.subject.id),
     }
     return Row(row.subject, row.metric, unit, **(fields | others))
-
-
-def number_of(case: Case, column: Any) -> float | None:
-    """The number that a case has in a column; None where there is none."""
-    value = case.number(column)
-    return None if math.isnan(value) else value

@@ -75,7 +75,7 @@ def spur_rows(judging: Judging, analysis: Analysis, model: str) -> Iterator["Spu
     mission = analysis.mission
     metric, by_platform = tone_limits(mission, analysis.allocation)
     for place, spur in enumerate(spurs_of(mission, analysis.geometry) if has_instruments(mission) else ()):
-        what, phase = subject(spur.name, "oscillator", "spur", entry=spur.entry), judging.array(spur.phase)
+        what, phase = spur.subject, judging.array(spur.phase)
         limits, is_over_other = by_platform.get(spur.name), np.zeros(judging.cases, dtype=bool)
         if limits is None:
             judged = judging.row(what, phase / 2, None, is_info=True)

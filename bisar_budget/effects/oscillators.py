@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bisar_budget import evaluators, phrases
-from bisar_budget.effects.effect import PLATFORMS, subject
+from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.random_effect import RandomEffect, RandomError, SensorCases
 from bisar_budget.effects.spectra import Parts, PowerLawPiece, heard_parts, held, left_parts, link_parts, set_parts
 from bisar_budget.geometry import BistaticGeometry
@@ -195,6 +195,11 @@ class Spur(NamedTuple):
     frequency: float
     phase: Any
     left: Any
+
+    @property
+    def subject(self) -> Subject:
+        """That of its row."""
+        return subject(self.name, "oscillator", "spur", entry=self.entry)
 
 
 def spurs_of(mission: Mission, geometry: BistaticGeometry | None = None) -> list[Spur]:
