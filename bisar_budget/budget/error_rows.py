@@ -9,7 +9,7 @@ import numpy as np
 
 from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Analysis, Case, Model
-from bisar_budget.budget.judged_rows import BOUND, CODE, REQUIREMENTS, FamilyRow, Judged, Judging, worded
+from bisar_budget.budget.judged_rows import BOUND, CODE, EFFECTS, REQUIREMENTS, FamilyRow, Judged, Judging, worded
 from bisar_budget.effects.declared import CUBIC, END_OF_IMAGE, HELD, LOCATION, OTHER_MODEL, QUADRATIC, Declared
 from bisar_budget.effects.effect import PLATFORMS, ErrorSource, subject
 from bisar_budget.findings.row import SPECIFICATION, Row
@@ -183,13 +183,10 @@ def _doubt(case: Case, other: Model, source: ErrorSource, limit: float) -> Note:
     size, allowed, binding = max(held, key=lambda one: one[0] / one[1])
     if size <= allowed * BOUND or other.is_blind:
         return NOTHING
-    if binding == LOCATION:
-        return phrases.other_model_fails(other.name, moved, allowed, "m", "displacement")
-    if binding == CUBIC:
-        return phrases.other_model_fails(other.name, size, allowed, "rad", "cubic phase")
-    if other.is_published:
-        return phrases.other_model_fails(other.name, size, allowed, "rad", "QPE", source.equation)
-    return phrases.other_model_fails(other.name, size, allowed, "rad", "QPE").then(_cause(source))
+    if binding == QUADRATIC and other.is_published:
+        return phrases.other_model_fails(other.name, size, allowed, *EFFECTS[binding], source.equation)
+    said = phrases.other_model_fails(other.name, size, allowed, *EFFECTS[binding])
+    return said.then(_cause(source)) if binding == QUADRATIC else said
 
 
 def _cause(source: ErrorSource) -> Note:

@@ -28,6 +28,7 @@ BOUND = 1 + UTILIZATION_TOLERANCE
 CODE = {name: np.int8(rank) for name, rank in RANK.items()}
 _NAMES = np.array(list(STATUS), dtype=object)
 REQUIREMENTS = (QUADRATIC, CUBIC, LOCATION, "pslr", "islr", END_OF_IMAGE)
+EFFECTS = {QUADRATIC: ("rad", "QPE"), CUBIC: ("rad", "cubic phase"), LOCATION: ("m", "displacement")}  # in a sentence
 
 WHOLE = ("allowable_published", "allowable_full", "qpe_full_rad", "qpe_exact_rad", "islr_db")  # see `Judging`
 NUMBERS = (

@@ -26,7 +26,7 @@ from bisar_budget.analysis.spread import (
     stated_powers,
 )
 from bisar_budget.budget.judged_requirements import SMALL_RAD
-from bisar_budget.budget.judged_rows import BOUND, CODE, REQUIREMENTS, FamilyRow, Judging, worded
+from bisar_budget.budget.judged_rows import BOUND, CODE, EFFECTS, REQUIREMENTS, FamilyRow, Judging, worded
 from bisar_budget.budget.tone_rows import evidence, notes_of_acceleration
 from bisar_budget.effects.air_delays import CONTENT, dispersion
 from bisar_budget.effects.declared import CUBIC, LOCATION, OTHER_MODEL, QUADRATIC
@@ -481,13 +481,9 @@ def _doubt(mission: Mission, error: RandomError, gating: str, binding: str, limi
     effect = held_effect(mission, error.effect(other), error.coverage(mission))
     if binding == ISLR:
         return phrases.other_model_spreads(other, _levels(mission, other)(effect.spread * size))
-    if binding == QUADRATIC:
-        return phrases.other_model_fails(other, effect.quadratic * size, limit, "rad", "QPE")
-    if binding == LOCATION:
-        needed = mission.requirements.location_error or 0.0
-        return phrases.other_model_fails(other, effect.displacement * size, needed, "m", "displacement")
-    allowed = mission.requirements.cubic_phase_error or 0.0
-    return phrases.other_model_fails(other, effect.cubic * size, allowed, "rad", "cubic phase")
+    per_unit = {QUADRATIC: effect.quadratic, CUBIC: effect.cubic, LOCATION: effect.displacement}[binding]
+    allowed = limit if binding == QUADRATIC else getattr(mission.requirements, binding)
+    return phrases.other_model_fails(other, per_unit * size, allowed, *EFFECTS[binding])
 
 
 def _levels(mission: Mission, model: str) -> Callable[[float], float]:
