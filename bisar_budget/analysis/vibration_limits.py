@@ -12,7 +12,7 @@ divided. The paper's rule, φ² ≤ PSLR·share and σ² ≤ ISLR·share, stays 
 beyond the second by 1/E, 0.44 dB with a uniform window; the same noise on both platforms would add 3 dB.
 
 Between one and three cycles per aperture a vibration is a quadratic phase as well, and counts as echoes; slower ones
-make none, see `slow_vibration`.
+make none, see `effects.vibration`.
 """
 
 import math

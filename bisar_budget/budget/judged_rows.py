@@ -41,7 +41,7 @@ NUMBERS = (
     "islr_db",
 )  # of columns
 _columns_of_numbers = attrgetter(*NUMBERS)
-_IN_UNIT = ("declared", "allowable", "allowable_published", "allowable_full")  # columns in the unit of their row
+IN_UNIT = ("declared", "allowable", "allowable_published", "allowable_full")  # columns in the unit of their row
 
 
 def statuses(codes: Any) -> Any:
@@ -114,11 +114,11 @@ class Judged(NamedTuple):
 
     def in_decibel(self) -> "Judged":
         """The row with its factors of amplitude in decibel; its utilization stays that of amplitudes."""
-        return self._of_columns(decibels, _IN_UNIT)
+        return self._of_columns(decibels, IN_UNIT)
 
     def in_unit(self, factor: Any) -> "Judged":
         """The row with its sizes in a unit of which a factor is one of before."""
-        return self._of_columns(lambda column: column * factor, _IN_UNIT)
+        return self._of_columns(lambda column: column * factor, IN_UNIT)
 
     def held_to(self, key: str) -> "Judged":
         """The row with the requirement that sets its allowable."""

@@ -89,7 +89,6 @@ VERDICT = (
     Column("binding_requirement", "", "The requirement that sets its allowable.", is_text=True),
 )
 REASON = Column("reason", "", "Why there is no mission in this case.", is_text=True)
-IN_UNIT = ("declared", "allowable", "allowable_published", "allowable_full")  # fields in the unit of their row
 
 _IS_JUDGED = np.array([one.is_judged and name != "waived" for name, one in STATUS.items()])
 

@@ -1,6 +1,6 @@
 """The statuses of rows, missions and runs: what each gates, and how every format says it.
 
-One line here is all that a new status needs, besides the rule that gives it (`budget.judgement`).
+One line here is all that a new status needs, besides the rule that gives it (`budget.judged_rows`).
 """
 
 from collections.abc import Container, Iterable, Mapping
