@@ -324,15 +324,16 @@ class _Words(NamedTuple):
 
 _EQUATIONS = {"sum": "sum of the rows", "rss": "root-sum-square of the rows", "each": "largest of the rows"}
 _PATHS: dict[str, KeyPath] = {"mission": ("platforms",), "clock": ("timing_error",)}
+_SAID = {
+    CUBIC: _Words("cubic phase", "rad", ("requirements", CUBIC), ("Table I, cubic column", "full model")),
+    LOCATION: _Words("displacement of the image", "m", ("requirements", LOCATION), ("(25)", "full model")),
+    PULL_IN: _Words("QPE", "rad", ("autofocus", "n_pull"), ("Section VI", "Section VI")),
+}
 
 
 def _said_of(what: Subject, rule: str) -> _Words:
-    if what.kind == CUBIC:
-        return _Words("cubic phase", "rad", ("requirements", CUBIC), ("Table I, cubic column", "full model"))
-    if what.kind == LOCATION:
-        return _Words("displacement of the image", "m", ("requirements", LOCATION), ("(25)", "full model"))
-    if what.kind == PULL_IN:
-        return _Words("QPE", "rad", ("autofocus", "n_pull"), ("Section VI", "Section VI"))
+    if what.kind in _SAID:
+        return _SAID[what.kind]
     path = _PATHS.get(what.owner, ("platforms", what.owner, "motion_error"))
     return _Words("QPE", "rad", path, (_EQUATIONS[rule], _EQUATIONS[rule]))
 

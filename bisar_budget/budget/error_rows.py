@@ -168,18 +168,13 @@ def _over(case: Case, model: Model, row: Judged, source: ErrorSource, mine: Decl
 
 def _doubt(case: Case, other: Model, source: ErrorSource, limit: float) -> Note:
     """Say that the model that does not gate fails the declared error, and why it thinks otherwise; else nothing."""
-    requirements, theirs = case.mission.requirements, case.does(other, source)
-    moved = 0.0 if theirs.farthest is None else math.hypot(*theirs.farthest)
+    needs, theirs = case.mission.requirements, case.does(other, source)
     held = [(abs(theirs.qpe), limit, QUADRATIC)]
-    if source.is_motion:
-        held += [
-            (size, required, name)
-            for size, required, name in (
-                (abs(theirs.cubic), requirements.cubic_phase_error, CUBIC),
-                (moved, requirements.location_error, LOCATION),
-            )
-            if required is not None
-        ]
+    if source.is_motion and needs.cubic_phase_error is not None:
+        held.append((abs(theirs.cubic), needs.cubic_phase_error, CUBIC))
+    if source.is_motion and needs.location_error is not None:
+        moved = 0.0 if theirs.farthest is None else math.hypot(*theirs.farthest)
+        held.append((moved, needs.location_error, LOCATION))
     size, allowed, binding = max(held, key=lambda one: one[0] / one[1])
     if size <= allowed * BOUND or other.is_blind:
         return NOTHING
