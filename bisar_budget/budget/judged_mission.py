@@ -28,7 +28,6 @@ from bisar_budget.budget.judged_requirements import (
     is_asked_for,
     missing_declarations,
     requirement_states,
-    status_of,
 )
 from bisar_budget.budget.judged_rows import CODE, REQUIREMENTS, Codes, FamilyRow, Judged, Judging, Why
 from bisar_budget.budget.random_rows import RandomRows
@@ -302,13 +301,20 @@ class RowStatuses:
                 self._settle(owed, is_doubtful & (self.status != CODE["fail"]), Why.INPUT_IN_DOUBT)
 
     def judge_effects(self, untaken: Sequence[UntakenEffect]) -> None:
-        """Rows that make up an effect that none takes are not evaluated; those that add little are `info`."""
+        """Rows that make up an effect that no requirement takes are not evaluated.
+
+        One that no requirement limits, with a negligible effect, judges nothing: `info`.
+        """
         for place, row in enumerate(self.rows):
-            row_id = row.subject.id
+            row_id, status = row.subject.id, self.status[place]
             of_row = [one for one in untaken if row_id in one.parts]
             if not of_row:
                 continue
-            status = status_of(self.status[place], row_id, ~np.isnan(row.allowable), of_row)
+            for one in of_row:
+                is_unlimited = np.isnan(row.allowable) & (one.parts[row_id] > 0)
+                status = np.where(is_unlimited & (status == CODE["pass"]), CODE["info"], status)
+                is_better = (status != CODE["fail"]) & (status != CODE["not_declared"])
+                status = np.where(one.makers[row_id] & is_better, CODE["not_evaluated"], status)
             is_judged = (status == CODE["not_evaluated"]) | (status == CODE["fail"])
             is_made = is_judged & np.any([one.makers[row_id] for one in of_row], axis=0)
             self.status[place] = status

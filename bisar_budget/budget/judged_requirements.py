@@ -8,7 +8,7 @@ tenth of the quadratic requirement and below 0.08 rad. Above, the rows that make
 Every number is an array over the cases, (n,): a check is one case.
 """
 
-from collections.abc import Callable, Container, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -80,24 +80,6 @@ def required_keys(mission: Mission) -> tuple[str, ...]:
     """Keys of the requirements that a mission has, the default of the quadratic phase included."""
     needs = mission.requirements
     return tuple(key for key in KEYS if (needs.declare if key == "declare" else getattr(needs, key) is not None))
-
-
-def status_of(status: Codes, row_id: str, is_limited: Any, untaken: Sequence[UntakenEffect]) -> Codes:
-    """Status of a row whose effects are looked at too.
-
-    One that makes up an effect which no requirement takes is `not_evaluated`, unless it fails. One that no
-    requirement limits, with a negligible effect, judges nothing: `info`.
-    """
-    found = status
-    for one in untaken:
-        if row_id not in one.parts:
-            continue
-        has_part = one.parts[row_id] > 0
-        unlimited = has_part & ~np.asarray(is_limited) & (found == RANK["pass"])
-        found = np.where(unlimited, RANK["info"], found)
-        is_better = (found != RANK["fail"]) & (found != RANK["not_declared"])
-        found = np.where(one.makers[row_id] & is_better, RANK["not_evaluated"], found)
-    return found.astype(np.int8)
 
 
 def requirement_states(
