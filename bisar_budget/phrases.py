@@ -61,6 +61,15 @@ def _size(size: float, unit: str) -> str:
     return format_quantity(size, unit) if unit == "m" else f"{abs(size):.3g} {unit}"
 
 
+def _against(size: float, limit: float, unit: str) -> str:
+    return f"{_size(size, unit)}, {format_limit(limit, unit)} allowed"
+
+
+def _by(text: str, equation: str) -> str:
+    """A text with where it comes from, if that is said."""
+    return f"{text} ({equation})" if equation else text
+
+
 def _level(db: float, rounding: str = "nearest") -> str:
     return format_quantity(db, "dB", 3, rounding)
 
@@ -208,15 +217,14 @@ def input_in_doubt(doubt: float, words: str, declared: float | None, key: str) -
 @phrase
 def quadratic_phase_over(phase: float, limit: float, equation: str = "") -> str:
     """Said of one error. [rad]"""
-    text = f"QPE {_size(phase, 'rad')}, {format_limit(limit, 'rad')} allowed"
-    return f"{text} ({equation})" if equation else text
+    return _by(f"QPE {_against(phase, limit, 'rad')}", equation)
 
 
 @phrase
 def cubic_phase_over(phase: float, limit: float, equation: str = "") -> str:
     """Said of one error. [rad]"""
-    text = f"cubic phase {_size(phase, 'rad')}, {format_limit(limit, 'rad')} allowed"
-    return f"{text} ({equation}); {_NO_GAIN}" if equation else f"{text}; {_NO_GAIN}"
+    text = _by(f"cubic phase {_against(phase, limit, 'rad')}", equation)
+    return f"{text}; {_NO_GAIN}"
 
 
 @phrase
@@ -243,11 +251,8 @@ def aggregate_over(
     what: str, size: float, limit: float, unit: str, row_id: str, largest: float, extrapolated: str = ""
 ) -> str:
     """Said of errors together: how large, what is allowed, and which is the largest, with what that rests on."""
-    text = (
-        f"{what} {_size(size, unit)}, {format_limit(limit, unit)} allowed; largest: {row_id}, "
-        f"{_size(abs(largest), unit)}"
-    )
-    return f"{text} ({extrapolated})" if extrapolated else text
+    text = f"{what} {_against(size, limit, unit)}; largest: {row_id}, {_size(abs(largest), unit)}"
+    return _by(text, extrapolated)
 
 
 @phrase
@@ -261,7 +266,7 @@ def all_together_over(what: str, size: float, limit: float, unit: str) -> str:
     """Said of errors that are judged one by one."""
     return (
         f"each error alone is judged. All declared errors together have a root-sum-square {what} of "
-        f"{_size(size, unit)}, {format_limit(limit, unit)} allowed: combine: rss judges that"
+        f"{_against(size, limit, unit)}: combine: rss judges that"
     )
 
 
@@ -288,14 +293,13 @@ def beyond_autofocus(n_pull: str, allowed: str) -> str:
 def other_model_fails(model: str, size: float, limit: float, unit: str, what: str = "", equation: str = "") -> str:
     """Said of a row, or an aggregate, that the gating model passes."""
     text = f"the {model} model says fail: {what}".rstrip()
-    text = f"{text} {_size(size, unit)}, {format_limit(limit, unit)} allowed"
-    return f"{text} ({equation})" if equation else text
+    return _by(f"{text} {_against(size, limit, unit)}", equation)
 
 
 @phrase
 def other_model_is_beyond(model: str, phase: float, limit: float, unit: str) -> str:
     """Said of the pull-in range."""
-    return f"the {model} model says beyond it: QPE {_size(phase, unit)}, {format_limit(limit, unit)} allowed"
+    return f"the {model} model says beyond it: QPE {_against(phase, limit, unit)}"
 
 
 @phrase

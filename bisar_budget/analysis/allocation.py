@@ -45,19 +45,23 @@ class Allocation(NamedTuple):
         """QPE that an owner may use, before autofocus. [rad]"""
         return self.qpe.of(owner) * self.qpe_total
 
+    def qpe_allowed(self, owner: str) -> Any:
+        """QPE that an owner may have, autofocus included. [rad]"""
+        return self.qpe_limit(owner) * self.autofocus_gain
+
     def of(self, case: int) -> "Allocation":
         """Those of one of many cases, in plain numbers."""
-        qpe, pslr, islr = (Shares._make(_plain(share, case) for share in split) for split in self[1:4])
-        total, n_pull, stated = (_plain(one, case) for one in (self.qpe_total, self.n_pull, self.n_pull_stated))
-        return Allocation(total, qpe, pslr, islr, n_pull, stated)
+        return Allocation._make(_plain(part, case) for part in self)
 
     def passes_with(self, qpe: float, owner: str, mission: Mission) -> Note:
         """Say from which N_pull a QPE of an owner would pass, or that no autofocus corrects it."""
         return needed_sentence(qpe / (self.qpe.of(owner) * math.pi), caps(mission))
 
 
-def _plain(number: Any, case: int) -> Any:
-    return None if number is None else plain(number, case)
+def _plain(part: Any, case: int) -> Any:
+    if isinstance(part, Shares):
+        return Shares._make(_plain(share, case) for share in part)
+    return None if part is None else plain(part, case)
 
 
 def is_balanced(mission: Mission) -> bool:

@@ -124,8 +124,7 @@ def tones(mission: Mission, geometry: Any = None) -> list[Tone]:
                 found.append(Tone(what, phase, cycles, is_there))
     if has_instruments(mission):
         for spur in spurs_of(mission, geometry):
-            what = subject(spur.name, "oscillator", "spur", entry=spur.entry)
-            found.append(Tone(what, spur.phase, spur.frequency * T))
+            found.append(Tone(spur.subject, spur.phase, spur.frequency * T))
         for one in accelerated_tones(mission, geometry):
             cycles = one.frequency * T
             is_there = np.asarray(cycles >= SLOWEST)[()]

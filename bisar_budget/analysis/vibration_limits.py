@@ -12,7 +12,7 @@ divided. The paper's rule, φ² ≤ PSLR·share and σ² ≤ ISLR·share, stays 
 beyond the second by 1/E, 0.44 dB with a uniform window; the same noise on both platforms would add 3 dB.
 
 Between one and three cycles per aperture a vibration is a quadratic phase as well, and counts as echoes; slower ones
-make none, see `slow_vibration`.
+make none, see `effects.vibration`.
 """
 
 import math
@@ -142,14 +142,15 @@ def vibration_limits(mission: Mission, allocation: Allocation, metric: str) -> d
         return {}
     power: Any = 10 ** (requirement_db / 10)  # -30 dB is 10⁻³: PSLR and ISLR are power ratios
     if metric == "pslr":
-        all_of_it, part = echo_phase(np.sqrt(power * (split.transmitter + split.receiver))), amplitude_share
+        largest = echo_phase(np.sqrt(power * (split.transmitter + split.receiver)))
     else:
-        all_of_it, part = spread_phase(power, "full", mainlobe_energy(mission)), power_share
+        largest = spread_phase(power, "full", mainlobe_energy(mission))
     wavelength, found = mission.radar.wavelength, {}
     for name in PLATFORMS:
+        # The squares of rms phases are the shares of power.
+        part = amplitude_share(split, name) if metric == "pslr" else np.sqrt(split.of(name))
         published = evaluators.vibration_limit(wavelength, power, split.of(name))
-        full = evaluators.motion_of_phase(wavelength, all_of_it * part(split, name))
-        found[name] = VibrationLimits(published, full)
+        found[name] = VibrationLimits(published, evaluators.motion_of_phase(wavelength, largest * part))
     return found
 
 
@@ -170,11 +171,6 @@ def amplitude_share(split: Shares, name: str) -> Any:
     """Part of a platform in the amplitude of both: they sum to 1, in the ratio of the roots of power."""
     own, other = split.of(name), split.of(next(one for one in PLATFORMS if one != name))
     return evaluators.amplitude_share(own, other)
-
-
-def power_share(split: Shares, name: str) -> Any:
-    """Part of a platform in the rms phase: their squares are the shares of power."""
-    return np.sqrt(split.of(name))
 
 
 class SlowLimits(NamedTuple):
@@ -201,6 +197,6 @@ def slow_limits(mission: Mission, allocation: Allocation, name: str, cycles: Any
     required, to the whole requirement without gain.
     """
     wavenumber = 2 * math.pi / mission.radar.wavelength
-    quadratic = allocation.qpe_limit(name) * allocation.autofocus_gain / (wavenumber * quadratic_part(cycles))
+    quadratic = allocation.qpe_allowed(name) / (wavenumber * quadratic_part(cycles))
     required = mission.requirements.cubic_phase_error
     return SlowLimits(quadratic, None if required is None else required / (wavenumber * cubic_part(cycles)))

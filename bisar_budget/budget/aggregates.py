@@ -7,7 +7,6 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Analysis, Case
@@ -22,23 +21,21 @@ from bisar_budget.budget.judged_requirements import (
     UntakenEffect,
     first_highest,
 )
-from bisar_budget.budget.judged_rows import BOUND, CODE, Floats, Judged, Judging, number_of, worded
+from bisar_budget.budget.judged_rows import BOUND, CODE, FamilyRow, Judging, worded
 from bisar_budget.effects.combined import (
     Phases,
     combined,
     correlation_notes,
 )
-from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
+from bisar_budget.effects.declared import CUBIC, LOCATION, OTHER_MODEL, QUADRATIC
 from bisar_budget.effects.effect import Subject, subject
 from bisar_budget.effects.vibration import DeclaredPhase
 from bisar_budget.faults import KeyPath
 from bisar_budget.findings.row import Row
 from bisar_budget.phrases import NOTHING, Note
+from bisar_budget.ranges.exact_ranges import Floats, Truths
 
 PULL_IN = "autofocus_pull_in"
-_OTHER = {"published": "full", "full": "published"}
-
-Truths = NDArray[np.bool_]
 
 
 class Aggregates:
@@ -51,7 +48,7 @@ class Aggregates:
 
     def rows(self, model: str) -> Iterator["Aggregate"]:
         """Every row by one model, which the other may doubt, in the order of the contract."""
-        mine, theirs = self.together(model), self.together(_OTHER[model])
+        mine, theirs = self.together(model), self.together(OTHER_MODEL[model])
         if self.combine == "each":
             yield self._largest_quadratic(mine, theirs)
         else:
@@ -191,15 +188,14 @@ class Aggregates:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Aggregate:
-    """One row of errors together, by a model, in many cases; `is_there` are the cases that have it.
+class Aggregate(FamilyRow):
+    """One row of errors together, by a model, in many cases.
 
     `rule` combines the `phases`; those of displacements are none. `by_other` is the sum by the model that does not
     gate, `of_all` the root-sum-square where the row is the largest part; where either breaks the limit, a pass is a
     warning.
     """
 
-    judged: Judged
     rule: str
     phases: Phases
     by_other: Any
@@ -207,13 +203,13 @@ class Aggregate:
     is_over_by_other: Any = False
     is_over_of_all: Any = False
     without_autofocus: Any = 0.0
-    is_there: Any = True
 
     def in_words(self, case: Case, model: str) -> Row:
         """The row of one case, by the model that judges it."""
         mission, allocation, what = case.mission, case.allocation, self.judged.subject
         groups, combine, owner = case.analysis.groups, mission.allocation.combine, what.owner
-        size, limit = number_of(case, self.judged.declared), number_of(case, self.judged.allowable)
+        numbers = map(case.number, (self.judged.declared, self.judged.allowable))
+        size, limit = (None if math.isnan(one) else one for one in numbers)
         said, over, notes = _said_of(what, self.rule), NOTHING, tuple[Note, ...]()
         if combine != "each" and what.kind != PULL_IN:
             notes = correlation_notes(combine, [group for group in groups if owner in (group.platform, "mission")])
@@ -234,7 +230,7 @@ class Aggregate:
             path=said.path,
             equation=said.equation[model != "published"],
             over=over,
-            doubt=doubt or _doubt(case, _OTHER[model], self, said, limit),
+            doubt=doubt or _doubt(case, OTHER_MODEL[model], self, said, limit),
             no_limit=phrases.no_requirement(),
             not_evaluated=case.degeneracy(model) or phrases.no_image_to_place(),
             info=phrases.no_requirement(),
@@ -328,15 +324,16 @@ class _Words(NamedTuple):
 
 _EQUATIONS = {"sum": "sum of the rows", "rss": "root-sum-square of the rows", "each": "largest of the rows"}
 _PATHS: dict[str, KeyPath] = {"mission": ("platforms",), "clock": ("timing_error",)}
+_SAID = {
+    CUBIC: _Words("cubic phase", "rad", ("requirements", CUBIC), ("Table I, cubic column", "full model")),
+    LOCATION: _Words("displacement of the image", "m", ("requirements", LOCATION), ("(25)", "full model")),
+    PULL_IN: _Words("QPE", "rad", ("autofocus", "n_pull"), ("Section VI", "Section VI")),
+}
 
 
 def _said_of(what: Subject, rule: str) -> _Words:
-    if what.kind == CUBIC:
-        return _Words("cubic phase", "rad", ("requirements", CUBIC), ("Table I, cubic column", "full model"))
-    if what.kind == LOCATION:
-        return _Words("displacement of the image", "m", ("requirements", LOCATION), ("(25)", "full model"))
-    if what.kind == PULL_IN:
-        return _Words("QPE", "rad", ("autofocus", "n_pull"), ("Section VI", "Section VI"))
+    if what.kind in _SAID:
+        return _SAID[what.kind]
     path = _PATHS.get(what.owner, ("platforms", what.owner, "motion_error"))
     return _Words("QPE", "rad", path, (_EQUATIONS[rule], _EQUATIONS[rule]))
 
@@ -402,12 +399,10 @@ class JudgedScene:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SceneRow:
+class SceneRow(FamilyRow):
     """The row of the scene's edge in many cases."""
 
-    judged: Judged
     scene: JudgedScene
-    is_there: bool = True
 
     def in_words(self, case: Case, model: str) -> Row:
         """The row of one case, by the model that judges it."""

@@ -116,7 +116,7 @@ def _findings(judged: JudgedMission, case: Case, today: date, outside: Outside) 
         overrides=overrides(mission, outside, today),
         warnings=file_warnings(case, rows, list(waived.unused(requirements)), resolution),
         place=_place(mission),
-        paths=tuple((name, path) for name, path in _paths(mission) if path.source),
+        paths=_flown_paths(mission),
         scene=None if judged.scene is None else judged.scene.edge(case),
         notes=(
             *negligible_effects(judged, case),
@@ -141,11 +141,9 @@ def _place(mission: Mission) -> str:
     return ", ".join(said)
 
 
-def _paths(mission: Mission) -> Iterator[tuple[str, FlownPath]]:
-    for name in PLATFORMS:
-        path = getattr(mission.platforms, name).path
-        if path is not None:
-            yield name, path
+def _flown_paths(mission: Mission) -> tuple[tuple[str, FlownPath], ...]:
+    paths = ((name, getattr(mission.platforms, name).path) for name in PLATFORMS)
+    return tuple((name, path) for name, path in paths if path is not None and path.source)
 
 
 def _overridden(mission: Mission) -> Iterator[Note]:

@@ -1,4 +1,4 @@
-"""One row for each error: the largest size that every requirement allows, and what is declared against it."""
+"""Rows of errors: what is declared against the largest size that requirements allow, and that is specified."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -9,13 +9,15 @@ import numpy as np
 
 from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Analysis, Case, Model
-from bisar_budget.budget.judged_rows import BOUND, CODE, REQUIREMENTS, Floats, Judged, Judging, number_of, worded
-from bisar_budget.constants import UTILIZATION_TOLERANCE
-from bisar_budget.effects.declared import CUBIC, END_OF_IMAGE, HELD, LOCATION, QUADRATIC, Declared
-from bisar_budget.effects.effect import ErrorSource
-from bisar_budget.findings.row import Row
+from bisar_budget.budget.judged_rows import BOUND, CODE, EFFECTS, REQUIREMENTS, FamilyRow, Judged, Judging, worded
+from bisar_budget.effects.declared import CUBIC, END_OF_IMAGE, HELD, LOCATION, OTHER_MODEL, QUADRATIC, Declared
+from bisar_budget.effects.effect import PLATFORMS, ErrorSource, subject
+from bisar_budget.findings.row import SPECIFICATION, Row
 from bisar_budget.geometry import FRAME_AXES
+from bisar_budget.mission.changes import name_of_error, parts_of
+from bisar_budget.mission.quantities import Number, largest_at
 from bisar_budget.phrases import NOTHING, Note
+from bisar_budget.ranges.exact_ranges import Floats
 
 _BINDING = np.array([REQUIREMENTS.index(name) for name in (*HELD, END_OF_IMAGE)] + [-1], dtype=np.int8)
 
@@ -38,13 +40,14 @@ class ErrorRows:
         self.gain = judging.array(analysis.allocation.autofocus_gain)
         self.is_of_sums = analysis.is_of_sums
 
-    def rows(self, gating: str, other: str) -> Iterator["ErrorRow"]:
+    def rows(self, gating: str) -> Iterator["ErrorRow"]:
         """Rows by one model, which the other may doubt."""
         for place in range(len(self.errors.blocks)):
-            yield from self._of_block(place, gating, other)
+            yield from self._of_block(place, gating)
 
-    def _of_block(self, place: int, gating: str, other: str) -> Iterator["ErrorRow"]:
+    def _of_block(self, place: int, gating: str) -> Iterator["ErrorRow"]:
         errors, block, is_whole = self.errors, self.errors.blocks[place], self.judging.is_whole
+        other = OTHER_MODEL[gating]
         needs, sources = errors.mission.requirements, block.sources
         limit = np.array([self.limits[source.owner] for source in sources])
         held = (limit, needs.cubic_phase_error, needs.location_error)
@@ -96,20 +99,18 @@ def _is_over(does: Declared, held: tuple[Floats, float | None, float | None], is
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ErrorRow:
+class ErrorRow(FamilyRow):
     """One error as judged in many cases; `limit` is the quadratic phase that it may have. [rad]"""
 
-    judged: Judged
     source: ErrorSource
     limit: Floats
-    is_there: bool = True
 
     def in_words(self, case: Case, gating: str) -> Row:
         """The row of one case, by the model that judges it."""
         mission, row, source = case.mission, self.judged, self.source
         model, other = case.analysis.models(gating)
         gain, status = case.allocation.autofocus_gain, row.status[case.place]
-        limit = number_of(case, self.limit) or 0.0
+        limit = case.number(self.limit)
         over = doubt = info = NOTHING
         notes, fields = source.notes, dict[str, Any]()
         qpe = 0.0
@@ -167,28 +168,20 @@ def _over(case: Case, model: Model, row: Judged, source: ErrorSource, mine: Decl
 
 def _doubt(case: Case, other: Model, source: ErrorSource, limit: float) -> Note:
     """Say that the model that does not gate fails the declared error, and why it thinks otherwise; else nothing."""
-    requirements, theirs = case.mission.requirements, case.does(other, source)
-    moved = 0.0 if theirs.farthest is None else math.hypot(*theirs.farthest)
+    needs, theirs = case.mission.requirements, case.does(other, source)
     held = [(abs(theirs.qpe), limit, QUADRATIC)]
-    if source.is_motion:
-        held += [
-            (size, required, name)
-            for size, required, name in (
-                (abs(theirs.cubic), requirements.cubic_phase_error, CUBIC),
-                (moved, requirements.location_error, LOCATION),
-            )
-            if required is not None
-        ]
+    if source.is_motion and needs.cubic_phase_error is not None:
+        held.append((abs(theirs.cubic), needs.cubic_phase_error, CUBIC))
+    if source.is_motion and needs.location_error is not None:
+        moved = 0.0 if theirs.farthest is None else math.hypot(*theirs.farthest)
+        held.append((moved, needs.location_error, LOCATION))
     size, allowed, binding = max(held, key=lambda one: one[0] / one[1])
-    if size <= allowed * (1 + UTILIZATION_TOLERANCE) or other.is_blind:
+    if size <= allowed * BOUND or other.is_blind:
         return NOTHING
-    if binding == LOCATION:
-        return phrases.other_model_fails(other.name, moved, allowed, "m", "displacement")
-    if binding == CUBIC:
-        return phrases.other_model_fails(other.name, size, allowed, "rad", "cubic phase")
-    if other.is_published:
-        return phrases.other_model_fails(other.name, size, allowed, "rad", "QPE", source.equation)
-    return phrases.other_model_fails(other.name, size, allowed, "rad", "QPE").then(_cause(source))
+    if binding == QUADRATIC and other.is_published:
+        return phrases.other_model_fails(other.name, size, allowed, *EFFECTS[binding], source.equation)
+    said = phrases.other_model_fails(other.name, size, allowed, *EFFECTS[binding])
+    return said.then(_cause(source)) if binding == QUADRATIC else said
 
 
 def _cause(source: ErrorSource) -> Note:
@@ -205,3 +198,50 @@ def _cause(source: ErrorSource) -> Note:
 def _stated_elsewhere(case: Case, source: ErrorSource) -> Note:
     frame = getattr(case.mission.platforms, source.owner).motion_error.frame
     return phrases.stated_along_other_axes([axis.replace("_", " ") for axis in FRAME_AXES[frame]])
+
+
+# ---------------------------------------------------------------------- specifications
+def specification_rows(judging: Judging, analysis: Analysis) -> Iterator["SpecificationRow"]:
+    """Judge each specification: no more may be declared, of three axes in the largest; coverage does not count.
+
+    An error that is specified and not declared is not evaluated. All of a specification may be used, without warning.
+    """
+    for number in analysis.mission.specifications.values():
+        most, found = judging.array(number.value), judging.array(largest_at(analysis.mission, number))
+        what = subject(_owner(number.key), SPECIFICATION, name_of_error(number.key))
+        of_amplitudes = _amplitude if number.is_level else np.asarray
+        judged = judging._replace(warn_above=1.0).row(what, of_amplitudes(found), of_amplitudes(most))
+        status = np.where(np.isnan(found), CODE["not_evaluated"], judged.status).astype(np.int8)
+        judged = judged._replace(status=status, declared=found, allowable=most, metric=SPECIFICATION)
+        yield SpecificationRow(judged, number)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SpecificationRow(FamilyRow):
+    """One specification in many cases."""
+
+    number: Number
+
+    def in_words(self, case: Case, model: str) -> Row:
+        """The row of one case; models do not differ in it."""
+        return worded(
+            case,
+            self.judged,
+            unit=self.number.dimension.si,
+            path=("specifications", self.number.key),
+            equation="declared against specified",
+            over=phrases.more_than_specified(),
+            not_evaluated=phrases.specified_and_not_declared(self.number.key),
+            is_independent=False,
+        )
+
+
+def _amplitude(level: Any) -> Any:
+    return 10 ** (level / 20)
+
+
+def _owner(key: str) -> str:
+    section, name, *_ = (*parts_of(key), "")
+    if section == "platforms":
+        return name if name in PLATFORMS else "mission"
+    return "clock" if section in ("timing_error", "synchronization") else "mission"

@@ -8,18 +8,16 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from bisar_budget.analysis.analysis import Analysis, Case
+from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.scene import SceneEdges, scene_edges
 from bisar_budget.analysis.spread import noise
-from bisar_budget.budget.acceleration_rows import accelerated_rows
 from bisar_budget.budget.aggregates import Aggregates, JudgedScene, Misplacing, misplacing, untaken_effects
 from bisar_budget.budget.doubts import declared_position_error, is_in_doubt, least_doubt
-from bisar_budget.budget.error_rows import ErrorRows
+from bisar_budget.budget.error_rows import ErrorRows, specification_rows
 from bisar_budget.budget.file_warnings import FASTEST_FLIGHT
 from bisar_budget.budget.judged_requirements import (
     DECLARATIONS,
@@ -30,42 +28,23 @@ from bisar_budget.budget.judged_requirements import (
     is_asked_for,
     missing_declarations,
     requirement_states,
-    status_of,
 )
-from bisar_budget.budget.judged_rows import CODE, REQUIREMENTS, Judged, Judging, Why
+from bisar_budget.budget.judged_rows import CODE, REQUIREMENTS, Codes, FamilyRow, Judged, Judging, Why
 from bisar_budget.budget.random_rows import RandomRows
-from bisar_budget.budget.specification_rows import specification_rows
-from bisar_budget.budget.vibration_rows import Vibrations, pslr_row, spur_rows
+from bisar_budget.budget.tone_rows import accelerated_rows, pslr_row, spur_rows
+from bisar_budget.budget.vibration_rows import Vibrations
 from bisar_budget.budget.waivers import is_waived
 from bisar_budget.effects.declared import END_OF_IMAGE, LOCATION, MODELS
 from bisar_budget.effects.effect import PLATFORMS, subject
-from bisar_budget.findings.row import DECLARE, SPECIFICATION, Row
-from bisar_budget.findings.status import STATUS
+from bisar_budget.findings.row import DECLARE, SPECIFICATION
+from bisar_budget.findings.status import BROKEN, STATUS
 from bisar_budget.geometry import BistaticGeometry, norm
 from bisar_budget.mission.model import Mission
+from bisar_budget.ranges.exact_ranges import Truths
 
-_STATUSES = tuple(STATUS)
-BROKEN = [CODE["fail"], CODE["not_evaluated"]]  # what a waiver covers
+_BROKEN = [CODE[name] for name in BROKEN]
 _GATES = np.array([one.gates for one in STATUS.values()])
 _OWNERS = (*PLATFORMS, "clock", "mission")
-
-Codes = NDArray[np.int8]
-Truths = NDArray[np.bool_]
-
-
-class FamilyRow(Protocol):
-    """A row as its family judges it by a model."""
-
-    @property
-    def judged(self) -> Judged:
-        """The row in all cases."""
-
-    @property
-    def is_there(self) -> Any:
-        """Cases that have it."""
-
-    def in_words(self, case: Case, model: str) -> Row:
-        """The row of one case."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,7 +127,7 @@ class _Judgement:
         states = requirement_states(
             mission,
             # A requirement judges effects by itself, and is waived where its row is.
-            np.where((after == CODE["waived"]) & np.isin(own, BROKEN), CODE["waived"], own),
+            np.where((after == CODE["waived"]) & np.isin(own, _BROKEN), CODE["waived"], own),
             np.array([row.utilization for row in rows]),
             of_all.judges(),
             np.array([row.quadratic_use for row in rows]),
@@ -172,8 +151,8 @@ class _Judgement:
     # ---------------------------------------------------------------- rows of the families
     def _families(self, model: str) -> Iterator[FamilyRow]:
         """Every row by a model, in the order of the contract."""
-        other, needs = "published" if model == "full" else "full", self.mission.requirements
-        yield from self._errors.rows(model, other)
+        needs = self.mission.requirements
+        yield from self._errors.rows(model)
         if self._vibrates or self._shows_vibration:
             yield from self._vibrations.rows(model)
         yield from self._random.rows(model)
@@ -214,8 +193,7 @@ class _Judgement:
     def _limits(self) -> Mapping[str, Any]:
         """Quadratic phase that each owner is held to, gain of autofocus included. [rad]"""
         allocation = self.analysis.allocation
-        gain = allocation.autofocus_gain
-        return {owner: self.judging.array(allocation.qpe_limit(owner) * gain) for owner in _OWNERS}
+        return {owner: self.judging.array(allocation.qpe_allowed(owner)) for owner in _OWNERS}
 
     @cached_property
     def _vibrations(self) -> Vibrations:
@@ -323,13 +301,20 @@ class RowStatuses:
                 self._settle(owed, is_doubtful & (self.status != CODE["fail"]), Why.INPUT_IN_DOUBT)
 
     def judge_effects(self, untaken: Sequence[UntakenEffect]) -> None:
-        """Rows that make up an effect that none takes are not evaluated; those that add little are `info`."""
+        """Rows that make up an effect that no requirement takes are not evaluated.
+
+        One that no requirement limits, with a negligible effect, judges nothing: `info`.
+        """
         for place, row in enumerate(self.rows):
-            row_id = row.subject.id
+            row_id, status = row.subject.id, self.status[place]
             of_row = [one for one in untaken if row_id in one.parts]
             if not of_row:
                 continue
-            status = status_of(self.status[place], row_id, ~np.isnan(row.allowable), of_row)
+            for one in of_row:
+                is_unlimited = np.isnan(row.allowable) & (one.parts[row_id] > 0)
+                status = np.where(is_unlimited & (status == CODE["pass"]), CODE["info"], status)
+                is_better = (status != CODE["fail"]) & (status != CODE["not_declared"])
+                status = np.where(one.makers[row_id] & is_better, CODE["not_evaluated"], status)
             is_judged = (status == CODE["not_evaluated"]) | (status == CODE["fail"])
             is_made = is_judged & np.any([one.makers[row_id] for one in of_row], axis=0)
             self.status[place] = status
@@ -358,7 +343,7 @@ class RowStatuses:
         is_named = np.array([[is_waived(self.mission, today, [what.id])] for what in self.subjects])
         if is_waived(self.mission, today, [DECLARATIONS.id]):
             is_named = is_named | (self.why == Why.NOT_DECLARED_AS_REQUIRED)
-        return np.where(is_named & np.isin(self.status, BROKEN), CODE["waived"], self.status)
+        return np.where(is_named & np.isin(self.status, _BROKEN), CODE["waived"], self.status)
 
     def judges(self) -> Codes:
         """Place in `KEYS` of the requirement that judges each row, -1: none, since it is not declared."""
@@ -395,13 +380,3 @@ def _stricter(full: Mapping[str, Judged], published: Mapping[str, Judged] | None
         is_other |= tie & is_same & ~is_as_high(size[1], size[0])
         found.append(one.where(is_other, other))
     return [*found, *others.values()]  # an aggregate that only one of them has
-
-
-def statuses(codes: Codes) -> NDArray[np.object_]:
-    """Names of statuses by their codes."""
-    return np.array(_STATUSES, dtype=object)[codes]
-
-
-def field(row: Judged, name: str) -> Any:
-    """One field of a row, (cases,)."""
-    return statuses(row.status) if name == "status" else getattr(row, name)

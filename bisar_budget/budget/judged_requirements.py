@@ -8,24 +8,21 @@ tenth of the quadratic requirement and below 0.08 rad. Above, the rows that make
 Every number is an array over the cases, (n,): a check is one case.
 """
 
-from collections.abc import Callable, Container, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bisar_budget.constants import UTILIZATION_TOLERANCE
+from bisar_budget.budget.judged_rows import BOUND, Codes
 from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.findings.requirement import DeclaredKinds
 from bisar_budget.findings.row import DECLARE
-from bisar_budget.findings.status import RANK, STATUS
+from bisar_budget.findings.status import BROKEN, RANK, STATUS
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import Platform
-
-Codes = NDArray[np.int8]  # places of statuses in STATUS: the worst has the lowest
-Floats = NDArray[np.float64]
-Truths = NDArray[np.bool_]
+from bisar_budget.ranges.exact_ranges import Floats, Truths
 
 KEYS = (QUADRATIC, CUBIC, LOCATION, "pslr", "islr", "declare")
 UNITS = {QUADRATIC: "rad", CUBIC: "rad", LOCATION: "m", "pslr": "dB", "islr": "dB", "declare": ""}
@@ -38,8 +35,7 @@ MAKES_UP = 0.1
 TAKEN_BY = {"cubic": (CUBIC, "islr"), "spread": ("islr",), "tone": ("pslr", "islr")}
 
 _NONE = np.int8(len(STATUS))  # of a row that judges nothing
-_BREAKS = [RANK[name] for name in ("fail", "not_evaluated")]
-_IS_JUDGED = np.array([one.is_judged for one in STATUS.values()])
+IS_JUDGED = np.array([one.is_judged for one in STATUS.values()])
 
 
 class UntakenEffect(NamedTuple):
@@ -86,24 +82,6 @@ def required_keys(mission: Mission) -> tuple[str, ...]:
     return tuple(key for key in KEYS if (needs.declare if key == "declare" else getattr(needs, key) is not None))
 
 
-def status_of(status: Codes, row_id: str, is_limited: Any, untaken: Sequence[UntakenEffect]) -> Codes:
-    """Status of a row whose effects are looked at too.
-
-    One that makes up an effect which no requirement takes is `not_evaluated`, unless it fails. One that no
-    requirement limits, with a negligible effect, judges nothing: `info`.
-    """
-    found = status
-    for one in untaken:
-        if row_id not in one.parts:
-            continue
-        has_part = one.parts[row_id] > 0
-        unlimited = has_part & ~np.asarray(is_limited) & (found == RANK["pass"])
-        found = np.where(unlimited, RANK["info"], found)
-        is_better = (found != RANK["fail"]) & (found != RANK["not_declared"])
-        found = np.where(one.makers[row_id] & is_better, RANK["not_evaluated"], found)
-    return found.astype(np.int8)
-
-
 def requirement_states(
     mission: Mission,
     codes: Codes,
@@ -138,12 +116,12 @@ def requirement_states(
     """
     uses, found = np.nan_to_num(utilization, nan=0.0, posinf=np.inf), []
     for key in required_keys(mission):
-        mine = _IS_JUDGED[codes] & (judges == KEYS.index(key))
+        mine = IS_JUDGED[codes] & (judges == KEYS.index(key))
         levels, used = np.where(mine, codes, _NONE), uses
         if key == QUADRATIC:  # a row that another requirement binds is held to this one too
-            is_other = _IS_JUDGED[codes] & ~mine & (codes != RANK["waived"]) & ~np.isnan(quadratic_use)
+            is_other = IS_JUDGED[codes] & ~mine & (codes != RANK["waived"]) & ~np.isnan(quadratic_use)
             by_autofocus = np.where(codes == RANK["pass_with_autofocus"], codes, RANK["pass"])
-            breaks = np.nan_to_num(quadratic_use) > 1 + UTILIZATION_TOLERANCE
+            breaks = np.nan_to_num(quadratic_use) > BOUND
             levels = np.where(is_other, np.where(breaks, RANK["fail"], by_autofocus), levels)
             used = np.where(is_other, quadratic_use, uses)
             mine = mine | is_other
@@ -162,7 +140,8 @@ def requirement_states(
             is_unjudged = is_unjudged | np.asarray(is_misplaced)
         status = np.where(is_unjudged & (worst != RANK["fail"]), RANK["not_evaluated"], worst)
         if waived.get(key):  # a row that breaks it has a waiver of its own, or none
-            status = np.where(np.isin(status, _BREAKS) & ~np.isin(worst, _BREAKS), RANK["waived"], status)
+            is_broken, is_by_row = (np.isin(one, [RANK[name] for name in BROKEN]) for one in (status, worst))
+            status = np.where(is_broken & ~is_by_row, RANK["waived"], status)
         found.append(RequirementState(key, status.astype(np.int8), decider, utilization, mine))
     return found
 

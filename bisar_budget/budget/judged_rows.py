@@ -1,7 +1,9 @@
 """A row of the budget in many cases at once, and how it is judged; a check is one case."""
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from enum import IntEnum
 from operator import attrgetter
 from typing import Any, NamedTuple
@@ -18,13 +20,15 @@ from bisar_budget.faults import KeyPath
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import RANK, STATUS
 from bisar_budget.phrases import NOTHING, Note
+from bisar_budget.ranges.exact_ranges import Floats
 
-Floats = NDArray[np.float64]
-Codes = NDArray[np.int8]
+Codes = NDArray[np.int8]  # places of statuses in STATUS: the worst has the lowest
 
 BOUND = 1 + UTILIZATION_TOLERANCE
 CODE = {name: np.int8(rank) for name, rank in RANK.items()}
+_NAMES = np.array(list(STATUS), dtype=object)
 REQUIREMENTS = (QUADRATIC, CUBIC, LOCATION, "pslr", "islr", END_OF_IMAGE)
+EFFECTS = {QUADRATIC: ("rad", "QPE"), CUBIC: ("rad", "cubic phase"), LOCATION: ("m", "displacement")}  # in a sentence
 
 WHOLE = ("allowable_published", "allowable_full", "qpe_full_rad", "qpe_exact_rad", "islr_db")  # see `Judging`
 NUMBERS = (
@@ -37,7 +41,12 @@ NUMBERS = (
     "islr_db",
 )  # of columns
 _columns_of_numbers = attrgetter(*NUMBERS)
-_IN_UNIT = ("declared", "allowable", "allowable_published", "allowable_full")  # columns in the unit of their row
+IN_UNIT = ("declared", "allowable", "allowable_published", "allowable_full")  # columns in the unit of their row
+
+
+def statuses(codes: Any) -> Any:
+    """Name of a status by its code, or names by codes."""
+    return _NAMES[codes]
 
 
 class Why(IntEnum):
@@ -105,15 +114,19 @@ class Judged(NamedTuple):
 
     def in_decibel(self) -> "Judged":
         """The row with its factors of amplitude in decibel; its utilization stays that of amplitudes."""
-        return self._of_columns(decibels, _IN_UNIT)
+        return self._of_columns(decibels, IN_UNIT)
 
     def in_unit(self, factor: Any) -> "Judged":
         """The row with its sizes in a unit of which a factor is one of before."""
-        return self._of_columns(lambda column: column * factor, _IN_UNIT)
+        return self._of_columns(lambda column: column * factor, IN_UNIT)
 
     def held_to(self, key: str) -> "Judged":
         """The row with the requirement that sets its allowable."""
         return self._replace(metric=key, binding=np.full_like(self.binding, REQUIREMENTS.index(key)))
+
+    def allowable_by(self, model: str) -> Floats:
+        """The allowable by a model, whichever gates."""
+        return self.allowable_published if model == "published" else self.allowable_full
 
     def requirement(self, case: Case) -> str | None:
         """The requirement that sets the allowable in a case; None: its metric does."""
@@ -211,7 +224,16 @@ class Judging(NamedTuple):
 
 
 # ---------------------------------------------------------------------- one case in words
-_STATUSES = tuple(STATUS)
+@dataclass(frozen=True, slots=True, eq=False)
+class FamilyRow(ABC):
+    """A row as its family judges it by a model, in many cases; `is_there` are those that have it."""
+
+    judged: Judged
+    is_there: Any = field(default=True, kw_only=True)
+
+    @abstractmethod
+    def in_words(self, case: Case, model: str) -> Row:
+        """The row of one case, by the model that judges it."""
 
 
 def worded(
@@ -230,7 +252,7 @@ def worded(
     **others: Any,  # further fields of the row
 ) -> Row:
     """Put a row as judged, in one case, into words: they follow from its status, and decide nothing."""
-    mission, status, numbers = case.mission, _STATUSES[row.status[case.place]], row.numbers(case.place)
+    mission, status, numbers = case.mission, statuses(row.status[case.place]), row.numbers(case.place)
     allowable, utilization, full = numbers["allowable"], numbers["utilization"], numbers["qpe_full_rad"]
     reason, remarks = no_limit if allowable is None else NOTHING, tuple[Note, ...](others.pop("remarks", ()))
     if status == "info":
@@ -257,9 +279,3 @@ def worded(
         "requirement_id": mission.requirement_ids.get(row.subject.id),
     }
     return Row(row.subject, row.metric, unit, **(fields | others))
-
-
-def number_of(case: Case, column: Any) -> float | None:
-    """The number that a case has in a column; None where there is none."""
-    value = case.number(column)
-    return None if math.isnan(value) else value

@@ -25,11 +25,11 @@ from bisar_budget.analysis.spread import (
     spread_limit,
     stated_powers,
 )
-from bisar_budget.budget.acceleration_rows import evidence, notes_of_acceleration
 from bisar_budget.budget.judged_requirements import SMALL_RAD
-from bisar_budget.budget.judged_rows import BOUND, CODE, REQUIREMENTS, Floats, Judged, Judging, worded
+from bisar_budget.budget.judged_rows import BOUND, CODE, EFFECTS, REQUIREMENTS, FamilyRow, Judging, worded
+from bisar_budget.budget.tone_rows import evidence, notes_of_acceleration
 from bisar_budget.effects.air_delays import CONTENT, dispersion
-from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
+from bisar_budget.effects.declared import CUBIC, LOCATION, OTHER_MODEL, QUADRATIC
 from bisar_budget.effects.effect import PLATFORMS, override_notes, subject
 from bisar_budget.effects.navigation_errors import process_of
 from bisar_budget.effects.oscillators import POOR_FIT
@@ -43,12 +43,11 @@ from bisar_budget.mission.platforms import MotionError
 from bisar_budget.mission.readers import SortedPoints
 from bisar_budget.mission.vibrations import Vibration
 from bisar_budget.phrases import NOTHING, Note
+from bisar_budget.ranges.exact_ranges import Floats, Truths
 
 ISLR = "islr"
 HELD = (QUADRATIC, CUBIC, ISLR, LOCATION)  # requirements, in the order of what an error does
 _GOOD_FIT = 0.005  # of an Allan deviation, up to which a power law needs no word
-
-Truths = NDArray[np.bool_]
 
 
 class Limits(NamedTuple):
@@ -123,7 +122,7 @@ class RandomRows:
         """Rows of every error by a model, `published` or `full`, declared or not."""
         if not self.errors:
             return
-        other = "full" if model == "published" else "published"
+        other = OTHER_MODEL[model]
         mine, theirs = self._effects(model), self._effects(other)
         sizes, sizes_of_other = self._sizes(model, mine), self._sizes(other, theirs)
         declared = self._table([math.nan if one.declared is None else one.declared for one in self.errors])
@@ -180,9 +179,10 @@ class RandomRows:
         # Where only vibration spreads, its own rows hold it to the shares; what is stated has none.
         is_there[-1] = True
         is_declared = np.array([known.any(axis=0) for known in is_known]) & is_there
-        models = (model, "full" if model == "published" else "published")
         shares = np.sqrt(self._table([split.of(owner) for owner in owners]))
-        limit, limit_of_other = (shares * spread_limit(mission, self.allocation, "mission", one) for one in models)
+        limit, limit_of_other = (
+            shares * spread_limit(mission, self.allocation, "mission", one) for one in (model, OTHER_MODEL[model])
+        )
         rms = np.sqrt(variance)
         judged = self.judging.row(
             subject("mission", ISLR),
@@ -200,9 +200,9 @@ class RandomRows:
             allowable_full=by_full,
             islr_db=islr_of(mission, variance),
         ).held_to(ISLR)
-        of_rows = (is_there, members, variance, limit, limit_of_other)
+        of_rows = (members, variance, limit, limit_of_other)
         for place, (owner, *others) in enumerate(zip(owners, *of_rows, strict=True)):
-            yield IslrRow(judged.at(place, subject(owner, ISLR)), *others)
+            yield IslrRow(judged.at(place, subject(owner, ISLR)), *others, is_there=is_there[place])
 
     def stated_rows(self, model: str) -> Iterator["StatedRow"]:
         """Rows of errors from elsewhere that state their ISLR: each may have all that is required."""
@@ -233,18 +233,16 @@ class RandomRows:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class RandomRow:
+class RandomRow(FamilyRow):
     """The row of one error in many cases, by its place among them.
 
     `is_over_other` says that the model that does not gate fails it, `bound_by_other` by which of `HELD`.
     """
 
-    judged: Judged
     place: int
     is_over_other: Truths
     bound_by_other: NDArray[np.intp]
     without_autofocus: Floats
-    is_there: bool = True
 
     def in_words(self, case: Case, gating: str) -> Row:
         """The row of one case, by the model that judges it."""
@@ -253,7 +251,7 @@ class RandomRow:
         if self.judged.status[case.place] == CODE["fail"]:
             over = _over(mission, error, gating, binding, allocation).then(error.extrapolated)
         if self.is_over_other[case.place]:
-            limit = float(allocation.qpe_limit(error.owner) * allocation.autofocus_gain)
+            limit = allocation.qpe_allowed(error.owner)
             doubt = _doubt(mission, error, gating, HELD[self.bound_by_other[case.place]], limit)
         equation, evidence, notes = _said(mission, error)
         return worded(
@@ -280,15 +278,13 @@ class RandomRow:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class IslrRow:
+class IslrRow(FamilyRow):
     """Row of the phases of one owner that spread, taken together, in many cases.
 
-    `is_there` are the cases that have the row; `variance` is that of the phase, and `limit` and `limit_of_other` the
-    rms phases that are allowed by the model that gates and the other one. [rad², rad]
+    `variance` is that of the phase, `limit` and `limit_of_other` are the rms phases that the model that gates and the
+    other one allow. [rad², rad]
     """
 
-    judged: Judged
-    is_there: Truths
     members: Sequence[SpreadPhase]
     variance: Floats
     limit: Floats
@@ -297,7 +293,7 @@ class IslrRow:
     def in_words(self, case: Case, gating: str) -> Row:
         """The row of one case, by the model that judges it."""
         level = _levels(case.mission, gating)
-        other, over, doubt = "full" if gating == "published" else "published", NOTHING, NOTHING
+        other, over, doubt = OTHER_MODEL[gating], NOTHING, NOTHING
         variance, limit, by_other = map(case.number, (self.variance, self.limit, self.limit_of_other))
         if math.sqrt(variance) > by_other * BOUND:
             doubt = phrases.other_model_allows(other, level(by_other), "dB")
@@ -321,11 +317,8 @@ class IslrRow:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class StatedRow:
+class StatedRow(FamilyRow):
     """Row of an error from elsewhere that states its ISLR, in many cases. [dB]"""
-
-    judged: Judged
-    is_there: bool = True
 
     def in_words(self, case: Case, _: str) -> Row:
         """The row of one case."""
@@ -484,17 +477,13 @@ def _over(mission: Mission, error: RandomError, model: str, binding: str | None,
 
 def _doubt(mission: Mission, error: RandomError, gating: str, binding: str, limit: float) -> Note:
     """Say by which requirement the model that does not gate fails a declared error."""
-    other, size = "full" if gating == "published" else "published", error.declared
+    other, size = OTHER_MODEL[gating], error.declared
     effect = held_effect(mission, error.effect(other), error.coverage(mission))
     if binding == ISLR:
         return phrases.other_model_spreads(other, _levels(mission, other)(effect.spread * size))
-    if binding == QUADRATIC:
-        return phrases.other_model_fails(other, effect.quadratic * size, limit, "rad", "QPE")
-    if binding == LOCATION:
-        needed = mission.requirements.location_error or 0.0
-        return phrases.other_model_fails(other, effect.displacement * size, needed, "m", "displacement")
-    allowed = mission.requirements.cubic_phase_error or 0.0
-    return phrases.other_model_fails(other, effect.cubic * size, allowed, "rad", "cubic phase")
+    per_unit = {QUADRATIC: effect.quadratic, CUBIC: effect.cubic, LOCATION: effect.displacement}[binding]
+    allowed = limit if binding == QUADRATIC else getattr(mission.requirements, binding)
+    return phrases.other_model_fails(other, per_unit * size, allowed, *EFFECTS[binding])
 
 
 def _levels(mission: Mission, model: str) -> Callable[[float], float]:

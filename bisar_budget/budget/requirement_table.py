@@ -9,7 +9,7 @@ from bisar_budget.analysis.analysis import Case
 from bisar_budget.analysis.spread import islr_db, mainlobe_energy, spread_limit
 from bisar_budget.analysis.vibration_limits import level_of, tone_limits
 from bisar_budget.budget.doubts import input_doubts, is_in_doubt
-from bisar_budget.budget.judged_mission import FamilyRow, JudgedMission
+from bisar_budget.budget.judged_mission import JudgedMission
 from bisar_budget.budget.judged_requirements import (
     DECLARATIONS,
     TAKEN_BY,
@@ -18,15 +18,13 @@ from bisar_budget.budget.judged_requirements import (
     is_asked_for,
     missing_declarations,
 )
-from bisar_budget.budget.judged_rows import Judged, Why
+from bisar_budget.budget.judged_rows import FamilyRow, Judged, Why, statuses
 from bisar_budget.budget.waivers import Waived
 from bisar_budget.effects.declared import CUBIC, LOCATION, MODELS, QUADRATIC
 from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.findings.row import DECLARE, Row
-from bisar_budget.findings.status import STATUS
 from bisar_budget.phrases import NOTHING, Note
 
-_STATUSES = tuple(STATUS)
 _EXAMPLES = {CUBIC: "22.5 deg", "islr": "-20 dB", "pslr": "-30 dB"}
 
 
@@ -47,7 +45,7 @@ def rows_in_words(judged: JudgedMission, case: Case) -> Iterator[Row]:
         found = families.get((model, one.subject.id))
         if found is None:  # only other cases have it
             continue
-        row, status = found.in_words(case, model), _STATUSES[one.status[case.place]]
+        row, status = found.in_words(case, model), statuses(one.status[case.place])
         changes: dict[str, Any] = {"model": model, "status": status}
         if status != row.status and status == "info":
             changes |= {"utilization": None, "margin": None}
@@ -63,7 +61,7 @@ def _declarations(case: Case, one: Judged) -> Row:
         DECLARATIONS,
         DECLARE,
         unit="",
-        status=_STATUSES[one.status[case.place]],
+        status=statuses(one.status[case.place]),
         line=mission.line(("requirements", "declare")),
         reason=phrases.declarations_are_missing([one.key for one in missing]) if missing else None,
         equation="requirements.declare",
@@ -126,7 +124,7 @@ def _entry(
     mission, key = case.mission, state.key
     value = getattr(mission.requirements, key)
     utilization = case.number(state.utilization)  # an error without an image has no phase to compare
-    status = _STATUSES[state.status[case.place]]
+    status = statuses(state.status[case.place])
     place = state.decider[case.place]
     decider = rows[place] if place >= 0 else None
     allowed, reached = _sizes(decider, key, case) if decider is not None else (None, None)
@@ -171,8 +169,7 @@ def _sizes(row: Row, key: str, case: Case) -> tuple[float | None, float | None]:
         return row.allowable, row.declared
     if key == QUADRATIC:
         qpe = row.qpe_full_rad if row.model == "full" else row.qpe_published_rad
-        limit = allocation.qpe_limit(row.owner) * allocation.autofocus_gain
-        return limit, None if qpe is None else abs(qpe)
+        return allocation.qpe_allowed(row.owner), None if qpe is None else abs(qpe)
     if key == CUBIC:
         return mission.requirements.cubic_phase_error, row.cubic_rad
     if key == LOCATION:

@@ -147,7 +147,7 @@ def _shown(verdict: Verdict) -> str:
     return verdict.reason or "the image shows more than it promises"
 
 
-def rows_worth_showing(findings: MissionFindings, count: int = _SHOWN) -> tuple[Verdict, ...]:
+def rows_worth_showing(findings: MissionFindings) -> tuple[Verdict, ...]:
     """Verdicts with a measured quadratic phase whose rows decide most: worst status, limits that images refute.
 
     A row that nobody declared is shown only if its limit is refuted, or if there is nothing else.
@@ -156,7 +156,7 @@ def rows_worth_showing(findings: MissionFindings, count: int = _SHOWN) -> tuple[
     known = [v for v in findings.verdicts or () if v.measured_qpe_rad is not None and v.id in rows]
     ordered = sorted(known, key=lambda verdict: _urgency(rows[verdict.id], verdict))
     wanted = [v for v in ordered if rows[v.id].status != "not_declared" or _is_refuted(v)]
-    return tuple((wanted or ordered[:1])[:count])
+    return tuple((wanted or ordered[:1])[:_SHOWN])
 
 
 def _urgency(row: Row, verdict: Verdict) -> tuple[int, bool, bool, float]:

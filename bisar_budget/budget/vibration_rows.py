@@ -1,4 +1,4 @@
-"""Rows about what vibrates: each line of a platform, lines near each other, noise, spurs, and all echoes together."""
+"""Rows about what vibrates: each line of a platform, lines near each other, and noise."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -7,27 +7,24 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Analysis, Case
-from bisar_budget.analysis.spread import Tone, islr_of
+from bisar_budget.analysis.spread import islr_of
 from bisar_budget.analysis.vibration_limits import (
     LARGEST_ECHO,
-    Echo,
     VibrationLimits,
     echo_level,
-    highest_echo,
     slow_limits,
     tone_limits,
     vibration_limits,
 )
-from bisar_budget.budget.judged_rows import BOUND, REQUIREMENTS, Floats, Judged, Judging, worded
-from bisar_budget.effects.declared import CUBIC, QUADRATIC
-from bisar_budget.effects.effect import PLATFORMS, Subject, override_notes, subject
-from bisar_budget.effects.oscillators import spurs_of
+from bisar_budget.budget.judged_rows import BOUND, REQUIREMENTS, FamilyRow, Judged, Judging, worded
+from bisar_budget.effects.declared import CUBIC, OTHER_MODEL, QUADRATIC
+from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.spectra import tone
 from bisar_budget.effects.vibration import (
+    ECHO_CYCLES,
     NEAR_CYCLES,
     SLOWEST,
     counted,
@@ -38,16 +35,12 @@ from bisar_budget.effects.vibration import (
     worst_phases,
 )
 from bisar_budget.findings.row import Row
-from bisar_budget.mission.instruments import Oscillator
-from bisar_budget.mission.model import has_instruments
 from bisar_budget.mission.platforms import MotionError
 from bisar_budget.phrases import NOTHING, Note
+from bisar_budget.ranges.exact_ranges import Floats, Truths
 from bisar_budget.units import format_quantity
 
-ECHO_CYCLES = 3.0  # per aperture; below, echoes lie beside the mainlobe and the motion is a quadratic phase as well
 _ROUNDING_DB = 1e-6  # by which a level may be above what is required
-
-Truths = NDArray[np.bool_]
 
 
 class Vibrations:
@@ -111,8 +104,7 @@ class Vibrations:
         if limits is not None:
             allowable = self.array(limits.by(model))
             if declared is not None and not self.mission.has_direct_path:  # which the published model does not know
-                by_other = limits.full if model == "published" else limits.published
-                is_over_other = declared > by_other * BOUND
+                is_over_other = declared > limits.by(OTHER_MODEL[model]) * BOUND
         judged = self.judging.row(what, declared, allowable, doubt=doubt | is_over_other, is_info=limits is None)
         judged = judged._replace(cubic_rad=self.array(others.get("cubic", math.nan)))
         if self.judging.is_whole:
@@ -123,7 +115,7 @@ class Vibrations:
                 variance = (self.to_phase * declared) ** 2
                 of_row = variance if what.axis == "wideband" else variance / 2
                 judged = judged._replace(islr_db=islr_of(self.mission, of_row))
-        return VibrationRow(judged.held_to(metric), is_there, limits, is_over_other=is_over_other, **others)
+        return VibrationRow(judged.held_to(metric), limits, is_there=is_there, is_over_other=is_over_other, **others)
 
     def _with_limits(self, judged: Judged, limits: VibrationLimits) -> Judged:
         published, full = map(self.array, limits)
@@ -142,7 +134,7 @@ class Vibrations:
         qpe = cubic = np.full(cycles.shape, math.nan)
         if is_near.any():
             qpe, cubic = np.where(is_near, self._phases(name, index), math.nan)
-        is_over_phase = qpe > self.allocation.qpe_limit(name) * self.allocation.autofocus_gain * BOUND
+        is_over_phase = qpe > self.allocation.qpe_allowed(name) * BOUND
         if allowed is not None:
             is_over_phase |= cubic > allowed * BOUND
         level = 20 * np.log10(echo_level(np.minimum(both, LARGEST_ECHO)))
@@ -188,8 +180,8 @@ class Vibrations:
             judged = self._with_limits(judged, same)._replace(qpe_full_rad=qpe)
         return VibrationRow(
             judged,
-            is_there,
             same,
+            is_there=is_there,
             is_slow=True,
             cycles=cycles,
             qpe=qpe,
@@ -238,10 +230,10 @@ def _together(amplitudes: Floats, cycles: Floats) -> Iterator[tuple[Truths, Floa
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class VibrationRow:
+class VibrationRow(FamilyRow):
     """One row about vibration in many cases: a line, lines near each other, or the noise of a platform.
 
-    `is_there` are the cases that have it, `members` the lines near each other. `qpe` and `cubic` are the
+    `members` are the lines near each other. `qpe` and `cubic` are the
     quadratic and cubic phases that a motion below three cycles per aperture has in its worst phase [rad]: where
     it `is_slow` it is judged by them, else `is_over_phase` says that they break what they may. `is_over_other`
     says that the model that does not gate fails it. `both` is the peak phase of one line with an echo as high as
@@ -249,8 +241,6 @@ class VibrationRow:
     says that it is too high. Sizes of the row are `per_metre` times those in metres.
     """
 
-    judged: Judged
-    is_there: Truths
     limits: VibrationLimits | None = None
     is_slow: bool = False
     members: Truths | None = None
@@ -288,119 +278,6 @@ class VibrationRow:
         return _line_row(case, self, error, model)
 
 
-def spur_rows(judging: Judging, analysis: Analysis, model: str) -> Iterator["SpurRow"]:
-    """Judge the oscillators' tones by a model; they make paired echoes as vibrations do. [dB of echo to response]"""
-    mission = analysis.mission
-    metric, by_platform = tone_limits(mission, analysis.allocation)
-    for place, spur in enumerate(spurs_of(mission, analysis.geometry) if has_instruments(mission) else ()):
-        what, phase = subject(spur.name, "oscillator", "spur", entry=spur.entry), judging.array(spur.phase)
-        limits, is_over_other = by_platform.get(spur.name), np.zeros(judging.cases, dtype=bool)
-        if limits is None:
-            judged = judging.row(what, phase / 2, None, is_info=True)
-        else:
-            limits = VibrationLimits(*(2 * math.pi / mission.radar.wavelength * limit for limit in limits))
-            is_over_other = phase > (limits.full if model == "published" else limits.published) * BOUND
-            is_near = spur.frequency * mission.collection.aperture_time < ECHO_CYCLES
-            judged = judging.row(  # the amplitude of an echo over that of the response
-                what,
-                phase / 2,
-                judging.array(limits.by(model) / 2),
-                doubt=is_over_other,
-                is_unknown=is_near & (metric == "pslr"),
-            )
-            published, full = (judging.array(limit / 2) for limit in limits)
-            judged = judged._replace(allowable_published=published, allowable_full=full)
-        judged = judged.in_decibel().held_to(metric)
-        if metric == "islr":
-            judged = judged._replace(islr_db=islr_of(mission, phase**2 / 2))
-        yield SpurRow(judged, place, is_over_other)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class SpurRow:
-    """A tone of an oscillator in many cases, by its place, as echo over response in decibel; see `VibrationRow`."""
-
-    judged: Judged
-    place: int
-    is_over_other: Any = False
-    is_there: bool = True
-
-    def in_words(self, case: Case, model: str) -> Row:
-        """The row of one case, by the model that judges it."""
-        mission, row, doubt, over = case.mission, self.judged, NOTHING, NOTHING
-        spur = spurs_of(mission)[self.place]
-        oscillator: Oscillator = getattr(mission.platforms, spur.name).oscillator
-        cycles, missing = spur.frequency * mission.collection.aperture_time, phrases.no_requirement_of("pslr")
-        if not math.isnan(row.allowable[case.place]):
-            over = phrases.echoes_over(case.number(row.declared), case.number(row.allowable))
-            if self.is_over_other[case.place]:
-                other, by_other = (
-                    ("published", row.allowable_published) if model == "full" else ("full", row.allowable_full)
-                )
-                doubt = phrases.other_model_allows(other, case.number(by_other), "dB")
-        return worded(
-            case,
-            row,
-            unit="dB",
-            path=("platforms", spur.name, "oscillator", "spurs"),
-            equation="first principles" if model == "full" else "Section V, sinusoidal",
-            over=over,
-            doubt=doubt,
-            no_limit=missing,
-            not_evaluated=phrases.echoes_on_the_mainlobe(cycles, ECHO_CYCLES),
-            info=missing,
-            evidence=oscillator.source,
-            remarks=(
-                phrases.tone_lies(spur.frequency, cycles),
-                *override_notes(spur.name, oscillator.overridden, "frequency"),
-            ),
-        )
-
-
-def pslr_row(judging: Judging, found: Sequence[Tone], required: Any) -> "PslrRow":
-    """Judge the highest echo that all tones make together, in the worst of their phases.
-
-    From first principles by both models: the shares of the paper's rule stay 3 dB inside it. Tones at most 2.5 cycles
-    per aperture apart raise each other's echo, whoever makes them.
-    """
-    highest, allowed = highest_echo(found, (judging.cases,)), judging.array(10 ** (np.asarray(required) / 20))
-    what = subject("mission", "pslr")
-    judged = judging.row(what, None, allowed)
-    if highest is not None:
-        is_declared = np.any([np.broadcast_to(one.is_there, (judging.cases,)) for one in found], axis=0)
-        judged = judged.where(is_declared, judging.row(what, highest.level, allowed))
-    judged = judged._replace(allowable_published=allowed, allowable_full=allowed)
-    return PslrRow(judged.in_decibel().held_to("pslr"), found, highest)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class PslrRow:
-    """The `highest` echo that all tones make together in many cases; where PSLR is required."""
-
-    judged: Judged
-    tones: Sequence[Tone]
-    highest: Echo | None
-    is_there: bool = True
-
-    def in_words(self, case: Case, _: str) -> Row:
-        """The row of one case."""
-        over = NOTHING
-        if self.highest is not None:
-            makers = [one for one, is_in in zip(self.tones, self.highest.is_of[:, case.place], strict=True) if is_in]
-            largest = max(makers, key=lambda one: case.number(one.phase))
-            level, required = case.number(self.judged.declared), case.mission.requirements.pslr or 0.0
-            over = phrases.echoes_together_over(level, required, largest.subject.id, len(makers))
-        return worded(
-            case,
-            self.judged,
-            unit="dB",
-            path=("requirements", "pslr"),
-            equation="first principles",
-            over=over,
-            binding_requirement="pslr",
-        )
-
-
 # ---------------------------------------------------------------------- in words
 def _line_row(case: Case, one: VibrationRow, error: MotionError, model: str) -> Row:
     mission, allocation, place = case.mission, case.allocation, case.place
@@ -416,7 +293,7 @@ def _line_row(case: Case, one: VibrationRow, error: MotionError, model: str) -> 
         )
         more, doubt = [note], note if one.is_over_both[place] else NOTHING
     if one.cycles[place] < ECHO_CYCLES:
-        limit = float(allocation.qpe_limit(owner) * allocation.autofocus_gain)
+        limit = allocation.qpe_allowed(owner)
         qpe, cubic, allowed = float(one.qpe[place]), float(one.cubic[place]), mission.requirements.cubic_phase_error
         more.insert(0, phrases.slower_than_three_cycles(float(one.cycles[place]), qpe, limit, cubic, allowed))
         if one.is_over_phase[place]:
@@ -443,7 +320,7 @@ def _row(
         margin = float(limits.margin_db)
         notes = (*notes, phrases.published_rule_is_off(margin))
         if one.is_over_other[case.place]:
-            other = "full" if model == "published" else "published"
+            other = OTHER_MODEL[model]
             allowed = float(limits.by(other)) * case.number(one.per_metre)
             doubt = phrases.other_model_allows(other, allowed, _unit(case, one))
     return worded(
@@ -489,7 +366,7 @@ def _slow_row(case: Case, one: VibrationRow, error: MotionError) -> Row:
     if is_cubic:
         over = phrases.slow_cubic_phase_over(cubic, mission.requirements.cubic_phase_error or 0.0)
     else:
-        limit = float(allocation.qpe_limit(what.owner) * allocation.autofocus_gain)
+        limit = allocation.qpe_allowed(what.owner)
         over = phrases.slow_quadratic_phase_over(qpe, limit)
         if qpe > limit:
             over = over.then(allocation.passes_with(qpe, what.owner, mission))

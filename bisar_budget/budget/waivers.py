@@ -15,11 +15,10 @@ from bisar_budget.budget.judged_requirements import KEYS
 from bisar_budget.faults import KeyPath, printable
 from bisar_budget.findings.requirement import JudgedRequirement, Outside, Override
 from bisar_budget.findings.row import DECLARE, AppliedWaiver, Row
+from bisar_budget.findings.status import BROKEN
 from bisar_budget.mission.model import Mission
 from bisar_budget.phrases import Note
 from bisar_budget.resources import resource
-
-_BROKEN = ("fail", "not_evaluated")  # statuses that a waiver covers
 
 
 class Waived(NamedTuple):
@@ -36,7 +35,7 @@ class Waived(NamedTuple):
 
     def unused(self, judged: Sequence[JudgedRequirement]) -> Iterator[tuple[KeyPath, Note]]:
         """Say which waivers name nothing, everything, or nothing that is broken."""
-        broken = {one.id for one in judged if one.status in (*_BROKEN, "waived")}
+        broken = {one.id for one in judged if one.status in (*BROKEN, "waived")}
         ids = [one.id for one in judged]
         for index, (waiver, (named, failing)) in enumerate(zip(self.mission.waivers, self.covered, strict=True)):
             key = ("waivers", index, "id")
@@ -62,7 +61,7 @@ def apply_waivers(rows: Sequence[Row], mission: Mission, today: date) -> Waived:
         UTC; a waiver holds through its last day.
     """
     ids = [row.id for row in rows]
-    broken = {position for position, row in enumerate(rows) if row.status in _BROKEN}
+    broken = {position for position, row in enumerate(rows) if row.status in BROKEN}
     requirements = [f"mission.{key}" for key in KEYS]
     missing = [n for n, row in enumerate(rows) if row.is_of_declare and row.status == "not_evaluated"]
     # A thousand waivers of one row would fill a report: it has the first that holds and the one that held longest.

@@ -17,13 +17,13 @@ from bisar_budget import units
 from bisar_budget.analysis.allocation import is_balanced
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.budget.judged_mission import JudgedMission, judged_mission
+from bisar_budget.budget.judged_requirements import IS_JUDGED
 from bisar_budget.budget.judged_rows import Judged
 from bisar_budget.design.table import Question, Table, Variation, hold_to_decisions, standing
 from bisar_budget.design.varied import scaled
 from bisar_budget.effects.effect import MOTION, PLATFORMS
 from bisar_budget.faults import SetValue
 from bisar_budget.findings.requirement import Override
-from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.model import MISSION, SHARES, Mission
 from bisar_budget.mission.propagation import DELAYS
 from bisar_budget.mission.quantities import FACTOR, Number, QuestionError, as_number, form_of, tree_of
@@ -48,7 +48,6 @@ _FURTHEST = math.log(1e6)  # times: a number that would have to change by more d
 _NOTHING = 1e-9  # of a utilization: what rounding leaves of a check
 _RELAXED = 2.0  # times, an error that is relaxed
 _SAME = 1e-9  # of what is declared
-_IS_JUDGED = np.array([one.is_judged for one in STATUS.values()])
 # Half of a difference. A power law of exponent p is wrong by (p - 1)(p - 2)/6 of its square, 2e-4 for the inverse
 # square; allowables by exact ranges end their search within 1e-5 of a limit, which is 1e-3 of a hundredth.
 RELATIVE_STEP = 0.01
@@ -519,7 +518,7 @@ def _of_others(owner: str, before: Sequence[Judged], after: Sequence[Judged]) ->
     for row in before:
         was, then = float(row.utilization[0]), now.get(row.subject.id)
         is_owed = row.subject.owner in (owner, "clock" if owner == "receiver" else owner)
-        if then is None or not is_owed or not math.isfinite(was) or not _IS_JUDGED[row.status[0]]:
+        if then is None or not is_owed or not math.isfinite(was) or not IS_JUDGED[row.status[0]]:
             continue
         old, new = np.nan_to_num([row.declared[0], then.declared[0]])
         if abs(new - old) <= _SAME * abs(old):

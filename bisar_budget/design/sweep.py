@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from bisar_budget.budget.check import check_mission
+from bisar_budget.budget.judged_rows import IN_UNIT
 from bisar_budget.design.cases import Cases, words_of
 from bisar_budget.design.table import (
     GEOMETRY,
-    IN_UNIT,
     REASON,
     VERDICT,
     Column,

@@ -16,9 +16,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bisar_budget.analysis.analysis import Analysis, by_nodes
-from bisar_budget.budget.judged_mission import JudgedMission, field, judged_mission, statuses
+from bisar_budget.budget.judged_mission import JudgedMission, judged_mission
 from bisar_budget.budget.judged_requirements import first_highest
-from bisar_budget.budget.judged_rows import REQUIREMENTS, WHOLE, Judged
+from bisar_budget.budget.judged_rows import REQUIREMENTS, WHOLE, Judged, statuses
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.design.cases import Values
 from bisar_budget.design.varied import is_held, is_image, scaled
@@ -89,7 +89,6 @@ VERDICT = (
     Column("binding_requirement", "", "The requirement that sets its allowable.", is_text=True),
 )
 REASON = Column("reason", "", "Why there is no mission in this case.", is_text=True)
-IN_UNIT = ("declared", "allowable", "allowable_published", "allowable_full")  # fields in the unit of their row
 
 _IS_JUDGED = np.array([one.is_judged and name != "waived" for name, one in STATUS.items()])
 
@@ -413,7 +412,7 @@ class Table:
                 columns |= {column.name: number for column, number in zip(GEOMETRY, geometry, strict=True)}
                 for name, (row, of_row) in self.fields.items():
                     if row in rows:
-                        columns[name] = field(rows[row], of_row)
+                        columns[name] = statuses(rows[row].status) if is_status(name) else getattr(rows[row], of_row)
                     elif is_status(name):
                         columns[name] = "not_declared"
             for name, column in columns.items():

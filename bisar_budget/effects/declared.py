@@ -31,6 +31,7 @@ QUADRATIC, CUBIC, LOCATION = "quadratic_phase_error", "cubic_phase_error", "loca
 HELD = (QUADRATIC, CUBIC, LOCATION)  # what an error is held to
 END_OF_IMAGE = "end_of_image"  # no requirement: no ground point has the range history of a larger error
 MODELS = ("published", "full")
+OTHER_MODEL = {"published": "full", "full": "published"}
 
 # No navigation error: it takes the platform, within the aperture, farther than this part of its slant range.
 FARTHEST = 0.1

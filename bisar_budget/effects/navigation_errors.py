@@ -33,12 +33,13 @@ from bisar_budget.effects.random_effect import (
     parts_of_largest,
     sigmas,
 )
-from bisar_budget.effects.spectra import Floats, gauss_markov
+from bisar_budget.effects.spectra import gauss_markov
 from bisar_budget.faults import KeyPath
 from bisar_budget.geometry import PlatformState, Vector, cross, unit, without_rounding
 from bisar_budget.mission.instruments import IMU_KINDS, GaussMarkov, LeverArm
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import CommonMotionError, MotionError
+from bisar_budget.ranges.exact_ranges import Floats
 
 _IMU_UNITS = dict(zip(IMU_KINDS, ("m/s^2", "1", "rad", "rad/s", "m/s/sqrt(s)", "rad/sqrt(s)"), strict=True))
 NOISE = ("velocity_random_walk", "angle_random_walk")  # figures of an inertial sensor that spread

@@ -23,12 +23,13 @@ from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.navigation_errors import specific_force
 from bisar_budget.effects.oscillators import left_of_tone
 from bisar_budget.effects.random_effect import RandomEffect, RandomError, SensorCases
-from bisar_budget.effects.spectra import Floats, Parts, PowerLawPiece, squares
+from bisar_budget.effects.spectra import Parts, PowerLawPiece, squares
 from bisar_budget.effects.vibration import SLOWEST, power_of, spectrum_parts, spectrum_pieces
 from bisar_budget.geometry import BistaticGeometry, PlatformState, norm
 from bisar_budget.mission.instruments import Oscillator
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.vibrations import FeltVibration, Vibration
+from bisar_budget.ranges.exact_ranges import Floats
 
 PHASE = (1.0, 2.0)  # S_φ = (Γ·f₀)²·S_a/f²
 _FELT = 1e-6  # m/s², below which an acceleration of a path is none

@@ -1,7 +1,10 @@
-"""Phase noise of an oscillator, from its mask, Allan deviation or power law, and its spurs. Spectra are one-sided."""
+"""Oscillators: phase noise by a mask, an Allan deviation or a power law, spurs, and errors of clocks at random.
+
+Spectra are one-sided. What a link leaves of the noise, and adds to it, depends on how the clocks are kept together.
+"""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from itertools import combinations, pairwise
 from typing import Any, NamedTuple
@@ -9,13 +12,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bisar_budget import evaluators, phrases
-from bisar_budget.effects.effect import PLATFORMS
-from bisar_budget.effects.spectra import PowerLawPiece, held
+from bisar_budget.effects.effect import PLATFORMS, Subject, subject
+from bisar_budget.effects.random_effect import RandomEffect, RandomError, SensorCases
+from bisar_budget.effects.spectra import Parts, PowerLawPiece, heard_parts, held, left_parts, link_parts, set_parts
 from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.instruments import Oscillator, PowerLaw
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.readers import Points, SortedPoints
 from bisar_budget.phrases import NOTHING, Note
+from bisar_budget.ranges.exact_ranges import Floats
 
 BANDWIDTH = 1e3  # Hz, to which noise counts that is stated without an end
 POOR_FIT = 0.2  # of an Allan deviation, from where a power law does not describe it
@@ -178,6 +183,7 @@ def _least_squares(rows: Sequence[Sequence[float]]) -> list[float] | None:
     return [value / size for value, size in zip(right, sizes, strict=True)]
 
 
+# ---------------------------------------------------------------------- spurs
 class Spur(NamedTuple):
     """A tone of an oscillator: platform, entry by frequency, frequency [Hz], peak phase at centre frequency [rad].
 
@@ -189,6 +195,11 @@ class Spur(NamedTuple):
     frequency: float
     phase: Any
     left: Any
+
+    @property
+    def subject(self) -> Subject:
+        """That of its row."""
+        return subject(self.name, "oscillator", "spur", entry=self.entry)
 
 
 def spurs_of(mission: Mission, geometry: BistaticGeometry | None = None) -> list[Spur]:
@@ -221,3 +232,104 @@ def left_of_tone(frequency: Any, mission: Mission, geometry: BistaticGeometry) -
     images = [np.rint(turns) + n for n in (-1, 0, 1)]
     passed = [np.where(image != 0, np.sqrt(held(2 * math.pi * (turns - image))), 0.0) for image in images]
     return np.max([1 - np.sqrt(held(2 * math.pi * turns)), *passed], axis=0)
+
+
+# ---------------------------------------------------------------------- errors of clocks
+def oscillator_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
+    """Phase noise of a platform's oscillator, or what exchanged pulses leave of it."""
+    mission = seen.mission
+    oscillator: Oscillator | None = getattr(mission.platforms, name).oscillator
+    if oscillator is None:
+        return
+    found = _left_at_1_hz(seen, name, oscillator)
+    scale = mission.radar.center_frequency**2 * 10 ** (np.asarray(oscillator.level) / 10)
+    published, full = _of_clock(seen, Parts(*found * scale))
+    key = ("platforms", name, "oscillator")
+    path = key if oscillator.sensor is None else (*key, "sensor")
+    yield RandomError(
+        subject(name, "oscillator"), "dB", 1.0, path, published.times(seen.factor), full.times(seen.factor)
+    )
+
+
+def _of_clock(seen: SensorCases, found: Parts) -> tuple[RandomEffect, RandomEffect]:
+    """Effects by both models of a phase with these parts [rad²]; those of orders 0 and 1 where they are known.
+
+    Where the file states both terms of the clock, these stand for what a free oscillator displaces.
+    """
+    k, timing = 2 * math.pi / np.asarray(seen.mission.radar.wavelength), seen.mission.timing_error
+    quadratic, cubic, spread = (np.sqrt(one) for one in found[:3])
+    is_stated = not seen.mission.has_direct_path and timing.constant is not None and timing.linear is not None
+    is_known = np.isfinite(found.constant + found.linear)
+    nothing = np.where(is_stated | (quadratic + cubic == 0), 0.0, math.nan)
+    counts = is_known & ~np.asarray(is_stated)
+    with np.errstate(invalid="ignore"):
+        square = 1 / k**2
+        covariance = np.where(counts, found.covariance * square, 0.0)
+        east, north = (
+            np.where(counts, one, nothing)
+            for one in seen.moved(found.constant * square, found.linear * square, found.constant_linear * square)
+        )
+    published = RandomEffect(quadratic, cubic, spread, east, north)
+    (*phases, east, north), whole = seen.of_orders(covariance)
+    own = np.zeros_like(whole)
+    own[0, 0], own[1, 1] = quadratic**2, cubic**2
+    quadratic, cubic, east, north = (
+        np.where(counts, *both)
+        for both in zip((*phases, east, north), (quadratic, cubic, nothing, nothing), strict=True)
+    )
+    return published, RandomEffect(quadratic, cubic, spread, east, north, np.where(counts, whole, own))
+
+
+def _left_at_1_hz(seen: SensorCases, name: str, oscillator: Oscillator) -> Floats:
+    """Parts of the phase at 1 Hz that an oscillator leaves over the aperture, (parts, cases); they grow as f₀².
+
+    It depends on how the clocks are kept together: all of its noise, what exchanged pulses leave, what has come since
+    the clocks were set, or what a receiver that hears the transmitter has between direct path and echo.
+    """
+    sync, times = seen.mission.synchronization, seen.aperture_time
+    found = np.zeros((len(Parts._fields), seen.cases))
+    if sync is not None and sync.is_direct_path and name == "transmitter":
+        return found
+    interval = None if sync is None else sync.interval
+    for (alike, exchanged), places in seen.alike((oscillator.noise_alone, interval)):
+        spectra: dict[Any, list[int]] = {}
+        for place in places.tolist():  # an Allan deviation may be fitted otherwise over another aperture
+            spectra.setdefault(noise_of(alike, 1.0, float(times[place])).pieces, []).append(place)
+        for pieces, some in spectra.items():
+            found[:, some] = _left_of(pieces, exchanged, seen, some).rows
+    return found
+
+
+def _left_of(
+    pieces: Sequence[PowerLawPiece], interval: float | None, seen: SensorCases, some: Sequence[int]
+) -> Parts:
+    """Parts of what is left of a spectrum in some cases, (some,)."""
+    sync, aperture_time = seen.mission.synchronization, seen.aperture_time[some]
+    if sync is None or interval is not None:
+        return left_parts(pieces, aperture_time, interval)
+
+    def of_some(value: Any) -> Floats:
+        return np.broadcast_to(np.asarray(value), (seen.cases,))[some]
+
+    if sync.is_holdover:
+        return set_parts(pieces, aperture_time, of_some(sync.age), of_some(sync.averaging))
+    # The constant phase between direct path and echo moves nothing.
+    return heard_parts(pieces, aperture_time, of_some(seen.geometry.echo_delay)).without_constant()
+
+
+def link_noise(seen: SensorCases) -> Iterator[RandomError]:
+    """Each exchange is wrong by an error of its own, and straight lines join them."""
+    sync = seen.mission.synchronization
+    if sync is None or sync.error is None:
+        return
+    found = np.zeros((len(Parts._fields), seen.cases))
+    if sync.interval is None:  # from pulse to pulse: all of it spreads
+        found[Parts._fields.index("left")] = 1.0
+    else:
+        for interval, places in seen.alike(sync.interval):
+            times, place = np.unique(seen.aperture_time[places], return_inverse=True)
+            found[:, places] = link_parts(times, interval).rows[:, place]
+    published, full = _of_clock(seen, Parts(*found).without_constant())  # a constant phase moves nothing
+    published, full = (one._replace(spread=one.spread / seen.factor) for one in (published, full))
+    what = subject("clock", "synchronization")
+    yield RandomError(what, "rad", sync.error * seen.factor, ("synchronization", "error"), published, full)

@@ -10,7 +10,7 @@ Numbers of a mission may be arrays (cases,); its geometry then is that of these 
 import math
 from collections.abc import Iterator, Sequence
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,15 +18,17 @@ from numpy.typing import NDArray
 from bisar_budget.constants import ROUNDING
 from bisar_budget.effects.declared import ImagePlane, published_planes
 from bisar_budget.effects.effect import PLATFORMS, Subject, plain
-from bisar_budget.effects.oscillators import Noise
 from bisar_budget.effects.sources import exact_ranges
-from bisar_budget.effects.spectra import Floats, Parts
+from bisar_budget.effects.spectra import Parts
 from bisar_budget.faults import KeyPath
 from bisar_budget.geometry import BistaticGeometry, PlatformState
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
 from bisar_budget.phrases import NOTHING, Note
-from bisar_budget.ranges.exact_ranges import ExactRanges
+from bisar_budget.ranges.exact_ranges import ExactRanges, Floats
+
+if TYPE_CHECKING:
+    from bisar_budget.effects.oscillators import Noise
 
 NODES = 16  # a walk has a covariance with an edge, which fewer nodes miss by a percent
 _CANCELS = ROUNDING * 1e-2  # of a square: below it, its root is rounding
@@ -88,7 +90,7 @@ class RandomError(NamedTuple):
     path: KeyPath
     published: RandomEffect
     full: RandomEffect
-    noise: Noise | None = None
+    noise: "Noise | None" = None
     spreads: bool = True
     counted_in: str = ""
 

@@ -11,11 +11,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from bisar_budget.effects.air_delays import delay_errors
-from bisar_budget.effects.clock_errors import link_noise, oscillator_noise
 from bisar_budget.effects.effect import PLATFORMS, plain, subject
 from bisar_budget.effects.navigation_errors import common_noise, inertial_errors, lever_arm_errors, position_noise
 from bisar_budget.effects.oscillator_acceleration import oscillator_acceleration
-from bisar_budget.effects.oscillators import noise_of
+from bisar_budget.effects.oscillators import link_noise, noise_of, oscillator_noise
 from bisar_budget.effects.random_effect import RandomEffect, RandomError, SensorCases
 from bisar_budget.effects.vibration import vibration_spectrum
 from bisar_budget.geometry import BistaticGeometry

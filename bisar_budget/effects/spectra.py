@@ -16,8 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget import evaluators
-
-Floats = NDArray[np.float64]
+from bisar_budget.ranges.exact_ranges import Floats
 
 SLOW = 0.5  # angle, or ratio, below which terms cancel and a series is exact to 1e-8
 
@@ -390,7 +389,7 @@ def _over_panels(
     panels = [
         (low, top, place)
         for place, (of_case, end) in enumerate(zip(edges, high.tolist(), strict=True))
-        for low, top in _panels(0.0, end, of_case)
+        for low, top in _panels(end, of_case)
     ]
     low, top, cases = (np.array(column) for column in zip(*panels, strict=True))
     total = np.zeros((_INTEGRALS, high.size))
@@ -465,12 +464,12 @@ def _image_edges(pieces: Sequence[PowerLawPiece], rate: float) -> list[float]:
     return edges + [abs(n * rate + sign * end) for n in range(_FOLDED + 1) for sign in (1, -1)]
 
 
-def _panels(low: float, high: float, edges: Sequence[float]) -> Iterator[tuple[float, float]]:
-    """Neighbouring edges; of two that are the same, computed in two ways, one.
+def _panels(high: float, edges: Sequence[float]) -> Iterator[tuple[float, float]]:
+    """Neighbouring edges from 0 Hz on; of two that are the same, computed in two ways, one.
 
     Between the two a tone would be folded on 0 Hz, where a spectrum has no value.
     """
-    kept = [low]
+    kept = [0.0]
     for edge in sorted(edges):
         if kept[-1] * _SAME < edge < high / _SAME:
             kept.append(edge)

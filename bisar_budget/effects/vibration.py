@@ -33,16 +33,18 @@ from bisar_budget import phrases
 from bisar_budget.constants import ROUNDING
 from bisar_budget.effects.effect import PLATFORMS, subject
 from bisar_budget.effects.random_effect import RandomError, SensorCases
-from bisar_budget.effects.spectra import SLOW, Floats, Parts, PowerLawPiece, heard_parts, left_parts, tone
+from bisar_budget.effects.spectra import SLOW, Parts, PowerLawPiece, heard_parts, left_parts, tone
 from bisar_budget.geometry import FRAME_AXES, Vector, dot
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
 from bisar_budget.mission.vibrations import AcceleratedSinusoid, FeltVibration, Spectrum, Vibration
 from bisar_budget.phrases import Note
+from bisar_budget.ranges.exact_ranges import Floats, Truths
 from bisar_budget.units import format_quantity
 
 NEAR_CYCLES = 2.5  # per aperture; farther apart, two equal lines raise each other's echo by less than 1.1 dB
 SLOWEST = 1.0  # cycles per aperture; what is slower makes no echoes
+ECHO_CYCLES = 3.0  # likewise; below, echoes lie beside the mainlobe and the motion is a quadratic phase as well
 
 _STEPS = (0.1, 0.02)  # of the search, in cells
 _REACH = np.arange(-6, 7)[:, None, None]
@@ -52,8 +54,6 @@ _MOST = 200_000  # echoes that are looked at together
 DISPLACED = ((2 * math.pi) ** -4, 4.0)  # S_x = S_a/(2πf)⁴
 _STEEP = 20.0  # slope of a density beyond which its powers would overflow
 _PARTS = 16  # by which such a piece is taken instead: it is narrow, or nearly nothing at one of its ends
-
-Truths = NDArray[np.bool_]
 
 
 # ---------------------------------------------------------------------- echoes that add

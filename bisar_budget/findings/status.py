@@ -1,6 +1,6 @@
 """The statuses of rows, missions and runs: what each gates, and how every format says it.
 
-One line here is all that a new status needs, besides the rule that gives it (`budget.judgement`).
+One line here is all that a new status needs, besides the rule that gives it (`budget.judged_rows`).
 """
 
 from collections.abc import Container, Iterable, Mapping
@@ -86,6 +86,7 @@ _WORST_FIRST = (
 )  # fmt: skip
 STATUS = {status.name: status for status in _WORST_FIRST}
 RANK = {name: place for place, name in enumerate(STATUS)}  # the worst has the lowest
+BROKEN = tuple(name for name, one in STATUS.items() if one.fails)  # a waiver covers them
 # In the order of summaries: what a mission can have, then what gates nothing.
 STATUSES = tuple(sorted(STATUS, key=lambda name: not STATUS[name].gates))
 

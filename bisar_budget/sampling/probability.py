@@ -169,7 +169,7 @@ def _requirements(
     }
     for name, owners in wanted.items():
         if present.intersection(owners):
-            limit = allocation.qpe_limit("clock" if name == "timing" else name) * allocation.autofocus_gain
+            limit = allocation.qpe_allowed("clock" if name == "timing" else name)
             yield HeldSum(f"{name}.quadratic_phase_error", "rad", limit, owners, (0,))
     cubic, location = mission.requirements.cubic_phase_error, mission.requirements.location_error
     moves = any(source.is_motion for variable in variables for source, _ in variable.parts)

@@ -281,8 +281,7 @@ def tone_cases(study: Study) -> Iterator[tuple[Subject, Case]]:
 
     for spur in spurs_of(mission):
         if spur.name in sizes:
-            of = subject(spur.name, "oscillator", "spur", entry=spur.entry)
-            yield case(of, 20 * math.log10(math.pi * sizes[spur.name] / wavelength), "dB", spur.frequency)
+            yield case(spur.subject, 20 * math.log10(math.pi * sizes[spur.name] / wavelength), "dB", spur.frequency)
     for tone in accelerated_tones(mission):
         is_fast = tone.frequency * study.collection.aperture_time >= SLOWEST
         if tone.name in sizes and is_fast and tone.per_unit:

@@ -1,0 +1,251 @@
+"""Rows of tones: spurs of oscillators, tones of oscillators that vibrate, and the echoes of all tones together."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from bisar_budget import phrases
+from bisar_budget.analysis.analysis import Analysis, Case
+from bisar_budget.analysis.spread import Tone, islr_of
+from bisar_budget.analysis.vibration_limits import Echo, VibrationLimits, highest_echo, tone_limits
+from bisar_budget.budget.judged_rows import BOUND, FamilyRow, Judging, worded
+from bisar_budget.effects.declared import OTHER_MODEL
+from bisar_budget.effects.effect import override_notes, subject
+from bisar_budget.effects.oscillator_acceleration import accelerated_tones, felt, flies_a_turn
+from bisar_budget.effects.oscillators import spurs_of
+from bisar_budget.effects.vibration import ECHO_CYCLES, SLOWEST, cubic_part, quadratic_part
+from bisar_budget.findings.row import Row
+from bisar_budget.mission.instruments import Oscillator
+from bisar_budget.mission.model import Mission, has_instruments
+from bisar_budget.mission.vibrations import Vibration
+from bisar_budget.phrases import NOTHING, Note
+
+SENSITIVITY = "acceleration_sensitivity"
+
+
+# ---------------------------------------------------------------------- all tones together
+def pslr_row(judging: Judging, found: Sequence[Tone], required: Any) -> "PslrRow":
+    """Judge the highest echo that all tones make together, in the worst of their phases.
+
+    From first principles by both models: the shares of the paper's rule stay 3 dB inside it. Tones at most 2.5 cycles
+    per aperture apart raise each other's echo, whoever makes them.
+    """
+    highest, allowed = highest_echo(found, (judging.cases,)), judging.array(10 ** (np.asarray(required) / 20))
+    what = subject("mission", "pslr")
+    judged = judging.row(what, None, allowed)
+    if highest is not None:
+        is_declared = np.any([np.broadcast_to(one.is_there, (judging.cases,)) for one in found], axis=0)
+        judged = judged.where(is_declared, judging.row(what, highest.level, allowed))
+    judged = judged._replace(allowable_published=allowed, allowable_full=allowed)
+    return PslrRow(judged.in_decibel().held_to("pslr"), found, highest)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PslrRow(FamilyRow):
+    """The `highest` echo that all tones make together in many cases; where PSLR is required."""
+
+    tones: Sequence[Tone]
+    highest: Echo | None
+
+    def in_words(self, case: Case, _: str) -> Row:
+        """The row of one case."""
+        over = NOTHING
+        if self.highest is not None:
+            makers = [one for one, is_in in zip(self.tones, self.highest.is_of[:, case.place], strict=True) if is_in]
+            largest = max(makers, key=lambda one: case.number(one.phase))
+            level, required = case.number(self.judged.declared), case.mission.requirements.pslr or 0.0
+            over = phrases.echoes_together_over(level, required, largest.subject.id, len(makers))
+        return worded(
+            case,
+            self.judged,
+            unit="dB",
+            path=("requirements", "pslr"),
+            equation="first principles",
+            over=over,
+            binding_requirement="pslr",
+        )
+
+
+# ---------------------------------------------------------------------- spurs
+def spur_rows(judging: Judging, analysis: Analysis, model: str) -> Iterator["SpurRow"]:
+    """Judge the oscillators' tones by a model; they make paired echoes as vibrations do. [dB of echo to response]"""
+    mission = analysis.mission
+    metric, by_platform = tone_limits(mission, analysis.allocation)
+    for place, spur in enumerate(spurs_of(mission, analysis.geometry) if has_instruments(mission) else ()):
+        what, phase = spur.subject, judging.array(spur.phase)
+        limits, is_over_other = by_platform.get(spur.name), np.zeros(judging.cases, dtype=bool)
+        if limits is None:
+            judged = judging.row(what, phase / 2, None, is_info=True)
+        else:
+            limits = VibrationLimits(*(2 * math.pi / mission.radar.wavelength * limit for limit in limits))
+            is_over_other = phase > limits.by(OTHER_MODEL[model]) * BOUND
+            is_near = spur.frequency * mission.collection.aperture_time < ECHO_CYCLES
+            judged = judging.row(  # the amplitude of an echo over that of the response
+                what,
+                phase / 2,
+                judging.array(limits.by(model) / 2),
+                doubt=is_over_other,
+                is_unknown=is_near & (metric == "pslr"),
+            )
+            published, full = (judging.array(limit / 2) for limit in limits)
+            judged = judged._replace(allowable_published=published, allowable_full=full)
+        judged = judged.in_decibel().held_to(metric)
+        if metric == "islr":
+            judged = judged._replace(islr_db=islr_of(mission, phase**2 / 2))
+        yield SpurRow(judged, place, is_over_other)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SpurRow(FamilyRow):
+    """A tone of an oscillator in many cases, by its place, as echo over response in decibel; see `VibrationRow`."""
+
+    place: int
+    is_over_other: Any
+
+    def in_words(self, case: Case, model: str) -> Row:
+        """The row of one case, by the model that judges it."""
+        mission, row, doubt, over = case.mission, self.judged, NOTHING, NOTHING
+        spur = spurs_of(mission)[self.place]
+        oscillator: Oscillator = getattr(mission.platforms, spur.name).oscillator
+        cycles, missing = spur.frequency * mission.collection.aperture_time, phrases.no_requirement_of("pslr")
+        if not math.isnan(row.allowable[case.place]):
+            over = phrases.echoes_over(case.number(row.declared), case.number(row.allowable))
+            if self.is_over_other[case.place]:
+                other = OTHER_MODEL[model]
+                doubt = phrases.other_model_allows(other, case.number(row.allowable_by(other)), "dB")
+        return worded(
+            case,
+            row,
+            unit="dB",
+            path=("platforms", spur.name, "oscillator", "spurs"),
+            equation="first principles" if model == "full" else "Section V, sinusoidal",
+            over=over,
+            doubt=doubt,
+            no_limit=missing,
+            not_evaluated=phrases.echoes_on_the_mainlobe(cycles, ECHO_CYCLES),
+            info=missing,
+            evidence=oscillator.source,
+            remarks=(
+                phrases.tone_lies(spur.frequency, cycles),
+                *override_notes(spur.name, oscillator.overridden, "frequency"),
+            ),
+        )
+
+
+# ---------------------------------------------------------------------- oscillators that vibrate
+def accelerated_rows(judging: Judging, analysis: Analysis, model: str) -> Iterator["AcceleratedRow"]:
+    """Judge what each vibration does to an oscillator by a model: the sensitivity that it may have. [s²/m]
+
+    Slower tones than one cycle per aperture are phases, which the row of the oscillator's random vibration has.
+    """
+    mission = analysis.mission
+    metric, by_platform = tone_limits(mission, analysis.allocation)
+    for place, one in enumerate(accelerated_tones(mission, analysis.geometry) if has_instruments(mission) else ()):
+        cycles = judging.array(one.frequency * mission.collection.aperture_time)
+        is_there, per_unit = cycles >= SLOWEST, judging.array(one.per_unit)
+        if not is_there.any():
+            continue
+        declared, limits = judging.array(one.sensitivity), by_platform.get(one.name)
+        phase = declared * per_unit
+        qpe, cubic = phase * quadratic_part(cycles), phase * cubic_part(cycles)
+        is_over_phase = qpe > analysis.allocation.qpe_allowed(one.name) * BOUND
+        if mission.requirements.cubic_phase_error is not None:
+            is_over_phase = is_over_phase | (cubic > mission.requirements.cubic_phase_error * BOUND)
+        is_over_phase &= cycles < ECHO_CYCLES
+        if limits is None:
+            judged = judging.row(one.subject, declared, None, doubt=is_over_phase, is_info=~is_over_phase)
+            is_over_other = np.zeros(judging.cases, dtype=bool)
+        else:
+            by_published, by_full = (
+                judging.array(2 * math.pi / mission.radar.wavelength * limit) / per_unit for limit in limits
+            )
+            published, full = (np.where(per_unit > 0, one, math.nan) for one in (by_published, by_full))
+            allowable = full if model == "full" else published
+            is_over_other = declared > (published if model == "full" else full) * BOUND
+            judged = judging.row(one.subject, declared, allowable, doubt=is_over_phase | is_over_other)
+            judged = judged._replace(allowable_published=published, allowable_full=full)
+        judged = judged.held_to(metric)
+        if metric == "islr":
+            judged = judged._replace(islr_db=islr_of(mission, phase**2 / 2))
+        yield AcceleratedRow(judged, place, is_over_other, is_over_phase, is_there=is_there)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AcceleratedRow(FamilyRow):
+    """A vibration of an oscillator in many cases, by its place among them; `is_there` where it is fast enough."""
+
+    place: int
+    is_over_other: Any
+    is_over_phase: Any
+
+    def in_words(self, case: Case, model: str) -> Row:
+        """The row of one case, by the model that judges it."""
+        mission, row, doubt, over = case.mission, self.judged, NOTHING, NOTHING
+        one = accelerated_tones(mission)[self.place]
+        cycles, missing = one.frequency * mission.collection.aperture_time, phrases.no_requirement_of("pslr")
+        if not math.isnan(row.allowable[case.place]):
+            echoes = (20 * math.log10(one.per_unit * case.number(size) / 2) for size in (row.declared, row.allowable))
+            over = phrases.echoes_over(*echoes) if row.declared[case.place] else NOTHING
+            if self.is_over_other[case.place]:
+                other = OTHER_MODEL[model]
+                doubt = phrases.other_model_allows(other, case.number(row.allowable_by(other)), "s^2/m")
+        if self.is_over_phase[case.place]:
+            limit, allowed = case.allocation.qpe_allowed(one.name), mission.requirements.cubic_phase_error
+            qpe, cubic = one.phase * float(quadratic_part(cycles)), one.phase * float(cubic_part(cycles))
+            doubt = phrases.phase_of_vibration_over(qpe, limit, cubic, allowed)
+        oscillator: Oscillator = getattr(mission.platforms, one.name).oscillator
+        return worded(
+            case,
+            row,
+            unit="s^2/m",
+            path=("platforms", one.name, "oscillator", SENSITIVITY),
+            equation="acceleration sensitivity" if model == "full" else "Section V, sinusoidal",
+            over=over,
+            doubt=doubt,
+            no_limit=missing,
+            info=missing,
+            evidence=evidence(oscillator),
+            remarks=(
+                phrases.tone_lies(one.frequency, cycles),
+                phrases.shakes_an_oscillator(float(one.acceleration), one.phase),
+                *_whose(mission, one.name),
+                *override_notes(one.name, oscillator.overridden, SENSITIVITY),
+            ),
+        )
+
+
+def evidence(oscillator: Oscillator) -> str | None:
+    """Where the sensitivity of an oscillator comes from: its part, else what the file says of it."""
+    return dict(oscillator.of_parts).get(SENSITIVITY, oscillator.source)
+
+
+def _whose(mission: Mission, name: str) -> tuple[Note, ...]:
+    """Say that the vibration which an oscillator feels is that of its platform."""
+    one = felt(mission, name)
+    return () if one is not None and one.is_own else (phrases.vibration_of_the_platform(),)
+
+
+def notes_of_acceleration(mission: Mission, name: str) -> tuple[Note, ...]:
+    """Say of the row of an oscillator's acceleration what counts in it, and what cannot."""
+    one = felt(mission, name)
+    oscillator: Oscillator = getattr(mission.platforms, name).oscillator
+    notes = list[Note]()
+    if one is None or (mission.has_direct_path and name == "transmitter"):
+        return ()
+    vibration = one.vibration
+    if vibration.spectrum is not None or vibration.sinusoidal:
+        notes += _whose(mission, name)
+    else:
+        notes.append(phrases.oscillator_does_not_vibrate(flies_a_turn(mission, name)))
+    if isinstance(vibration, Vibration) and vibration.wideband is not None:
+        notes.append(phrases.wideband_has_no_spectrum())
+    if any(line.frequency * mission.collection.aperture_time >= SLOWEST for line in vibration.sinusoidal):
+        notes.append(phrases.tones_have_rows(f"{name}.oscillator.acceleration"))
+    if mission.synchronization is not None and mission.synchronization.interval is not None:
+        notes.append(phrases.left_by_exchanges(mission.synchronization.interval))
+    if mission.has_direct_path:
+        notes.append(phrases.heard_twice(mission.geometry.echo_delay))
+    return (*notes, *override_notes(name, oscillator.overridden, SENSITIVITY))
