@@ -583,11 +583,6 @@ class Model:
         per_unit = float(block.per_unit(self.name)[HELD.index(requirement), place, 0])
         return limit / per_unit if per_unit else math.inf
 
-    def farthest(self, source: ErrorSource) -> float:
-        """Size beyond which an error is none of navigation; infinite: it has no effect whatever its size. [unit]"""
-        block, place = self.errors.block_of(source)
-        return float(block.farthest[place, 0])
-
     def ends_image(self, source: ErrorSource, size: float) -> bool:
         """Whether an allowable, as found, is where the image ends; to a linear model none does."""
         block, place = self.errors.block_of(source)

@@ -38,8 +38,6 @@ from bisar_budget.verifier.spread_cases import (
 from bisar_budget.verifier.study import Responses, Study
 from bisar_budget.workers import MapBlocks, Progress, in_processes, unseen
 
-__all__ = ["Study", "form_image_evidence", "rows_to_verify", "seconds_to_verify", "verify_mission"]
-
 _FINE = 4  # interpolation of a cut, so that its nulls look like nulls
 _AROUND = 10  # resolution cells of a cut each way, beyond the smear
 _MAX_PIXELS = 96  # of a chip, each way

@@ -13,6 +13,7 @@ from bisar_budget.ranges.exact_ranges import FINE, STILL, ExactRanges, Lanes, ap
 from bisar_budget.simulator.phase_history import cell_centres, exact_effect
 from bisar_budget.verifier.study import Study
 from tests.conftest import mission_text
+from tests.effects.test_models import farthest_size
 from tests.families import DIRECT_PATH, FAMILIES
 from tests.families import mission_text as family_text
 
@@ -44,13 +45,14 @@ def test_check_and_simulator_agree(family: str, more: str) -> None:
     As long as the image moves by less than a tenth of the nearest range: farther away a history may have two points.
     """
     study = Study(parse_mission(family_text(family, 1) + more))
-    full = Analysis(study.mission).full
+    analysis = Analysis(study.mission)
+    full = analysis.full
     compared, geometry = 0, study.geometry
     nearest = min(geometry.transmitter.slant_range, geometry.receiver.slant_range)
     for source in study.sources:
         if not source.is_motion or not source.is_heard:
             continue
-        farthest = full.farthest(source)
+        farthest = farthest_size(analysis, source)
         sizes = [part * farthest for part in (0.01, -0.01, 0.1, -0.1)]
         found = by_courses(study, source, sizes)
         for index, size in enumerate(sizes):
