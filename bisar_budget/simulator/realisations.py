@@ -63,8 +63,8 @@ def position_courses(
     """Position errors by one sensor, (draws, times, 3), east, north, up, of one sigma of what is declared. [m]
 
     They are by the name of the platform: of what both have in common the same draws, along the axes of each. The
-    error is that of an inertial sensor, a lever arm, or of correlated noise, and `declared` any size; `times` (times,)
-    are slow times within the aperture [s]. The mission says the sizes along each axis.
+    error is that of an inertial sensor, a lever arm, or of correlated noise, `declared` any size. Times (times,) are
+    slow times within the aperture [s]. The mission says the sizes along each axis.
     """
     size = (error.declared or 0.0) / mission.allocation.coverage_factor
     found = {}
