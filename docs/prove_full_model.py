@@ -13,7 +13,8 @@ from pathlib import Path
 
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import Mission
-from bisar_budget.verifier.limits import Study, verify_mission
+from bisar_budget.verifier.limits import verify_mission
+from bisar_budget.verifier.study import Study
 
 PAGE = Path(__file__).with_name("full-model.md")
 SQUINTS = (0, 15, 30, 45, 60)  # degrees

@@ -70,12 +70,16 @@ class Exported:
 
 @dataclass(frozen=True)
 class _Plan:
-    """How much is recorded: pulses, frequencies, swath of delay to each side [s], half the side of the area [m]."""
+    """How much is recorded: pulses, frequencies, swath of delay to each side [s], half the side of the area [m].
+
+    `cell` is the resolution in range and across. [m]
+    """
 
     pulses: int
     samples: int
     delay: float
     half: float
+    cell: tuple[float, float]
 
 
 def export_phase_history(mission: Mission, targets: Targets) -> Exported:
@@ -106,7 +110,7 @@ def export_phase_history(mission: Mission, targets: Targets) -> Exported:
     slow_time: Floats = np.linspace(-T / 2, T / 2, plan.pulses)
     frequency: Floats = radar.center_frequency + np.linspace(-0.5, 0.5, plan.samples) * radar.bandwidth
     flown = collection.flight(errors, slow_time, np.random.default_rng(settings.seed))
-    scatterers, amplitudes = _scene(mission, targets, plan.half)
+    scatterers, amplitudes = _scene(mission, targets, plan)
     rng = np.random.default_rng(settings.seed)
     noise = {"noise_power": 10 ** (settings.noise / 10) if settings.noise is not None else 0.0, "rng": rng}
     history = flown.record(scatterers, amplitudes, slow_time, frequency, **noise)
@@ -133,18 +137,14 @@ def export_phase_history(mission: Mission, targets: Targets) -> Exported:
 
 def _plan(mission: Mission, targets: Targets, collection: PointCollection, errors: Errors) -> _Plan:
     """Choose the image area, and the samples that keep it from repeating in range and in Doppler."""
-    T, radar, geometry = mission.collection.aperture_time, mission.radar, mission.geometry
+    T, radar = mission.collection.aperture_time, mission.radar
     try:
         effect = collection.effect(errors.still())
     except ValueError as fault:
         raise SimulationError(f"the declared errors leave no image of a point: {fault}") from None
     moved = max(abs(part) for part in effect.displacement)
-    cell = max(
-        geometry.range_resolution(radar.bandwidth, SPEED_OF_LIGHT),
-        geometry.cross_range_resolution(radar.wavelength, T),
-    )
     reach = max(max(abs(one.east), abs(one.north)) for one in targets.points)
-    half = float(math.ceil(reach + moved + _MARGIN_CELLS * cell))
+    half = float(math.ceil(reach + moved + _MARGIN_CELLS * max(collection.resolution)))
     fine: Floats = np.linspace(-T / 2, T / 2, _FINE)
     flown = collection.flight(errors.smooth(), fine)
     measured = sum(np.linalg.norm(path.measured, axis=1) for path in flown.paths)
@@ -161,20 +161,17 @@ def _plan(mission: Mission, targets: Targets, collection: PointCollection, error
     if mission.collection.pulses is None:
         pulses += 1  # so that one is at the middle
     samples = max(_LEAST_SAMPLES, math.ceil(2 * _OVERSAMPLED * delay * radar.bandwidth)) + 1
-    return _Plan(pulses, samples, delay, half)
+    return _Plan(pulses, samples, delay, half, collection.resolution)
 
 
-def _scene(mission: Mission, targets: Targets, half: float) -> tuple[Floats, NDArray[np.complex128]]:
+def _scene(mission: Mission, targets: Targets, plan: _Plan) -> tuple[Floats, NDArray[np.complex128]]:
     """Places (n, 3) [m] and amplitudes (n,) of targets and clutter."""
     places = [(one.east, one.north, 0.0) for one in targets.points]
     amplitudes = [10 ** (one.level_db / 20) for one in targets.points]
     if targets.clutter_db is None:
         return np.array(places), np.array(amplitudes, dtype=complex)
-    geometry, radar = mission.geometry, mission.radar
-    cell = geometry.range_resolution(radar.bandwidth, SPEED_OF_LIGHT) * geometry.cross_range_resolution(
-        radar.wavelength, mission.collection.aperture_time
-    )
-    count = math.ceil((2 * half) ** 2 / cell)
+    half = plan.half
+    count = math.ceil((2 * half) ** 2 / math.prod(plan.cell))
     if count > _MOST_SCATTERERS:
         raise SimulationError(
             f"clutter of {count} scatterers, at most {_MOST_SCATTERERS} are simulated: put the targets nearer to "
@@ -268,7 +265,7 @@ def _document(
         "Global/FxBand/FxMax": high,
         "Global/TOASwath/TOAMin": -plan.delay,
         "Global/TOASwath/TOAMax": plan.delay,
-        **_scene_coordinates(mission, plan, axes),
+        **_scene_coordinates(plan, axes),
         "Data/SignalArrayFormat": "CF8",
         "Data/NumBytesPVP": vectors.dtype.itemsize,
         "Data/NumCPHDChannels": 1,
@@ -343,14 +340,12 @@ def _degrees(path: str, place: Geodetic) -> _Leaves:
     return {f"{path}/Lat": math.degrees(place.latitude), f"{path}/Lon": math.degrees(place.longitude)}
 
 
-def _scene_coordinates(mission: Mission, plan: _Plan, axes: SceneAxes) -> _Leaves:
+def _scene_coordinates(plan: _Plan, axes: SceneAxes) -> _Leaves:
     """Plane of the scene: x east, y north; its corners clockwise as seen from above."""
     half = plan.half
     corners = [(-half, -half), (-half, half), (half, half), (half, -half)]
     place = geodetic(axes.origin)
-    spacing = mission.geometry.range_resolution(mission.radar.bandwidth, SPEED_OF_LIGHT) / 2
-    across = mission.geometry.cross_range_resolution(mission.radar.wavelength, mission.collection.aperture_time) / 2
-    pixels = math.ceil(2 * half / min(spacing, across))
+    pixels = math.ceil(2 * half / (min(plan.cell) / 2))
     step = 2 * half / pixels
     leaves: _Leaves = {
         "EarthModel": "WGS_84",

@@ -18,14 +18,9 @@ _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
 def with_values(text: str, changes: Sequence[SetValue]) -> str:
-    """Put values into the text of a mission file.
+    """Put values, as a file has them, into the text of one that can be read as a mission.
 
-    Parameters
-    ----------
-    text : str
-        Of a file that can be read as a mission.
-    changes : sequence of SetValue
-        Keys, with their values as the file has them; sections that are not there are made.
+    Sections that are not there are made.
     """
     is_of_dos = "\r\n" in text
     text = text.replace("\r\n", "\n")

@@ -419,17 +419,7 @@ def _file_of(name: str, beside: str, files: Files) -> str:
 
 
 def with_parts(mission: Mission, find: Find, report: Report) -> Any:
-    """Put in the figures of the parts that a mission names; `INVALID` after a report.
-
-    Parameters
-    ----------
-    mission : Mission
-        As read.
-    find : callable
-        File and content of a part by its name; raises `PartError`.
-    report : callable
-        Takes what is wrong, and where.
-    """
+    """Put in the figures of the parts that a mission names; `INVALID` after a report. `find` raises `PartError`."""
     is_valid, taken = True, list[TakenFigure]()
     platforms = mission.platforms
     for name, platform in platforms._asdict().items():
@@ -449,7 +439,7 @@ def report_parts(root: Any, find: Find, report: Report) -> None:
     """Say what is wrong with the parts that a file names, which is no mission for other reasons.
 
     A section whose values are right is held to its parts as that of a mission is; of another one the names are looked
-    at. The parameters are those of `with_parts`, `root` is what the file says.
+    at. `root` is what the file says.
     """
     platforms = root.get("platforms")
     for name in Platforms._fields:

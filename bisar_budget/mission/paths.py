@@ -104,7 +104,7 @@ def report_files(root: Any, read: Beside, report: Report) -> None:
     """Say which orbits and logs cannot be read, of a file that is no mission for other reasons.
 
     What they say is looked at where the rest of the mission is there: a path depends on its scene, time and aperture.
-    The parameters are those of `with_paths`, `root` is what the file says.
+    `root` is what the file says.
     """
     platforms, stated = root.get("platforms"), root.get("earth_orientation")
     named: dict[KeyPath, Any] = {}
@@ -123,17 +123,7 @@ def report_files(root: Any, read: Beside, report: Report) -> None:
 
 
 def with_paths(mission: Mission, read: Beside, report: Report) -> Any:
-    """Put in the paths; `INVALID` after a report.
-
-    Parameters
-    ----------
-    mission : Mission
-        As read.
-    read : callable
-        Content of a file that the mission names; raises `PathFileError`.
-    report : callable
-        Takes what is wrong, and where.
-    """
+    """Put in the paths; `INVALID` after a report. `read` gives the content of a file, and raises `PathFileError`."""
     axes, platforms, is_valid = mission.scene.axes, mission.platforms, True
     if (wrong := _unusable_orientation(mission, read)) is not None:
         report(("earth_orientation", "file"), wrong)

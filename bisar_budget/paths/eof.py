@@ -15,10 +15,10 @@ from bisar_budget.paths.instant import FIRST_DAY, Instant, tai
 from bisar_budget.paths.messages import (
     LATEST,
     MessageElement,
+    coordinate_in,
     epoch_in,
     hold_to_size,
     is_markup,
-    number_in,
     object_key,
     parse_markup,
 )
@@ -26,7 +26,6 @@ from bisar_budget.paths.orientation import UNKNOWN, Orientation
 
 _COORDINATES = (("X", "m"), ("Y", "m"), ("Z", "m"), ("VX", "m/s"), ("VY", "m/s"), ("VZ", "m/s"))
 _SYSTEMS = ("UTC", "TAI")
-_FARTHEST = 1e9  # m, m/s
 _HERMITE = Interpolation(True, 7)
 # Accuracy of position that is required of a type of file: ESA, product news of the Copernicus POD service.
 _ACCURACY = {"AUX_POEORB": 0.05, "AUX_RESORB": 0.10}  # m
@@ -115,12 +114,7 @@ def _numbers(vector: MessageElement, parts: dict[str, MessageElement], name: str
             raise PathFileError(f"{name}:{vector.line}: the state vector has no {key}")
         if part.units not in ("", unit):
             raise PathFileError(f"{name}:{part.line}: {key} must be in {unit} (got {shown(part.units)})")
-        number = number_in(part.text)
-        if number is None or abs(number) > _FARTHEST:
-            raise PathFileError(
-                f"{name}:{part.line}: {key} must be a number of {unit} (got {shown(part.text.strip())})"
-            )
-        yield number
+        yield coordinate_in(part.text, f"{name}:{part.line}", f"{key} must be a number of {unit}")
 
 
 def _time(vector: MessageElement, parts: dict[str, MessageElement], system: str, name: str) -> Instant:

@@ -108,23 +108,10 @@ def hold_to_ellipsoid(keys: LogKeys, name: str, own: str = "has heights above th
 
 
 def from_sea_level(heights: Floats, separations: Floats | None, keys: LogKeys, name: str) -> Floats:
-    """Heights above the ellipsoid of WGS-84 from those above mean sea level, which is the geoid. [m]
+    """Heights (n,) above the ellipsoid of WGS-84 from those above mean sea level, which is the geoid. [m]
 
-    Parameters
-    ----------
-    heights : (n,) ndarray
-        As the log has them. [m]
-    separations : (n,) ndarray or None
-        Height of the geoid above the ellipsoid, where the log gives it. [m]
-    keys : LogKeys
-        What the mission file says; its separation stands in where the log gives none.
-    name : str
-        What messages call the log.
-
-    Raises
-    ------
-    PathFileError
-        Nobody gives the separation, or both do.
+    The separation, height of the geoid above the ellipsoid, is the log's (n,), or else what the mission file says. A
+    `PathFileError` says that nobody gives it, or both do.
     """
     if separations is not None:
         hold_to_ellipsoid(keys, name, "gives the geoid separation itself")
@@ -153,29 +140,11 @@ def geodetic_log(
     places: tuple[Floats, Floats, Floats],
     sigmas: Floats | None = None,
 ) -> Log:
-    """A log from geodetic places.
+    """A log from geodetic places: latitude, longitude [rad] and height above the ellipsoid [m], (n,) each.
 
-    Parameters
-    ----------
-    rows : LogRows
-        What messages call the places.
-    words : str
-        What the log is, for reports.
-    times : (n,) ndarray
-        Since `start`, or since anywhere. [s]
-    start : Instant or None
-        Day and seconds of the first place in the scale.
-    scale : str
-        A key of `SCALES`.
-    places : 3 × (n,) ndarray
-        Latitude, longitude [rad], height above the ellipsoid [m].
-    sigmas : (n, 3) ndarray or None
-        One-sigma errors east, north, up. [m]
-
-    Raises
-    ------
-    PathFileError
-        There is no place, one cannot be, or times do not rise.
+    Times (n,) count from `start`, day and seconds of the first place in a scale of `SCALES`, or from anywhere [s].
+    `sigmas` (n, 3) are one-sigma errors east, north, up [m]. A `PathFileError` says that there is no place, that one
+    cannot be, or that times do not rise.
     """
     latitude, longitude, height = places
     if not times.size:

@@ -17,6 +17,7 @@ from bisar_budget.paths.instant import Instant, day_of_year, parse_instant
 
 LARGEST_BYTES = 32_000_000  # a day of an ephemeris at 1 Hz has 26 MB as XML
 EARLIEST, LATEST = 36112, 124593  # modified Julian days of 1957-10-01 and 2200-01-01, for which there are orbits
+_FARTHEST = 1e9  # of a place, in m or km, and of a velocity
 _NUMBER = re.compile(r"\s*[+-]?(\d+(?:\.\d*)?|\.\d+)([eEdD][+-]?\d+)?\s*", re.ASCII)
 
 
@@ -64,6 +65,14 @@ def number_in(text: object) -> float | None:
     except OverflowError:
         return None
     return value if math.isfinite(value) else None
+
+
+def coordinate_in(text: str, where: str, says: str) -> float:
+    """A number of a place or a velocity from a text; refused with what is said where it is none, or beyond 1e9."""
+    number = number_in(text)
+    if number is None or abs(number) > _FARTHEST:
+        raise PathFileError(f"{where}: {says} (got {shown(text.strip())})")
+    return number
 
 
 # ---------------------------------------------------------------------- objects

@@ -21,11 +21,11 @@ from bisar_budget.paths.instant import DAY, FIRST_DAY, TAI_LESS, Instant, has_le
 from bisar_budget.paths.messages import (
     LATEST,
     MessageElement,
+    coordinate_in,
     decoded,
     epoch_in,
     hold_to_size,
     is_markup,
-    number_in,
     object_key,
     parse_markup,
 )
@@ -198,12 +198,7 @@ def _interpolation(
 
 
 def _sample(line: int, epoch: str, values: Sequence[str], system: str, name: str) -> Sample:
-    numbers = []
-    for value in values:
-        one = number_in(value)
-        if one is None or abs(one) > 1e9:  # km
-            raise PathFileError(f"{name}:{line}: must be a number of km or km/s (got {shown(value)})")
-        numbers.append(1000 * one)
+    numbers = [1000 * coordinate_in(value, f"{name}:{line}", "must be a number of km or km/s") for value in values]
     x, y, z, u, v, w = numbers[:6]
     return Sample(_time(line, epoch, system, name), (x, y, z), (u, v, w))
 

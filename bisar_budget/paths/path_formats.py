@@ -128,23 +128,10 @@ def log_format(data: bytes) -> str | None:
 
 
 def read_log(data: bytes, name: str, stated: str | None, keys: LogKeys) -> Log:
-    """Read a log.
+    """Read a log of the format that the mission file states; None: by its content, or else by the ending of its name.
 
-    Parameters
-    ----------
-    data : bytes
-        The file.
-    name : str
-        What messages call it.
-    stated : str or None
-        Its format by the mission file; None: by its content, or else by the ending of its name.
-    keys : LogKeys
-        What else the mission file says of it.
-
-    Raises
-    ------
-    PathFileError
-        The content is that of another format, or of none; or what its reader says.
+    All else are arguments of its reader. A `PathFileError` says that the content is that of another format, or of
+    none; or what the reader says.
     """
     found = log_format(data)
     if stated is not None and found not in (None, stated):

@@ -105,26 +105,12 @@ def read_accuracy(
     center_seconds: float | None,
     aperture_time_s: float,
 ) -> Accuracy:
-    """Read the accuracy of a trajectory in the aperture.
+    """Read the accuracy of a trajectory in the aperture, a file of at most `LARGEST` bytes.
 
-    The largest of each sigma counts, in the aperture and next to it: see `around_aperture`.
-
-    Parameters
-    ----------
-    data : bytes
-        The file, at most `LARGEST` bytes.
-    name : str
-        What messages call it.
-    week : int or None
-        As of the trajectory.
-    center, center_seconds, aperture_time_s
-        As of `flight.slow_times`.
-
-    Raises
-    ------
-    PathFileError
-        Names the file, and the record or byte of the fault. The records do not cover the aperture, have a gap in it,
-        or state an error of zero all over it.
+    The largest of each sigma counts, in the aperture and next to it: see `around_aperture`. The week is that of the
+    trajectory, what says where the aperture is are arguments of `slow_times`. A `PathFileError` names the file, and
+    the record or byte of the fault; or the records do not cover the aperture, have a gap in it, or state an error of
+    zero all over it.
     """
     records = _records(data, name, 10, _SIGMAS)
     times, start = _risen(records[:, 0], name), None

@@ -14,7 +14,7 @@ from bisar_budget.paths.ephemeris import APART, OWN_VELOCITY, USUAL_DEGREE, Inte
 from bisar_budget.paths.ephemeris import velocity_off as off_places
 from bisar_budget.paths.flight import Orbit, PathDoubt, PathFileError, Sample
 from bisar_budget.paths.instant import FIRST_DAY, TAI_LESS, Instant, parse_instant, tai, tai_less_utc
-from bisar_budget.paths.messages import LATEST, decoded, hold_to_size, number_in, object_key
+from bisar_budget.paths.messages import LATEST, coordinate_in, decoded, hold_to_size, number_in, object_key
 from bisar_budget.paths.orientation import UNKNOWN, Orientation
 
 _FIRST_LINE = re.compile(r"#[abcd][PV]", re.ASCII)
@@ -166,17 +166,10 @@ def _satellite_of(line: str, where: str) -> str:
 
 def _numbers(line: str, where: str, unit: str) -> list[float]:
     """The three coordinates of a line, each of 14 columns."""
-    numbers = []
-    for first in (4, 18, 32):
-        cell = line[first : first + 14]
-        number = number_in(cell)
-        if number is None or abs(number) > 1e9:
-            raise PathFileError(
-                f"{where}: must be a number of {unit} in columns {first + 1} to {first + 14}"
-                f" (got {shown(cell.strip())})"
-            )
-        numbers.append(number)
-    return numbers
+    says = f"must be a number of {unit} in columns"
+    return [
+        coordinate_in(line[first : first + 14], where, f"{says} {first + 1} to {first + 14}") for first in (4, 18, 32)
+    ]
 
 
 def _epoch(line: str, system: str, where: str) -> Instant:

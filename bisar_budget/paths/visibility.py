@@ -100,19 +100,7 @@ class Watched:
     def over(
         cls, orbit_at: Callable[[Instant], Orbit], axes: SceneAxes, origin: Instant, duration_s: float
     ) -> "Watched":
-        """Sample the orbits of a span.
-
-        Parameters
-        ----------
-        orbit_at : callable
-            The orbit that is flown at an instant; raises `PathFileError` where there is none.
-        axes : SceneAxes
-            East, north and up at the place.
-        origin : Instant
-            Beginning of the span.
-        duration_s : float
-            Its length. [s]
-        """
+        """Sample the orbits of a span from `origin` on; `orbit_at` raises `PathFileError` where there is none."""
         pieces: list[_Sampled] = []
         gaps: list[OrbitGap] = []
         for start, stop, orbit in _orbits(orbit_at, origin, duration_s):

@@ -14,20 +14,12 @@ from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.geometry import GroundVector
 from bisar_budget.simulator.image_formation import direct_sum
 from bisar_budget.simulator.impulse_response import lagrange_weight
-from bisar_budget.simulator.phase_history import Complexes, Floats, PhaseHistory
+from bisar_budget.simulator.phase_history import Complexes, Floats, PhaseHistory, look_sum
 
 _TOLERANCE = 1e-8  # asked of the non-uniform FFT
 _FINE, _BESIDE = 2, 10  # samples per cell of the grid of a non-uniform FFT, along each axis; cells beyond the box
 _LARGEST_GRID = 1 << 22  # of those samples, some 40 bytes each
 _STENCIL = 12  # samples per interpolation
-
-
-def look_sum(history: PhaseHistory) -> Floats:
-    """Unit vectors from the scene centre to the measured platforms, added: what stands in (6). (pulses, 3)"""
-    total: Floats = np.zeros(history.transmitter.shape)
-    for positions in (history.transmitter, history.receiver):
-        total += positions / np.linalg.norm(positions, axis=1, keepdims=True)
-    return total
 
 
 def far_field_filter(
@@ -61,7 +53,7 @@ def far_field_filter(
     flat = np.reshape(np.asarray(points, dtype=float), (-1, 3))
     if not np.isfinite(flat).all():
         raise ValueError("points: positions must be finite numbers of metres")
-    sight = look_sum(history)
+    sight = look_sum(history.transmitter, history.receiver)
     if method != "direct" and flat.size:
         try:
             image = _by_nufft(history, sight, flat, bounded=method == "auto")
@@ -154,7 +146,7 @@ def polar_format(
         or pixels are coarser than its resolution.
     """
     cosine, sine = math.cos(look_azimuth), math.sin(look_azimuth)
-    east, north = look_sum(history)[:, :2].T / 2
+    east, north = look_sum(history.transmitter, history.receiver)[:, :2].T / 2
     along, across = east * cosine + north * sine, north * cosine - east * sine  # (9), per hertz
     slope = across / along
     to_centre = 2 * (east * centre[0] + north * centre[1])

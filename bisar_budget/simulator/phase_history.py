@@ -219,6 +219,14 @@ class PhaseHistory:
     receiver: Floats
 
 
+def look_sum(transmitter: Floats, receiver: Floats) -> Floats:
+    """Unit vectors from the origin of positions (pulses, 3) to them, added: what stands in (6). (pulses, 3)"""
+    total: Floats = np.zeros(transmitter.shape)
+    for positions in (transmitter, receiver):
+        total += positions / np.linalg.norm(positions, axis=1, keepdims=True)
+    return total
+
+
 def cell_centres(length: float, count: int) -> Floats:
     """Centres of `count` equal cells of an interval about zero: samples that stand for the whole of it."""
     centres: Floats = np.linspace(-(length - length / count) / 2, (length - length / count) / 2, count)

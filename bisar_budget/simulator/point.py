@@ -38,6 +38,7 @@ from bisar_budget.simulator.phase_history import (
     PathSinusoid,
     PhaseHistory,
     cell_centres,
+    look_sum,
 )
 from bisar_budget.simulator.realisations import drawn_errors, oscillator_sinusoids
 from bisar_budget.simulator.targets import Target, Targets
@@ -416,10 +417,8 @@ def _formers(
     )
     if image_former in ("backprojection", "matched_filter"):
         return exact, exact
-    sight = sum(one.measured / np.linalg.norm(one.measured, axis=1, keepdims=True) for one in flight.paths)
-    plane = PlaneWaves(
-        np.asarray(sight)[:, :2], radar.center_frequency, radar.bandwidth, image_former == "polar_format"
-    )
+    sight = look_sum(*(one.measured for one in flight.paths))[:, :2]
+    plane = PlaneWaves(sight, radar.center_frequency, radar.bandwidth, image_former == "polar_format")
     return plane, exact if plane.is_polar else plane
 
 

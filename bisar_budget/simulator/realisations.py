@@ -62,20 +62,9 @@ def position_courses(
 ) -> dict[str, Floats]:
     """Position errors by one sensor, (draws, times, 3), east, north, up, of one sigma of what is declared. [m]
 
-    They are by the name of the platform: of what both have in common the same draws, along the axes of each.
-
-    Parameters
-    ----------
-    mission : Mission
-        Says the sizes along each axis.
-    error : RandomError
-        Of an inertial sensor, a lever arm, or of correlated noise; `declared` may be any size.
-    times : (times,) ndarray
-        Slow time within the aperture. [s]
-    draws : int
-        How many.
-    rng : numpy Generator
-        Source of the draws.
+    They are by the name of the platform: of what both have in common the same draws, along the axes of each. The
+    error is that of an inertial sensor, a lever arm, or of correlated noise, `declared` any size. Times (times,) are
+    slow times within the aperture [s]. The mission says the sizes along each axis.
     """
     size = (error.declared or 0.0) / mission.allocation.coverage_factor
     found = {}
@@ -145,7 +134,7 @@ def delay_courses(
 ) -> Floats:
     """Group delays on one leg at the centre frequency, (draws, times), of one sigma of what is declared. [m]
 
-    Parameters are those of `position_courses`. What is above the scene stays as it is within an aperture.
+    What is above the scene stays as it is within an aperture.
     """
     size = (error.declared or 0.0) / mission.allocation.coverage_factor
     path: PlatformState = getattr(mission.geometry, error.owner)
@@ -282,9 +271,8 @@ def phase_courses(
 ) -> Floats:
     """Phases of one oscillator, or of the link, at the centre frequency, (draws, times), of one sigma. [rad]
 
-    Parameters are those of `position_courses`; of an oscillator `declared` is a factor on its amplitude. Times are
-    evenly spaced and divide the aperture. Tones above `highest` [Hz] may be left out, where no exchange of pulses
-    folds them.
+    Of an oscillator `declared` is a factor on its amplitude. Times are evenly spaced and divide the aperture. Tones
+    above `highest` [Hz] may be left out, where no exchange of pulses folds them.
     """
     sync, T = mission.synchronization, mission.collection.aperture_time
     size = error.declared or 0.0

@@ -41,20 +41,10 @@ class Targets(NamedTuple):
 def parse_targets(text: str) -> Targets:
     """Read `0, 0; 30 m, -20 m, -6 dB; clutter -25 dB`, or `grid:3x3:50 m`, or the name of a list.
 
-    Parameters
-    ----------
-    text : str
-        Points, grids about the scene centre, and at most one clutter, in the units of a mission file; bare numbers
-        are metres and decibels. What ends in .csv is a file with the columns east [m], north [m], amplitude.
-
-    Returns
-    -------
-    Targets
-
-    Raises
-    ------
-    ValueError
-        What is wrong with the first entry that cannot be read, no point, or more than a hundred.
+    These are points, grids about the scene centre, and at most one clutter, in the units of a mission file; bare
+    numbers are metres and decibels. What ends in .csv is a file with the columns east [m], north [m], amplitude. A
+    `ValueError` says what is wrong with the first entry that cannot be read, or that there is no point, or more than
+    a hundred.
     """
     points: list[Target] = []
     clutter = None
@@ -99,13 +89,7 @@ def _grid(entry: str) -> Iterator[Target]:
 
 
 def read_list(file: str) -> list[Target]:
-    """Read points from a CSV file with the columns east [m], north [m], amplitude.
-
-    Raises
-    ------
-    ValueError
-        The file and line of what is no list of points.
-    """
+    """Read points from a CSV file; a `ValueError` says the file and line of what is no list of points."""
     try:
         data = DISK.content(file, _MOST_BYTES)
     except UnreadableError as error:

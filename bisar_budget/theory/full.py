@@ -81,6 +81,12 @@ def look_series(platform: PlatformSymbols) -> tuple[Matrix, ...]:
     return tuple(series)
 
 
+def range_error_at(platform: PlatformSymbols) -> Expr:
+    """Range error of one platform at one slow time to first order, −u·r̃(τ), its position being that at τ. [m]"""
+    first_order = dr.first_order_range_error(platform)
+    return first_order.subs(platform.exact_slant_range(), platform.slant_range)
+
+
 @cache
 def range_error() -> tuple[Expr, ...]:
     """β̃₀ … β̃₄ of −Σ u(τ)·r̃(τ) + c·t̃(τ), in the derivatives of u. [m/sⁿ]"""
@@ -90,21 +96,15 @@ def range_error() -> tuple[Expr, ...]:
             (derivative * tau**n / factorial(n) for n, derivative in enumerate(platform.look)),
             start=Matrix([0, 0, 0]),
         )
-        total -= look.dot(dr.error_polynomial(platform))
+        total += range_error_at(platform).subs(dict(zip(platform.position, platform.slant_range * look, strict=True)))
     polynomial = Poly(expand(total), tau)
     return tuple(polynomial.coeff_monomial(tau**n) for n in range(ORDER + 1))
 
 
-def range_error_at(platform: PlatformSymbols) -> Expr:
-    """Range error of one platform at one slow time to first order, −u·r̃(τ), its position being that at τ. [m]"""
-    first_order = dr.first_order_range_error(platform)
-    return first_order.subs(platform.exact_slant_range(), platform.slant_range)
-
-
 def direct_range_error(platform: PlatformSymbols) -> Expr:
-    """The same where the direct path is the clock, of errors of any course: −(u_t − b)·r̃_t or −(u_r + b)·r̃_r. [m]
+    """Range error of one platform where the direct path is the clock: −(u_t − b)·r̃_t or −(u_r + b)·r̃_r. [m]
 
-    b is the unit vector from receiver to transmitter at that time.
+    Its error is of any course; b is the unit vector from receiver to transmitter at that time.
     """
     (other,) = (one for one in PLATFORMS if one is not platform)
     b = DIRECT_PATH if platform is TRANSMITTER else -DIRECT_PATH

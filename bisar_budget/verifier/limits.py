@@ -38,8 +38,6 @@ from bisar_budget.verifier.spread_cases import (
 from bisar_budget.verifier.study import Responses, Study
 from bisar_budget.workers import MapBlocks, Progress, in_processes, unseen
 
-__all__ = ["Study", "form_image_evidence", "rows_to_verify", "seconds_to_verify", "verify_mission"]
-
 _FINE = 4  # interpolation of a cut, so that its nulls look like nulls
 _AROUND = 10  # resolution cells of a cut each way, beyond the smear
 _MAX_PIXELS = 96  # of a chip, each way
@@ -57,25 +55,10 @@ def verify_mission(
     progress: Progress = unseen,
     mapped: MapBlocks | None = None,
 ) -> VerifiedMission:
-    """Verify every limit of a mission whose row id matches a glob.
+    """Verify every limit of a mission whose row id matches a glob; the verdicts do not depend on the processes.
 
-    Parameters
-    ----------
-    mission : Mission
-        As loaded.
-    only : str
-        Glob of row ids.
-    jobs : int
-        Processes; the verdicts do not depend on it.
-    progress : callable
-        Told, after each row, how many are done, and how many there are.
-    mapped : callable, optional
-        Has others form the images instead of processes here.
-
-    Returns
-    -------
-    VerifiedMission
-        Rows with a limit, in the order of `check`, and both platforms' vibration together.
+    They are in the order of `check`, both platforms' vibration together among them. `progress` is told, after each
+    row, how many are done, and how many there are; `mapped` has others form the images instead of processes here.
     """
     mission = mission._replace(places={})  # the parser's marks cannot go to another process, and nobody asks here
     known = cases(Study(mission), only)
@@ -276,19 +259,9 @@ def _seconds(study: Study, cells: int) -> float:
 
 # ---------------------------------------------------------------------- images that a report shows
 def form_image_evidence(mission: Mission, findings: MissionFindings) -> tuple[ImageEvidence, ...]:
-    """Form the images of the rows that decide most about a verified mission.
+    """Form the images of the rows that decide most about a verified mission; empty where no row has one.
 
-    Parameters
-    ----------
-    mission : Mission
-        As loaded.
-    findings : MissionFindings
-        About it, with the verdicts of its images.
-
-    Returns
-    -------
-    tuple of ImageEvidence
-        The worst row first; empty where no row has an image.
+    The worst row comes first. Its findings have the verdicts of its images.
     """
     verdicts = rows_worth_showing(findings)
     if not verdicts:

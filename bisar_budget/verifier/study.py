@@ -15,7 +15,7 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.ranges.exact_ranges import FINE, STILL, ExactEffect, Found, followed
 from bisar_budget.simulator.autofocus import ALGORITHMS
 from bisar_budget.simulator.collection import CELLS, MAX_CELLS, OVERSAMPLING, RANGE_CELLS, Chip, PointCollection
-from bisar_budget.simulator.phase_history import Errors, Floats, PathError, superposed
+from bisar_budget.simulator.phase_history import Errors, Floats, PathError, look_sum, superposed
 from bisar_budget.verifier.aperture_reading import READ_CELLS, ApertureReading, read_aperture, refocused
 
 Sizes = Sequence[tuple[ErrorSource, float]]  # errors and how large each is, signed
@@ -89,21 +89,16 @@ class Study:
 
     def errors(self, source: ErrorSource, size: float) -> Errors:
         """Return one error of a given size and nothing else."""
-        kind = source.subject.kind
         if source.clock is not None:
             return Errors(clock=tuple(size * term for term in source.clock))
-        found = Errors()
+        kind, found = source.subject.kind, Errors()
+        if kind == "terrain":  # a higher scene: both platforms measured too high
+            kind = "position"
         for place in source.platforms:
-            error = PathError(time_tag=size)
+            stated: Any = size
             if kind != "time_tag":
-                x, y, z = (size * component for component in source.direction_of(place))
-                error = {
-                    "position": PathError(position=(x, y, z)),
-                    "terrain": PathError(position=(x, y, z)),  # a higher scene: both platforms measured too high
-                    "velocity": PathError(velocity=(x, y, z)),
-                    "acceleration": PathError(acceleration=(x, y, z)),
-                }[kind]
-            found = found.of(PLATFORMS[place], error)
+                stated = tuple(size * component for component in source.direction_of(place))
+            found = found.of(PLATFORMS[place], PathError(**{kind: stated}))
         return found
 
     def together(self, sizes: Sizes, scale: float = 1.0) -> Errors:
@@ -242,10 +237,7 @@ class Study:
         point = np.array([*effect.displacement, 0.0])
         flight = self.collection.flight(errors.smooth(), time)
         left = flight.range_error((0.0, 0.0), effect.displacement)
-        slopes: Floats = np.zeros((time.size, 2))
-        for one in flight.paths:
-            sight = one.measured - point
-            slopes = slopes - sight[:, :2] / np.linalg.norm(sight, axis=1, keepdims=True)
+        slopes = -look_sum(*(one.measured - point for one in flight.paths))[:, :2]
         lines = self.collection.range_lines(errors)
         cells = lines.cells(effect.displacement, self.mission.radar.bandwidth, self.collection.wavelength)
         by_range = slopes[time.size // 2]

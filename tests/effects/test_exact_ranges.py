@@ -13,7 +13,7 @@ from bisar_budget.ranges.exact_ranges import FINE, STILL, ExactRanges, Lanes, ap
 from bisar_budget.simulator.phase_history import cell_centres, exact_effect
 from bisar_budget.verifier.study import Study
 from tests.conftest import mission_text
-from tests.effects.test_models import farthest
+from tests.effects.test_models import farthest_size
 from tests.families import DIRECT_PATH, FAMILIES
 from tests.families import mission_text as family_text
 
@@ -52,8 +52,8 @@ def test_check_and_simulator_agree(family: str, more: str) -> None:
     for source in study.sources:
         if not source.is_motion or not source.is_heard:
             continue
-        largest = farthest(analysis, source)
-        sizes = [part * largest for part in (0.01, -0.01, 0.1, -0.1)]
+        farthest = farthest_size(analysis, source)
+        sizes = [part * farthest for part in (0.01, -0.01, 0.1, -0.1)]
         found = by_courses(study, source, sizes)
         for index, size in enumerate(sizes):
             scalar = full.at(source, size)

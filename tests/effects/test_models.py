@@ -29,6 +29,12 @@ SECTION_V = {
 }  # fmt: skip
 
 
+def farthest_size(analysis: Analysis, source) -> float:
+    """Size beyond which an error is none of navigation, as the search for limits of the full model has it. [unit]"""
+    block, place = analysis.full.errors.block_of(source)
+    return float(block.farthest[place, 0])
+
+
 def brute_force(mission, errors):
     """Displaced point, quadratic and cubic phase: 600 pulses, a Legendre fit of tenth order, Newton by differences.
 
@@ -64,12 +70,6 @@ def still(tau):
 
 def along(direction, size, power):
     return lambda tau: size * tau**power / math.factorial(power) * np.array(direction)
-
-
-def farthest(analysis, source):
-    """Size beyond which an error is none of navigation."""
-    block, place = analysis.errors.block_of(source)
-    return block.farthest[place, 0]
 
 
 def phases(analysis, row_id, size):
@@ -123,7 +123,7 @@ def test_what_a_declared_error_does_is_what_exact_ranges_do(place, velocity, kin
         return
     source = next(s for s in analysis.sources if s.id == f"receiver.{kind}.{axis}")
     allowable = analysis.full.allowable(source, QUADRATIC, 0.4)
-    size = share * (allowable or 0.1 * farthest(analysis, source))
+    size = share * (allowable or 0.1 * farthest_size(analysis, source))
     found = analysis.full.does(source, size)
     if found.farthest is None or math.hypot(*found.farthest) > 500:
         return  # brute force follows no branch
@@ -139,12 +139,12 @@ def test_no_error_is_allowed_that_takes_its_platform_beyond_a_tenth_of_its_range
     analysis = Analysis(parse_mission(mission_text()))
     for source in analysis.sources:
         if source.is_motion:
-            largest = farthest(analysis, source)
+            farthest = farthest_size(analysis, source)
             for limit in (0.4, 4.0, 40.0, 400.0):
                 allowable = analysis.full.allowable(source, QUADRATIC, limit)
-                assert allowable is None or allowable <= largest * (1 + 1e-9)
+                assert allowable is None or allowable <= farthest * (1 + 1e-9)
     receiver = next(s for s in analysis.sources if s.id == "receiver.position.x")
-    assert farthest(analysis, receiver) == pytest.approx(FARTHEST * math.hypot(6e3, 6e3, 2e3))
+    assert farthest_size(analysis, receiver) == pytest.approx(FARTHEST * math.hypot(6e3, 6e3, 2e3))
     assert analysis.full.allowable(receiver, QUADRATIC, 1e4) is None
 
 
@@ -286,9 +286,9 @@ def test_terrain_clock_and_common_errors_have_their_own_farthest_size() -> None:
     analysis = Analysis(mission)
     nearest = min(mission.geometry.transmitter.slant_range, mission.geometry.receiver.slant_range)
     sources = {s.id: s for s in analysis.sources}
-    assert farthest(analysis, sources["mission.terrain"]) == pytest.approx(0.1 * nearest)
-    assert farthest(analysis, sources["common.velocity.x"]) == pytest.approx(0.1 * nearest / 3)
-    constant = farthest(analysis, sources["timing.constant"])
+    assert farthest_size(analysis, sources["mission.terrain"]) == pytest.approx(0.1 * nearest)
+    assert farthest_size(analysis, sources["common.velocity.x"]) == pytest.approx(0.1 * nearest / 3)
+    constant = farthest_size(analysis, sources["timing.constant"])
     assert constant == pytest.approx(0.1 * nearest / C)
 
 
@@ -347,8 +347,8 @@ def test_following_a_point_to_any_size_ends(name: str, monkeypatch: pytest.Monke
     analysis = Analysis(load_mission(str(ROOT / "specs" / "missions" / f"{name}.yaml")))
     sizes = np.random.default_rng(1)
     for source in analysis.sources:
-        largest = farthest(analysis, source)
-        if source.is_motion and math.isfinite(largest):
-            for size in (1.0, *(largest * 10 ** sizes.uniform(-6, 0.3, 6))):
+        farthest = farthest_size(analysis, source)
+        if source.is_motion and math.isfinite(farthest):
+            for size in (1.0, *(farthest * 10 ** sizes.uniform(-6, 0.3, 6))):
                 count[0] = 0
                 analysis.full.at(source, size)

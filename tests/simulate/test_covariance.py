@@ -8,7 +8,8 @@ import pytest
 from bisar_budget.budget.check import check_mission
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.simulator.phase_history import Errors, PathError
-from bisar_budget.verifier.limits import Study, verify_mission
+from bisar_budget.verifier.limits import verify_mission
+from bisar_budget.verifier.study import Study
 from tests.conftest import TODAY, findings, mission_text, row
 from tests.simulate.conftest import images_of
 from tests.simulate.test_full_model import random_missions

@@ -12,7 +12,8 @@ from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.faults import MissionError
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.simulator.phase_history import cell_centres, exact_effect, path
-from bisar_budget.verifier.limits import Study, verify_mission
+from bisar_budget.verifier.limits import verify_mission
+from bisar_budget.verifier.study import Study
 from tests.conftest import ROOT, TODAY, findings, mission_text
 from tests.conftest import row as row_of
 from tests.simulate.conftest import collection, platform

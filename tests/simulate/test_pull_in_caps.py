@@ -10,7 +10,7 @@ from bisar_budget.mission.load import parse_mission
 from bisar_budget.report.explain.explanation import explain
 from bisar_budget.simulator.autofocus import ALGORITHMS
 from bisar_budget.simulator.phase_history import Errors
-from bisar_budget.verifier.limits import Study
+from bisar_budget.verifier.study import Study
 from tests.conftest import findings, mission_text, row
 
 F0_MHZ = 10_000

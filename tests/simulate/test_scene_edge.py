@@ -16,7 +16,7 @@ from bisar_budget.mission.load import parse_mission
 from bisar_budget.simulator.collection import RANGE_CELLS
 from bisar_budget.simulator.phase_history import cell_centres, exact_effect, path
 from bisar_budget.verifier.aperture_reading import read_aperture
-from bisar_budget.verifier.limits import Study
+from bisar_budget.verifier.study import Study
 from tests.conftest import TODAY, findings, mission_text, row
 from tests.simulate.conftest import collection
 

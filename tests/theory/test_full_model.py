@@ -100,9 +100,8 @@ def test_a_monostatic_radar_at_broadside_loses_no_phase_to_the_displacement_of_a
     beta = [put_in(term).subs(clockless) for term in full.range_error()]
     gradients, adjugate, determinant = full.gradient_inverse()
     s, rate, *_ = full.ground_history()
-    moved = (adjugate * Matrix(beta[:2]) / determinant).subs(
-        dict(zip(gradients, map(put_in, (*s, *rate)), strict=True))
-    )
+    known = dict(zip(gradients, map(put_in, (*s, *rate)), strict=True))
+    moved = (adjugate * Matrix(beta[:2]) / determinant).subs(known)
     second = put_in(full.effective_coefficients()[0]).subs(clockless)
     second = second.subs(dict(zip(full.DISPLACEMENT, moved, strict=True)))
     v, R = TRANSMITTER.velocity[1], TRANSMITTER.slant_range

@@ -16,7 +16,8 @@ from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.report import Style, render
 from bisar_budget.simulator.collection import RANGE_CELLS
 from bisar_budget.simulator.phase_history import Errors
-from bisar_budget.verifier.limits import Study, _point_image, form_image_evidence, verify_mission
+from bisar_budget.verifier.limits import _point_image, form_image_evidence, verify_mission
+from bisar_budget.verifier.study import Study
 from tests.conftest import ROOT, TODAY, findings, mission_text
 
 SECTION_V = ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml"
