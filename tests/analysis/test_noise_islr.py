@@ -33,14 +33,18 @@ def left_after_the_cubic(slope: int) -> np.ndarray:
 
 
 def added_db(phases: np.ndarray, window: str) -> float:
-    """ISLR of the mean image less that of no error, by the transform and a mask of the first nulls. [dB]"""
+    """ISLR of the mean image less that of no error, by the transform within a mask of the first nulls. [dB]
+
+    All that is transformed has the power of the signal (Parseval).
+    """
+    # The mask's edge is a null: what half a fine step holds there is below 1e-3 of the mainlobe.
+    mask = round(first_null(window) * _FINE)
+    turns = np.multiply.outer(np.arange(_CELLS), np.arange(-mask, mask + 1)) / (_CELLS * _FINE)
+    transform = np.exp(-2j * math.pi * turns)
 
     def islr(signals: np.ndarray) -> float:
-        mask = round(first_null(window) * _FINE)
-        power = sum(np.abs(np.fft.fft(one, _CELLS * _FINE)) ** 2 for one in signals)
-        # The mask's edge is a null: what half a fine step holds there is below 1e-3 of the mainlobe.
-        mainlobe = power[: mask + 1].sum() + power[-mask:].sum()
-        return float((power.sum() - mainlobe) / mainlobe)
+        mainlobe = np.sum(np.abs(signals @ transform) ** 2)
+        return float(_CELLS * _FINE * np.sum(np.abs(signals) ** 2) / mainlobe - 1)
 
     clean = islr(weights(window)[None])
     return 10 * math.log10(islr(weights(window) * np.exp(1j * phases)) - clean)
