@@ -8,6 +8,7 @@ what it was, in its new place and its new unit.
 import copy
 import math
 from collections.abc import Callable, Iterator
+from functools import cache
 from random import Random
 from typing import Any, NamedTuple
 
@@ -15,7 +16,9 @@ import pytest
 import yaml
 
 import bisar_budget as bb
+from bisar_budget.simulator.point import PointImages
 from tests.families import FAMILIES, mission_text
+from tests.simulate.conftest import only_rotated_images
 
 KINDS = ("position", "velocity", "acceleration")
 CLOCK = ("constant", "linear", "quadratic", "cubic")
@@ -250,7 +253,23 @@ WAYS: dict[str, Callable[[Tree], Seen]] = {
 
 
 def loaded(tree: Tree) -> bb.Mission:
-    return bb.loads(yaml.safe_dump(tree, sort_keys=False))
+    return bb.loads(text_of(tree))
+
+
+def text_of(tree: Tree) -> str:
+    return yaml.safe_dump(tree, sort_keys=False)
+
+
+# Each mission is seen in many ways; it is checked and imaged once.
+@cache
+def checked(text: str) -> bb.CheckResult:
+    return bb.check(bb.loads(text))
+
+
+@cache
+def imaged(text: str) -> PointImages:
+    with only_rotated_images():
+        return bb.simulate(bb.loads(text)).images
 
 
 def is_near(one: float | None, other: float | None, absolute: float = 0.0) -> bool:
@@ -262,7 +281,7 @@ def is_near(one: float | None, other: float | None, absolute: float = 0.0) -> bo
 def differences(tree: Tree, way: Callable[[Tree], Seen]) -> list[Any]:
     """Rows and requirements of a mission that differ from those of the same one seen otherwise."""
     other = way(tree)
-    here, there = bb.check(loaded(tree)), bb.check(loaded(other.tree))
+    here, there = (checked(text_of(one)) for one in (tree, other.tree))
     rows = {row.id: row for row in there.findings.rows}
     found: list[Any] = []
     for row in here.findings.rows:
@@ -389,7 +408,7 @@ def test_so_is_its_image(family: str, seed: int, way: str) -> None:
     """Mirrored, sidelobes of aircraft 1 without errors were 0.4 dB too high, and 0.05 dB higher than here."""
     tree = tree_of(family, seed)
     other = WAYS[way](tree)
-    here, there = (bb.simulate(loaded(one)).images for one in (tree, other.tree))
+    here, there = (imaged(text_of(one)) for one in (tree, other.tree))
     for before, after in ((here.clean_response, there.clean_response), (here.response, there.response)):
         assert after.irw_m == pytest.approx((other.scale or 1.0) * before.irw_m, rel=2e-3)
         assert after.pslr_db == pytest.approx(before.pslr_db, abs=0.02)

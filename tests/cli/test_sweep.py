@@ -259,15 +259,23 @@ def test_nobody_reads_on(run) -> None:
 
 
 def test_a_terminal_has_a_bar(tmp_path: Path) -> None:
-    """Work that takes longer than a second has one."""
+    """Work that takes a moment has one."""
     master, slave = terminal()
-    with started("--vary", f"{TIME}=1:2s:300000", "-o", str(tmp_path / "t.csv"), stderr=slave) as process:
+    line = [*watched_soon("sweep", SPOTLIGHT, "--vary", f"{TIME}=1:2s:40000"), "-o", str(tmp_path / "t.csv")]
+    with subprocess.Popen(line, cwd=ROOT, stdout=subprocess.PIPE, stderr=slave) as process:
         os.close(slave)
         shown = read_all(lambda: os.read(master, 65536))
         assert process.wait(timeout=120) == 0
     os.close(master)
     assert "Checking cases" in shown
-    assert "300000 cases" in shown
+    assert "40000 cases" in shown
+
+
+def watched_soon(*arguments: str) -> list[str]:
+    """A command that has a bar after a tenth of a second; what follows is as long as that takes."""
+    imports = "from bisar_budget.cli import main; from bisar_budget.front import progress"
+    code = f"{imports}; progress._MOMENT = 0.1; main()"
+    return [sys.executable, "-c", code, *arguments]
 
 
 def terminal() -> tuple[int, int]:

@@ -42,7 +42,11 @@ def wait_until(is_so: Callable[[], object], seconds: float = 60) -> None:
         time.sleep(0.02)
 
 
-@pytest.fixture(scope="session")
+# What processes of Dask do while they wait, a fiftieth of a core each.
+IDLE = {"DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED": "False", "DASK_DISTRIBUTED__ADMIN__TICK__INTERVAL": "1s"}
+
+
+@pytest.fixture(scope="module")
 def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
     folder = tmp_path_factory.mktemp("cluster")
     log = (folder / "log").open("wb")
@@ -54,6 +58,7 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
             **os.environ,
             "PYTHONPATH": os.pathsep.join(filter(None, (path, str(ROOT)))),
             "OMP_NUM_THREADS": "1",
+            **IDLE,
         }
         command = [sys.executable, "-W", "ignore", "-m", *line]
         started.append(subprocess.Popen(command, env=environment, cwd=folder, stdout=log, stderr=log))

@@ -20,7 +20,7 @@ from bisar_budget.mission.load import load_mission
 from bisar_budget.sampling import draws as drawing
 from bisar_budget.sampling.draws import Drawing, in_turn, joined, shared_out
 from bisar_budget.sampling.probability import monte_carlo
-from tests.cli.test_sweep import read_all, terminal
+from tests.cli.test_sweep import read_all, terminal, watched_soon
 from tests.cluster.conftest import Cluster, wait_until
 from tests.cluster.test_scheduler import Client
 from tests.conftest import ROOT, heed_signals
@@ -123,8 +123,8 @@ def test_how_many_draws_one_machine_makes(run) -> None:
 
 def test_a_terminal_has_a_bar() -> None:
     master, slave = terminal()
-    line = [sys.executable, "-m", "bisar_budget", "check", "-q", DRONES, "--monte-carlo", "12e6"]
-    with subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=slave) as process:
+    line = watched_soon("check", "-q", DRONES, "--monte-carlo", "3e6")
+    with subprocess.Popen(line, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=slave) as process:
         os.close(slave)
         shown = read_all(lambda: os.read(master, 65536))
         assert process.wait(timeout=120) == 1

@@ -64,10 +64,12 @@ def test_the_last_key_is_the_fastest() -> None:
 
 
 def test_more_cases_than_an_array_could_count() -> None:
-    texts = [f"{key}=1:2:{MAX_VALUES}" for key in (TIME, "radar.bandwidth", "platforms.receiver.slant_range")]
+    time, bandwidth, slant_range = (
+        f"{key}=1:2:{MAX_VALUES}" for key in (TIME, "radar.bandwidth", "platforms.receiver.slant_range")
+    )
     with pytest.raises(QuestionError, match="must be"):
-        grid(TREE, texts[:2])  # 1 Hz
-    many = grid(TREE, [texts[0], texts[2]])
+        grid(TREE, [bandwidth])  # 1 Hz
+    many = grid(TREE, [time, slant_range])
     assert many.count == MAX_VALUES**2
 
 

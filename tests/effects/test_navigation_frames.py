@@ -233,7 +233,7 @@ def walks(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     noise = rng.standard_normal((3, DRAWS, 2 * count))
     none = np.zeros((count, count))
     tilt, twice = (
-        noise @ np.block([[one[:, :0:-1], np.zeros((count, 1)), none], [none, one]]) @ at_nodes.T
+        noise @ (np.block([[one[:, :0:-1], np.zeros((count, 1)), none], [none, one]]) @ at_nodes.T)
         for one in (walk, area)
     )
     return np.moveaxis(tilt, 0, 2), np.moveaxis(twice, 0, 2)

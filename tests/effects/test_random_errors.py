@@ -4,7 +4,6 @@
 """
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -106,36 +105,24 @@ def integrated(steps: np.ndarray, dt: float) -> np.ndarray:
     return np.concatenate([np.zeros((*steps.shape[:-1], 1)), area], axis=-1)
 
 
-def from_middle(draw: Callable[[np.ndarray], np.ndarray], times: np.ndarray, half: float) -> np.ndarray:
-    """Histories that start at mid-aperture, (draws, nodes): each side has a noise of its own."""
-    fine = np.linspace(0, half, 301)
-    after, before = draw(fine), draw(fine)
-    late, early = times > 0, times < 0
-    found = np.empty((len(after), len(times)))
-    for side, where in ((after, late), (before, early)):
-        at = np.abs(times[where]) / (fine[1] - fine[0])
-        low = np.minimum(at.astype(int), len(fine) - 2)
-        part = at - low
-        found[:, where] = side[:, low] * (1 - part) + side[:, low + 1] * part
-    return found
-
-
 def history(kind: str, rng: np.random.Generator, times: np.ndarray, half: float) -> np.ndarray:
     """Position error by a unit of acceleration, or of its rate or noise, along one axis, (draws, nodes)."""
     if kind in ("accelerometer_bias", "accelerometer_scale_factor", "attitude"):
         return rng.standard_normal((DRAWS, 1)) * times**2 / 2
     if kind == "gyro_bias":
         return rng.standard_normal((DRAWS, 1)) * times**3 / 6
-
-    def walk(fine: np.ndarray) -> np.ndarray:
-        dt = fine[1] - fine[0]
-        noise = rng.standard_normal((DRAWS, len(fine) - 1)) * math.sqrt(dt)
-        first = np.concatenate([np.zeros((DRAWS, 1)), np.cumsum(noise, axis=1)], axis=1)
-        for _ in range(1 if kind == "velocity_random_walk" else 2):
-            first = integrated(first, dt)
-        return first
-
-    return from_middle(walk, times, half)
+    # A walk starts at mid-aperture, and each side has a noise of its own. It is the sum of what each step does alone.
+    fine = np.linspace(0, half, 301)
+    dt, count = fine[1], len(fine) - 1
+    by_step = np.zeros((count, count + 1))
+    np.cumsum(np.eye(count) * math.sqrt(dt), axis=1, out=by_step[:, 1:])
+    for _ in range(1 if kind == "velocity_random_walk" else 2):
+        by_step = integrated(by_step, dt)
+    found = np.zeros((DRAWS, len(times)))
+    for side in (times > 0, times < 0):
+        at_nodes = np.stack([np.interp(np.abs(times[side]), fine, one) for one in by_step])
+        found[:, side] = rng.standard_normal((DRAWS, count)) @ at_nodes
+    return found
 
 
 def falling(position: np.ndarray) -> np.ndarray:

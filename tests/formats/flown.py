@@ -1,6 +1,7 @@
 """Files of radar formats for tests: samples of the standards, with satellites that fly as gravity has them."""
 
 import copy
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -22,9 +23,14 @@ def _rates(state):
 
 def orbit(position, velocity, epoch, half=2.0, step=0.01):
     """Places and velocities as functions of time, by Runge-Kutta and Hermite's cubic: better than a nanometre."""
+    return _integrated(tuple(position), tuple(velocity), epoch, half, step)
+
+
+@cache
+def _integrated(position, velocity, epoch, half, step):
     sides = []
     for sign in (-1, 1):
-        states = [np.concatenate([position, velocity])]
+        states = [np.array([*position, *velocity])]
         h = sign * step
         for _ in range(round(half / step)):
             s = states[-1]

@@ -397,6 +397,19 @@ def test_the_surface_as_it_was_agreed(tmp_path: Path, monkeypatch: pytest.Monkey
     simulated.plot()
 
 
+@pytest.mark.parametrize(("seconds", "is_shown"), [(0.9, False), (1.1, True)])
+def test_work_that_takes_longer_than_a_second_has_a_bar(
+    monkeypatch: pytest.MonkeyPatch, seconds: float, is_shown: bool
+) -> None:
+    monkeypatch.setattr(errors := io.StringIO(), "isatty", lambda: True)
+    monkeypatch.setattr("sys.stderr", errors)
+    times = iter((100.0, 100.0 + seconds))
+    monkeypatch.setattr(progress, "monotonic", lambda: next(times))
+    with progress.watched("Working") as told:
+        told(1, 2)
+    assert ("Working" in errors.getvalue()) == is_shown
+
+
 def test_bars_of_the_caller_keep_their_lock_and_their_thread(monkeypatch: pytest.MonkeyPatch) -> None:
     """tqdm has both for all bars of a process: those of long work here took them away."""
     errors = io.StringIO()

@@ -54,16 +54,17 @@ def test_faults_of_files_are_sentences(run, path) -> None:
 def texts_of_the_package() -> Iterator[tuple[str, str]]:
     """Every text of the source but docstrings, with # for what is put in, and where it stands."""
     for file in sorted((ROOT / "bisar_budget").rglob("*.py")):
-        tree = ast.parse(file.read_text(encoding="utf-8"))
-        docstrings = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
-        joined = [node for node in ast.walk(tree) if isinstance(node, ast.JoinedStr)]
+        nodes = list(ast.walk(ast.parse(file.read_text(encoding="utf-8"))))
+        docstrings = {id(node.value) for node in nodes if isinstance(node, ast.Expr)}
+        joined = [node for node in nodes if isinstance(node, ast.JoinedStr)]
         skipped = docstrings | {id(part) for text in joined for part in text.values}
-        for node in ast.walk(tree):
-            where = f"{file.relative_to(ROOT)}:{getattr(node, 'lineno', 0)}"
+        texts = [node for node in nodes if isinstance(node, ast.Constant) and isinstance(node.value, str)]
+        for node in (*joined, *(text for text in texts if id(text) not in skipped)):
+            where = f"{file.relative_to(ROOT)}:{node.lineno}"
             if isinstance(node, ast.JoinedStr):
                 yield where, "".join(str(p.value) if isinstance(p, ast.Constant) else "#" for p in node.values)
-            elif isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in skipped:
-                yield where, node.value
+            else:
+                yield where, str(node.value)
 
 
 def test_no_text_of_the_package_has_a_capital_within_a_sentence() -> None:

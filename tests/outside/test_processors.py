@@ -29,6 +29,7 @@ from bisar_budget.simulator.targets import Targets
 from tests.conftest import ROOT
 from tests.outside.focus import Collection
 from tests.outside.record import compare
+from tests.simulate.conftest import only_rotated_images
 
 pytestmark = [
     pytest.mark.extras,
@@ -59,7 +60,8 @@ def formed(tmp_path_factory: pytest.TempPathFactory) -> Any:
         mission = bb.load(ROOT / "specs" / "missions" / f"{name}.yaml")
         path = folder / f"{name}.cphd"
         path.write_bytes(export_phase_history(mission, Targets()).data)
-        return Formed(bb.simulate(mission).images, Collection(path), path)
+        with only_rotated_images():
+            return Formed(bb.simulate(mission).images, Collection(path), path)
 
     return of
 
@@ -97,6 +99,11 @@ def chip(formed: Formed) -> tuple[np.ndarray, np.ndarray]:
     return image, points[i, j] + np.array(tops) / FINE @ np.stack((nearer, along))
 
 
+@pytest.fixture(scope="module")
+def chips(formed: Any) -> Any:
+    return cache(lambda name: chip(formed(name)))
+
+
 @pytest.mark.parametrize("name", BISTATIC)
 def test_images_are_those_of_fastsar(formed: Any, name: str) -> None:
     """Pixel by pixel: FastSAR reads range profiles by straight lines, at 16 samples per cell, to 0.5 %."""
@@ -109,10 +116,10 @@ def test_images_are_those_of_fastsar(formed: Any, name: str) -> None:
 
 
 @pytest.mark.parametrize("name", BISTATIC)
-def test_fastsar_shows_the_point_where_check_puts_it(formed: Any, name: str) -> None:
+def test_fastsar_shows_the_point_where_check_puts_it(formed: Any, chips: Any, name: str) -> None:
     """To 0.5 % of a cell; the loss of the brightest to 0.1 dB."""
     one = formed(name)
-    image, place = chip(one)
+    image, place = chips(name)
     effect = one.images.effect
     loss = -20 * math.log10(np.abs(image).max())
     here = -20 * math.log10(one.images.response.peak)
@@ -124,14 +131,14 @@ def test_fastsar_shows_the_point_where_check_puts_it(formed: Any, name: str) -> 
 
 
 @pytest.mark.parametrize("name", BISTATIC[1:])
-def test_perseo_measures_what_simulate_does(formed: Any, name: str) -> None:
+def test_perseo_measures_what_simulate_does(formed: Any, chips: Any, name: str) -> None:
     """In FastSAR's image: it counts sidelobes to 5 widths (PSLR) and 10 (ISLR), beyond the minima that it finds."""
     from perseo_quality.core.generic_dataclasses import MaskingMethod
     from perseo_quality.core.signal_processing import evaluate_irf_resolution
     from perseo_quality.point_targets_analysis.core import irf
 
     one = formed(name)
-    image, _ = chip(one)
+    image, _ = chips(name)
     row, column = np.unravel_index(np.argmax(np.abs(image)), image.shape)
     widths = evaluate_irf_resolution(image[:, column]), evaluate_irf_resolution(image[row])
     _, pslr, _ = irf.compute_pslr_2d(image, widths, MaskingMethod.PEAK)

@@ -15,6 +15,7 @@ from bisar_budget.theory import render
 from tests.conftest import ROOT, TODAY, mission_text
 from tests.effects.test_random_errors import MISSION as SENSORS
 from tests.effects.test_random_errors import OSCILLATORS
+from tests.report.test_text_width import too_long
 from tests.verify.test_random_errors import REST
 
 LAMBDA = 299_792_458.0 / 10e9
@@ -125,11 +126,13 @@ def test_every_row_can_be_repeated_by_hand(path, model: str) -> None:
 
 
 def repeat_by_hand(mission: Mission) -> None:
-    """Six digits are put in, so a sum agrees to 1e-5 of its terms' sizes."""
+    """Six digits are put in, so a sum agrees to 1e-5 of its terms' sizes. No line is longer than a terminal's."""
     found = check_mission(mission, TODAY)
     for row in found.rows:
         results: dict[str, float] = {}
-        for symbol, numbers, value in sums(explain(mission, found, row.id)):
+        text = explain(mission, found, row.id)
+        assert too_long(text) == []
+        for symbol, numbers, value in sums(text):
             sizes = evaluated(re.sub(r"(^|\(|\+ )-", r"\1", numbers).replace(" - ", " + "))
             rounds = 10 / math.log(10) * 5e-6 if "log" in numbers else 0.0  # of the argument, however near 0 dB
             room = 1e-5 * max(abs(sizes), abs(value)) + rounds

@@ -65,10 +65,12 @@ def test_check(run, odd, options) -> None:
 
 
 def test_explain(run, odd) -> None:
+    """Every row of the odd ones; all rows of the examples are explained where each is repeated by hand."""
     for path in [*MISSIONS, *odd]:
         mission = load_mission(str(path))
         found = check_mission(mission, TODAY)
-        texts = {row.id: explain(mission, found, row.id) for row in found.rows}
+        explained = found.rows if path in odd else found.rows[:1]
+        texts = {row.id: explain(mission, found, row.id) for row in explained}
         assert {row_id: too_long(text) for row_id, text in texts.items()} == {key: [] for key in texts}
         row_id = found.rows[0].id
         shown = run("check", path, "--explain", row_id).stdout

@@ -1,6 +1,8 @@
 """Geometries for the image tests: the paper's ranges at any squint."""
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -114,20 +116,26 @@ def broadside() -> Collection:
     return collection()
 
 
+@contextmanager
+def only_rotated_images() -> Iterator[None]:
+    """Form a small middle of the image along (x, y), for who does not look at it.
+
+    Forming takes pixels times pulses, most of them for that image.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(point, "_SCENE_PIXELS", 1 << 10)
+        yield
+
+
 @cache
 def images_of(
     text: str, model: str | None = None, *, file: str = "-", rotated_only: bool = False, **how: Any
 ) -> point.PointImages:
     """Images of a mission file's text by `simulate_point`, formed once for all tests; nobody writes to them.
 
-    What the text names is beside `file`.
-
-    Forming takes pixels times pulses, most of them for the image along (x, y): a test that does not look at that one
-    asks for the rotated ones only, and gets a small middle of it.
+    What the text names is beside `file`. A test that looks at the rotated ones only says so.
     """
-    with pytest.MonkeyPatch.context() as patch:
-        if rotated_only:
-            patch.setattr(point, "_SCENE_PIXELS", 1 << 10)
+    with only_rotated_images() if rotated_only else nullcontext():
         images = point.simulate_point(parse_mission(text, file, model), **how)
     for one in images:
         if isinstance(one, np.ndarray):

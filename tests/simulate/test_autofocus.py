@@ -1,6 +1,7 @@
 """Autofocus against phase errors put on apertures by direct sums, in every kind of scene it may meet."""
 
 import math
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -322,15 +323,21 @@ def peak(image) -> float:
 class TestSceneAxes:
     SIDE, SPACING = 128, 0.5
 
-    def images(self, look_azimuth: float, phase=quadratic):
+    @classmethod
+    @cache
+    def images(cls, look_azimuth: float) -> list[np.ndarray]:
+        """In the scene's axes and in the rotated ones; and there without a phase error."""
         rng = np.random.default_rng(8)
         points = rng.uniform(-16, 16, (8, 2))
         amplitudes = np.exp(2j * math.pi * rng.random(8))
-        size, shape = (self.SIDE * self.SPACING,) * 2, (self.SIDE,) * 2
-        return [
-            plane_waves(ground_grid((0, 0), azimuth, size, shape), look_azimuth, points, amplitudes, self.SPACING, f)
-            for azimuth, f in ((0.0, phase), (look_azimuth, phase), (look_azimuth, lambda u: 0 * u))
+        size, shape = (cls.SIDE * cls.SPACING,) * 2, (cls.SIDE,) * 2
+        found = [
+            plane_waves(ground_grid((0, 0), azimuth, size, shape), look_azimuth, points, amplitudes, cls.SPACING, f)
+            for azimuth, f in ((0.0, quadratic), (look_azimuth, quadratic), (look_azimuth, lambda u: 0 * u))
         ]
+        for one in found:
+            one.setflags(write=False)
+        return found
 
     @pytest.mark.parametrize("look_azimuth", [0.0, 0.3, math.pi / 4, 1.1, 2.5, -2.0, math.pi, -math.pi / 2])
     def test_rotation_is_the_image_formed_there(self, look_azimuth: float) -> None:
