@@ -10,9 +10,9 @@ root-sum-squares is less.
   displacement they make is another one. These terms are those of the displacement at the centre. What the file leaves
   open of them, as of a free oscillator, is not counted, and the report says so.
 - A delay of the zenith is that of the whole scene; each place sees its leg at another elevation.
-- The phase of a slow vibration is not known: cosine and sine are parts of one size, and the worst phase is the root of
-  the sum of their squares. Its axes may have any phases, so that they add up. One along the line of sight moves along
-  that of the centre.
+- The phase of a slow vibration is not known: cosine and sine are parts of one size, and the worst phase has the root
+  of the sum of their squares. Its axes may have any phases, so that they add up. One along the line of sight moves
+  along that of the centre.
 
 What is stated by its effect alone is that all over the scene. Against exact ranges:
 `tests/simulate/test_random_at_scene_edge.py`. Derived here.

@@ -74,7 +74,7 @@ class RandomEffect(NamedTuple):
 
 
 class Moves(NamedTuple):
-    """What an error at random does to the path of a platform: along each way, each course by 1 sigma of its own.
+    """Motion of a platform by an error at random: along each way, each course by 1 sigma of its own.
 
     `ways` are (ways, 3, nodes or 1, cases) [m/unit], `courses` (courses, nodes, cases or 1), at the nodes of
     `SensorCases.exact`. Where an error has several, a way and a course of one are those of each.

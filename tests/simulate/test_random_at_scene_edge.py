@@ -63,31 +63,46 @@ def ranges(paths: np.ndarray, point: np.ndarray) -> np.ndarray:
     return np.sqrt((east - point[..., 0, None]) ** 2 + (north - point[..., 1, None]) ** 2 + up**2).sum(axis=0)
 
 
-def quadratics(moved: np.ndarray, late: np.ndarray, point: np.ndarray, receiver: np.ndarray = PATHS[1]) -> np.ndarray:
+def apart(paths: np.ndarray) -> np.ndarray:
+    """Distance of both platforms, (..., times)."""
+    return np.linalg.norm(paths[0] - paths[1], axis=-2)
+
+
+def quadratics(
+    moved: np.ndarray, late: np.ndarray, point: np.ndarray, receiver: np.ndarray = PATHS[1], is_heard: bool = False
+) -> np.ndarray:
     """Quadratic phase at the aperture edge of errors as a point sees them, (errors,). [rad]
 
     Positions are wrong by (2, errors, 3, times), ranges by (errors, times) [m]; half of what both signs differ by.
+    A direct path that is heard is taken off, as it is from the true ranges, as it is measured from the others.
     """
     powers = np.array([np.ones_like(TIMES), TIMES, TIMES**2 / 2])
     true = np.array([state.T @ powers for state in (PATHS[0], receiver)])[:, None]
     found = []
     for sign in (1.0, -1.0):
+        own = sign * late + is_heard * (apart(true + sign * moved) - apart(true))
         place = np.broadcast_to(point, (moved.shape[1], 2)).copy()
         left = np.zeros(0)
         for _ in range(8):
-            left, steps = ranges(true, np.asarray(point)) + sign * late - ranges(true + sign * moved, place), []
+            left, steps = ranges(true, np.asarray(point)) + own - ranges(true + sign * moved, place), []
             for way in np.eye(2):
                 ahead, back = (ranges(true + sign * moved, place + h * way) for h in (0.5, -0.5))
                 steps.append((ahead - back) @ FIT[:2].T)
             jacobian = np.stack(steps, axis=-1)
             place += np.linalg.solve(jacobian, (left @ FIT[:2].T)[..., None])[..., 0]
-        left = ranges(true, np.asarray(point)) + sign * late - ranges(true + sign * moved, place)
+        left = ranges(true, np.asarray(point)) + own - ranges(true + sign * moved, place)
         found.append(2 * math.pi * CARRIER / LIGHT * 1.5 * (left @ FIT[2]))
     return (found[0] - found[1]) / 2
 
 
 def difference(
-    found: MissionFindings, moved: Any = 0.0, late: Any = 0.0, receiver: np.ndarray = PATHS[1], azimuth: Any = None
+    found: MissionFindings,
+    moved: Any = 0.0,
+    late: Any = 0.0,
+    receiver: np.ndarray = PATHS[1],
+    azimuth: float | None = None,
+    *,
+    is_heard: bool = False,
 ) -> np.ndarray:
     """Phase of each error at the worst place of the rim, or another one, less that at the centre. [rad]"""
     assert found.scene is not None
@@ -96,7 +111,7 @@ def difference(
     count = max(np.shape(moved)[1] if np.ndim(moved) else 1, np.shape(late)[0] if np.ndim(late) else 1)
     moved = np.broadcast_to(moved, (2, count, 3, TIMES.size))
     late = np.broadcast_to(late, (count, TIMES.size))
-    there, centre = (quadratics(moved, late, np.asarray(point), receiver) for point in (place, np.zeros(2)))
+    there, centre = (quadratics(moved, late, point, receiver, is_heard) for point in (place, np.zeros(2)))
     return there - centre
 
 
@@ -153,6 +168,16 @@ def test_an_attitude_error_swings_an_arm_there_too() -> None:
     moved[1, 0] = tilt * (force[:, None] * TIMES**2 / 2 + swings)
     (exact,) = np.abs(difference(found, moved, receiver=state))
     assert declared(found) == pytest.approx(exact, rel=5e-3)
+
+
+def test_the_direct_path_changes_alike_all_over_the_scene() -> None:
+    """Where that is the clock: an arm of unknown length moves what is heard too, and with it each place."""
+    error = {"motion_error": {"lever_arm": {"uncertainty": 3.0}}}
+    found = checked(of_receiver=error, synchronization={"method": "direct_path", "error": "1 deg"})
+    moved = of_receiver(3.0 * np.eye(3), np.ones((1, TIMES.size)))
+    exact, unheard = (np.linalg.norm(difference(found, moved, is_heard=heard)) for heard in (True, False))
+    assert declared(found) == pytest.approx(exact, rel=2e-3)
+    assert abs(exact - unheard) > 0.1 * exact
 
 
 def samples_of(covariance: np.ndarray) -> np.ndarray:
@@ -293,10 +318,30 @@ def test_the_coverage_factor_counts_and_the_radius_holds_for_all() -> None:
     assert once.scene is not None
     served = once.scene.autofocus_radius
     assert served is not None
-    inside, outside = (
-        row(
-            checked(radius=factor * served, of_receiver={"motion_error": {"imu": {"accelerometer_bias": 18e-3}}}), ROW
-        )
-        for factor in (0.995, 1.005)
-    )
+    alone = {"motion_error": {"imu": {"accelerometer_bias": 18e-3}}}
+    inside, outside = (row(checked(radius=part * served, of_receiver=alone), ROW) for part in (0.995, 1.005))
     assert (inside.status, outside.status) == ("warn", "fail")
+
+
+def test_what_free_oscillators_drift_is_said_not_to_count() -> None:
+    free = {"oscillator": {"power_law": {"h0": 1e-24}}}
+    bias = {"motion_error": {"imu": {"accelerometer_bias": 18e-3}}}
+    said = "receiver.oscillator: what free oscillators drift"
+    (note,) = (one for one in row(checked(of_receiver=free | bias), ROW).notes if "drift" in one)
+    assert note.startswith(said)
+    assert declared(checked(of_receiver=free | bias)) == pytest.approx(declared(checked(of_receiver=bias)), rel=1e-9)
+    timing = {"constant": 0, "linear": 0}
+    assert not any("drift" in one for one in row(checked(of_receiver=free | bias, timing_error=timing), ROW).notes)
+
+
+def test_an_error_over_its_limit_at_the_edge_alone_is_a_warning() -> None:
+    """At random too: a bias along one axis, a little inside its share at the centre."""
+
+    def bias(size: float) -> MissionFindings:
+        return checked(of_receiver={"motion_error": {"imu": {"accelerometer_bias": [size, 0, 0]}}}, autofocus={})
+
+    per_unit = row(bias(1e-3), "receiver.quadratic_phase_error").qpe_full_rad / 1e-3
+    found = bias(0.99 * math.pi / 8 / per_unit)
+    assert row(found, "receiver.quadratic_phase_error").status != "fail"
+    assert row(found, ROW).status == "warn"
+    assert "receiver.quadratic_phase_error is" in row(found, ROW).reason
