@@ -9,7 +9,8 @@ What gates is the difference against the total budget, without the gain of autof
 error after a correction. Without autofocus it is what the edge has more than the centre, where the rows stand; then,
 and with a correction that has its own bound, an edge whose phase itself exceeds a limit is a warning.
 
-A place is a point of the ground of one of the cases; `of` says of which. Rows of arrays are errors.
+A place is a point of the ground of one of the cases; `of` says of which. Rows of arrays are errors, and below them
+the parts of those at random (`scene_random`).
 """
 
 import math
@@ -60,7 +61,7 @@ SizeAt = Callable[[Floats, Places], Floats]  # sizes at radii, of some cases
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ScenePlaces:
-    """Quadratic phase of each error at places, signed, (errors, places); how far they are from the centre's. [rad]
+    """Quadratic phase of each error or part at places, (errors, places); how far they are from the centre's. [rad]
 
     There is an image where both `clearances`, (2, places), are above 1: the sine between range and Doppler gradient,
     and the range gradient, over the least of each. The sine has the centre's sign: below zero, they are parallel on
