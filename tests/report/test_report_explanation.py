@@ -12,7 +12,7 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.report.explain import notation
 from bisar_budget.report.explain.explanation import explain
 from bisar_budget.theory import render
-from tests.conftest import ROOT, TODAY, findings, mission_text, row
+from tests.conftest import ROOT, TODAY, findings, mission_text
 from tests.effects.test_random_errors import MISSION as SENSORS
 from tests.effects.test_random_errors import OSCILLATORS
 from tests.verify.test_random_errors import REST
@@ -324,5 +324,5 @@ def test_errors_at_random_are_among_what_differs_at_the_edge(rule: str) -> None:
     sizes = {name: abs(float(size)) for name, size in re.findall(r"^ +([\w.]+) +(\S+) rad$", text, re.MULTILINE)}
     assert {"receiver.imu.accelerometer_bias", "receiver.random.gnss"} <= sizes.keys()
     together = {"each": max, "sum": math.fsum, "rss": lambda parts: math.hypot(*parts)}[rule](sizes.values())
-    declared = row(findings(**changes), "mission.spatial_variance").declared
-    assert declared == pytest.approx(together, rel=1e-4)
+    (row,) = (one for one in findings(**changes).rows if one.id == "mission.spatial_variance")
+    assert row.declared == pytest.approx(together, rel=1e-4)
