@@ -527,6 +527,15 @@ def same_at_the_edge() -> str:
 
 
 @phrase
+def drift_is_open_at_the_edge(row_ids: Sequence[str]) -> str:
+    """Said of the scene's edge, beside free oscillators."""
+    return (
+        f"{', '.join(row_ids)}: what free oscillators drift since they were set, which the file leaves open, is not "
+        "counted"
+    )
+
+
+@phrase
 def largest_at_the_edge(azimuth_deg: float, radius: float) -> str:
     """Where the scene's edge differs most."""
     return f"largest between the centre and azimuth {azimuth_deg:.0f} deg, {format_quantity(radius, 'm')} away"

@@ -9,7 +9,8 @@ What gates is the difference against the total budget, without the gain of autof
 error after a correction. Without autofocus it is what the edge has more than the centre, where the rows stand; then,
 and with a correction that has its own bound, an edge whose phase itself exceeds a limit is a warning.
 
-A place is a point of the ground of one of the cases; `of` says of which. Rows of arrays are errors.
+A place is a point of the ground of one of the cases; `of` says of which. Rows of arrays are errors, and below them
+the parts of those at random (`scene_random`).
 """
 
 import math
@@ -21,9 +22,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bisar_budget import phrases
+from bisar_budget.analysis.scene_random import RandomPhases
 from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG, MIN_GROUND_GRADIENT, UTILIZATION_TOLERANCE
 from bisar_budget.effects.combined import combined, combined_phase, correlated_errors
 from bisar_budget.effects.declared import DeclaredErrors
+from bisar_budget.effects.random_effect import RandomError
 from bisar_budget.geometry import BistaticGeometry, GroundVector
 from bisar_budget.mission.model import Shares
 from bisar_budget.phrases import NOTHING, Note
@@ -58,7 +61,7 @@ SizeAt = Callable[[Floats, Places], Floats]  # sizes at radii, of some cases
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ScenePlaces:
-    """Quadratic phase of each error at places, signed, (errors, places); how far they are from the centre's. [rad]
+    """Quadratic phase of each error or part at places, (errors, places); how far they are from the centre's. [rad]
 
     There is an image where both `clearances`, (2, places), are above 1: the sine between range and Doppler gradient,
     and the range gradient, over the least of each. The sine has the centre's sign: below zero, they are parallel on
@@ -127,19 +130,26 @@ class Heights(NamedTuple):
 
 
 class ScenePhases:
-    """Quadratic phases of the declared errors at any places of the scenes."""
+    """Quadratic phases of the declared errors at any places of the scenes.
 
-    def __init__(self, errors: DeclaredErrors) -> None:
+    An error at random has a phase for each of its parts (`scene_random`): they follow those of the others, `members`.
+    """
+
+    def __init__(self, errors: DeclaredErrors, random: Sequence[RandomError] = ()) -> None:
         self.errors, self.exact, self.combine = errors, errors.exact, errors.mission.allocation.combine
         self.groups = correlated_errors(errors.mission) if self.combine == "rss" else ()
         self.members = [error for error in errors.stated if error.is_motion]
-        self.ids = [error.subject.id for error in self.members]
+        self.random = RandomPhases(errors, random)
+        subjects = [*(error.subject for error in self.members), *self.random.subjects]
+        self.ids, self.owners = ([getattr(what, part) for what in subjects] for part in ("id", "owner"))
         self.small = SmallErrors.of([errors.lanes(error) for error in self.members])
         shape = (len(self.members), errors.cases)
         self.sizes = np.array([errors.array(error.declared) for error in self.members]).reshape(shape)
         per_unit = [errors.array(error.full.qpe) for error in self.members]
-        self.centre = np.array(per_unit).reshape(shape) * self.sizes
-        self.is_large = np.array([errors.is_large(error) for error in self.members]).reshape(shape)
+        self.centre = np.concatenate((np.array(per_unit).reshape(shape) * self.sizes, self.random.centre))
+        self.is_large = np.zeros(self.centre.shape, dtype=bool)
+        for index, error in enumerate(self.members):
+            self.is_large[index] = errors.is_large(error)
         self.nearest = errors.array(np.minimum(*(path.slant_range for path in errors.geometries.both)))
         self.turn = np.copysign(1.0, self.exact.sine)
 
@@ -154,7 +164,10 @@ class ScenePhases:
     def there(self, there: ExactRanges, of: Places) -> ScenePlaces:
         """The same where exact ranges are taken."""
         centre = self.centre.take(of, axis=1)
-        phases = there.quadratics_of(self.small.there(of)) * self.sizes.take(of, axis=1)
+        phases = self.random.there(there, of)
+        if self.members:
+            small = there.quadratics_of(self.small.there(of)) * self.sizes.take(of, axis=1)
+            phases = np.concatenate((small, phases))
         clearances = np.array(
             (self.turn.take(of) * there.sine / MIN_SINE, there.range_gradient / MIN_GROUND_GRADIENT)
         )
@@ -165,12 +178,18 @@ class ScenePhases:
 
     def together(self, phases: Floats, of: Places, indices: Sequence[int] | None = None) -> Floats:
         """Phases of the errors, or of some of them, combined; those of a covariance with their correlations. [rad]"""
+        found = self.of_errors(phases)
         if indices is None and not self.groups:
-            return np.asarray(combined(list(phases), self.combine))
-        chosen = range(len(self.members)) if indices is None else indices
+            return np.asarray(combined(list(found), self.combine))
+        chosen = range(len(self.ids)) if indices is None else indices
         groups = [group.of(of) for group in self.groups]
-        one = combined_phase([(self.ids[i], phases[i]) for i in chosen], self.combine, groups)
+        one = combined_phase([(self.ids[i], found[i]) for i in chosen], self.combine, groups)
         return np.asarray(np.broadcast_to(one, phases.shape[1:]))
+
+    def of_errors(self, phases: Floats) -> Floats:
+        """Phases of the errors, (errors, ...), of one at random the sigma, by those of their parts. [rad]"""
+        count = len(self.members)
+        return np.concatenate((phases[:count], self.random.of_errors(phases[count:])))
 
     def differences(self, radius: Floats, azimuth: Floats, of: Places) -> Floats:
         """Phase of each error there less that at the centre; by the worse sign of the large ones. [rad]"""
@@ -232,7 +251,9 @@ class ScenePhases:
     @cached_property
     def more(self) -> Floats:
         """Quadratic phase at the centre beyond that of a small error, by the worse sign, (errors, cases). [rad]"""
-        exactly = np.array([self.errors.does("full", error).qpe for error in self.members])
+        exactly = self.centre.copy()
+        for index, error in enumerate(self.members):
+            exactly[index] = self.errors.does("full", error).qpe
         return np.where(self.is_large, exactly - self.centre, 0.0)
 
     # ------------------------------------------------------------------ circles
@@ -408,10 +429,15 @@ class _Climb:
 
 
 @np.errstate(all="ignore")
-def differences_at(errors: DeclaredErrors, radius: float, azimuth: float) -> list[tuple[str, float]]:
-    """Phase of each error of one case at a place less that at the centre, by row id, in the file's order. [rad]"""
-    phases = ScenePhases(errors)
-    found = phases.differences(np.array([radius]), np.array([azimuth]), np.zeros(1, dtype=int))
+def differences_at(
+    errors: DeclaredErrors, radius: float, azimuth: float, random: Sequence[RandomError] = ()
+) -> list[tuple[str, float]]:
+    """Phase of each error of one case at a place less that at the centre, by row id, in the file's order. [rad]
+
+    Of one at random it is the sigma, coverage factor included.
+    """
+    phases = ScenePhases(errors, random)
+    found = phases.of_errors(phases.differences(np.array([radius]), np.array([azimuth]), np.zeros(1, dtype=int)))
     return list(zip(phases.ids, found[:, 0].tolist(), strict=True))
 
 
@@ -444,22 +470,26 @@ class SceneEdges:
         return np.asarray((self.over > 0).any(axis=0))
 
 
-def scene_edges(errors: DeclaredErrors, limits: Mapping[str, Floats], split: Shares) -> SceneEdges | None:
+def scene_edges(
+    errors: DeclaredErrors, random: Sequence[RandomError], limits: Mapping[str, Floats], split: Shares
+) -> SceneEdges | None:
     """Evaluate the errors of many cases at the edges of their scenes; None without a declared error.
 
     Parameters
     ----------
     errors : DeclaredErrors
         Of missions with `scene.radius`.
+    random : sequence of RandomError
+        Of the same, declared or not.
     limits : mapping of str to (cases,)
         What each owner's phases are held to, autofocus gain included. [rad]
     split : Shares
         Whose errors count against whose limit.
     """
-    phases = ScenePhases(errors)
-    if not phases.members:
+    phases = ScenePhases(errors, random)
+    if not phases.ids:
         return None
-    owners, radius = [error.subject.owner for error in phases.members], errors.array(errors.mission.scene.radius)
+    owners, radius = phases.owners, errors.array(errors.mission.scene.radius)
     if phases.combine == "each":
         held = [(name, [i], limits[owner]) for i, (name, owner) in enumerate(zip(phases.ids, owners, strict=True))]
     else:
@@ -510,7 +540,7 @@ def _over_at_the_edge(found: SceneEdges, members: Sequence[Sequence[int]], of: P
     def held(at_places: Floats) -> Floats:
         """Phases as they are held to limits, (names, ..., of)."""
         if phases.combine == "each":
-            return np.abs(at_places)
+            return np.abs(phases.of_errors(at_places))
         return np.array([phases.together(at_places, of, indices) for indices in members])
 
     around = held(rims.phases + more[:, None])

@@ -410,7 +410,10 @@ class SceneRow(FamilyRow):
         doubt, degeneracy, notes = NOTHING, NOTHING, tuple[Note, ...]()
         if edge is not None:
             doubt, degeneracy = edge.doubt, edge.degeneracy
-            notes = () if degeneracy else edge.notes(total)
+            drifting = [one.subject.id for one in case.analysis.random if case.number(one.displaces_unknown)]
+            if not degeneracy:
+                open_drift = (phrases.drift_is_open_at_the_edge(drifting),) if drifting else ()
+                notes = (*edge.notes(total), *open_drift)
             if model == "published" and edge.difference > total * BOUND:
                 doubt = phrases.other_model_fails("full", edge.difference, total, "rad")
         return worded(

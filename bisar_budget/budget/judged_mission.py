@@ -216,8 +216,11 @@ class _Judgement:
     def _scene(self) -> JudgedScene | None:
         if self.mission.scene.radius is None:
             return None
-        edges: SceneEdges | None = scene_edges(self.analysis.errors, self._limits, self.analysis.allocation.qpe)
-        return JudgedScene(self.analysis, edges)
+        analysis = self.analysis
+        edges: SceneEdges | None = scene_edges(
+            analysis.errors, analysis.random, self._limits, analysis.allocation.qpe
+        )
+        return JudgedScene(analysis, edges)
 
     # ---------------------------------------------------------------- what no row says by itself
     @cached_property

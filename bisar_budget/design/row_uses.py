@@ -34,7 +34,8 @@ _SHORT_OF_END = 0.995  # of the size from which there is no image: that is found
 _NOTHING = 1e-13  # of a row: what rounding leaves of it
 # What the ids of rows begin with that have no requirement: effects that none takes, and what a file may state.
 NEGLIGIBLE, ACCEPTED = "negligible", "accepted"
-_WARN_ONLY = ("autofocus_pull_in", "spatial_variance")  # kinds of rows that warn and never fail
+_WARN_ONLY = ("autofocus_pull_in",)  # kinds of rows that warn and never fail
+_AS_COMBINED = (QUADRATIC, CUBIC, LOCATION, "spatial_variance")  # kinds of rows that combine errors by the rule
 
 
 class RowUses(NamedTuple):
@@ -164,7 +165,7 @@ class SpecifiedMission:
 
     def _power(self, kind: str) -> float:
         """Power of a size that adds up in a row."""
-        is_summed = self.combine == "sum" and kind in (QUADRATIC, CUBIC, LOCATION)
+        is_summed = self.combine == "sum" and kind in _AS_COMBINED
         return 1.0 if is_summed or kind in _WARN_ONLY else 2.0
 
     def allowed(self, ids: Sequence[str]) -> Floats:

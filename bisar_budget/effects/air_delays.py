@@ -80,6 +80,26 @@ def seen_course(group: Any, mean: Any, delay: str) -> Any:
     return group if delay == DELAY else 2 * mean - group
 
 
+def delay_course(delay: str, track: Vectors, middle: Vectors, scale: Any, fit: Any) -> Any:
+    """Range error that an image shows at the nodes by the delay of the leg to a track, `scale` m/unit of the zenith.
+
+    Parameters
+    ----------
+    delay : str
+        Which of `DELAYS`.
+    track : Vectors
+        Positions of the platform at the nodes, (nodes, cases), as a place of the scene sees them. [m]
+    middle : Vectors
+        At mid-aperture, as the scene centre does. [m]
+    scale : (cases,)
+        `metres_per_unit`.
+    fit : (4, nodes)
+        Of the sampling.
+    """
+    group = scale * leg_factor(delay, track, middle) + np.zeros_like(track[0])
+    return seen_course(group, fit[0] @ group, delay)
+
+
 def dispersion(mission: Mission, path: PlatformState) -> float:
     """Phase at the ends of the band that a unit of electron content bends it by, of one case. [rad/unit]
 
@@ -99,11 +119,9 @@ def delay_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
     track, middle = exact.tracks[place], getattr(seen.geometry, name).position
     for delay, unit in UNITS.items():
         scale = metres_per_unit(seen.mission, delay)
-        moving, still = (
-            np.broadcast_to(scale * leg_factor(delay, one, middle), exact.times.shape) for one in (track, middle)
-        )
-        mean = exact.fit[0] @ moving
-        published, full = seen.of_courses(seen_course(moving, mean, delay)[None], still[None])
+        still = np.broadcast_to(scale * leg_factor(delay, middle, middle), exact.times.shape)
+        moving = delay_course(delay, track, middle, scale, exact.fit)
+        published, full = seen.of_courses(moving[None], still[None])
         value = getattr(leg, delay)
         yield RandomError(
             subject=subject(name, "propagation", delay),

@@ -27,9 +27,11 @@ from bisar_budget import evaluators
 from bisar_budget.effects.effect import PLATFORMS, subject
 from bisar_budget.effects.random_effect import (
     NODES,
+    Moves,
     RandomEffect,
     RandomError,
     SensorCases,
+    factor,
     parts_of_largest,
     sigmas,
 )
@@ -122,7 +124,24 @@ def inertial_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
             published=published,
             full=full,
             spreads=kind in NOISE,
+            moves=_moves_by_imu(seen, place, kind, directions, about, arm) if seen.has_edge else (),
         )
+
+
+def _moves_by_imu(
+    seen: SensorCases, place: int, kind: str, directions: Floats, about: Floats, arm: Floats | None
+) -> tuple[Moves, ...]:
+    """How a unit moves a platform: by the acceleration it makes, (axes, 3, cases) [m/s²/unit], and with an arm."""
+    ways, half = directions[:, :, None], seen.exact.half
+    if arm is None or kind not in TILTS:
+        return (Moves(place, ways, _courses(kind)[..., None] * half ** (_GROWS[kind] / 2)),)
+    swings = swung(about, arm)
+    if kind != "angle_random_walk":
+        order, times = (2 if kind == "attitude" else 3), seen.exact.times
+        grows, swing = times**order / math.factorial(order), times ** (order - 2)
+        return Moves(place, ways, grows[None]), Moves(place, swings, swing[None])
+    twice, once = _courses_of_both_walks()
+    return Moves(place, ways, twice[..., None] * half**2.5), Moves(place, swings, once[..., None] * half**0.5)
 
 
 def _at_mid_aperture(mission: Mission, index: int, along: Any) -> tuple[Any, ...]:
@@ -165,6 +184,15 @@ def _covariance_at_nodes(kind: str) -> Floats:
         return np.multiply.outer(history, history)
     walk = _velocity_walk if kind == "velocity_random_walk" else _angle_walk
     return np.array([[walk(*sorted((abs(s), abs(t)))) if s * t > 0 else 0.0 for t in times] for s in times])
+
+
+@cache
+def _courses(kind: str) -> Floats:
+    """Independent courses that together have this covariance, (courses, nodes). [m/unit]"""
+    if kind.endswith("random_walk"):
+        return factor(_covariance_at_nodes(kind)).T
+    order = 3 if kind == "gyro_bias" else 2
+    return np.array([evaluators.LEGENDRE_FITS[NODES][0]]) ** order / math.factorial(order)
 
 
 def _velocity_walk(early: float, late: float) -> float:
@@ -226,10 +254,12 @@ def lever_arm_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
         yield RandomError(what, "rad", declared, path, published, full, spreads=False, counted_in=counted)
     if lever.uncertainty is not None:
         declared, sizes = parts_of_largest(seen.vector(lever.uncertainty))
-        published, full = seen.of_motion(place, body_axes(state, times) * sizes[:, None, None])
+        ways = body_axes(state, times) * sizes[:, None, None]
+        published, full = seen.of_motion(place, ways)
         what = subject(name, "lever_arm", "uncertainty")
         path = (*key, "lever_arm", "uncertainty")
-        yield RandomError(what, "m", declared * seen.factor, path, published, full, spreads=False)
+        moves = (Moves(place, ways, np.ones((1, NODES, 1))),)
+        yield RandomError(what, "m", declared * seen.factor, path, published, full, spreads=False, moves=moves)
 
 
 def _with_arm(
@@ -302,6 +332,17 @@ def _walks(first: int, second: int) -> _Walks:
     return _Walks(at_nodes @ both @ at_nodes.T, mean - float((np.diagonal(both) / (2 * number + 1))[:4].sum()))
 
 
+@cache
+def _courses_of_both_walks() -> tuple[Floats, Floats]:
+    """Independent courses of a walk of a tilt over an aperture of 2 s, integrated twice, and as it is.
+
+    Both are (courses, nodes): course by course they are of one noise.
+    """
+    both = np.block([[_walks(a, b).at_nodes for b in (2, 0)] for a in (2, 0)])
+    twice, once = np.split(factor(both).T, 2, axis=1)
+    return twice, once
+
+
 def _legendre(places: Floats) -> Floats:
     return np.asarray(np.polynomial.legendre.legvander(places, NODES - 1))
 
@@ -331,12 +372,14 @@ def _noise(
     k = 2 * math.pi / seen.mission.radar.wavelength
     largest, sizes = parts_of_largest(seen.vector(process.sigma))
     found = gauss_markov(seen.aperture_time, process.correlation_time)
-    sighted, heard, moved = list[Floats](), list[Floats](), list[Floats]()
+    courses = seen.courses(found.covariance) if seen.has_edge else np.zeros((0, NODES, 1))
+    sighted, heard, moved, moves = list[Floats](), list[Floats](), list[Floats](), list[Moves]()
     for name, of_platform in axes.items():
         place, directions = PLATFORMS.index(name), of_platform * sizes[:, None]
         for kept, sight in ((sighted, seen.geometry.both[place].look), (heard, seen.sights[place])):
             kept.append((directions * seen.vector(sight)).sum(axis=1))
         moved.append(seen.range_errors(place, directions[:, :, None]))
+        moves.append(Moves(place, directions[:, :, None], courses))
     along, along_heard = (np.sqrt(np.square(sum(one)).sum(axis=0)) for one in (sighted, heard))
     (own, own_cubic, east, north), covariance = seen.of_orders(found.covariance, sum(moved))
     quadratic, cubic, left = (np.sqrt(one) for one in found[:3])
@@ -352,4 +395,5 @@ def _noise(
             *seen.moved(found.constant * along**2, found.linear * along**2),
         ),
         full=RandomEffect(own, own_cubic, k * along_heard * left / seen.factor, east, north, covariance),
+        moves=tuple(moves),
     )

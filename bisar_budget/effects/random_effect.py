@@ -75,13 +75,26 @@ class RandomEffect(NamedTuple):
         )
 
 
+class Moves(NamedTuple):
+    """Motion of a platform by an error at random: along each way, each course by 1 sigma of its own.
+
+    `ways` are (ways, 3, nodes or 1, cases) [m/unit], `courses` (courses, nodes, cases or 1), at the nodes of
+    `SensorCases.exact`. Where an error has several, a way and a course of one are those of each.
+    """
+
+    place: int
+    ways: Floats
+    courses: Floats
+
+
 class RandomError(NamedTuple):
     """One error of a sensor, a clock or the air: what it is, how large it is declared, what one unit of it does.
 
     `declared` is the largest of the axes, coverage factor included, and all axes grow with it; None where the file is
     silent. The unit of an oscillator is `dB`: its noise as a factor of amplitude, declared 1. `noise` is the spectrum
     of an oscillator; not of many cases. `spreads` tells noise from what changes within the aperture by a few orders.
-    `counted_in` is the id of a row whose error does this too, so that this one counts nowhere.
+    `counted_in` is the id of a row whose error does this too, so that this one counts nowhere. `moves` says how a
+    unit moves platforms, where the edge of a scene is looked at; of clocks and the air nothing.
     """
 
     subject: Subject
@@ -93,6 +106,7 @@ class RandomError(NamedTuple):
     noise: "Noise | None" = None
     spreads: bool = True
     counted_in: str = ""
+    moves: tuple[Moves, ...] = ()
 
     @property
     def id(self) -> str:
@@ -136,6 +150,11 @@ class SensorCases:
         self.sights = geometry.sights(has_direct_path=mission.has_direct_path)
         self.factor = mission.allocation.coverage_factor
         self.aperture_time = np.broadcast_to(np.asarray(mission.collection.aperture_time), (cases,))
+
+    @property
+    def has_edge(self) -> bool:
+        """Whether it is asked what errors do at the edge of a scene."""
+        return self.mission.scene.radius is not None
 
     def vector(self, values: Sequence[Any]) -> Floats:
         """Three numbers for each case, (3, cases)."""
@@ -223,6 +242,12 @@ class SensorCases:
             for a, b in self.plane.adjugate
         ]
 
+    @cached_property
+    def orders(self) -> Floats:
+        """Orders 0 to 3 at the nodes, by their values at the aperture edge as `_LEADING` has them, (nodes, 4)."""
+        places = self.exact.sampling.places
+        return np.asarray(np.polynomial.legendre.legvander(places, len(_LEADING) - 1) / _LEADING)
+
     def of_orders(self, covariance: Floats, along: Any = 1.0) -> tuple[Floats, Floats]:
         """`sigmas` of phases and displacement by orders 0 to 3 of independent range errors.
 
@@ -231,12 +256,16 @@ class SensorCases:
         """
         whole = covariance if covariance.ndim == 3 else covariance[..., None]
         whole = np.broadcast_to(whole, (*whole.shape[:2], self.cases))
-        places = self.exact.sampling.places
-        orders = np.polynomial.legendre.legvander(places, len(_LEADING) - 1) / _LEADING
-        seen = np.broadcast_to(along, (np.shape(along)[0] if np.ndim(along) else 1, places.size, self.cases))
+        orders = self.orders
+        seen = np.broadcast_to(along, (np.shape(along)[0] if np.ndim(along) else 1, len(orders), self.cases))
         effects = np.einsum("fnc,anc,no->afoc", self.weights, seen, orders)
         found = np.asarray(np.einsum("afoc,opc,agpc->fgc", effects, whole, effects))
         return sigmas(found, np.einsum("ffc->fc", found))
+
+    def courses(self, covariance: Floats) -> Floats:
+        """Independent courses that together have a covariance of these orders, (4, 4, ...); (4, nodes, ...)."""
+        of_orders = factor(np.moveaxis(covariance.reshape(4, 4, -1), 2, 0))
+        return np.asarray(np.einsum("no,cof->fnc", self.orders, of_orders))
 
     def of_parts(self, found: Parts, along: Any = 1.0) -> tuple["RandomEffect", "RandomEffect"]:
         """The same of a range error with these parts [m²]; `along` is what data have of a metre of it."""
@@ -288,3 +317,11 @@ def sigmas(covariance: Floats, sizes: Floats) -> tuple[Floats, Floats]:
     squares = np.einsum("ffc->fc", covariance)
     is_real = squares > _CANCELS * sizes
     return np.sqrt(np.where(is_real, squares, 0.0)), np.where(is_real & is_real[:, None], covariance, 0.0)
+
+
+def factor(covariance: Floats) -> Floats:
+    """A matrix F with FFᵀ = C, (..., n, n), of a covariance that may be singular, and whose units may differ."""
+    sizes = np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1))[..., None]
+    units = np.where(sizes > 0, sizes, 1.0)
+    squares, ways = np.linalg.eigh(covariance / (units * np.swapaxes(units, -1, -2)))
+    return np.asarray(units * ways * np.sqrt(np.maximum(squares, 0.0))[..., None, :])

@@ -31,8 +31,8 @@ from numpy.typing import NDArray
 
 from bisar_budget import phrases
 from bisar_budget.constants import ROUNDING
-from bisar_budget.effects.effect import PLATFORMS, subject
-from bisar_budget.effects.random_effect import RandomError, SensorCases
+from bisar_budget.effects.effect import PLATFORMS, Subject, subject
+from bisar_budget.effects.random_effect import Moves, RandomError, SensorCases
 from bisar_budget.effects.spectra import SLOW, Parts, PowerLawPiece, heard_parts, left_parts, tone
 from bisar_budget.geometry import FRAME_AXES, Vector, dot
 from bisar_budget.mission.model import Mission
@@ -298,6 +298,27 @@ def slow_phases(mission: Mission, geometry: Any = None) -> list[DeclaredPhase]:
     return found
 
 
+def slow_moves(seen: SensorCases) -> Iterator[tuple[Subject, Moves]]:
+    """How each vibration below one cycle per aperture moves its platform: along each axis, as cosine and as sine.
+
+    One that is stated along the line of sight moves along that of the centre. [m]
+    """
+    for name in PLATFORMS:
+        for index, line in enumerate(seen.error(name).vibration.sinusoidal):
+            is_slow = line.frequency * seen.aperture_time < SLOWEST
+            if not np.any(is_slow):
+                continue
+            value = line.displacement
+            if isinstance(value, tuple):
+                ways = seen.axes(name) * seen.vector(value)[:, None]
+            else:
+                ways = seen.vector(getattr(seen.geometry, name).look)[None] * value
+            angle = 2 * math.pi * line.frequency * seen.exact.times
+            courses = np.array((np.cos(angle), np.sin(angle))) * is_slow
+            moves = Moves(PLATFORMS.index(name), ways[:, :, None], courses)
+            yield subject(name, "vibration", "sinusoidal", entry=index), moves
+
+
 def _largest_displacement(mission: Mission, name: str, index: int, line: Line, geometry: Any) -> Any:
     """Upper bound of what a slow vibration displaces the image by, in any phase, to first order. [m]
 
@@ -388,7 +409,12 @@ def vibration_spectrum(seen: SensorCases, name: str) -> Iterator[RandomError]:
     published, full = seen.of_parts(found.times(power_of(vibration)), along)
     path = ("platforms", name, "motion_error", "vibration", "spectrum")
     what = subject(name, "vibration", "spectrum")
-    yield RandomError(what, "dB", 1.0, path, published.times(seen.factor), full.times(seen.factor))
+    moves: tuple[Moves, ...] = ()
+    if seen.has_edge:  # along the line of sight of the centre, and nothing is said of other motion
+        way = seen.factor * seen.vector(getattr(seen.geometry, name).look)[None, :, None]
+        courses = seen.courses(found.times(power_of(vibration)).covariance)
+        moves = (Moves(PLATFORMS.index(name), way, courses),)
+    yield RandomError(what, "dB", 1.0, path, published.times(seen.factor), full.times(seen.factor), moves=moves)
 
 
 def displacement_rms(spectrum: Spectrum, power: float = 1.0) -> float:

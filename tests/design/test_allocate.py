@@ -106,6 +106,26 @@ def test_a_reserve_is_what_warnings_leave_and_a_sheet_passes_without_one() -> No
     assert max(one.utilization or 0.0 for one in sheet.requirements) <= 0.8
 
 
+@pytest.mark.parametrize("rule", ["rss", "sum"])
+@pytest.mark.parametrize("kind", ["acceleration", "imu.accelerometer_bias"])
+def test_the_edge_of_the_scene_is_held_without_a_reserve_too(kind: str, rule: str) -> None:
+    """With much autofocus one correction for the whole scene limits the order: 5 % more of it fails."""
+    given = mission(
+        allocation__combine=rule,
+        autofocus={"algorithm": "pga", "n_pull": 33},
+        scene={"radius": 1000},
+        requirements__cubic_phase_error="90 deg",
+        platforms__transmitter__motion_error={},
+    )
+    key = f"platforms.receiver.motion_error.{kind}"
+    sheet = allocate(given, keys={key: 1.0}, reserve=0.0, today=DAY)
+    assert sheet.status == "warn"
+    (limit,) = (one.id for one in sheet.rows if one.multiplier > 0.5)
+    assert limit == "mission.spatial_variance"
+    failing = checked(given, sheet, {key: 1.05})
+    assert [one.id for one in failing.rows if one.status == "fail"] == [limit]
+
+
 def test_the_mission_is_checked_with_what_is_ordered() -> None:
     given = mission()
     sheet = allocate(given, today=DAY)

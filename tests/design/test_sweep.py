@@ -272,6 +272,51 @@ def test_edges_of_scenes_are_held(rule, model) -> None:
     assert_as_checked(mission, cases, whole, EDGE)
 
 
+WANDERING = """
+    acceleration: [6 m/s^2, 10 m/s^2, 0 m/s^2]
+    oscillator: {power_law: {h0: 1e-22, h-2: 1e-26}, acceleration_sensitivity: 1e-9 /g}
+    motion_error:
+      acceleration: 1 mm/s^2
+      imu: {accelerometer_bias: 5 mm/s^2, angle_random_walk: 0.2 deg/sqrt(h), attitude: [1 mrad, 1 mrad, 0 rad]}
+      lever_arm: {arm: [2 m, 1 m, 3 m], uncertainty: 2 cm}
+      random: [{name: gnss, sigma: 5 cm, correlation_time: 20 s}]
+      vibration:
+        sinusoidal: [{amplitude: [1 mm, 0 mm, 2 mm], frequency: 0.2 Hz}]
+        spectrum: {0.1 Hz: 1e-6 m^2/Hz, 3 Hz: 1e-8 m^2/Hz}
+"""
+AT_RANDOM = """
+schema_version: 1
+name: Errors at random
+radar: {center_frequency: 9.6 GHz, bandwidth: 200 MHz}
+collection: {aperture_time: 4 s}
+platforms:
+  transmitter: {position: [20 km, -6 km, 5 km], velocity: [20 m/s, 140 m/s, 0 m/s]}
+  receiver:
+    position: [5 km, 7 km, 2 km]
+    velocity: [-50 m/s, 30 m/s, 0 m/s]WANDERING
+scene: {radius: 600 m}
+propagation: {zenith_delay: 30 cm}
+synchronization:
+  {method: holdover, age: 60 s, averaging: 10 s, time_error: 0 s, frequency_error: 0}
+"""
+
+
+@pytest.mark.parametrize("rule", ["each", "sum", "rss"])
+def test_errors_at_random_are_held_at_the_edges_of_scenes(rule) -> None:
+    """Sensors, noise, arms, delays, clocks and vibrations that are slow in some of the cases."""
+    text = AT_RANDOM.replace("WANDERING", WANDERING)
+    mission = parse_mission(text, "m.yaml", changes=[SetValue("allocation.combine", rule)])
+    cases = grid(
+        mission,
+        collection__aperture_time=[2.0, 4.0, 9.0],
+        platforms__receiver__motion_error__imu__attitude__0=[1e-4, 2e-3],
+        platforms__receiver__motion_error__random__0__correlation_time=[5.0, 500.0],
+    )
+    whole = swept(mission, cases, EDGE)
+    assert len(set(whole["mission.spatial_variance.declared"])) > 3
+    assert_as_checked(mission, cases, whole, EDGE)
+
+
 @pytest.mark.parametrize("rule", ["each", "sum", "rss"])
 @pytest.mark.parametrize("needs", [{}, {"requirements": {"location_error": "5 mm"}}])
 def test_vibrations_may_be_slow(needs, rule) -> None:

@@ -12,7 +12,7 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.report.explain import notation
 from bisar_budget.report.explain.explanation import explain
 from bisar_budget.theory import render
-from tests.conftest import ROOT, TODAY, mission_text
+from tests.conftest import ROOT, TODAY, findings, mission_text
 from tests.effects.test_random_errors import MISSION as SENSORS
 from tests.effects.test_random_errors import OSCILLATORS
 from tests.report.test_text_width import too_long
@@ -309,3 +309,23 @@ def test_what_is_left_of_rounding_is_not_listed() -> None:
     assert "common.velocity.x" in text
     assert not re.search(r"e-1[4-9]", text)
     assert not re.search(r"e-1[4-9] m$", explained("common.position.y", **changes), re.MULTILINE)
+
+
+@pytest.mark.parametrize("rule", ["each", "rss", "sum"])
+def test_errors_at_random_are_among_what_differs_at_the_edge(rule: str) -> None:
+    """By their sigmas, which combine with the others to the very number of the row."""
+    changes = {
+        "platforms__receiver__motion_error": {
+            "imu": {"accelerometer_bias": "10 mm/s^2"},
+            "random": [{"name": "gnss", "sigma": "2 cm", "correlation_time": "5 s"}],
+        },
+        "scene": {"radius": "800 m"},
+        "allocation__model": "full",
+        "allocation__combine": rule,
+    }
+    text = explained("mission.spatial_variance", **changes)
+    sizes = {name: abs(float(size)) for name, size in re.findall(r"^ +([\w.]+) +(\S+) rad$", text, re.MULTILINE)}
+    assert {"receiver.imu.accelerometer_bias", "receiver.random.gnss"} <= sizes.keys()
+    together = {"each": max, "sum": math.fsum, "rss": lambda parts: math.hypot(*parts)}[rule](sizes.values())
+    (row,) = (one for one in findings(**changes).rows if one.id == "mission.spatial_variance")
+    assert row.declared == pytest.approx(together, rel=1e-4)

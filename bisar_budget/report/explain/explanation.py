@@ -433,7 +433,8 @@ def _spatial_variance(analysis: Analysis, found: MissionFindings, row: Row) -> I
     if scene is None or scene.degeneracy or row.declared is None:
         return
     east, north = at(scene.radius, scene.azimuth)
-    parts = phase_parts(differences_at(analysis.errors, scene.radius, scene.azimuth), found.combine, analysis.groups)
+    differences = differences_at(analysis.errors, scene.radius, scene.azimuth, analysis.random)
+    parts = phase_parts(differences, found.combine, analysis.groups)
     yield step(
         f"Full model at the scene’s edge, {east:.6g} m east, {north:.6g} m north of the centre, less at the centre"
     )

@@ -1,0 +1,183 @@
+"""Quadratic phases of errors without a sign, at places of a scene: of sensors, clocks, the air, and slow vibrations.
+
+An error at random is a sum of independent parts, each with a course over the aperture that is known but for its size:
+an axis of a bias, an axis and an order of noise. One flight has one size of each for the whole scene. So what two
+places differ by is the difference of each part, and of the error the root-sum-square of these; the difference of two
+root-sum-squares is less.
+
+- What moves a platform is seen from each place along its line of sight.
+- A clock moves nothing: a place has the phase of the centre, and what the constant and the linear term add where the
+  displacement they make is another one. These terms are those of the displacement at the centre. What the file leaves
+  open of them, as of a free oscillator, is not counted, and the report says so.
+- A delay of the zenith is that of the whole scene; each place sees its leg at another elevation.
+- The phase of a slow vibration is not known: cosine and sine are parts of one size, and the worst phase has the root
+  of the sum of their squares. Its axes may have any phases, so that they add up. One along the line of sight moves
+  along that of the centre.
+
+What is stated by its effect alone is that all over the scene. Against exact ranges:
+`tests/simulate/test_random_at_scene_edge.py`. Derived here.
+"""
+
+from collections.abc import Iterator, Sequence
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from bisar_budget.constants import ROUNDING
+from bisar_budget.effects.air_delays import delay_course, metres_per_unit
+from bisar_budget.effects.declared import DeclaredErrors
+from bisar_budget.effects.effect import PLATFORMS, Subject
+from bisar_budget.effects.random_effect import NODES, Moves, RandomError, SensorCases, factor
+from bisar_budget.effects.vibration import slow_moves
+from bisar_budget.geometry import Vectors
+from bisar_budget.ranges.exact_ranges import ExactRanges, Floats, Places, nodes
+
+_CLOCKS = ("oscillator", "synchronization")  # kinds of errors that move nothing
+
+
+class RandomPhases:
+    """Declared errors without a sign of many cases, at any places of their scenes.
+
+    Attributes
+    ----------
+    subjects : list of Subject
+        What they are.
+    centre : (parts, cases)
+        Quadratic phases of their parts at the centre. [rad]
+    """
+
+    def __init__(self, errors: DeclaredErrors, random: Sequence[RandomError]) -> None:
+        found = [*_at_random(errors, random), *_vibrating(errors)]
+        self.subjects = [what for what, _ in found]
+        self._errors = [error for _, error in found]
+        of_each = [error.there(errors.exact, errors.each) for error in self._errors]
+        self.centre = np.concatenate([np.zeros((0, errors.cases)), *of_each])
+        groups = [error.groups for error in self._errors]
+        sizes = np.repeat([len(parts) // count for parts, count in zip(of_each, groups, strict=True)], groups)
+        self._parts, self._groups = (np.cumsum([0, *counts])[:-1].astype(int) for counts in (sizes, groups))
+
+    def there(self, there: ExactRanges, of: Places) -> Floats:
+        """Quadratic phases of the parts where exact ranges are taken, (parts, places). [rad]"""
+        return np.concatenate([np.zeros((0, of.size)), *(error.there(there, of) for error in self._errors)])
+
+    def of_errors(self, parts: Floats) -> Floats:
+        """Phases of the errors, (errors, ...), by those of their parts, (parts, ...). [rad]"""
+        if not self._errors:
+            return parts
+        of_groups = np.sqrt(np.add.reduceat(np.square(parts), self._parts, axis=0))
+        return np.asarray(np.add.reduceat(of_groups, self._groups, axis=0))
+
+
+# ---------------------------------------------------------------------- one error at places
+class _Moving(NamedTuple):
+    """An error of the paths of platforms; its parts are in groups, each a root-sum-square, which add up."""
+
+    moves: Sequence[Moves]
+    size: Floats
+    groups: int = 1
+
+    def there(self, there: ExactRanges, of: Places) -> Floats:
+        """Quadratic phase of each way and course, (parts, places). [rad]"""
+        weights, (found, seen) = there.phase_weights[0], np.zeros((2, 1, 1, 1))
+        for one in self.moves:
+            ways, courses = _of(one.ways, of), _of(one.courses, of)
+            along = weights * there.along(one.place, (ways[:, 0], ways[:, 1], ways[:, 2]))
+            found = found + np.einsum("anp,mnp->amp", along, courses)
+            seen = seen + np.einsum("anp,mnp->amp", np.abs(along), np.abs(courses))
+        # What is left of terms that cancel exactly is rounding.
+        phase = np.where(np.abs(found) > ROUNDING * seen, found, 0.0) * _of(self.size, of)
+        return np.asarray(phase.reshape(-1, of.size))
+
+
+class _Clock(NamedTuple):
+    """An error of a clock by its parts, (parts, cases): quadratic phase at the centre [rad], terms. [m], [m/s]
+
+    And what a metre, and a metre per second, of these add to the phase at the centre, (2, cases). [rad]
+    """
+
+    quadratic: Floats
+    constant: Floats
+    linear: Floats
+    at_centre: Floats
+    groups: int = 1
+
+    @classmethod
+    def of(cls, exact: ExactRanges, covariance: Floats, size: Floats) -> "_Clock":
+        """That of a covariance of phases and displacement at the centre by a unit, (4, 4, cases)."""
+        known = covariance.reshape(4, 4, -1)[np.ix_((0, 2, 3), (0, 2, 3))]
+        quadratic, east, north = np.moveaxis(factor(np.moveaxis(known, 2, 0)), 0, 2) * size
+        (a, b), (c, d) = exact.adjugate  # of Q, which takes a displacement to the terms
+        return cls(quadratic, d * east - b * north, a * north - c * east, np.array(exact.phases_per_term[0]))
+
+    def there(self, there: ExactRanges, of: Places) -> Floats:
+        """Quadratic phase of each part, (parts, places). [rad]"""
+        by_constant, by_linear = np.array(there.phases_per_term[0]) - self.at_centre[:, of]
+        quadratic, constant, linear = (part[:, of] for part in self[:3])
+        return np.asarray(quadratic + by_constant * constant + by_linear * linear)
+
+
+class _Delay(NamedTuple):
+    """A delay of the air on the leg of a platform that the centre sees at `middle`, so many metres of the zenith."""
+
+    place: int
+    delay: str
+    middle: Vectors
+    metres: Floats
+    groups: int = 1
+
+    def there(self, there: ExactRanges, of: Places) -> Floats:
+        """Quadratic phase, (1, places). [rad]"""
+        x, y, z = (part[of] for part in self.middle)
+        course = delay_course(self.delay, there.tracks[self.place], (x, y, z), self.metres[of], there.fit)
+        return np.asarray(np.einsum("np,np->p", there.phase_weights[0], course)[None])
+
+
+# ---------------------------------------------------------------------- those of a mission
+def _at_random(
+    errors: DeclaredErrors, random: Sequence[RandomError]
+) -> Iterator[tuple[Subject, _Moving | _Clock | _Delay]]:
+    for error in random:
+        what, kind = error.subject, error.subject.kind
+        if error.declared is None or error.counted_in or kind == "other":
+            continue
+        size = errors.array(error.declared)
+        if error.moves:
+            yield what, _Moving(_at_nodes_of(errors, error.moves), size)
+        elif kind in _CLOCKS:
+            yield what, _Clock.of(errors.exact, error.full.covariance, size)
+        elif kind == "propagation":
+            place, metres = PLATFORMS.index(what.owner), metres_per_unit(errors.mission, what.axis)
+            yield what, _Delay(place, what.axis, errors.exact.positions[place], size * metres)
+
+
+def _vibrating(errors: DeclaredErrors) -> Iterator[tuple[Subject, _Moving]]:
+    for what, moves in slow_moves(SensorCases(errors.mission, errors.geometries, errors.cases)):
+        yield what, _Moving(_at_nodes_of(errors, [moves]), errors.array(1.0), len(moves.ways))
+
+
+def _at_nodes_of(errors: DeclaredErrors, moves: Sequence[Moves]) -> list[Moves]:
+    """The same at the nodes of declared errors."""
+    between = _between(errors.exact.fit.shape[1])
+    return [
+        Moves(
+            one.place,
+            one.ways if one.ways.shape[2] == 1 else np.einsum("nm,axmc->axnc", between, one.ways),
+            np.einsum("nm,fmc->fnc", between, one.courses),
+        )
+        for one in moves
+    ]
+
+
+@cache
+def _between(count: int) -> Floats:
+    """Takes courses at the nodes of sensors to fewer nodes, by the Legendre orders that these tell apart."""
+    places, weights = np.polynomial.legendre.leggauss(NODES)
+    order = np.arange(count)
+    fit = (order + 0.5)[:, None] * np.polynomial.legendre.legvander(places, count - 1).T * weights
+    return np.asarray(np.polynomial.legendre.legvander(nodes(count).places, count - 1) @ fit)
+
+
+def _of(array: Any, some: Places) -> Any:
+    """Some cases of an array (…, cases); what all share is there once."""
+    return array if array.shape[-1] == 1 else array.take(some, axis=-1)
