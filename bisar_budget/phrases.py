@@ -821,9 +821,12 @@ def oscillator_does_not_vibrate(turns: bool) -> str:
 
 
 @phrase
-def wideband_has_no_spectrum() -> str:
+def wideband_has_no_spectrum(platform: str) -> str:
     """Said of an oscillator whose platform has a wideband vibration."""
-    return "wideband vibration has no spectrum: what it does to the oscillator is not counted; state a spectrum"
+    return (
+        "what wideband vibration does to the oscillator depends on its frequencies, which an rms does not say: state "
+        f"platforms.{platform}.oscillator.vibration, or motion_error.vibration.spectrum in place of wideband"
+    )
 
 
 @phrase

@@ -131,7 +131,7 @@ def _entry(
     decider = rows[place] if place >= 0 else None
     allowed, reached = _sizes(decider, key, case) if decider is not None else (None, None)
     reason: Note | None = None
-    if status == "not_evaluated" and (decider is None or decider.status != status or key == "islr"):
+    if status == "not_evaluated" and (decider is None or decider.status != status):
         reason = (unknown_place(judged, case) if key == LOCATION else NOTHING) or phrases.nothing_judges(key)
     elif decider is not None and status not in ("pass", "info"):
         reason = decider.reason
