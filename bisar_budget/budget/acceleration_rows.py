@@ -108,6 +108,7 @@ class AcceleratedRow:
                 *_whose(not _is_own(mission, one.name)),
                 *override_notes(one.name, oscillator.overridden, SENSITIVITY),
             ),
+            displacement_m=case.moved_by_tone(row.subject, model),
         )
 
 

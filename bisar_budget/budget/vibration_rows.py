@@ -276,7 +276,7 @@ class VibrationRow:
         what = self.judged.subject
         error: MotionError = getattr(case.mission.platforms, what.owner).motion_error
         if self.is_slow:
-            return _slow_row(case, self, error)
+            return _slow_row(case, self, error, model)
         if self.members is not None:
             members = np.flatnonzero(self.members[:, case.place]).tolist()
             note = _lines_together(error, members, case.number(self.judged.declared))
@@ -354,6 +354,7 @@ class SpurRow:
                 phrases.tone_lies(spur.frequency, cycles),
                 *override_notes(spur.name, oscillator.overridden, "frequency"),
             ),
+            displacement_m=case.moved_by_tone(row.subject, model),
         )
 
 
@@ -459,6 +460,7 @@ def _row(
         evidence=error.source,
         remarks=(*notes, *more),
         published_margin_db=margin,
+        displacement_m=case.moved_by_tone(what, model),
     )
 
 
@@ -481,7 +483,7 @@ def _lines_together(error: MotionError, members: Sequence[int], declared: float)
     return phrases.lines_together(shown, " to ".join(dict.fromkeys(ends)), NEAR_CYCLES, declared)
 
 
-def _slow_row(case: Case, one: VibrationRow, error: MotionError) -> Row:
+def _slow_row(case: Case, one: VibrationRow, error: MotionError, model: str) -> Row:
     mission, allocation = case.mission, case.allocation
     what, combine = one.judged.subject, mission.allocation.combine
     cycles, qpe, cubic = map(case.number, (one.cycles, one.qpe, one.cubic))
@@ -509,4 +511,5 @@ def _slow_row(case: Case, one: VibrationRow, error: MotionError) -> Row:
             phrases.slower_than_a_cycle(cycles, qpe, cubic),
         ),
         binding_requirement=CUBIC if is_cubic else QUADRATIC,
+        displacement_m=case.moved_by_tone(what, model),
     )

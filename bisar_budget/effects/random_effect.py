@@ -229,9 +229,8 @@ class SensorCases:
         """
         whole = covariance if covariance.ndim == 3 else covariance[..., None]
         whole = np.broadcast_to(whole, (*whole.shape[:2], self.cases))
-        places = self.exact.sampling.places
-        orders = np.polynomial.legendre.legvander(places, len(_LEADING) - 1) / _LEADING
-        seen = np.broadcast_to(along, (np.shape(along)[0] if np.ndim(along) else 1, places.size, self.cases))
+        orders = orders_at(self.exact.sampling.places)
+        seen = np.broadcast_to(along, (np.shape(along)[0] if np.ndim(along) else 1, len(orders), self.cases))
         effects = np.einsum("fnc,anc,no->afoc", self.weights, seen, orders)
         found = np.asarray(np.einsum("afoc,opc,agpc->fgc", effects, whole, effects))
         return sigmas(found, np.einsum("ffc->fc", found))
@@ -253,6 +252,11 @@ class SensorCases:
         rows, group = np.unique(np.stack(arrays, axis=1), axis=0, return_inverse=True)
         for place, row in enumerate(rows.tolist()):
             yield _with_numbers(value, iter(row)), np.flatnonzero(group.ravel() == place)
+
+
+def orders_at(places: Floats) -> Floats:
+    """Orders 0 to 3 at places of the aperture, (places, 4), of a size of 1 at its edge as `Parts` has them."""
+    return np.asarray(np.polynomial.legendre.legvander(places, len(_LEADING) - 1) / _LEADING)
 
 
 def _arrays_in(value: Any) -> Iterator[Floats]:
