@@ -177,12 +177,6 @@ def nothing_judges(key: str) -> str:
 
 
 @phrase
-def place_is_not_known(row_ids: Sequence[str]) -> str:
-    """Said of the location, beside errors that vary slowly."""
-    return f"{', '.join(row_ids)}: slow vibration moves the image too, and this version does not compute by how much"
-
-
-@phrase
 def clocks_are_not_set(row_ids: Sequence[str]) -> str:
     """Said of the location, beside free oscillators."""
     return (
@@ -705,10 +699,15 @@ def echoes_together_over(level_db: float, limit_db: float, row_id: str, count: i
     return f"echoes of {_level(level_db)}, {_level(limit_db)} allowed; largest: {row_id}{others}"
 
 
+def cycles_below(cycles: float) -> str:
+    """Number of cycles that are below a border, which three digits rounded down do not reach."""
+    return format_quantity(cycles, "", 3, "down")
+
+
 @phrase
 def echoes_on_the_mainlobe(cycles: float, least: float) -> str:
     """Said of a slow tone."""
-    return f"{cycles:.3g} cycles per aperture: below {least:g} its echoes lie on the mainlobe"
+    return f"{cycles_below(cycles)} cycles per aperture: below {least:g} its echoes lie on the mainlobe"
 
 
 @phrase
@@ -741,8 +740,8 @@ def slow_cubic_phase_over(phase: float, limit: float) -> str:
 def slower_than_a_cycle(cycles: float, quadratic: float, cubic: float) -> str:
     """Said of a vibration. [rad]"""
     return (
-        f"{cycles:.2g} cycles per aperture: below one a vibration makes no echoes but, in its worst phase, a "
-        f"quadratic phase of {quadratic:.3g} rad or a cubic phase of {cubic:.3g} rad"
+        f"{cycles_below(cycles)} cycles per aperture: below one a vibration makes no echoes but, in its worst phase, "
+        f"a quadratic phase of {quadratic:.3g} rad or a cubic phase of {cubic:.3g} rad"
     )
 
 
@@ -760,7 +759,7 @@ def slower_than_three_cycles(
 ) -> str:
     """Said of a vibration. [rad]"""
     return (
-        f"{cycles:.3g} cycles per aperture: below three it also is "
+        f"{cycles_below(cycles)} cycles per aperture: below three it also is "
         f"{_in_the_worst_phase(quadratic, limit, cubic, cubic_limit)}; it is the same motion, so no sum counts it"
     )
 
@@ -834,9 +833,12 @@ def oscillator_does_not_vibrate(turns: bool) -> str:
 
 
 @phrase
-def wideband_has_no_spectrum() -> str:
+def wideband_has_no_spectrum(platform: str) -> str:
     """Said of an oscillator whose platform has a wideband vibration."""
-    return "wideband vibration has no spectrum: what it does to the oscillator is not counted; state a spectrum"
+    return (
+        "what wideband vibration does to the oscillator depends on its frequencies, which an rms does not say: state "
+        f"platforms.{platform}.oscillator.vibration, or motion_error.vibration.spectrum in place of wideband"
+    )
 
 
 @phrase

@@ -7,5 +7,6 @@ __all__ = [
     "scene",
     "spread",
     "together",
+    "tone_displacement",
     "vibration_limits",
 ]

@@ -3,6 +3,7 @@
 Cases of one shape are analysed together; one of them in plain numbers is put into words.
 """
 
+import math
 from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import Any
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from bisar_budget.analysis.allocation import Allocation, allocate
 from bisar_budget.analysis.spread import Tone, tones
 from bisar_budget.analysis.together import Together
+from bisar_budget.analysis.tone_displacement import ToneDisplacement, tone_displacements
 from bisar_budget.effects.combined import Correlated, correlated_errors
 from bisar_budget.effects.declared import Declared, DeclaredErrors, Model
 from bisar_budget.effects.effect import ErrorSource, Subject, plain
@@ -20,7 +22,7 @@ from bisar_budget.effects.random_effect import RandomError
 from bisar_budget.effects.random_errors import in_one_case, random_errors
 from bisar_budget.effects.sources import exact_ranges
 from bisar_budget.effects.vibration import DeclaredPhase, slow_phases
-from bisar_budget.geometry import BistaticGeometry
+from bisar_budget.geometry import BistaticGeometry, GroundVector
 from bisar_budget.mission.model import Mission, has_random_errors
 from bisar_budget.mission.stacked import picked
 from bisar_budget.phrases import Note
@@ -114,10 +116,17 @@ class Analysis:
         """Phases of the declared vibrations below one cycle per aperture."""
         return slow_phases(self.mission, self.geometry)
 
+    @cached_property
+    def displacing_tones(self) -> list[ToneDisplacement]:
+        """Displacement by each vibration and each tone of an oscillator, slow or fast."""
+        return tone_displacements(self.mission, self.geometry, self.exact, self.tones)
+
     def together(self, model: str) -> Together:
         """The declared errors together, by a model."""
         if model not in self._together:
-            self._together[model] = Together(self.errors, model, self.slow, self.random, self.groups)
+            self._together[model] = Together(
+                self.errors, model, self.slow, self.displacing_tones, self.random, self.groups
+            )
         return self._together[model]
 
     @cached_property
@@ -196,6 +205,14 @@ class Case:
     def does(self, model: Model, source: ErrorSource) -> Declared:
         """Effect of a declared error by a model."""
         return self.analysis.errors.does(model.name, source).in_one_case(self.place)
+
+    def moved_by_tone(self, what: Subject, model: str) -> GroundVector | None:
+        """Displacement by the tone of a row in the worst phases, by a model; None of a row that is no tone's. [m]"""
+        for one in self.analysis.displacing_tones:
+            if one.subject.id == what.id:
+                east, north = map(self.number, one.by(model))
+                return None if math.isnan(east) else (east, north)
+        return None
 
     def degeneracy(self, model: str) -> Note:
         """Why a model has no displacement here; nothing where it has one."""

@@ -6,6 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
+from bisar_budget.analysis.tone_displacement import ToneDisplacement
 from bisar_budget.effects.combined import (
     Correlated,
     Moves,
@@ -34,6 +35,8 @@ class Together:
         `published` or `full`.
     slow : sequence of DeclaredPhase
         Vibrations below one cycle per aperture.
+    tones : sequence of ToneDisplacement
+        Vibrations, and tones of oscillators, by what they displace.
     random : sequence of RandomError
         Errors of sensors and clocks, declared or not.
     groups : sequence of Correlated
@@ -45,10 +48,11 @@ class Together:
         errors: DeclaredErrors,
         model: str,
         slow: Sequence[DeclaredPhase],
+        tones: Sequence[ToneDisplacement],
         random: Sequence[RandomError],
         groups: Sequence[Correlated],
     ) -> None:
-        self.errors, self.model, self.slow, self.groups = errors, model, slow, groups
+        self.errors, self.model, self.slow, self.tones, self.groups = errors, model, slow, tones, groups
         self.random = [error for error in random if not error.counted_in]
         self.rule = errors.mission.allocation.combine
         self.motion = [error for error in errors.stated if error.is_motion]
@@ -115,8 +119,11 @@ class Together:
         return [*moves, ("whatever the signs", (rest[0], rest[1]))] if rest.any() else moves
 
     @cached_property
-    def random_moves(self) -> Moves:
-        """Sigmas of the displacement of sensors and clocks, none of one that the file leaves open. [m]"""
+    def undirected_moves(self) -> Moves:
+        """Displacement of what has no sign: sigmas of sensors and clocks, and tones in their worst phases. [m]
+
+        None of a clock that the file leaves open.
+        """
         found = []
         for error in self.random:
             if error.declared is not None:
@@ -125,23 +132,27 @@ class Together:
                 moved = (self.errors.array(one * error.declared) for one in effect[3:5])
                 east, north = (np.where(is_open, 0.0, one) for one in moved)
                 found.append((error.subject.id, (east, north)))
+        for tone in self.tones:
+            east, north = map(self.errors.array, tone.by(self.model))
+            found.append((tone.subject.id, (east, north)))
         return found
 
     @property
     def is_placed(self) -> bool:
         """Whether any declared error can displace the image."""
-        return bool(self.motion or self.random_moves)
+        return bool(self.motion or self.undirected_moves)
 
     def moved(self, rule: str) -> Floats:
         """Displacements combined by a rule; not a number where an error has no image to place. [m]
 
-        One at random has no direction: to a sum over all signs it adds its length, whatever the others do.
+        One at random, or of a tone, has no direction: to a sum over all signs it adds its length, whatever the others
+        do.
         """
         if rule != "sum":
-            moves = [*self.moves(rule), *self.random_moves]
+            moves = [*self.moves(rule), *self.undirected_moves]
             return self.errors.array(combined_displacement(moves, rule, self.groups))
         found = combined_displacement(self.moves(rule), rule, self.groups)
-        return self.errors.array(found + sum(np.hypot(*move) for _, move in self.random_moves))
+        return self.errors.array(found + sum(np.hypot(*move) for _, move in self.undirected_moves))
 
     # ---------------------------------------------------------------- of one case
     def phase_parts(self, phases: Phases, rule: str = "", case: int = 0) -> list[tuple[str, float]]:
@@ -151,7 +162,7 @@ class Together:
 
     def displacement_parts(self, case: int = 0) -> list[tuple[str, GroundVector]]:
         """List the parts of displacements that the mission's rule combines: none where one has no image. [m]"""
-        found = displacement_parts([*self.moves(self.rule), *self.random_moves], self.rule, self.groups)
+        found = displacement_parts([*self.moves(self.rule), *self.undirected_moves], self.rule, self.groups)
         parts = [(row_id, (float(east[case]), float(north[case]))) for row_id, (east, north) in found]
         return [] if any(math.isnan(east) for _, (east, _) in parts) else parts
 

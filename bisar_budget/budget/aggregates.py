@@ -22,11 +22,7 @@ from bisar_budget.budget.judged_requirements import (
     first_highest,
 )
 from bisar_budget.budget.judged_rows import BOUND, CODE, FamilyRow, Judging, worded
-from bisar_budget.effects.combined import (
-    Phases,
-    combined,
-    correlation_notes,
-)
+from bisar_budget.effects.combined import Phases, correlation_notes
 from bisar_budget.effects.declared import CUBIC, LOCATION, OTHER_MODEL, QUADRATIC
 from bisar_budget.effects.effect import Subject, subject
 from bisar_budget.effects.vibration import DeclaredPhase
@@ -283,33 +279,9 @@ def untaken_effects(analysis: Analysis) -> list[UntakenEffect]:
 
 
 # ---------------------------------------------------------------------- displacements that no row holds
-class Misplacing(NamedTuple):
-    """Rows of errors that displace the image by an amount that is not computed, each with the cases in which."""
-
-    at_random: list[tuple[str, Truths]]
-    slow: list[tuple[str, Truths]]
-
-    def where(self, cases: int) -> Truths:
-        """Cases in which any of them does."""
-        of_each = (one for _, one in (*self.at_random, *self.slow))
-        return np.asarray(np.any([np.zeros(cases, dtype=bool), *of_each], axis=0))
-
-
-def misplacing(together: Together, place: Floats) -> Misplacing:
-    """Find the errors that vary at random, or slowly, and displace the image.
-
-    A slow vibration is no doubt where the location is met with the most that it could add to the `place`, the
-    displacement of the declared errors together, not a number where there is none. [m]
-    """
-    mission, array = together.errors.mission, together.errors.array
-    needed = mission.requirements.location_error
-    at_random = [(one.subject.id, array(one.displaces_unknown) > 0) for one in together.random]
-    slow: list[tuple[str, Truths]] = []
-    if needed is not None and together.slow:
-        moves = [array(one.moves) for one in together.slow]
-        is_over = combined([np.nan_to_num(place), *moves], together.rule) > array(needed) * BOUND
-        slow = [(one.row_id, is_over & (size > 0)) for one, size in zip(together.slow, moves, strict=True)]
-    return Misplacing(at_random, slow)
+def unplaced(together: Together) -> dict[str, Truths]:
+    """Find the clocks that displace the image by an amount that the file leaves open, and in which cases."""
+    return {one.subject.id: together.errors.array(one.displaces_unknown) > 0 for one in together.random}
 
 
 # ---------------------------------------------------------------------- in words

@@ -219,7 +219,7 @@ def _of_calm_oscillators(mission: Mission) -> Iterator[_Warned]:
     """Sensitivities to acceleration that the file states, of oscillators that nothing shakes or turns."""
     for name in PLATFORMS:
         key, one = ("platforms", name, "oscillator", "acceleration_sensitivity"), felt(mission, name)
-        if one is None or key not in mission.places or one.vibration.sinusoidal or one.vibration.spectrum is not None:
+        if one is None or key not in mission.places or one.vibration.is_stated:
             continue
         state = getattr(mission.geometry, name)
         if not (state.bends or any(state.acceleration)):

@@ -15,7 +15,7 @@ import numpy as np
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.scene import SceneEdges, scene_edges
 from bisar_budget.analysis.spread import noise
-from bisar_budget.budget.aggregates import Aggregates, JudgedScene, Misplacing, misplacing, untaken_effects
+from bisar_budget.budget.aggregates import Aggregates, JudgedScene, unplaced, untaken_effects
 from bisar_budget.budget.doubts import declared_position_error, is_in_doubt, least_doubt
 from bisar_budget.budget.error_rows import ErrorRows, specification_rows
 from bisar_budget.budget.file_warnings import FASTEST_FLIGHT
@@ -61,7 +61,7 @@ class JudgedMission:
     before: tuple[Judged, ...]
     requirements: tuple[RequirementState, ...]
     untaken: Sequence[UntakenEffect]
-    misplacing: Misplacing
+    unplaced: Mapping[str, Truths]
     scene: JudgedScene | None
     floor: Codes  # the best status that each case can have
 
@@ -114,9 +114,9 @@ class _Judgement:
         of_all.require_declarations(analysis.geometry)
         of_all.doubt_inputs(self._in_doubt)
         untaken = untaken_effects(analysis)
-        (place,) = (row.declared for row in rows if row.subject.id == f"mission.{LOCATION}")
-        displacing = misplacing(analysis.together("full"), place)
-        is_misplaced = np.any([displacing.where(self.cases), *self._in_doubt.values()], axis=0)
+        drifting = unplaced(analysis.together("full"))
+        nowhere = np.zeros(self.cases, dtype=bool)
+        is_misplaced = np.any([nowhere, *drifting.values(), *self._in_doubt.values()], axis=0)
         has_noise = self._has_noise()
         own = of_all.status.copy()
         of_all.judge_effects(untaken)
@@ -143,7 +143,7 @@ class _Judgement:
             before=of_all.rows_with(before),
             requirements=tuple(states),
             untaken=untaken,
-            misplacing=displacing,
+            unplaced=drifting,
             scene=self._scene,
             floor=np.min([self._floor(), *after_waivers], axis=0),
         )

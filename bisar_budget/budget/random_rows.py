@@ -32,6 +32,7 @@ from bisar_budget.effects.air_delays import CONTENT, dispersion
 from bisar_budget.effects.declared import CUBIC, LOCATION, OTHER_MODEL, QUADRATIC
 from bisar_budget.effects.effect import PLATFORMS, override_notes, subject
 from bisar_budget.effects.navigation_errors import process_of
+from bisar_budget.effects.oscillator_acceleration import lacks_a_spectrum
 from bisar_budget.effects.oscillators import POOR_FIT
 from bisar_budget.effects.random_effect import RandomEffect, RandomError
 from bisar_budget.effects.vibration import counted, displacement_rms, power_of, projected
@@ -128,8 +129,9 @@ class RandomRows:
         declared = self._table([math.nan if one.declared is None else one.declared for one in self.errors])
         allocation, smallest, combine = self.allocation, sizes.min(axis=0), self.mission.allocation.combine
         gain = allocation.autofocus_gain
-        is_limited = np.isfinite(smallest)
-        binds = np.where(is_limited, sizes.argmin(axis=0), -1)
+        is_open = self._table([_is_open(self.mission, one) for one in self.errors]) > 0
+        is_limited = np.isfinite(smallest) & ~is_open
+        binds = np.where(is_open, HELD.index(ISLR), np.where(is_limited, sizes.argmin(axis=0), -1))
         allowable = np.where(is_limited, smallest, math.nan)
         qpe, limit = mine.quadratic * declared, self._table([allocation.qpe_limit(one.owner) for one in self.errors])
         within = np.where(binds == 0, declared / allowable * gain, qpe / limit)
@@ -142,13 +144,15 @@ class RandomRows:
             allowable,
             doubt=is_over_other,
             without_autofocus=without_autofocus,
-            is_info=self._table([combine != "each" or bool(one.counted_in) for one in self.errors]) > 0,
+            is_info=(self._table([combine != "each" or bool(one.counted_in) for one in self.errors]) > 0) & ~is_open,
+            is_unknown=is_open,
         )._replace(
             binding=np.array([-1, *map(REQUIREMENTS.index, HELD)], np.int8)[binds + 1],
             qpe_published_rad=published.quadratic * declared,
             cubic_rad=mine.cubic * declared,
             quadratic_use=qpe / (limit * gain),
         )
+        judged = judged._replace(utilization=np.where(is_open, math.nan, judged.utilization))
         if self.judging.is_whole:
             by_published, by_full = (
                 np.where(one.quadratic > 0, limit * gain / one.quadratic, math.nan) for one in (published, full)
@@ -263,6 +267,7 @@ class RandomRow(FamilyRow):
             over=over,
             doubt=doubt,
             no_limit=_unlimited(mission, error, error.effect(gating)),
+            not_evaluated=phrases.wideband_has_no_spectrum(error.owner),
             info=phrases.counted_in_another_row(error.counted_in)
             if error.counted_in
             else NOTHING
@@ -339,6 +344,12 @@ class StatedRow(FamilyRow):
             evidence=mission.other_errors[index].source,
             binding_requirement=ISLR if is_limited else None,
         )
+
+
+def _is_open(mission: Mission, error: RandomError) -> Any:
+    """Whether an error's file leaves open what makes a part of it, in which cases: ISLR cannot be judged there."""
+    is_shaken = error.subject.kind == "oscillator" and error.subject.axis == "acceleration"
+    return is_shaken and lacks_a_spectrum(mission, error.owner)
 
 
 # ---------------------------------------------------------------------- in words

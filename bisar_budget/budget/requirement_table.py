@@ -93,14 +93,12 @@ def _why(judged: JudgedMission, case: Case, one: Judged, row: Row) -> Note:
 
 
 def unknown_place(judged: JudgedMission, case: Case) -> Note:
-    """Say what displaces the image by an amount that no row holds: a random or slow error, a path in doubt."""
-    at_random, slow = ([row_id for row_id, is_there in kind if is_there[case.place]] for kind in judged.misplacing)
-    if not slow and not at_random:
-        doubts = input_doubts(case.mission)
-        return doubts[0].note if doubts else NOTHING
-    said = [phrases.clocks_are_not_set(at_random)] if at_random else []
-    said += [phrases.place_is_not_known(slow)] if slow else []
-    return said[0].then(*said[1:])
+    """Say what displaces the image by an amount that no row holds: clocks that are not set, a path in doubt."""
+    clocks = [row_id for row_id, is_there in judged.unplaced.items() if is_there[case.place]]
+    if clocks:
+        return phrases.clocks_are_not_set(clocks)
+    doubts = input_doubts(case.mission)
+    return doubts[0].note if doubts else NOTHING
 
 
 def negligible_effects(judged: JudgedMission, case: Case) -> Iterator[Note]:
@@ -129,7 +127,7 @@ def _entry(
     decider = rows[place] if place >= 0 else None
     allowed, reached = _sizes(decider, key, case) if decider is not None else (None, None)
     reason: Note | None = None
-    if status == "not_evaluated" and (decider is None or decider.status != status or key == "islr"):
+    if status == "not_evaluated" and (decider is None or decider.status != status):
         reason = (unknown_place(judged, case) if key == LOCATION else NOTHING) or phrases.nothing_judges(key)
     elif decider is not None and status not in ("pass", "info"):
         reason = decider.reason

@@ -14,13 +14,12 @@ from bisar_budget.analysis.vibration_limits import Echo, VibrationLimits, highes
 from bisar_budget.budget.judged_rows import BOUND, FamilyRow, Judging, worded
 from bisar_budget.effects.declared import OTHER_MODEL
 from bisar_budget.effects.effect import override_notes, subject
-from bisar_budget.effects.oscillator_acceleration import accelerated_tones, felt, flies_a_turn
+from bisar_budget.effects.oscillator_acceleration import accelerated_tones, felt, flies_a_turn, lacks_a_spectrum
 from bisar_budget.effects.oscillators import spurs_of
 from bisar_budget.effects.vibration import ECHO_CYCLES, SLOWEST, cubic_part, quadratic_part
 from bisar_budget.findings.row import Row
 from bisar_budget.mission.instruments import Oscillator
 from bisar_budget.mission.model import Mission, has_instruments
-from bisar_budget.mission.vibrations import Vibration
 from bisar_budget.phrases import NOTHING, Note
 
 SENSITIVITY = "acceleration_sensitivity"
@@ -132,6 +131,7 @@ class SpurRow(FamilyRow):
                 phrases.tone_lies(spur.frequency, cycles),
                 *override_notes(spur.name, oscillator.overridden, "frequency"),
             ),
+            displacement_m=case.moved_by_tone(row.subject, model),
         )
 
 
@@ -214,6 +214,7 @@ class AcceleratedRow(FamilyRow):
                 *_whose(mission, one.name),
                 *override_notes(one.name, oscillator.overridden, SENSITIVITY),
             ),
+            displacement_m=case.moved_by_tone(row.subject, model),
         )
 
 
@@ -238,10 +239,8 @@ def notes_of_acceleration(mission: Mission, name: str) -> tuple[Note, ...]:
     vibration = one.vibration
     if vibration.spectrum is not None or vibration.sinusoidal:
         notes += _whose(mission, name)
-    else:
+    elif not lacks_a_spectrum(mission, name):
         notes.append(phrases.oscillator_does_not_vibrate(flies_a_turn(mission, name)))
-    if isinstance(vibration, Vibration) and vibration.wideband is not None:
-        notes.append(phrases.wideband_has_no_spectrum())
     if any(line.frequency * mission.collection.aperture_time >= SLOWEST for line in vibration.sinusoidal):
         notes.append(phrases.tones_have_rows(f"{name}.oscillator.acceleration"))
     if mission.synchronization is not None and mission.synchronization.interval is not None:

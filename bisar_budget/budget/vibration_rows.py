@@ -266,7 +266,7 @@ class VibrationRow(FamilyRow):
         what = self.judged.subject
         error: MotionError = getattr(case.mission.platforms, what.owner).motion_error
         if self.is_slow:
-            return _slow_row(case, self, error)
+            return _slow_row(case, self, error, model)
         if self.members is not None:
             members = np.flatnonzero(self.members[:, case.place]).tolist()
             note = _lines_together(error, members, case.number(self.judged.declared))
@@ -336,6 +336,7 @@ def _row(
         evidence=error.source,
         remarks=(*notes, *more),
         published_margin_db=margin,
+        displacement_m=case.moved_by_tone(what, model),
     )
 
 
@@ -358,7 +359,7 @@ def _lines_together(error: MotionError, members: Sequence[int], declared: float)
     return phrases.lines_together(shown, " to ".join(dict.fromkeys(ends)), NEAR_CYCLES, declared)
 
 
-def _slow_row(case: Case, one: VibrationRow, error: MotionError) -> Row:
+def _slow_row(case: Case, one: VibrationRow, error: MotionError, model: str) -> Row:
     mission, allocation = case.mission, case.allocation
     what, combine = one.judged.subject, mission.allocation.combine
     cycles, qpe, cubic = map(case.number, (one.cycles, one.qpe, one.cubic))
@@ -386,4 +387,5 @@ def _slow_row(case: Case, one: VibrationRow, error: MotionError) -> Row:
             phrases.slower_than_a_cycle(cycles, qpe, cubic),
         ),
         binding_requirement=CUBIC if is_cubic else QUADRATIC,
+        displacement_m=case.moved_by_tone(what, model),
     )

@@ -55,6 +55,15 @@ def felt(mission: Mission, name: str) -> Felt | None:
     return Felt(vibration, oscillator.acceleration_sensitivity, own is not None)
 
 
+def lacks_a_spectrum(mission: Mission, name: str) -> Any:
+    """Whether an oscillator feels a wideband vibration, in which cases: its phase f₀Γ·4π²·f·σ/g needs a frequency."""
+    one = felt(mission, name)
+    if one is None or not isinstance(one.vibration, Vibration) or one.vibration.wideband is None:
+        return False
+    rms, is_heard = one.vibration.wideband.rms, name == "receiver" or not mission.has_direct_path
+    return is_heard & (np.asarray(rms if not isinstance(rms, tuple) else sum(rms)) * one.sensitivity > 0)
+
+
 class AcceleratedTone(NamedTuple):
     """A vibration as an oscillator's tone: platform, entry, frequency [Hz], amplitude of the acceleration [m/s²].
 

@@ -245,8 +245,7 @@ class SensorCases:
     @cached_property
     def orders(self) -> Floats:
         """Orders 0 to 3 at the nodes, by their values at the aperture edge as `_LEADING` has them, (nodes, 4)."""
-        places = self.exact.sampling.places
-        return np.asarray(np.polynomial.legendre.legvander(places, len(_LEADING) - 1) / _LEADING)
+        return orders_at(self.exact.sampling.places)
 
     def of_orders(self, covariance: Floats, along: Any = 1.0) -> tuple[Floats, Floats]:
         """`sigmas` of phases and displacement by orders 0 to 3 of independent range errors.
@@ -284,6 +283,11 @@ class SensorCases:
         rows, group = np.unique(np.stack(arrays, axis=1), axis=0, return_inverse=True)
         for place, row in enumerate(rows.tolist()):
             yield _with_numbers(value, iter(row)), np.flatnonzero(group.ravel() == place)
+
+
+def orders_at(places: Floats) -> Floats:
+    """Orders 0 to 3 at places of the aperture, (places, 4), of a size of 1 at its edge as `Parts` has them."""
+    return np.asarray(np.polynomial.legendre.legvander(places, len(_LEADING) - 1) / _LEADING)
 
 
 def _arrays_in(value: Any) -> Iterator[Floats]:

@@ -33,7 +33,7 @@ from bisar_budget import phrases
 from bisar_budget.constants import ROUNDING
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.random_effect import Moves, RandomError, SensorCases
-from bisar_budget.effects.spectra import SLOW, Parts, PowerLawPiece, heard_parts, left_parts, tone
+from bisar_budget.effects.spectra import Parts, PowerLawPiece, heard_parts, left_parts, tone
 from bisar_budget.geometry import FRAME_AXES, Vector, dot
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
@@ -268,8 +268,7 @@ class DeclaredPhase(NamedTuple):
     """Phases of one declared error, which sums count: row id, owner, quadratic and cubic phase. [rad]
 
     What is a quadratic phase and nothing else has no cubic one: None. A vibration is there, and its phases are not
-    0, only in the cases in which it is slow. `coverage` is the coverage factor that both phases have in them,
-    `moves` the most by which a slow vibration displaces the image. [m]
+    0, only in the cases in which it is slow. `coverage` is the coverage factor that both phases have in them.
     """
 
     row_id: str
@@ -277,7 +276,6 @@ class DeclaredPhase(NamedTuple):
     qpe_rad: Any
     cubic_rad: Any
     coverage: Any = 1.0
-    moves: Any = 0.0
     is_there: Any = True
 
 
@@ -293,8 +291,7 @@ def slow_phases(mission: Mission, geometry: Any = None) -> list[DeclaredPhase]:
                 phase = is_slow * 2 * math.pi * line.amplitude / mission.radar.wavelength
                 row_id = subject(name, "vibration", "sinusoidal", entry=index).id
                 qpe, cubic = phase * quadratic_part(cycles), phase * cubic_part(cycles)
-                moves = is_slow * _largest_displacement(mission, name, index, line, geometry or mission.geometry)
-                found.append(DeclaredPhase(row_id, name, qpe, cubic, moves=moves, is_there=is_slow))
+                found.append(DeclaredPhase(row_id, name, qpe, cubic, is_there=is_slow))
     return found
 
 
@@ -317,33 +314,6 @@ def slow_moves(seen: SensorCases) -> Iterator[tuple[Subject, Moves]]:
             courses = np.array((np.cos(angle), np.sin(angle))) * is_slow
             moves = Moves(PLATFORMS.index(name), ways[:, :, None], courses)
             yield subject(name, "vibration", "sinusoidal", entry=index), moves
-
-
-def _largest_displacement(mission: Mission, name: str, index: int, line: Line, geometry: Any) -> Any:
-    """Upper bound of what a slow vibration displaces the image by, in any phase, to first order. [m]
-
-    Its mean A·j₀(x) and its slope (2/T)·3A·j₁(x), x = πfT, are those of a range error, which lie a quarter of a cycle
-    apart; a line of sight that turns sees what moves across it as well. Along the gradients s and ṡ a metre of the
-    one is 1/(|s| sin γ) on the ground and a metre per second of the other 1/(|ṡ| sin γ).
-    """
-    T = mission.collection.aperture_time
-    stated: Any = getattr(mission.platforms, name).motion_error.vibration.sinusoidal[index].displacement
-    x = math.pi * line.frequency * T
-    mean = np.sin(x) / x
-    slope = np.where(x > SLOW, 3 * (mean - np.cos(x)) / x, x)  # 3·j₁(x), which is below x
-    whole = np.sqrt(sum(part * part for part in stated)) if isinstance(stated, tuple) else stated
-    rate = 2 / T * line.amplitude * slope
-    if isinstance(stated, tuple):
-        rate = rate + whole * _length(getattr(geometry, name).look_rate)
-    if mission.has_direct_path:
-        rate = rate + whole * _length(geometry.apart.look_rate)
-    sine = np.sin(geometry.gradient_angle)
-    by_mean = line.amplitude * mean / (np.hypot(*geometry.range_gradient) * sine)
-    return np.hypot(by_mean, rate / (np.hypot(*geometry.doppler_gradient) * sine))
-
-
-def _length(vector: Vector) -> Any:
-    return np.sqrt(dot(vector, vector))
 
 
 # ---------------------------------------------------------------------- by a spectrum

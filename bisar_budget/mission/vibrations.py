@@ -195,5 +195,10 @@ class FeltVibration(NamedTuple):
         """Hold a level to a spectrum."""
         yield from Vibration.problems(values)
 
+    @property
+    def is_stated(self) -> bool:
+        """Whether the file says anything of it; a zero does."""
+        return bool(self.sinusoidal) or self.spectrum is not None
+
 
 FELT_VIBRATION = Section(FeltVibration)

@@ -184,7 +184,7 @@ class _Predictions:
     """Figures without draws: combinations by the rules of `check`, standard uncertainties, a normal distribution."""
 
     def __init__(self, analysis: Analysis, variables: Sequence[Variable]) -> None:
-        self.together = Together(analysis.errors, "full", (), analysis.random, analysis.groups)
+        self.together = Together(analysis.errors, "full", (), (), analysis.random, analysis.groups)
         self.variables = variables
 
     def combined(self, judged: HeldSum, rule: str) -> float | None:

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 
-from bisar_budget.phrases import phrase
+from bisar_budget.phrases import cycles_below, phrase
 from bisar_budget.units import format_limit, format_quantity
 
 
@@ -107,7 +107,7 @@ def lines_without_amplitude() -> str:
 @phrase
 def echoes_on_the_peak(cycles: float) -> str:
     """Said of a vibration below three cycles per aperture."""
-    return f"{cycles:.3g} cycles per aperture: below three the echoes lie on the mainlobe"
+    return f"{cycles_below(cycles)} cycles per aperture: below three the echoes lie on the mainlobe"
 
 
 @phrase

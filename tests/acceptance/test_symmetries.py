@@ -23,7 +23,8 @@ from tests.simulate.conftest import only_rotated_images
 KINDS = ("position", "velocity", "acceleration")
 CLOCK = ("constant", "linear", "quadratic", "cubic")
 SCALED = ("m", "m/s", "m/s^2", "s", "s/s", "1/s", "1/s^2")  # units of errors that grow with a mission
-AT_RANDOM = {"imu", "random", "oscillator", "lever_arm", "synchronization"}  # displaced by sizes without a sign
+# Rows that are displaced by sizes without a sign.
+UNSIGNED = {"imu", "random", "oscillator", "lever_arm", "synchronization", "vibration"}
 # A search stops where a phase changes by less than 3e-5 rad beyond what is linear, an allowable within 1e-4.
 NEAR, NEAR_RAD = 1e-4, 6e-5
 
@@ -305,7 +306,7 @@ def differences(tree: Tree, way: Callable[[Tree], Seen]) -> list[Any]:
             is_same &= row.displacement_m is one.displacement_m
         else:
             moved, seen_there = other.displacement(list(row.displacement_m)), list(one.displacement_m)
-            if AT_RANDOM.intersection(row.id.split(".")):
+            if UNSIGNED.intersection(row.id.split(".")):
                 moved, seen_there = list(map(abs, moved)), list(map(abs, seen_there))
             is_same &= math.dist(moved, seen_there) <= max(NEAR * math.hypot(*moved), 2e-5)
         if not is_same:

@@ -7,6 +7,7 @@ import pytest
 from bisar_budget.budget.check import check_mission
 from bisar_budget.constants import STANDARD_GRAVITY
 from bisar_budget.findings.mission import MissionFindings
+from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.findings.row import Row
 from bisar_budget.mission.load import parse_mission
 from tests.conftest import TODAY
@@ -115,11 +116,58 @@ def codes(one: Row) -> set[str]:
     return {note.code for note in one.notes}
 
 
-def test_what_cannot_be_converted_is_said() -> None:
-    found = checked("wideband: {rms: 1 um}", "acceleration_sensitivity: 1e-9 /g", "islr: -20 dB")
-    one = row(found, "receiver.oscillator.acceleration")
-    assert {"wideband-has-no-spectrum", "oscillator-does-not-vibrate"} <= codes(one)
-    assert one.utilization == 0
+SENSITIVE = "acceleration_sensitivity: 2e-9 /g"
+
+
+def required(found: MissionFindings, key: str) -> JudgedRequirement:
+    return next(one for one in found.requirements if one.key == key)
+
+
+@pytest.mark.parametrize("combine", ["rss", "each"])
+@pytest.mark.parametrize(
+    "beside",
+    ["", ", sinusoidal: [{amplitude: 1 um, frequency: 50 Hz}]", f", {QUALIFICATION}, spectrum_level: -20 dB"],
+)
+def test_what_wideband_does_to_an_oscillator_is_not_evaluated(beside: str, combine: str) -> None:
+    """f₀·Γ·4π²·f·σ/g of 150 um is 0.012 rad at 1 Hz and 0.72 rad at 60 Hz, on both sides of -20 dB; it passed."""
+    needs = "cubic_phase_error: 90 deg, pslr: -1 dB, islr: -1 dB"
+    found = checked(f"wideband: {{rms: 150 um}}{beside}", SENSITIVE, needs, f"combine: {combine}")
+    one, islr = row(found, "receiver.oscillator.acceleration"), required(found, "islr")
+    assert (one.status, one.allowable, one.utilization) == ("not_evaluated", None, None)
+    assert found.status == islr.status == "not_evaluated"
+    assert required(found, "quadratic_phase_error").status == "pass"
+    assert one.reason is not None
+    assert one.reason.code == "wideband-has-no-spectrum"
+    assert islr.reason == one.reason
+    assert "oscillator-does-not-vibrate" not in codes(one)
+    assert not any("act on it" in warning.message for warning in found.warnings)
+
+
+@pytest.mark.parametrize(
+    ("vibration", "oscillator"),
+    [
+        ("wideband: {rms: 0}", SENSITIVE),
+        ("wideband: {rms: 150 um}", "acceleration_sensitivity: 0"),
+        ("wideband: {rms: 150 um}", "level: 0 dB"),
+        (
+            "wideband: {rms: 150 um}",
+            f"{SENSITIVE}, vibration: {{spectrum: {{20 Hz: 1e-9 g^2/Hz, 1 kHz: 1e-9 g^2/Hz}}}}",
+        ),
+    ],
+)
+def test_it_is_evaluated_where_wideband_does_nothing_to_the_oscillator(vibration: str, oscillator: str) -> None:
+    found = checked(vibration, oscillator, "cubic_phase_error: 90 deg, islr: -10 dB")
+    assert required(found, "islr").status == found.status == "pass"
+
+
+def test_one_frequency_says_what_wideband_leaves_open() -> None:
+    """As a narrow spectrum the same rms passes at 1 Hz and fails at 60 Hz."""
+    for frequency, is_met in ((1.0, True), (60.0, False)):
+        spectrum = ", ".join(
+            f"{frequency * edge} Hz: {150e-6**2 / (0.02 * frequency)} m^2/Hz" for edge in (0.99, 1.01)
+        )
+        found = checked(f"spectrum: {{{spectrum}}}", SENSITIVE, "cubic_phase_error: 90 deg, islr: -16 dB")
+        assert (required(found, "islr").status == "pass") is is_met
 
 
 def test_whose_vibration_counts_is_said() -> None:

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.effects.declared import END_OF_IMAGE
-from bisar_budget.effects.effect import MOTION_UNITS, ErrorSource, Subject
-from bisar_budget.effects.random_effect import RandomError
+from bisar_budget.effects.effect import MOTION_UNITS, Subject
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.row import DECLARE, SPECIFICATION, Row, worst_first
 from bisar_budget.findings.status import STATUS
@@ -282,13 +281,14 @@ def _phase(value: float, found: MissionFindings) -> str:
 def moves(page: Page) -> list[Contribution]:
     """Displacements of the image by errors as the file states them."""
     rows = {row.id: row.displacement_m for row in page.found.rows}
-    stated: list[ErrorSource | RandomError] = [*page.analysis.stated]
-    stated += [one for one in page.analysis.random if one.declared is not None]
-    known = [(source, rows.get(source.id)) for source in stated]
-    moving = [(source, math.hypot(*by)) for source, by in known if by is not None and any(by)]
+    stated = [one.subject for one in page.analysis.stated]
+    stated += [one.subject for one in page.analysis.random if one.declared is not None]
+    stated += [one.subject for one in page.analysis.displacing_tones]
+    known = [(what, rows.get(what.id)) for what in stated]
+    moving = [(what, math.hypot(*by)) for what, by in known if by is not None and any(by)]
     moving.sort(key=lambda one: -one[1])
     largest = max((size for _, size in moving), default=1.0)
-    return [Contribution(one.id, one.subject, format_quantity(size, "m"), size / largest) for one, size in moving]
+    return [Contribution(what.id, what, format_quantity(size, "m"), size / largest) for what, size in moving]
 
 
 def largest_contributions(page: Page) -> Iterator[doc.Block]:

@@ -23,7 +23,13 @@ from bisar_budget.effects.air_delays import (
 )
 from bisar_budget.effects.declared import CUBIC, LOCATION
 from bisar_budget.effects.navigation_errors import TILTS, arm_at, body_axes, process_of, specific_force
-from bisar_budget.effects.oscillator_acceleration import accelerated_tones, felt, flies_a_turn, pieces_by_acceleration
+from bisar_budget.effects.oscillator_acceleration import (
+    accelerated_tones,
+    felt,
+    flies_a_turn,
+    lacks_a_spectrum,
+    pieces_by_acceleration,
+)
 from bisar_budget.effects.random_effect import RandomEffect, RandomError
 from bisar_budget.effects.random_errors import random_errors
 from bisar_budget.effects.spectra import (
@@ -443,7 +449,8 @@ def _acceleration(mission: Mission, error: RandomError) -> Iterator[Step]:
     name, f_0, sync = error.owner, mission.radar.center_frequency, mission.synchronization
     one = felt(mission, name)
     if one is None or not any(error.published[:3]):
-        yield step(no_effect(mission, error))
+        if not lacks_a_spectrum(mission, name):
+            yield step(no_effect(mission, error))
         return
     yield step("Fractional frequency y = Γ·a, with Γ and the acceleration as they point at their worst")
     pieces = pieces_by_acceleration(mission, name)
@@ -554,6 +561,9 @@ def _covered(mission: Mission, error: RandomError) -> float:
 
 
 def _allowable(mission: Mission, allocation: Allocation, error: RandomError, row: Row, model: str) -> Iterator[Step]:
+    if row.reason is not None and row.reason.code == "wideband-has-no-spectrum":
+        yield step("Allowable: not known", row.reason)
+        return
     effect = error.effect(model)
     held = held_effect(mission, effect, error.coverage(mission))
     limit = allocation.qpe_limit(error.owner) * allocation.autofocus_gain

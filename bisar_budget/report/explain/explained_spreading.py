@@ -1,7 +1,7 @@
-"""How tones come to their echoes, and noise to the power that spreads: one by one, and all together."""
+"""How tones come to their echoes and displace, and noise to the power that spreads: one by one, and all together."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from bisar_budget.analysis.spread import (
     stated_powers,
     tones,
 )
+from bisar_budget.analysis.tone_displacement import TonePart
 from bisar_budget.analysis.vibration_limits import (
     LARGEST_ECHO,
     Echo,
@@ -25,12 +26,14 @@ from bisar_budget.analysis.vibration_limits import (
     quadratures,
     tone_limits,
 )
+from bisar_budget.constants import ROUNDING
 from bisar_budget.effects.declared import CUBIC
 from bisar_budget.effects.effect import subject
 from bisar_budget.effects.oscillator_acceleration import accelerated_tones, felt
 from bisar_budget.effects.oscillators import spurs_of
 from bisar_budget.faults import printable
 from bisar_budget.findings.row import Row
+from bisar_budget.geometry import GroundVector
 from bisar_budget.mission.model import Mission
 from bisar_budget.report.explain.explained_error import combined, no_limit, place, stated
 from bisar_budget.report.explain.notation import Step, Sum, WorkedEquation, number, step, with_unit
@@ -170,6 +173,37 @@ def _use_of_amplitudes(row: Row) -> Iterator[Step]:
     values = {"declared": row.declared, "allowable": row.allowable}
     worked = WorkedEquation("utilization", "10^((declared - allowable)/20)", values, row.utilization, "")
     yield step("Utilization, of amplitudes", worked)
+
+
+def moved_by_tone(parts: Sequence[TonePart], model: str, moved: GroundVector) -> Iterator[Step]:
+    """The orders of a tone, and what they displace; of one along three axes those of each axis, which add."""
+    by = "(25)" if model == "published" else "exact ranges"
+    for index, part in enumerate(parts):
+        axis = f"_{index + 1}" if len(parts) > 1 else ""
+        c, worked = part.orders[:, 0].tolist(), list[WorkedEquation]()
+        for name, each, size in zip(
+            ("east", "north"), part.per_metre[..., 0].T, part.displacement[:, 0], strict=True
+        ):
+            p = np.where(np.abs(each) > ROUNDING * np.abs(each).max(), each, 0.0).tolist()
+            values = {f"{symbol}{n}": order[n] for symbol, order in (("c_", c), ("p_", p)) for n in range(4)}
+            formula = (
+                "sqrt((c_0*p_0 - c_2*p_2)^2 + (c_1*p_1 - c_3*p_3)^2)"
+                if any(p[2:])
+                else "sqrt((c_0*p_0)^2 + (c_1*p_1)^2)"
+            )
+            worked.append(WorkedEquation(f"{name}{axis}", formula, values, float(size), "m"))
+        yield step(
+            "Orders of the tone at the aperture edge, c_0 = A·j₀(x), c_1 = 3·A·j₁(x), x = π·f·T, and what a metre of "
+            f"each displaces by {by}, p: east and north each in its worst phase",
+            *worked,
+        )
+    if len(parts) > 1:
+        of_axes = np.array([part.displacement[:, 0] for part in parts]).T
+        sums = (
+            Sum(f"{name} = {' + '.join(map(number, sizes))} = {with_unit(total, 'm')}")
+            for name, sizes, total in zip(("east", "north"), of_axes, moved, strict=True)
+        )
+        yield step("Axes may vibrate in any phase: displacements add", *sums)
 
 
 def explained_spur(mission: Mission, allocation: Allocation, row: Row) -> Iterator[Step]:

@@ -56,6 +56,7 @@ from bisar_budget.report.explain.explained_spreading import (
     explained_pslr,
     explained_spur,
     explained_tone,
+    moved_by_tone,
 )
 from bisar_budget.report.explain.notation import Step, Sum, WorkedEquation, number, step, with_unit
 from bisar_budget.report.words.requirements import requirement_finding, requirement_id
@@ -148,6 +149,9 @@ def _to_utilization(mission: Mission, found: MissionFindings, row: Row) -> Itera
             yield step("Declared, of three axes the largest", f"{key} = {row_size(row.declared, row, found)}")
     elif row.metric == DECLARE:
         yield from declarations(mission)
+    for tone in analysis.displacing_tones:
+        if tone.subject.id == row.id and row.displacement_m is not None:
+            yield from moved_by_tone(tone.parts(together.model), together.model, row.displacement_m)
     if row.declared is not None and row.allowable is not None and row.utilization is not None and row.unit != "dB":
         values = {"declared": row.declared, "allowable": row.allowable}
         yield step("Utilization", WorkedEquation("utilization", "declared/allowable", values, row.utilization, ""))
@@ -447,7 +451,7 @@ def _location_aggregate(mission: Mission, together: Together, found: MissionFind
     parts = together.displacement_parts()
     title = "(25), (30)" if row.model == "published" else "Full model, each by the sign that moves farther"
     if found.combine == "sum":
-        wander = dict(together.random_moves)
+        wander = dict(together.undirected_moves)
         vectors = [
             f"{printable(name)}: {with_unit(math.hypot(x, y), 'm')} whichever way"
             if name in wander
@@ -519,8 +523,8 @@ def not_judged(found: MissionFindings, row: Row) -> Iterator[Step]:
         yield from _asked_for(mission)
     elif code == "input-in-doubt":
         yield from _path_in_doubt(mission, row)
-    elif code in ("place-is-not-known", "clocks-are-not-set"):
-        yield from _displacing(analysis, row, reason)
+    elif code == "clocks-are-not-set":
+        yield from _displacing(analysis, row)
     else:
         for one in untaken_effects(analysis):
             if row.id in one.makers and one.makers[row.id][0]:
@@ -586,12 +590,10 @@ def _path_in_doubt(mission: Mission, row: Row) -> Iterator[Step]:
         yield step("Position errors that it declares, without coverage factor: less than the doubt", line)
 
 
-def _displacing(analysis: Analysis, row: Row, reason: Note) -> Iterator[Step]:
-    """Phases of the errors that move the image by an amount that is not computed."""
-    model = row.model or "published"
-    said, lines = reason.values[0], []
+def _displacing(analysis: Analysis, row: Row) -> Iterator[Step]:
+    """Phases of the clocks that move the image by an amount that the file leaves open."""
+    model, lines = row.model or "published", []
     names = {error.id for error in analysis.random if error.displaces_unknown}
-    names |= set(said) if isinstance(said, list | tuple) else set()
     for one in analysis.together(model).own:
         if one.row_id in names:
             qpe, cubic = (with_unit(float(phase[0]), "rad") for phase in (one.qpe_rad, one.cubic_rad))

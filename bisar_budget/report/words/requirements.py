@@ -15,7 +15,6 @@ from bisar_budget.units import format_quantity
 
 COLUMNS = ("requirement", "allowed", "reached", "use", "status", "decided by")
 _BREAKS = ("fail", "not_evaluated")
-_UNKNOWN_PLACE = "place-is-not-known"  # a reason that rows say at length
 
 
 class RequirementLine(NamedTuple):
@@ -55,14 +54,9 @@ def requirement_lines(mission: MissionFindings) -> Iterator[RequirementLine]:
             reached=requirement_size(reached, one),
             use=use_words(None if one.allowed is None or is_open else one.utilization),
             status=one.status,
-            decided_by=(_short(one.reason) if is_open and one.reason else one.row) or ("" if remark else "-"),
+            decided_by=(one.reason if is_open and one.reason else one.row) or ("" if remark else "-"),
             remark=remark,
         )
-
-
-def _short(reason: phrases.Note) -> str:
-    """A reason that rows say at length, without the ids of the rows."""
-    return "slow vibration moves the image too" if reason.code == _UNKNOWN_PLACE else reason
 
 
 def _remarks(one: JudgedRequirement, mission: MissionFindings) -> Iterator[str]:
@@ -159,8 +153,7 @@ def _texts(values: object) -> list[str]:
 
 def is_said_with_the_table(row: Row) -> bool:
     """Whether the table of requirements, and what stands below it, says why a row is not evaluated."""
-    codes = ("effect-is-not-judged", _UNKNOWN_PLACE)
-    return row.status == "not_evaluated" and row.reason is not None and row.reason.code in codes
+    return row.status == "not_evaluated" and row.reason is not None and row.reason.code == "effect-is-not-judged"
 
 
 def unseen(mission: MissionFindings) -> list[JudgedRequirement]:

@@ -1,0 +1,117 @@
+"""Displacement of the image by tones: vibrations of platforms, and tones of their oscillators.
+
+Over an aperture a tone of amplitude A and x = πfT has the mean A·j₀(x) and, at the edge, the linear part 3A·j₁(x).
+They displace as those of any range error: by (25), or, as a line of sight turns, by orders 0 to 3 over exact ranges.
+Orders 0 and 2 are largest together, 1 and 3 a quarter of a cycle later, so that with the phase of the tone the image
+runs on an ellipse. East and north count in the worst phase of each: their root-sum-square is √2 times the rms
+displacement over all phases, which is the largest one or more, up to √2 times that. Derived here, of first order in
+the amplitude; held to exact ranges in all phases (`tests/analysis/test_tone_displacement.py`).
+
+The axes of a vibration may be in any phase: what each displaces adds. What is faster displaces less, as 1/(fT).
+"""
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from bisar_budget.constants import ROUNDING
+from bisar_budget.effects.declared import published_planes
+from bisar_budget.effects.effect import PLATFORMS, Subject, subject
+from bisar_budget.effects.random_effect import orders_at
+from bisar_budget.effects.spectra import tone
+from bisar_budget.effects.vibration import counted
+from bisar_budget.geometry import BistaticGeometry
+from bisar_budget.mission.model import Mission
+from bisar_budget.mission.platforms import MotionError
+from bisar_budget.ranges.exact_ranges import ExactRanges, Floats
+
+if TYPE_CHECKING:
+    from bisar_budget.analysis.spread import Tone
+
+
+class TonePart(NamedTuple):
+    """A tone along one way: amplitudes of its orders 0 to 3 at the aperture edge, and what a metre of each displaces.
+
+    Signed, (4, n) [m] and (4, 2, n), east and north [m/m].
+    """
+
+    orders: Floats
+    per_metre: Floats
+
+    @property
+    def displacement(self) -> Floats:
+        """East and north, each in its worst phase, (2, n). [m]"""
+        constant, linear, quadratic, cubic = self.orders[:, None] * self.per_metre
+        return np.asarray(np.hypot(constant - quadratic, linear - cubic))
+
+
+class ToneDisplacement(NamedTuple):
+    """The row of a tone, and by each model its parts, which may be in any phase."""
+
+    subject: Subject
+    published: Sequence[TonePart]
+    full: Sequence[TonePart]
+
+    def parts(self, model: str) -> Sequence[TonePart]:
+        """Those of a model."""
+        return self.full if model == "full" else self.published
+
+    def by(self, model: str) -> Floats:
+        """Displacement east and north by a model, each in its worst phase, (2, n). [m]"""
+        return np.asarray(sum(part.displacement for part in self.parts(model)))
+
+
+def tone_displacements(
+    mission: Mission, geometry: BistaticGeometry, exact: ExactRanges, tones: Sequence["Tone"]
+) -> list[ToneDisplacement]:
+    """Displacement by every vibration of a platform, and by those of the `tones` that are an oscillator's.
+
+    An oscillator's tone below one cycle per aperture counts in the random row of its acceleration.
+    """
+    plane, found = _by_plane(geometry, exact), list[ToneDisplacement]()
+    for place, name in enumerate(PLATFORMS):
+        error: MotionError = getattr(mission.platforms, name).motion_error
+        for index, line in enumerate(error.vibration.sinusoidal):
+            value, cycles = line.displacement, line.frequency * mission.collection.aperture_time
+            if isinstance(value, tuple):
+                ways, sizes = getattr(geometry, name).frame(error.frame), value
+            else:  # along the line of sight, as it turns
+                ways, sizes = [[part / exact.ranges[place] for part in exact.tracks[place]]], (value,)
+            published = TonePart(_orders(cycles, counted(mission, name, value, "pslr", geometry)), plane)
+            full = [
+                TonePart(_orders(cycles, size), _by_ranges(exact, exact.along(place, way)))
+                for way, size in zip(ways, sizes, strict=True)
+            ]
+            found.append(ToneDisplacement(subject(name, "vibration", "sinusoidal", entry=index), [published], full))
+    by_models = [plane, _by_ranges(exact, np.ones_like(exact.times))]
+    if mission.has_direct_path:  # the constant phase between direct path and echo moves nothing
+        by_models = [per_metre * np.array([0.0, 1.0, 1.0, 1.0])[:, None, None] for per_metre in by_models]
+    for one in tones:
+        if one.subject.kind == "oscillator":
+            orders = _orders(one.cycles, one.is_there * one.phase / exact.k)
+            found.append(ToneDisplacement(one.subject, *([TonePart(orders, per_metre)] for per_metre in by_models)))
+    return found
+
+
+def _orders(cycles: Any, size: Any) -> Floats:
+    """Orders 0 to 3 of a tone of so many cycles per aperture and an amplitude [m], (4, n). [m]"""
+    quadratic, cubic, _, constant, linear = size * tone(math.pi * np.atleast_1d(cycles))
+    return np.array([constant, linear, quadratic, cubic])
+
+
+def _by_plane(geometry: BistaticGeometry, exact: ExactRanges) -> Floats:
+    """Displacement by a metre of each order by (25), (4, 2, n); not a number where Q has no inverse. [m/m]"""
+    plane, _ = published_planes(geometry)
+    found = np.zeros((4, *np.shape(exact.place_weights)[::2]))
+    scale = 1 / np.where(plane.is_singular, math.nan, plane.determinant)
+    for way, (by_value, by_slope) in enumerate(plane.adjugate):
+        found[0, way], found[1, way] = by_value * scale, by_slope * scale / exact.half
+    return found
+
+
+def _by_ranges(exact: ExactRanges, along: Floats) -> Floats:
+    """The same over exact ranges, of an error of which the range has `along` at the nodes, (nodes, n). [m/m]"""
+    seen = np.where(np.abs(along) > ROUNDING, along, 0.0)
+    return np.asarray(np.einsum("wnc,nc,no->owc", exact.place_weights, seen, orders_at(exact.sampling.places)))
