@@ -49,6 +49,7 @@ _AGES, _PER_AGE = 24, 8  # turns within the age of a setting that are followed, 
 _TURNED = 256  # turns within an averaging, beyond which nothing of a tone is left in its line
 _PER_CYCLE = 8  # samples of the fastest tone that is flown, joined by straight lines
 _MAX_TONES = 1 << 18
+_NARROW, _IN_NARROW = 4, 8  # tones at even distances below which a piece is narrow, and those it then has of its own
 _NUMBERS = 1 << 20  # drawn at once
 _FAR = 32  # apertures from which on an exchange knows nothing of a tone that turns in one
 _FEWEST = 4  # exchanges in a period of tones: those on either side of an aperture are not the same
@@ -505,7 +506,7 @@ def powers_at(powers: Floats, count: int) -> Floats:
 class _Tones:
     """A spectrum as tones: those that turn within the aperture at even distances, the others by logarithms.
 
-    The fast ones repeat after a period [s]. What is faster still is another number at every moment, of the sigma
+    A piece between which few of those lie has tones of its own, which stand behind the slow ones. The fast ones repeat after a period [s]. What is faster still is another number at every moment, of the sigma
     `rest`.
     """
 
@@ -518,11 +519,20 @@ class _Tones:
     ) -> None:
         self.period = _PERIODS * aperture_time if period is None else period
         high, fine = max((piece.high for piece in pieces), default=0.0), 1 / self.period
+        narrow: list[PowerLawPiece] = []
         if slow is None:
             slow = np.geomspace(_SLOWEST / aperture_time, fine / 2, _SLOW_TONES + 1)
+            narrow = [one for one in pieces if one.low >= fine / 2 and one.high - one.low < _NARROW * fine]
+            pieces = tuple(one for one in pieces if one not in narrow)
         self.slow: Floats = (slow[1:] + slow[:-1]) / 2
         # Sigma of what a tone has of cosine, and of sine: √(S·Δf).
         self.slow_size: Floats = np.sqrt(density(pieces, self.slow) * (slow[1:] - slow[:-1]))
+        self.count = self.slow.size
+        for piece in narrow:
+            width = (piece.high - piece.low) / _IN_NARROW
+            own = piece.low + width * (np.arange(_IN_NARROW) + 0.5)
+            self.slow = np.append(self.slow, own)
+            self.slow_size = np.append(self.slow_size, np.sqrt(piece.at(own) * width))
         pieces = _above(pieces, float(slow[-1]))
         count = min(_MAX_TONES, max(1, math.ceil(high / fine)))
         self.fast: Floats = fine * np.arange(1.0, count + 1)
@@ -537,11 +547,16 @@ class _Tones:
         return found
 
     def slow_at(self, times: Floats, drawn: Floats) -> Floats:
-        """Sums of the slow tones, (draws, times). [rad]"""
+        """Sums of the slow tones, and of those of narrow pieces, (draws, times). [rad]"""
         few = times if times.size <= _FLOWN else np.linspace(times[0], times[-1], _FLOWN)
-        cosines, sines = _slow_waves(self.slow, few)
-        found: Floats = drawn[0] @ cosines.T + drawn[1] @ sines.T
-        return found if few is times else np.stack([np.interp(times, few, one) for one in found])
+        cosines, sines = _slow_waves(self.slow[: self.count], few)
+        found: Floats = drawn[0, :, : self.count] @ cosines.T + drawn[1, :, : self.count] @ sines.T
+        if few is not times:
+            found = np.stack([np.interp(times, few, one) for one in found])
+        for index in range(self.count, self.slow.size):
+            turn = 2 * math.pi * self.slow[index] * times
+            found += np.outer(drawn[0, :, index], np.cos(turn)) + np.outer(drawn[1, :, index], np.sin(turn))
+        return found
 
     def fast_at(self, times: Floats, draws: int, rng: np.random.Generator, later: float | None = None) -> Floats:
         """Sums of the fast tones at times that divide their period evenly, (draws, times); see `at`. [rad]"""
