@@ -12,8 +12,9 @@ from bisar_budget.analysis.analysis import Analysis, Case
 from bisar_budget.analysis.spread import islr_of
 from bisar_budget.analysis.vibration_limits import tone_limits
 from bisar_budget.budget.judged_rows import BOUND, Judged, Judging, worded
+from bisar_budget.budget.vibration_rows import folds
 from bisar_budget.effects.effect import override_notes
-from bisar_budget.effects.oscillator_acceleration import accelerated_tones, felt, flies_a_turn
+from bisar_budget.effects.oscillator_acceleration import AcceleratedTone, accelerated_tones, felt, flies_a_turn
 from bisar_budget.effects.vibration import SLOWEST, cubic_part, quadratic_part
 from bisar_budget.findings.row import Row
 from bisar_budget.mission.instruments import Oscillator
@@ -34,16 +35,16 @@ def accelerated_rows(judging: Judging, analysis: Analysis, model: str) -> Iterat
     metric, by_platform = tone_limits(mission, analysis.allocation)
     for place, one in enumerate(accelerated_tones(mission, analysis.geometry) if has_instruments(mission) else ()):
         cycles = judging.array(one.frequency * mission.collection.aperture_time)
-        is_there, per_unit = cycles >= SLOWEST, judging.array(one.per_unit)
+        T, per_unit = mission.collection.aperture_time, judging.array(one.per_unit)
+        is_there = per_unit > 0 if one.left.is_folded else cycles >= SLOWEST
         if not is_there.any():
             continue
         declared, limits = judging.array(one.sensitivity), by_platform.get(one.name)
         phase = declared * per_unit
-        qpe, cubic = phase * quadratic_part(cycles), phase * cubic_part(cycles)
+        qpe, cubic = map(judging.array, phases_beside(one, T))
         is_over_phase = qpe > analysis.allocation.qpe_limit(one.name) * analysis.allocation.autofocus_gain * BOUND
         if mission.requirements.cubic_phase_error is not None:
             is_over_phase = is_over_phase | (cubic > mission.requirements.cubic_phase_error * BOUND)
-        is_over_phase &= cycles < _ECHO_CYCLES
         if limits is None:
             judged = judging.row(one.subject, declared, None, doubt=is_over_phase, is_info=~is_over_phase)
             is_over_other = np.zeros(judging.cases, dtype=bool)
@@ -62,6 +63,18 @@ def accelerated_rows(judging: Judging, analysis: Analysis, model: str) -> Iterat
         yield AcceleratedRow(judged, place, is_there, is_over_other, is_over_phase)
 
 
+def phases_beside(one: AcceleratedTone, aperture_time: Any) -> tuple[Any, Any]:
+    """Quadratic and cubic phase of the echoes that lie beside the mainlobe, in their worst phases. [rad]"""
+    found: list[Any] = [0.0, 0.0]
+    for frequency, share in zip(one.left.frequencies, one.left.echoes(aperture_time), strict=True):
+        cycles = frequency * aperture_time
+        phase = np.where(cycles < _ECHO_CYCLES, one.free * one.sensitivity * share, 0.0)
+        found = [
+            total + phase * part(cycles) for total, part in zip(found, (quadratic_part, cubic_part), strict=True)
+        ]
+    return found[0], found[1]
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class AcceleratedRow:
     """A vibration of an oscillator in many cases, by its place among them; `is_there` where it is fast enough."""
@@ -76,7 +89,8 @@ class AcceleratedRow:
         """The row of one case, by the model that judges it."""
         mission, row, doubt, over = case.mission, self.judged, NOTHING, NOTHING
         one = accelerated_tones(mission)[self.place]
-        cycles, missing = one.frequency * mission.collection.aperture_time, phrases.no_requirement_of("pslr")
+        T, missing = mission.collection.aperture_time, phrases.no_requirement_of("pslr")
+        cycles = one.frequency * T
         if not math.isnan(row.allowable[case.place]):
             echoes = (20 * math.log10(one.per_unit * size / 2) for size in map(case.number, row[2:4]) if size)
             over = phrases.echoes_over(*echoes) if row.declared[case.place] else NOTHING
@@ -87,7 +101,7 @@ class AcceleratedRow:
                 doubt = phrases.other_model_allows(other, case.number(by_other), "s^2/m")
         if self.is_over_phase[case.place]:
             limit = float(case.allocation.qpe_limit(one.name) * case.allocation.autofocus_gain)
-            phases = one.phase * float(quadratic_part(cycles)), one.phase * float(cubic_part(cycles))
+            phases = [float(phase) for phase in phases_beside(one, T)]
             doubt = phrases.phase_of_vibration_over(
                 phases[0], limit, phases[1], mission.requirements.cubic_phase_error
             )
@@ -106,6 +120,7 @@ class AcceleratedRow:
             remarks=(
                 phrases.tone_lies(one.frequency, cycles),
                 phrases.shakes_an_oscillator(float(one.acceleration), one.phase),
+                *folds(one.left, one.free * one.sensitivity, T, f"{one.name}.oscillator.acceleration"),
                 *_whose(not _is_own(mission, one.name)),
                 *override_notes(one.name, oscillator.overridden, SENSITIVITY),
             ),

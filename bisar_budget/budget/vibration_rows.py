@@ -25,7 +25,7 @@ from bisar_budget.analysis.vibration_limits import (
 from bisar_budget.budget.judged_rows import BOUND, REQUIREMENTS, Floats, Judged, Judging, worded
 from bisar_budget.effects.declared import CUBIC, QUADRATIC
 from bisar_budget.effects.effect import PLATFORMS, Subject, override_notes, subject
-from bisar_budget.effects.oscillators import spurs_of
+from bisar_budget.effects.oscillator_tones import LeftTone, spurs_of
 from bisar_budget.effects.spectra import tone
 from bisar_budget.effects.vibration import (
     NEAR_CYCLES,
@@ -300,7 +300,8 @@ def spur_rows(judging: Judging, analysis: Analysis, model: str) -> Iterator["Spu
         else:
             limits = VibrationLimits(*(2 * math.pi / mission.radar.wavelength * limit for limit in limits))
             is_over_other = phase > (limits.full if model == "published" else limits.published) * BOUND
-            is_near = spur.frequency * mission.collection.aperture_time < ECHO_CYCLES
+            T = mission.collection.aperture_time
+            is_near = spur.left.slowest_echo(T) * T < ECHO_CYCLES
             judged = judging.row(  # the amplitude of an echo over that of the response
                 what,
                 phase / 2,
@@ -313,7 +314,7 @@ def spur_rows(judging: Judging, analysis: Analysis, model: str) -> Iterator["Spu
         judged = judged.in_decibel().held_to(metric)
         if metric == "islr":
             judged = judged._replace(islr_db=islr_of(mission, phase**2 / 2))
-        yield SpurRow(judged, place, is_over_other)
+        yield SpurRow(judged, place, is_over_other, (phase > 0) | (not spur.left.is_folded))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -323,14 +324,15 @@ class SpurRow:
     judged: Judged
     place: int
     is_over_other: Any = False
-    is_there: bool = True
+    is_there: Any = True
 
     def in_words(self, case: Case, model: str) -> Row:
         """The row of one case, by the model that judges it."""
         mission, row, doubt, over = case.mission, self.judged, NOTHING, NOTHING
         spur = spurs_of(mission)[self.place]
         oscillator: Oscillator = getattr(mission.platforms, spur.name).oscillator
-        cycles, missing = spur.frequency * mission.collection.aperture_time, phrases.no_requirement_of("pslr")
+        T, missing = mission.collection.aperture_time, phrases.no_requirement_of("pslr")
+        cycles = spur.frequency * T
         if not math.isnan(row.allowable[case.place]):
             over = phrases.echoes_over(case.number(row.declared), case.number(row.allowable))
             if self.is_over_other[case.place]:
@@ -347,14 +349,30 @@ class SpurRow:
             over=over,
             doubt=doubt,
             no_limit=missing,
-            not_evaluated=phrases.echoes_on_the_mainlobe(cycles, ECHO_CYCLES),
+            not_evaluated=phrases.echoes_on_the_mainlobe(spur.left.slowest_echo(T) * T, ECHO_CYCLES),
             info=missing,
             evidence=oscillator.source,
             remarks=(
                 phrases.tone_lies(spur.frequency, cycles),
+                *folds(spur.left, spur.free, T, subject(spur.name, "oscillator").id),
                 *override_notes(spur.name, oscillator.overridden, "frequency"),
             ),
         )
+
+
+def folds(left: LeftTone, free: float, aperture_time: float, row_id: str) -> tuple[Note, ...]:
+    """Say what of a tone is folded below one cycle per aperture, and of which row its phases are."""
+    slow = [
+        (float(share), float(frequency))
+        for frequency, share in zip(left.frequencies, left.shares, strict=True)
+        if left.is_folded and frequency * aperture_time < SLOWEST and share > 0
+    ]
+    if not slow:
+        return ()
+    parts = left.slow_parts(aperture_time)
+    qpe, cubic = (free * math.sqrt(float(part)) for part in (parts.quadratic, parts.cubic))
+    frequency = max(slow)[1]
+    return (phrases.tone_is_folded(frequency, frequency * aperture_time, qpe, cubic, row_id),)
 
 
 def pslr_row(judging: Judging, found: Sequence[Tone], required: Any) -> "PslrRow":

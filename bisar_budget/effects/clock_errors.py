@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from bisar_budget.effects.effect import subject
+from bisar_budget.effects.oscillator_tones import spurs_of
 from bisar_budget.effects.oscillators import noise_of
 from bisar_budget.effects.random_effect import RandomEffect, RandomError, SensorCases
 from bisar_budget.effects.spectra import Floats, Parts, PowerLawPiece, heard_parts, left_parts, link_parts, set_parts
@@ -14,14 +15,19 @@ from bisar_budget.mission.instruments import Oscillator
 
 
 def oscillator_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
-    """Phase noise of a platform's oscillator, or what exchanged pulses leave of it."""
+    """Phase noise of a platform's oscillator, or what exchanged pulses leave of it, and spurs that they make slow."""
     mission = seen.mission
     oscillator: Oscillator | None = getattr(mission.platforms, name).oscillator
     if oscillator is None:
         return
     found = _left_at_1_hz(seen, name, oscillator)
     scale = mission.radar.center_frequency**2 * 10 ** (np.asarray(oscillator.level) / 10)
-    published, full = _of_clock(seen, Parts(*found * scale))
+    found = found * scale
+    for spur in spurs_of(mission, seen.geometry):
+        slow = spur.slow_parts(seen.aperture_time)
+        if spur.name == name and slow is not None:
+            found += slow.rows.reshape(len(found), -1)
+    published, full = _of_clock(seen, Parts(*found))
     key = ("platforms", name, "oscillator")
     path = key if oscillator.sensor is None else (*key, "sensor")
     yield RandomError(

@@ -1,19 +1,14 @@
-"""Phase noise of an oscillator, from its mask, Allan deviation or power law, and its spurs. Spectra are one-sided."""
+"""Phase noise of an oscillator, from its mask, Allan deviation or power law. Spectra are one-sided."""
 
 import math
 from collections.abc import Sequence
 from functools import lru_cache
 from itertools import combinations, pairwise
-from typing import Any, NamedTuple
-
-import numpy as np
+from typing import NamedTuple
 
 from bisar_budget import evaluators, phrases
-from bisar_budget.effects.effect import PLATFORMS
-from bisar_budget.effects.spectra import PowerLawPiece, held
-from bisar_budget.geometry import BistaticGeometry
+from bisar_budget.effects.spectra import PowerLawPiece
 from bisar_budget.mission.instruments import Oscillator, PowerLaw
-from bisar_budget.mission.model import Mission
 from bisar_budget.mission.readers import Points, SortedPoints
 from bisar_budget.phrases import NOTHING, Note
 
@@ -176,48 +171,3 @@ def _least_squares(rows: Sequence[Sequence[float]]) -> list[float] | None:
     for i in reversed(range(count)):
         right[i] = (right[i] - math.fsum(matrix[i][j] * right[j] for j in range(i + 1, count))) / matrix[i][i]
     return [value / size for value, size in zip(right, sizes, strict=True)]
-
-
-class Spur(NamedTuple):
-    """A tone of an oscillator: platform, entry by frequency, frequency [Hz], peak phase at centre frequency [rad].
-
-    `left` is the part of it that exchanged pulses leave, which the phase has.
-    """
-
-    name: str
-    entry: int
-    frequency: float
-    phase: Any
-    left: Any
-
-
-def spurs_of(mission: Mission, geometry: BistaticGeometry | None = None) -> list[Spur]:
-    """Tones that reach the image: with a direct path as clock those of the receiver alone, heard twice.
-
-    `geometry` is that of many cases, where numbers of the mission are arrays.
-    """
-    found = []
-    for name in PLATFORMS[mission.has_direct_path :]:
-        oscillator = getattr(mission.platforms, name).oscillator
-        for index, (frequency, level) in enumerate(oscillator.spurs if oscillator is not None else ()):
-            scale = mission.radar.center_frequency / oscillator.frequency
-            left = left_of_tone(frequency, mission, geometry or mission.geometry)
-            # A sideband of a phase φ has the amplitude φ/2 of the carrier.
-            found.append(Spur(name, index, frequency, 2 * 10 ** (level / 20) * scale * left, left))
-    return found
-
-
-def left_of_tone(frequency: Any, mission: Mission, geometry: BistaticGeometry) -> Any:
-    """Largest part of a tone that exchanged pulses leave, at its own frequency or at one that it is folded to.
-
-    A receiver that hears the transmitter has 2|sin(πfΔt)| of its own.
-    """
-    sync = mission.synchronization
-    if mission.has_direct_path:
-        return 2 * np.abs(np.sin(math.pi * frequency * geometry.echo_delay))
-    if sync is None or sync.interval is None:
-        return 1.0
-    turns = frequency * np.asarray(sync.interval)
-    images = [np.rint(turns) + n for n in (-1, 0, 1)]
-    passed = [np.where(image != 0, np.sqrt(held(2 * math.pi * (turns - image))), 0.0) for image in images]
-    return np.max([1 - np.sqrt(held(2 * math.pi * turns)), *passed], axis=0)

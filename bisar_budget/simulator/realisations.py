@@ -506,8 +506,8 @@ def powers_at(powers: Floats, count: int) -> Floats:
 class _Tones:
     """A spectrum as tones: those that turn within the aperture at even distances, the others by logarithms.
 
-    A piece between which few of those lie has tones of its own, which stand behind the slow ones. The fast ones repeat after a period [s]. What is faster still is another number at every moment, of the sigma
-    `rest`.
+    A piece so narrow that few of the fast ones lie in it has tones of its own, which stand behind the slow ones. The
+    fast ones repeat after a period [s]. What is faster still is another number at every moment, of the sigma `rest`.
     """
 
     def __init__(
