@@ -29,6 +29,7 @@ from bisar_budget.effects.oscillator_acceleration import (
     pieces_by_acceleration,
     turn_courses,
 )
+from bisar_budget.effects.oscillator_tones import LeftTone, spurs_of
 from bisar_budget.effects.oscillators import noise_of
 from bisar_budget.effects.random_effect import RandomError, parts_of_largest
 from bisar_budget.effects.random_errors import random_errors
@@ -313,7 +314,11 @@ def phase_courses(
     bends = [bend.draw(rng) for _ in range(draws)] if bend is not None else []
     if interval is not None:
         # Pulses that follow each other faster take the phase away to nothing that an image shows.
-        return size * _between_exchanges(pieces, T, max(interval, T / _MOST_KNOTS), times, draws, rng, bends)
+        left = _between_exchanges(pieces, T, max(interval, T / _MOST_KNOTS), times, draws, rng, bends)
+        for frequency, amplitude in _folded_tones(mission, error):
+            start = rng.uniform(0, 2 * math.pi, (draws, 1))
+            left += math.sqrt(2) * amplitude * np.cos(2 * math.pi * frequency * times + start)
+        return size * left
     pieces = _below(pieces, highest)
     if sync is not None and sync.is_direct_path:
         if error.owner == "transmitter":  # both paths have its phase at one time
@@ -411,10 +416,35 @@ def oscillator_sinusoids(mission: Mission, name: str) -> tuple[PathSinusoid, ...
     """
     metres, T = mission.radar.wavelength / (2 * math.pi), mission.collection.aperture_time
     return tuple(
-        PathSinusoid(metres * one.phase, one.frequency, 0.0 if one.in_quadrature is None else math.pi / 2)
+        PathSinusoid(
+            metres * one.free * one.sensitivity * share,
+            frequency,
+            0.0 if one.in_quadrature is None or place else math.pi / 2,
+        )
         for one in accelerated_tones(mission)
-        if one.name == name and one.frequency * T >= SLOWEST
+        for place, (frequency, share) in enumerate(zip(one.left.frequencies, one.left.shares, strict=True))
+        if one.name == name and one.frequency * T >= SLOWEST and frequency * T >= SLOWEST and (share or not place)
     )
+
+
+def _folded_tones(mission: Mission, error: RandomError) -> list[tuple[float, float]]:
+    """Frequencies [Hz] and amplitudes, by a unit, of what of an oscillator's tones straight lines make slow.
+
+    What they leave of a vibration that is slow itself is drawn as a whole.
+    """
+    T, name = mission.collection.aperture_time, error.owner
+    tones: list[tuple[float, LeftTone]] = []
+    if error.subject.axis == "acceleration":
+        of_platform = [one for one in accelerated_tones(mission) if one.name == name]
+        tones = [(one.free, one.left) for one in of_platform if one.frequency * T >= SLOWEST]
+    elif error.subject.kind == "oscillator":
+        tones = [(spur.free, spur.left) for spur in spurs_of(mission) if spur.name == name]
+    return [
+        (frequency, free * share)
+        for free, left in tones
+        for frequency, share in zip(left.frequencies, left.shares, strict=True)
+        if frequency * T < SLOWEST and share
+    ]
 
 
 class _Bend:
@@ -430,7 +460,7 @@ class _Bend:
         sync = mission.synchronization
         is_linked = sync is not None and sync.interval is not None  # what exchanges leave is drawn
         self.slow = [
-            (one.frequency, one.free if is_linked else one.per_unit)
+            (one.frequency, one.free if is_linked else one.free * one.left.shares[0])
             for one in accelerated_tones(mission)
             if one.name == name and one.frequency * T < SLOWEST
         ]

@@ -7,6 +7,7 @@ import pytest
 from numpy.polynomial import legendre
 
 from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.effects.random_errors import random_errors
 from bisar_budget.effects.spectra import PowerLawPiece
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.simulator.phase_history import Floats
@@ -14,6 +15,7 @@ from bisar_budget.simulator.realisations import (
     _between_exchanges,
     _Tones,
     oscillator_sinusoids,
+    phase_courses,
     powers_at,
     tones_at,
 )
@@ -121,3 +123,26 @@ def test_a_narrow_piece_flies(frequency: float) -> None:
     quadratic = legendre.legfit(times / 2, drawn.T, 3)[2]
     assert np.sqrt(np.mean(drawn**2)) == pytest.approx(math.sqrt(expected[0]), rel=0.05)
     assert np.std(quadratic) == pytest.approx(math.sqrt(expected[1]), rel=0.07)
+
+
+@pytest.mark.parametrize("kind", ["oscillator", "acceleration"])
+def test_what_exchanges_make_of_a_tone_flies(kind: str) -> None:
+    """1.4 Hz every second is 0.4 Hz; of 2 s slow, 0.8 cycles, with the sigma of its row; at 1.4 Hz it is an echo."""
+    spur, shake = {"spurs": {"1.4 Hz": "-80 dBc"}}, {"sinusoidal": [{"amplitude": "1 mg", "frequency": "1.4 Hz"}]}
+    felt = {"acceleration_sensitivity": "1e-9 /g", "vibration": shake}
+    part = {"frequency": "10 MHz", "power_law": {"h0": 1e-34}, **(spur if kind == "oscillator" else felt)}
+    linear = {"method": "linear", "interval": "1 s", "error": 0}
+    mission = parse_mission(
+        mission_text(platforms__receiver__oscillator=part, synchronization=linear, collection__aperture_time="2 s"),
+        "m.yaml",
+    )
+    row_id = "receiver.oscillator" + (".acceleration" if kind == "acceleration" else "")
+    (error,) = (one for one in random_errors(mission) if one.id == row_id)
+    times = np.linspace(-1, 1, 513)
+    drawn = phase_courses(mission, error, times, 4_000, np.random.default_rng(2))
+    quadratic, cubic = (legendre.legfit(times, drawn.T, 3)[order] for order in (2, 3))
+    assert 1.5 * np.std(quadratic) == pytest.approx(error.published.quadratic * error.declared, rel=0.05)
+    assert 2.5 * np.std(cubic) == pytest.approx(error.published.cubic * error.declared, rel=0.05)
+    if kind == "acceleration":
+        flown = oscillator_sinusoids(mission, "receiver")
+        assert {round(one.frequency, 6) for one in flown} >= {0.6, 1.4}
