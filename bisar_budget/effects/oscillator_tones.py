@@ -59,9 +59,8 @@ class LeftTone(NamedTuple):
 
     def place(self, aperture_time: Any) -> Any:
         """Frequency of the largest echo. [Hz]"""
-        echoes, frequencies = (
-            np.array(np.broadcast_arrays(*columns)) for columns in (self.echoes(aperture_time), self.frequencies)
-        )
+        both = np.array(np.broadcast_arrays(*self.echoes(aperture_time), *self.frequencies))
+        echoes, frequencies = np.split(both, 2)
         return np.take_along_axis(frequencies, echoes.argmax(axis=0)[None], axis=0)[0]
 
     def slow_parts(self, aperture_time: Any) -> Parts:

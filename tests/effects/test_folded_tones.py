@@ -120,3 +120,18 @@ def test_echoes_lie_where_the_transform_has_them(frequency: float, interval: flo
     assert echo is not None
     # Echoes farther apart than 2.5 cells raise each other by less than 1.1 dB, which is left out.
     assert 0.88 < float(echo.phase) / (PHASE * highest) < 1.02
+
+
+@pytest.mark.parametrize(
+    ("key", "values"),
+    [("synchronization.interval", ["90 ms", "99 ms", "0.1 s"]), ("collection.aperture_time", ["1 s", "4 s", "8 s"])],
+)
+@pytest.mark.parametrize("one", [spur(50.2), spur(50.2, "islr: -10 dB"), shaken(50.2, PHASE)])
+def test_cases_together_are_what_each_is_alone(one: str, key: str, values: list[str]) -> None:
+    mission = bb.loads(one)
+    table = bb.sweep(mission, {key: values})
+    for place, value in enumerate(values):
+        alone = bb.check(mission.replace({key: value}))
+        assert alone.status == table["status"][place]
+        worst = alone[table["worst_row"][place]]
+        assert worst.utilization == pytest.approx(table["utilization"][place], rel=1e-9)
