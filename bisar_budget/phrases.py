@@ -716,6 +716,15 @@ def tone_lies(frequency: float, cells: float) -> str:
     return f"at {format_quantity(frequency, 'Hz')}, {cells:.3g} cells from the response"
 
 
+@phrase
+def tone_is_folded(frequency: float, cycles: float, qpe: float, cubic: float, row_id: str) -> str:
+    """Said of a tone of an oscillator between exchanges. [Hz]"""
+    return (
+        f"straight lines between exchanges fold it to {format_quantity(frequency, 'Hz')}, {cycles:.3g} cycles per "
+        f"aperture: QPE {qpe:.3g} rad, cubic phase {cubic:.3g} rad at most, which count in {row_id}"
+    )
+
+
 # ---------------------------------------------------------------------- vibration
 @phrase
 def share_of_power_over(metric: str, rule: str) -> str:

@@ -20,7 +20,7 @@ from bisar_budget.constants import MAINLOBE_ENERGY
 from bisar_budget.effects.declared import CUBIC
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.oscillator_acceleration import accelerated_tones
-from bisar_budget.effects.oscillators import spurs_of
+from bisar_budget.effects.oscillator_tones import LeftTone, spurs_of
 from bisar_budget.effects.vibration import SLOWEST, counted, lines_of
 from bisar_budget.mission.model import Mission, Simulation, has_instruments
 
@@ -124,13 +124,27 @@ def tones(mission: Mission, geometry: Any = None) -> list[Tone]:
                 found.append(Tone(what, phase, cycles, is_there))
     if has_instruments(mission):
         for spur in spurs_of(mission, geometry):
-            found.append(Tone(spur.subject, spur.phase, spur.frequency * T))
+            found += _echoes(Tone(spur.subject, spur.phase, spur.frequency * T), spur.free, spur.left, mission)
         for one in accelerated_tones(mission, geometry):
             cycles = one.frequency * T
-            is_there = np.asarray(cycles >= SLOWEST)[()]
-            if np.any(is_there):
-                found.append(Tone(one.subject, one.phase, cycles, is_there, one.in_quadrature))
-    return found
+            alone = Tone(one.subject, one.phase, cycles, np.asarray(cycles >= SLOWEST)[()], one.in_quadrature)
+            found += _echoes(alone, one.free * one.sensitivity, one.left, mission)
+    return [one for one in found if np.any(one.is_there)]
+
+
+def _echoes(alone: Tone, free: Any, left: LeftTone, mission: Mission) -> list[Tone]:
+    """Echoes of an oscillator's tone; of one that is folded where each lies, or all power where the largest does."""
+    if not left.is_folded:
+        return [alone]
+    T = mission.collection.aperture_time
+    if mission.requirements.pslr is None:
+        cycles = left.place(T) * T
+        return [Tone(alone.subject, alone.phase, cycles, np.asarray(alone.phase > 0)[()])]
+    each = [
+        Tone(alone.subject, free * share, frequency * T, np.asarray(share > 0)[()])
+        for frequency, share in zip(left.frequencies, left.echoes(T), strict=True)
+    ]
+    return [each[0]._replace(in_quadrature=alone.in_quadrature), *each[1:]]
 
 
 def noise(analysis: "Analysis", model: str) -> list[SpreadPhase]:

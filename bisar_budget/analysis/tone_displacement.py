@@ -88,10 +88,14 @@ def tone_displacements(
     by_models = [plane, _by_ranges(exact, np.ones_like(exact.times))]
     if mission.has_direct_path:  # the constant phase between direct path and echo moves nothing
         by_models = [per_metre * np.array([0.0, 1.0, 1.0, 1.0])[:, None, None] for per_metre in by_models]
+    of_oscillators: dict[Subject, list[Floats]] = {}
     for one in tones:
-        if one.subject.kind == "oscillator":
+        if one.subject.kind == "oscillator":  # one that exchanges fold has several, of which phases are not known
             orders = _orders(one.cycles, one.is_there * one.phase / exact.k)
-            found.append(ToneDisplacement(one.subject, *([TonePart(orders, per_metre)] for per_metre in by_models)))
+            of_oscillators.setdefault(one.subject, []).append(orders)
+    for what, of_one in of_oscillators.items():
+        both = ([TonePart(orders, per_metre) for orders in of_one] for per_metre in by_models)
+        found.append(ToneDisplacement(what, *both))
     return found
 
 

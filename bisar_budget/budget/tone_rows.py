@@ -14,8 +14,14 @@ from bisar_budget.analysis.vibration_limits import Echo, VibrationLimits, highes
 from bisar_budget.budget.judged_rows import BOUND, FamilyRow, Judging, worded
 from bisar_budget.effects.declared import OTHER_MODEL
 from bisar_budget.effects.effect import override_notes, subject
-from bisar_budget.effects.oscillator_acceleration import accelerated_tones, felt, flies_a_turn, lacks_a_spectrum
-from bisar_budget.effects.oscillators import spurs_of
+from bisar_budget.effects.oscillator_acceleration import (
+    AcceleratedTone,
+    accelerated_tones,
+    felt,
+    flies_a_turn,
+    lacks_a_spectrum,
+)
+from bisar_budget.effects.oscillator_tones import LeftTone, spurs_of
 from bisar_budget.effects.vibration import ECHO_CYCLES, SLOWEST, cubic_part, quadratic_part
 from bisar_budget.findings.row import Row
 from bisar_budget.mission.instruments import Oscillator
@@ -81,7 +87,8 @@ def spur_rows(judging: Judging, analysis: Analysis, model: str) -> Iterator["Spu
         else:
             limits = VibrationLimits(*(2 * math.pi / mission.radar.wavelength * limit for limit in limits))
             is_over_other = phase > limits.by(OTHER_MODEL[model]) * BOUND
-            is_near = spur.frequency * mission.collection.aperture_time < ECHO_CYCLES
+            T = mission.collection.aperture_time
+            is_near = spur.left.slowest_echo(T) * T < ECHO_CYCLES
             judged = judging.row(  # the amplitude of an echo over that of the response
                 what,
                 phase / 2,
@@ -94,7 +101,8 @@ def spur_rows(judging: Judging, analysis: Analysis, model: str) -> Iterator["Spu
         judged = judged.in_decibel().held_to(metric)
         if metric == "islr":
             judged = judged._replace(islr_db=islr_of(mission, phase**2 / 2))
-        yield SpurRow(judged, place, is_over_other)
+        is_there = (phase > 0) | (not spur.left.is_folded)
+        yield SpurRow(judged, place, is_over_other, is_there=is_there)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -109,7 +117,7 @@ class SpurRow(FamilyRow):
         mission, row, doubt, over = case.mission, self.judged, NOTHING, NOTHING
         spur = spurs_of(mission)[self.place]
         oscillator: Oscillator = getattr(mission.platforms, spur.name).oscillator
-        cycles, missing = spur.frequency * mission.collection.aperture_time, phrases.no_requirement_of("pslr")
+        T, missing = mission.collection.aperture_time, phrases.no_requirement_of("pslr")
         if not math.isnan(row.allowable[case.place]):
             over = phrases.echoes_over(case.number(row.declared), case.number(row.allowable))
             if self.is_over_other[case.place]:
@@ -124,15 +132,31 @@ class SpurRow(FamilyRow):
             over=over,
             doubt=doubt,
             no_limit=missing,
-            not_evaluated=phrases.echoes_on_the_mainlobe(cycles, ECHO_CYCLES),
+            not_evaluated=phrases.echoes_on_the_mainlobe(spur.left.slowest_echo(T) * T, ECHO_CYCLES),
             info=missing,
             evidence=oscillator.source,
             remarks=(
-                phrases.tone_lies(spur.frequency, cycles),
+                phrases.tone_lies(spur.frequency, spur.frequency * T),
+                *_folds(spur.left, spur.free, T, f"{spur.name}.oscillator"),
                 *override_notes(spur.name, oscillator.overridden, "frequency"),
             ),
             displacement_m=case.moved_by_tone(row.subject, model),
         )
+
+
+def _folds(left: LeftTone, free: float, aperture_time: float, row_id: str) -> tuple[Note, ...]:
+    """Say what of a tone is folded below one cycle per aperture, and of which row its phases are."""
+    slow = [
+        (float(share), float(frequency))
+        for frequency, share in zip(left.frequencies, left.shares, strict=True)
+        if left.is_folded and frequency * aperture_time < SLOWEST and share > 0
+    ]
+    if not slow:
+        return ()
+    parts = left.slow_parts(aperture_time)
+    qpe, cubic = (free * math.sqrt(float(part)) for part in (parts.quadratic, parts.cubic))
+    frequency = max(slow)[1]
+    return (phrases.tone_is_folded(frequency, frequency * aperture_time, qpe, cubic, row_id),)
 
 
 # ---------------------------------------------------------------------- oscillators that vibrate
@@ -144,17 +168,16 @@ def accelerated_rows(judging: Judging, analysis: Analysis, model: str) -> Iterat
     mission = analysis.mission
     metric, by_platform = tone_limits(mission, analysis.allocation)
     for place, one in enumerate(accelerated_tones(mission, analysis.geometry) if has_instruments(mission) else ()):
-        cycles = judging.array(one.frequency * mission.collection.aperture_time)
-        is_there, per_unit = cycles >= SLOWEST, judging.array(one.per_unit)
+        T, per_unit = mission.collection.aperture_time, judging.array(one.per_unit)
+        is_there = per_unit > 0 if one.left.is_folded else judging.array(one.frequency * T) >= SLOWEST
         if not is_there.any():
             continue
         declared, limits = judging.array(one.sensitivity), by_platform.get(one.name)
         phase = declared * per_unit
-        qpe, cubic = phase * quadratic_part(cycles), phase * cubic_part(cycles)
+        qpe, cubic = map(judging.array, _phases_beside(one, T))
         is_over_phase = qpe > analysis.allocation.qpe_allowed(one.name) * BOUND
         if mission.requirements.cubic_phase_error is not None:
             is_over_phase = is_over_phase | (cubic > mission.requirements.cubic_phase_error * BOUND)
-        is_over_phase &= cycles < ECHO_CYCLES
         if limits is None:
             judged = judging.row(one.subject, declared, None, doubt=is_over_phase, is_info=~is_over_phase)
             is_over_other = np.zeros(judging.cases, dtype=bool)
@@ -185,7 +208,7 @@ class AcceleratedRow(FamilyRow):
         """The row of one case, by the model that judges it."""
         mission, row, doubt, over = case.mission, self.judged, NOTHING, NOTHING
         one = accelerated_tones(mission)[self.place]
-        cycles, missing = one.frequency * mission.collection.aperture_time, phrases.no_requirement_of("pslr")
+        T, missing = mission.collection.aperture_time, phrases.no_requirement_of("pslr")
         if not math.isnan(row.allowable[case.place]):
             echoes = (20 * math.log10(one.per_unit * case.number(size) / 2) for size in (row.declared, row.allowable))
             over = phrases.echoes_over(*echoes) if row.declared[case.place] else NOTHING
@@ -194,7 +217,7 @@ class AcceleratedRow(FamilyRow):
                 doubt = phrases.other_model_allows(other, case.number(row.allowable_by(other)), "s^2/m")
         if self.is_over_phase[case.place]:
             limit, allowed = case.allocation.qpe_allowed(one.name), mission.requirements.cubic_phase_error
-            qpe, cubic = one.phase * float(quadratic_part(cycles)), one.phase * float(cubic_part(cycles))
+            qpe, cubic = map(float, _phases_beside(one, T))
             doubt = phrases.phase_of_vibration_over(qpe, limit, cubic, allowed)
         oscillator: Oscillator = getattr(mission.platforms, one.name).oscillator
         return worded(
@@ -209,13 +232,25 @@ class AcceleratedRow(FamilyRow):
             info=missing,
             evidence=evidence(oscillator),
             remarks=(
-                phrases.tone_lies(one.frequency, cycles),
+                phrases.tone_lies(one.frequency, one.frequency * T),
                 phrases.shakes_an_oscillator(float(one.acceleration), one.phase),
+                *_folds(one.left, one.free * one.sensitivity, T, f"{one.name}.oscillator.acceleration"),
                 *_whose(mission, one.name),
                 *override_notes(one.name, oscillator.overridden, SENSITIVITY),
             ),
             displacement_m=case.moved_by_tone(row.subject, model),
         )
+
+
+def _phases_beside(one: AcceleratedTone, aperture_time: Any) -> tuple[Any, Any]:
+    """Quadratic and cubic phase of the echoes that lie beside the mainlobe, in their worst phases. [rad]"""
+    qpe: Any = 0.0
+    cubic: Any = 0.0
+    for frequency, share in zip(one.left.frequencies, one.left.echoes(aperture_time), strict=True):
+        cycles = frequency * aperture_time
+        phase = np.where(cycles < ECHO_CYCLES, one.free * one.sensitivity * share, 0.0)
+        qpe, cubic = qpe + phase * quadratic_part(cycles), cubic + phase * cubic_part(cycles)
+    return qpe, cubic
 
 
 def evidence(oscillator: Oscillator) -> str | None:

@@ -21,10 +21,10 @@ import numpy as np
 from bisar_budget.constants import ROUNDING, SPEED_OF_LIGHT
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.navigation_errors import specific_force
-from bisar_budget.effects.oscillators import left_of_tone
+from bisar_budget.effects.oscillator_tones import LeftTone, left_of_tone
 from bisar_budget.effects.random_effect import RandomEffect, RandomError, SensorCases
-from bisar_budget.effects.spectra import Parts, PowerLawPiece, squares
-from bisar_budget.effects.vibration import SLOWEST, power_of, spectrum_parts, spectrum_pieces
+from bisar_budget.effects.spectra import Parts, PowerLawPiece
+from bisar_budget.effects.vibration import power_of, spectrum_parts, spectrum_pieces
 from bisar_budget.geometry import BistaticGeometry, PlatformState, norm
 from bisar_budget.mission.instruments import Oscillator
 from bisar_budget.mission.model import Mission
@@ -68,8 +68,9 @@ class AcceleratedTone(NamedTuple):
     """A vibration as an oscillator's tone: platform, entry, frequency [Hz], amplitude of the acceleration [m/s²].
 
     `free` is the peak phase by a unit of Γ of a free oscillator [rad/(s²/m)], `left` what the synchronization leaves
-    of it. `in_quadrature` is the row of the vibration of the platform that makes it, from which it is a quarter of a
-    turn away; None of one along several axes, and of one that the oscillator alone is said to feel.
+    of it, `echo` the share of that which makes echoes. `in_quadrature` is the row of the vibration of the platform
+    that makes it, from which it is a quarter of a turn away; None of one along several axes, and of one that the
+    oscillator alone is said to feel.
     """
 
     name: str
@@ -78,7 +79,8 @@ class AcceleratedTone(NamedTuple):
     acceleration: Any
     free: Any
     sensitivity: Any
-    left: Any
+    left: LeftTone
+    echo: Any
     in_quadrature: str | None
 
     @property
@@ -88,12 +90,12 @@ class AcceleratedTone(NamedTuple):
 
     @property
     def per_unit(self) -> Any:
-        """Peak phase at the centre frequency by a unit of Γ. [rad/(s²/m)]"""
-        return self.free * self.left
+        """Peak phase of its echo at the centre frequency by a unit of Γ. [rad/(s²/m)]"""
+        return self.free * self.echo
 
     @property
     def phase(self) -> Any:
-        """Peak phase at the centre frequency. [rad]"""
+        """Peak phase of its echo at the centre frequency. [rad]"""
         return self.per_unit * self.sensitivity
 
 
@@ -114,7 +116,8 @@ def accelerated_tones(mission: Mission, geometry: BistaticGeometry | None = None
             # Axes may vibrate in any phase: then a quarter of a turn is not certain.
             is_apart = one.is_own or isinstance(line.amplitude, tuple)
             shared = None if is_apart else subject(name, "vibration", "sinusoidal", entry=index).id
-            found.append(AcceleratedTone(name, index, line.frequency, a, free, one.sensitivity, left, shared))
+            echo = left.echo(mission)
+            found.append(AcceleratedTone(name, index, line.frequency, a, free, one.sensitivity, left, echo, shared))
     return found
 
 
@@ -149,10 +152,8 @@ def _vibrating(seen: SensorCases, name: str, one: Felt) -> Parts:
         random = spectrum_parts(seen, vibration.spectrum, PHASE, interval, delay)
         total += random.rows * (power_of(vibration) * np.square(mission.radar.center_frequency))
     for line in accelerated_tones(mission, seen.geometry):
-        cycles = line.frequency * seen.aperture_time
-        if line.name == name and np.any(cycles < SLOWEST):
-            power = np.where(cycles < SLOWEST, np.square(line.per_unit), 0.0)
-            total += Parts(*squares(math.pi * cycles)).rows * power
+        if line.name == name:
+            total += line.left.slow_parts(seen.aperture_time).times(np.square(line.free)).rows.reshape(len(total), -1)
     return Parts(*total).times(np.square(mission.radar.wavelength) / (4 * math.pi**2))
 
 

@@ -1,4 +1,4 @@
-"""Oscillators: phase noise by a mask, an Allan deviation or a power law, spurs, and errors of clocks at random.
+"""Oscillators: phase noise by a mask, an Allan deviation or a power law, and errors of clocks at random.
 
 Spectra are one-sided. What a link leaves of the noise, and adds to it, depends on how the clocks are kept together.
 """
@@ -12,12 +12,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bisar_budget import evaluators, phrases
-from bisar_budget.effects.effect import PLATFORMS, Subject, subject
+from bisar_budget.effects.effect import subject
+from bisar_budget.effects.oscillator_tones import spurs_of
 from bisar_budget.effects.random_effect import RandomEffect, RandomError, SensorCases
-from bisar_budget.effects.spectra import Parts, PowerLawPiece, heard_parts, held, left_parts, link_parts, set_parts
-from bisar_budget.geometry import BistaticGeometry
+from bisar_budget.effects.spectra import Parts, PowerLawPiece, heard_parts, left_parts, link_parts, set_parts
 from bisar_budget.mission.instruments import Oscillator, PowerLaw
-from bisar_budget.mission.model import Mission
 from bisar_budget.mission.readers import Points, SortedPoints
 from bisar_budget.phrases import NOTHING, Note
 from bisar_budget.ranges.exact_ranges import Floats
@@ -183,67 +182,21 @@ def _least_squares(rows: Sequence[Sequence[float]]) -> list[float] | None:
     return [value / size for value, size in zip(right, sizes, strict=True)]
 
 
-# ---------------------------------------------------------------------- spurs
-class Spur(NamedTuple):
-    """A tone of an oscillator: platform, entry by frequency, frequency [Hz], peak phase at centre frequency [rad].
-
-    `left` is the part of it that exchanged pulses leave, which the phase has.
-    """
-
-    name: str
-    entry: int
-    frequency: float
-    phase: Any
-    left: Any
-
-    @property
-    def subject(self) -> Subject:
-        """That of its row."""
-        return subject(self.name, "oscillator", "spur", entry=self.entry)
-
-
-def spurs_of(mission: Mission, geometry: BistaticGeometry | None = None) -> list[Spur]:
-    """Tones that reach the image: with a direct path as clock those of the receiver alone, heard twice.
-
-    `geometry` is that of many cases, where numbers of the mission are arrays.
-    """
-    found = []
-    for name in PLATFORMS[mission.has_direct_path :]:
-        oscillator = getattr(mission.platforms, name).oscillator
-        for index, (frequency, level) in enumerate(oscillator.spurs if oscillator is not None else ()):
-            scale = mission.radar.center_frequency / oscillator.frequency
-            left = left_of_tone(frequency, mission, geometry or mission.geometry)
-            # A sideband of a phase φ has the amplitude φ/2 of the carrier.
-            found.append(Spur(name, index, frequency, 2 * 10 ** (level / 20) * scale * left, left))
-    return found
-
-
-def left_of_tone(frequency: Any, mission: Mission, geometry: BistaticGeometry) -> Any:
-    """Largest part of a tone that exchanged pulses leave, at its own frequency or at one that it is folded to.
-
-    A receiver that hears the transmitter has 2|sin(πfΔt)| of its own.
-    """
-    sync = mission.synchronization
-    if mission.has_direct_path:
-        return 2 * np.abs(np.sin(math.pi * frequency * geometry.echo_delay))
-    if sync is None or sync.interval is None:
-        return 1.0
-    turns = frequency * np.asarray(sync.interval)
-    images = [np.rint(turns) + n for n in (-1, 0, 1)]
-    passed = [np.where(image != 0, np.sqrt(held(2 * math.pi * (turns - image))), 0.0) for image in images]
-    return np.max([1 - np.sqrt(held(2 * math.pi * turns)), *passed], axis=0)
-
-
 # ---------------------------------------------------------------------- errors of clocks
 def oscillator_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
-    """Phase noise of a platform's oscillator, or what exchanged pulses leave of it."""
+    """Phase noise of a platform's oscillator, or what exchanged pulses leave of it, and spurs that they make slow."""
     mission = seen.mission
     oscillator: Oscillator | None = getattr(mission.platforms, name).oscillator
     if oscillator is None:
         return
     found = _left_at_1_hz(seen, name, oscillator)
     scale = mission.radar.center_frequency**2 * 10 ** (np.asarray(oscillator.level) / 10)
-    published, full = _of_clock(seen, Parts(*found * scale))
+    found = found * scale
+    for spur in spurs_of(mission, seen.geometry):
+        slow = spur.slow_parts(seen.aperture_time)
+        if spur.name == name and slow is not None:
+            found += slow.rows.reshape(len(found), -1)
+    published, full = _of_clock(seen, Parts(*found))
     key = ("platforms", name, "oscillator")
     path = key if oscillator.sensor is None else (*key, "sensor")
     yield RandomError(

@@ -100,12 +100,16 @@ def held(step: Any) -> Any:
 _INTEGRALS = 7  # parts of any spectrum, in their order
 _TURNS = 24  # half turns of a tone within the aperture that are followed one by one
 _FAST = _TURNS * math.pi  # angle from which what turns with a tone is averaged
+_RESOLVED_TURNS = 1.5  # half turns within a panel, up to which its nodes follow a tone however fast
 _FIRST = 0.1  # angle below which a tone's parts are their first powers, to 4e-4 of the 3 % that lie there
 _OCTAVE = 2.0
 _SAME = 1.000001  # of two edges, computed in two ways
-_NOTHING = 1e-6  # of the first edge: nothing of a tone's parts is below
-_FOLDED = 8  # intervals of sampling beyond which straight lines pass less than 1e-5 of a tone's power
-_ALIASES = 3  # tones folded from so many rates away are counted one by one, those beyond by an integral
+_APART = 1 + 1e-10  # ratio of two edges of panels, at least
+_FOLDED = 10  # intervals of sampling up to which images are followed one by one
+_PASSED = 50  # intervals beyond which they pass less than 1e-4 of its amplitude
+_NEAR_ALIASES = 3  # rates, and one for each two powers of a slope, within which aliases are counted one by one
+_STEEP = 4.0  # slope beyond which straight lines do not flatten an image of a piece
+_FALLS = 6.0  # powers of e by which a steep piece falls from edge to edge
 
 # Nodes and weights of Gauss and Legendre on 0 … 1.
 _NODES, _WEIGHTS = (
@@ -209,7 +213,8 @@ def _between_edges(slope: float) -> Floats:
 def _at_an_end(slope: float, low: Floats, high: Floats) -> Floats:
     """Parts of a panel at the end of a piece, which may be slow or fast; nothing of one without length."""
     found = np.zeros((_INTEGRALS, low.size))
-    is_slow, is_fast = high <= _FIRST * _SAME, low >= _FAST / _SAME
+    is_slow = high <= _FIRST * _SAME
+    is_fast = (low >= _FAST / _SAME) & (high > low + _RESOLVED_TURNS * math.pi)
     for some, of_panel in (
         (is_slow, _slow),
         (~is_slow & is_fast, _fast),
@@ -356,15 +361,20 @@ def synchronized_parts(pieces: Sequence[PowerLawPiece], aperture_time: Any, inte
     """The same of what synchronisation leaves: a phase less the straight lines between samples of it.
 
     Straight lines pass sinc²(f·T_s) of a tone, and fold every tone that is m/T_s away on it: of a spectrum S they
-    leave S·(1 − sinc²)² + sinc⁴·Σ S(|f + m/T_s|), m ≠ 0. The lines begin anywhere in the interval.
+    leave S·(1 − sinc²)² + sinc⁴·Σ S(|f + m/T_s|), m ≠ 0. The lines begin anywhere in the interval. Pieces may be
+    narrow or steep, and begin and end anywhere: all is right to 1e-4, but for phases of what turns more than 24 times
+    within the aperture, which are means over its turns.
     """
     rate, times = 1 / interval, np.atleast_1d(aperture_time)
-    beyond = [_folded_from_beyond(piece, rate) for piece in pieces]
     scale = math.pi * times
-    last = np.maximum(_FOLDED * rate, _FAST / scale)
-    edges = [[*_exchange_edges(T, rate), *_image_edges(pieces, rate)] for T in times.tolist()]
-    total = _over_panels(lambda f, cases: _left(pieces, beyond, f, rate), edges, last, scale)
+    ends = [edge for piece in pieces for edge in _ends(piece)]
+    near = _PASSED if max(ends, default=0.0) > _FOLDED * rate else _FOLDED
+    last = np.maximum(near * rate, _FAST / scale)
+    images = _image_edges(ends, rate)
+    edges = [[*_exchange_edges(T, rate), *images] for T in times.tolist()]
+    total = _over_panels(lambda f, cases: _left(pieces, f, rate), edges, last, scale)
     _add_fast(total, pieces, last, scale, 1.0)  # straight lines pass nothing any more
+    total += parts(_far_images(pieces, images, rate), times)[:_INTEGRALS]
     return _like(total, aperture_time)
 
 
@@ -408,48 +418,97 @@ def _add_fast(total: Floats, pieces: Sequence[PowerLawPiece], last: Floats, scal
         to_angle = times * piece.density * scale ** (piece.slope - 1)
         low, high = np.maximum(piece.low, last) * scale, piece.high * scale
         some = piece.high > last
-        total[:, some] += to_angle[some] * _fast(piece.slope, low[some], high[some])
+        total[:, some] += to_angle[some] * _at_an_end(piece.slope, low[some], high[some])
 
 
 def _panels_of(density: Callable[[Floats], Floats], low: Floats, high: Floats, scale: Floats) -> Floats:
     """Parts of panels (n,)."""
-    low = np.where(low > 0, low, high * _NOTHING)
-    span = np.log(high / low)
-    f = low * np.exp(span * _NODES)
-    angle = f * scale
-    fast = np.array(*evaluators.tone_parts_fast(1.0, *(angle**-power for power in (2, 4, 6, 8))))  # type: ignore[arg-type]
-    of_tone = np.where(low * scale >= _FAST / _SAME, fast, squares(angle))
-    return np.asarray((density(f) * f * span * _WEIGHTS * of_tone).sum(axis=1))
+    is_first = low == 0
+    span = np.log(high / np.where(is_first, high, low))
+    f = np.where(is_first, high * _NODES, low * np.exp(span * _NODES))
+    width = np.where(is_first, high, f * span) * _WEIGHTS
+    angle, of_tone = f * scale, np.empty((_INTEGRALS, *f.shape))
+    is_mean = (low * scale >= _FAST / _SAME) & ((high - low) * scale > _RESOLVED_TURNS * math.pi)
+    of_tone[..., ~is_mean] = squares(angle[:, ~is_mean])
+    (mean,) = evaluators.tone_parts_fast(1.0, *(angle[:, is_mean] ** -power for power in (2, 4, 6, 8)))  # type: ignore[arg-type]
+    of_tone[..., is_mean] = np.array(mean)
+    return np.asarray((density(f) * width * of_tone).sum(axis=1))
 
 
-def _left(pieces: Sequence[PowerLawPiece], beyond: Sequence[float], f: Floats, rate: float) -> Floats:
-    """Spectrum that straight lines between samples leave [rad²/Hz]."""
-    passed, nearest = held(2 * math.pi * f / rate), np.rint(f / rate)
-    start = f - nearest * rate
-    total = np.zeros_like(f)
-    for piece, far in zip(pieces, beyond, strict=True):
-        own, aliases = np.zeros_like(f), np.full_like(f, far)
-        for n in range(-_ALIASES, _ALIASES + 1):
-            folded = density([piece], np.abs(start + n * rate))
-            own = np.where(nearest == n, folded, own)
-            aliases = aliases + np.where(nearest == n, 0.0, folded)
-        own = np.where(np.abs(nearest) > _ALIASES, density([piece], f), own)
-        total += own * (1 - np.sqrt(passed)) ** 2 + passed * aliases
-    return total
+def _left(pieces: Sequence[PowerLawPiece], f: Floats, rate: float) -> Floats:
+    """Spectrum that straight lines between samples leave, at nodes of panels (nodes, n). [rad²/Hz]"""
+    _, once, again = np.unique(f[0] + 1j * f[-1], return_index=True, return_inverse=True)  # cases share panels
+    f = f[:, once]
+    own, passed = density(pieces, f), np.sinc(f / rate) ** 2
+    total = own * (1 - passed) ** 2
+    some = f < _FOLDED * rate
+    nearest = np.rint(f[some] / rate)
+    start = np.abs(f[some] - nearest * rate)
+    aliases = sum((_aliases(piece, start, rate) for piece in pieces), np.zeros_like(start))
+    aliases += np.where(nearest == 0, 0.0, density(pieces, start) - own[some])
+    total[some] += passed[some] ** 2 * aliases
+    return np.asarray(total[:, again])
 
 
-def _folded_from_beyond(piece: PowerLawPiece, rate: float) -> float:
-    """Sum of what is folded from farther away, as an integral; its first correction is that of the midpoint rule."""
-    low = max(piece.low, (_ALIASES + 0.5) * rate)
-    if low >= piece.high:
-        return 0.0
-    rise = -piece.slope * piece.at(low) / low  # of the spectrum, at the integral's beginning
-    return float(2 * (piece.integral(low, piece.high) / rate + rise * rate / 24))
+def _aliases(piece: PowerLawPiece, start: Floats, rate: float) -> Floats:
+    """Sum of a piece at m·rate ± start, m = 1, 2 …; `start` is at most half a rate. [rad²/Hz]
+
+    Those where the power law bends within a rate are counted one by one, those beyond by the formula of Euler and
+    Maclaurin.
+    """
+    far = math.ceil(_NEAR_ALIASES + abs(piece.slope) / 2)
+    first, end = max(1, math.floor(piece.low / rate)), min(far, math.ceil(piece.high / rate) + 1)
+    sides = np.array((start, -start))
+    total = np.zeros_like(sides)
+    for m in range(first, end):
+        total += density([piece], m * rate + sides)
+    low = np.maximum(np.ceil((piece.low - sides) / rate), far)
+    high = np.ceil((piece.high - sides) / rate) - 1
+    there = high >= low
+    total[there] += _sum_at_steps(piece, (low * rate + sides)[there], (high * rate + sides)[there], rate)
+    return np.asarray(total.sum(axis=0))
+
+
+def _far_images(pieces: Sequence[PowerLawPiece], edges: Sequence[float], rate: float) -> list[PowerLawPiece]:
+    """Mean of the images beyond those that are followed, (2/T_s³)·∫ S·sin⁴(πfT_s) df/(πf)⁴, as pieces.
+
+    They lie x rates from whole ones: by Euler and Maclaurin B₂(x) times the slope where they begin is missing, which
+    beginnings half a rate before and behind make up.
+    """
+    low, high = np.array(list(_panels(rate / 2, [rate / 4, *edges]))).T
+    f = low + (high - low) * _NODES
+    aliases = density(pieces, f) + sum((_aliases(piece, f, rate) for piece in pieces), np.zeros_like(f))
+    x = f / rate
+    powers = aliases * np.sin(math.pi * x) ** 4 * (high - low) * _WEIGHTS
+    at_half = 2 * float((powers * (x**2 - x + 1 / 6)).sum())
+    whole, last = float(powers.sum()), float(_FOLDED)
+    return [
+        PowerLawPiece(begin * rate, math.inf, 2 * rate**3 / math.pi**4 * power, 4.0)
+        for begin, power in ((last - 0.5, at_half), (last, whole - 2 * at_half), (last + 0.5, at_half))
+    ]
+
+
+def _sum_at_steps(piece: PowerLawPiece, low: Floats, high: Floats, step: float) -> Floats:
+    """Sum of a power law at steps from `low` to `high`, both with, by Euler and Maclaurin. [rad²/Hz]
+
+    The integral over the step, half of both ends, and B₂ₖ/(2k)!·step^(2k−1) times what odd derivatives differ by:
+    the first, the third and the fifth.
+    """
+    slope, density, derivatives = piece.slope, [], []
+    for f in (low, high):
+        at, bend = piece.at(f), step / f
+        first = -slope * at * bend
+        third = first * (slope + 1) * (slope + 2) * bend**2
+        fifth = third * (slope + 3) * (slope + 4) * bend**2
+        density.append(at)
+        derivatives.append(first / 12 - third / 720 + fifth / 30240)
+    integral = piece.density * _integral(-slope, low, high) / step
+    return np.asarray(integral + sum(density) / 2 + derivatives[1] - derivatives[0])
 
 
 def _exchange_edges(aperture_time: float, rate: float) -> list[float]:
     """Frequencies between which a tone's parts, and what straight lines pass, are smooth. [Hz]"""
-    edges = _tone_edges(aperture_time) + [rate * n / 4 for n in range(1, 4 * _FOLDED + 1)]
+    edges = [*_tone_edges(aperture_time), rate / 4, *(rate * n / 2 for n in range(1, 2 * _FOLDED + 1))]
     octave = _TURNS / aperture_time
     while octave < rate / 4:
         edges.append(octave)
@@ -457,11 +516,22 @@ def _exchange_edges(aperture_time: float, rate: float) -> list[float]:
     return edges
 
 
-def _image_edges(pieces: Sequence[PowerLawPiece], rate: float) -> list[float]:
-    """Frequencies at which pieces of a spectrum begin and end, and where images of it end. [Hz]"""
-    end = max((piece.high for piece in pieces), default=0.0)  # an oscillator may be stated to have no noise
-    edges = [edge for piece in pieces for edge in (piece.low, piece.high)]
-    return edges + [abs(n * rate + sign * end) for n in range(_FOLDED + 1) for sign in (1, -1)]
+def _image_edges(ends: Sequence[float], rate: float) -> list[float]:
+    """Frequencies between which a spectrum with such ends, and its images, are smooth. [Hz]"""
+    starts = {abs(end - round(end / rate) * rate) for end in ends}
+    images = [abs(n * rate + sign * start) for start in starts for n in range(_FOLDED + 1) for sign in (1, -1)]
+    least = min((start for start in starts if start), default=rate)
+    grown = (least * _OCTAVE ** (3 * n) for n in range(1, math.ceil(math.log2(max(rate / least, 1.0)) / 3)))
+    return [*ends, *images, *grown, *(n * rate for n in range(_FOLDED + 1, _PASSED))]
+
+
+def _ends(piece: PowerLawPiece) -> Iterator[float]:
+    """Where a piece begins and ends, and where a steep one has fallen from there by a few powers of e. [Hz]"""
+    yield from (piece.low, piece.high)
+    if abs(piece.slope) > _STEEP:
+        dense = piece.low if piece.slope > 0 else piece.high
+        fallen = (dense * math.exp(_FALLS * n / piece.slope) for n in range(1, 4))
+        yield from (f for f in fallen if piece.low < f < piece.high)
 
 
 def _panels(high: float, edges: Sequence[float]) -> Iterator[tuple[float, float]]:
@@ -471,6 +541,6 @@ def _panels(high: float, edges: Sequence[float]) -> Iterator[tuple[float, float]
     """
     kept = [0.0]
     for edge in sorted(edges):
-        if kept[-1] * _SAME < edge < high / _SAME:
+        if kept[-1] * _APART < edge < high / _APART:
             kept.append(edge)
     return pairwise([*kept, high])

@@ -29,6 +29,7 @@ from bisar_budget.effects.oscillator_acceleration import (
     pieces_by_acceleration,
     turn_courses,
 )
+from bisar_budget.effects.oscillator_tones import LeftTone, spurs_of
 from bisar_budget.effects.oscillators import noise_of
 from bisar_budget.effects.random_effect import RandomError, parts_of_largest
 from bisar_budget.effects.random_errors import random_errors
@@ -49,6 +50,7 @@ _AGES, _PER_AGE = 24, 8  # turns within the age of a setting that are followed, 
 _TURNED = 256  # turns within an averaging, beyond which nothing of a tone is left in its line
 _PER_CYCLE = 8  # samples of the fastest tone that is flown, joined by straight lines
 _MAX_TONES = 1 << 18
+_NARROW, _IN_NARROW = 4, 8  # tones at even distances below which a piece is narrow, and those it then has of its own
 _NUMBERS = 1 << 20  # drawn at once
 _FAR = 32  # apertures from which on an exchange knows nothing of a tone that turns in one
 _FEWEST = 4  # exchanges in a period of tones: those on either side of an aperture are not the same
@@ -300,7 +302,11 @@ def phase_courses(
     bends = [bend.draw(rng) for _ in range(draws)] if bend is not None else []
     if interval is not None:
         # Pulses that follow each other faster take the phase away to nothing that an image shows.
-        return size * _between_exchanges(pieces, T, max(interval, T / _MOST_KNOTS), times, draws, rng, bends)
+        left = _between_exchanges(pieces, T, max(interval, T / _MOST_KNOTS), times, draws, rng, bends)
+        for frequency, amplitude in _folded_tones(mission, error):
+            start = rng.uniform(0, 2 * math.pi, (draws, 1))
+            left += math.sqrt(2) * amplitude * np.cos(2 * math.pi * frequency * times + start)
+        return size * left
     pieces = _below(pieces, highest)
     if sync is not None and sync.is_direct_path:
         if error.owner == "transmitter":  # both paths have its phase at one time
@@ -398,10 +404,35 @@ def oscillator_sinusoids(mission: Mission, name: str) -> tuple[PathSinusoid, ...
     """
     metres, T = mission.radar.wavelength / (2 * math.pi), mission.collection.aperture_time
     return tuple(
-        PathSinusoid(metres * one.phase, one.frequency, 0.0 if one.in_quadrature is None else math.pi / 2)
+        PathSinusoid(
+            metres * one.free * one.sensitivity * share,
+            frequency,
+            0.0 if one.in_quadrature is None or place else math.pi / 2,
+        )
         for one in accelerated_tones(mission)
-        if one.name == name and one.frequency * T >= SLOWEST
+        for place, (frequency, share) in enumerate(zip(one.left.frequencies, one.left.shares, strict=True))
+        if one.name == name and one.frequency * T >= SLOWEST and frequency * T >= SLOWEST and (share or not place)
     )
+
+
+def _folded_tones(mission: Mission, error: RandomError) -> list[tuple[float, float]]:
+    """Frequencies [Hz] and amplitudes, by a unit, of what of an oscillator's tones straight lines make slow.
+
+    What they leave of a vibration that is slow itself is drawn as a whole.
+    """
+    T, name = mission.collection.aperture_time, error.owner
+    tones: list[tuple[float, LeftTone]] = []
+    if error.subject.axis == "acceleration":
+        of_platform = [one for one in accelerated_tones(mission) if one.name == name]
+        tones = [(one.free, one.left) for one in of_platform if one.frequency * T >= SLOWEST]
+    elif error.subject.kind == "oscillator":
+        tones = [(spur.free, spur.left) for spur in spurs_of(mission) if spur.name == name]
+    return [
+        (frequency, free * share)
+        for free, left in tones
+        for frequency, share in zip(left.frequencies, left.shares, strict=True)
+        if frequency * T < SLOWEST and share
+    ]
 
 
 class _Bend:
@@ -417,7 +448,7 @@ class _Bend:
         sync = mission.synchronization
         is_linked = sync is not None and sync.interval is not None  # what exchanges leave is drawn
         self.slow = [
-            (one.frequency, one.free if is_linked else one.per_unit)
+            (one.frequency, one.free if is_linked else one.free * one.left.shares[0])
             for one in accelerated_tones(mission)
             if one.name == name and one.frequency * T < SLOWEST
         ]
@@ -493,8 +524,8 @@ def powers_at(powers: Floats, count: int) -> Floats:
 class _Tones:
     """A spectrum as tones: those that turn within the aperture at even distances, the others by logarithms.
 
-    The fast ones repeat after a period [s]. What is faster still is another number at every moment, of the sigma
-    `rest`.
+    A piece so narrow that few of the fast ones lie in it has tones of its own, which stand behind the slow ones. The
+    fast ones repeat after a period [s]. What is faster still is another number at every moment, of the sigma `rest`.
     """
 
     def __init__(
@@ -506,11 +537,20 @@ class _Tones:
     ) -> None:
         self.period = _PERIODS * aperture_time if period is None else period
         high, fine = max((piece.high for piece in pieces), default=0.0), 1 / self.period
+        narrow: list[PowerLawPiece] = []
         if slow is None:
             slow = np.geomspace(_SLOWEST / aperture_time, fine / 2, _SLOW_TONES + 1)
+            narrow = [one for one in pieces if one.low >= fine / 2 and one.high - one.low < _NARROW * fine]
+            pieces = tuple(one for one in pieces if one not in narrow)
         self.slow: Floats = (slow[1:] + slow[:-1]) / 2
         # Sigma of what a tone has of cosine, and of sine: √(S·Δf).
         self.slow_size: Floats = np.sqrt(density(pieces, self.slow) * (slow[1:] - slow[:-1]))
+        self.count = self.slow.size
+        for piece in narrow:
+            width = (piece.high - piece.low) / _IN_NARROW
+            own = piece.low + width * (np.arange(_IN_NARROW) + 0.5)
+            self.slow = np.append(self.slow, own)
+            self.slow_size = np.append(self.slow_size, np.sqrt(piece.at(own) * width))
         pieces = _above(pieces, float(slow[-1]))
         count = min(_MAX_TONES, max(1, math.ceil(high / fine)))
         self.fast: Floats = fine * np.arange(1.0, count + 1)
@@ -525,11 +565,16 @@ class _Tones:
         return found
 
     def slow_at(self, times: Floats, drawn: Floats) -> Floats:
-        """Sums of the slow tones, (draws, times). [rad]"""
+        """Sums of the slow tones, and of those of narrow pieces, (draws, times). [rad]"""
         few = times if times.size <= _FLOWN else np.linspace(times[0], times[-1], _FLOWN)
-        cosines, sines = _slow_waves(self.slow, few)
-        found: Floats = drawn[0] @ cosines.T + drawn[1] @ sines.T
-        return found if few is times else np.stack([np.interp(times, few, one) for one in found])
+        cosines, sines = _slow_waves(self.slow[: self.count], few)
+        found: Floats = drawn[0, :, : self.count] @ cosines.T + drawn[1, :, : self.count] @ sines.T
+        if few is not times:
+            found = np.stack([np.interp(times, few, one) for one in found])
+        for index in range(self.count, self.slow.size):
+            turn = 2 * math.pi * self.slow[index] * times
+            found += np.outer(drawn[0, :, index], np.cos(turn)) + np.outer(drawn[1, :, index], np.sin(turn))
+        return found
 
     def fast_at(self, times: Floats, draws: int, rng: np.random.Generator, later: float | None = None) -> Floats:
         """Sums of the fast tones at times that divide their period evenly, (draws, times); see `at`. [rad]"""

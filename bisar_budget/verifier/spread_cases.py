@@ -23,7 +23,7 @@ from bisar_budget.effects.declared import CUBIC, LOCATION
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.navigation_errors import process_of
 from bisar_budget.effects.oscillator_acceleration import accelerated_tones
-from bisar_budget.effects.oscillators import spurs_of
+from bisar_budget.effects.oscillator_tones import spurs_of
 from bisar_budget.effects.random_effect import RandomError
 from bisar_budget.effects.vibration import SLOWEST, Line, lines_of, near_lines, sight_of, unit_of_line, worst_phases
 from bisar_budget.findings.images import Verdict

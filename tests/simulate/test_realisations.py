@@ -4,8 +4,10 @@ import math
 
 import numpy as np
 import pytest
+from numpy.polynomial import legendre
 
 from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.effects.random_errors import random_errors
 from bisar_budget.effects.spectra import PowerLawPiece
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.simulator.phase_history import Floats
@@ -13,6 +15,7 @@ from bisar_budget.simulator.realisations import (
     _between_exchanges,
     _Tones,
     oscillator_sinusoids,
+    phase_courses,
     powers_at,
     tones_at,
 )
@@ -99,3 +102,47 @@ def test_a_tone_of_an_oscillator_is_flown_from_one_cycle_per_aperture_on() -> No
     # Δφ = Γ f₀ a/f, as a motion of λ/2π times as much; a = (2πf)² 1 µm.
     a = (2 * math.pi * 2) ** 2 * 1e-6
     assert flown.amplitude == pytest.approx(SPEED_OF_LIGHT / (2 * math.pi) * 1e-9 / 9.80665 * a / 2, rel=1e-9)
+
+
+@pytest.mark.parametrize("frequency", [9.96, 50.2, 1000.205])
+def test_a_narrow_piece_flies(frequency: float) -> None:
+    """20 mHz within the 62 mHz between tones of a period: none of it was flown.
+
+    2 000 draws know a sigma to 1.6 %; what is left after the cubic of 4 s is that of the tone, sampled each 100 ms.
+    """
+    times, power = np.linspace(-2, 2, 4097), 50.0
+    piece = PowerLawPiece(frequency - 0.01, frequency + 0.01, power, 0.0)
+    drawn = _between_exchanges((piece,), 4.0, 0.1, times, 2_000, np.random.default_rng(1))
+    expected = np.zeros(2)
+    for start in np.arange(16) / 160:
+        knots = np.arange(-2.1 + start, 2.2, 0.1)
+        for turn in (0.0, math.pi / 2):
+            left, at_knots = (np.cos(2 * math.pi * frequency * t + turn) for t in (times, knots))
+            left = left - np.interp(times, knots, at_knots)
+            expected += np.array((np.mean(left**2), legendre.legfit(times / 2, left, 3)[2] ** 2)) / 16
+    quadratic = legendre.legfit(times / 2, drawn.T, 3)[2]
+    assert np.sqrt(np.mean(drawn**2)) == pytest.approx(math.sqrt(expected[0]), rel=0.05)
+    assert np.std(quadratic) == pytest.approx(math.sqrt(expected[1]), rel=0.07)
+
+
+@pytest.mark.parametrize("kind", ["oscillator", "acceleration"])
+def test_what_exchanges_make_of_a_tone_flies(kind: str) -> None:
+    """1.4 Hz every second is 0.4 Hz; of 2 s slow, 0.8 cycles, with the sigma of its row; at 1.4 Hz it is an echo."""
+    spur, shake = {"spurs": {"1.4 Hz": "-80 dBc"}}, {"sinusoidal": [{"amplitude": "1 mg", "frequency": "1.4 Hz"}]}
+    felt = {"acceleration_sensitivity": "1e-9 /g", "vibration": shake}
+    part = {"frequency": "10 MHz", "power_law": {"h0": 1e-34}, **(spur if kind == "oscillator" else felt)}
+    linear = {"method": "linear", "interval": "1 s", "error": 0}
+    mission = parse_mission(
+        mission_text(platforms__receiver__oscillator=part, synchronization=linear, collection__aperture_time="2 s"),
+        "m.yaml",
+    )
+    row_id = "receiver.oscillator" + (".acceleration" if kind == "acceleration" else "")
+    (error,) = (one for one in random_errors(mission) if one.id == row_id)
+    times = np.linspace(-1, 1, 513)
+    drawn = phase_courses(mission, error, times, 4_000, np.random.default_rng(2))
+    quadratic, cubic = (legendre.legfit(times, drawn.T, 3)[order] for order in (2, 3))
+    assert 1.5 * np.std(quadratic) == pytest.approx(error.published.quadratic * error.declared, rel=0.05)
+    assert 2.5 * np.std(cubic) == pytest.approx(error.published.cubic * error.declared, rel=0.05)
+    if kind == "acceleration":
+        flown = oscillator_sinusoids(mission, "receiver")
+        assert {round(one.frequency, 6) for one in flown} >= {0.6, 1.4}

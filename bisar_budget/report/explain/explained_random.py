@@ -30,6 +30,7 @@ from bisar_budget.effects.oscillator_acceleration import (
     lacks_a_spectrum,
     pieces_by_acceleration,
 )
+from bisar_budget.effects.oscillator_tones import LeftTone, spurs_of
 from bisar_budget.effects.random_effect import RandomEffect, RandomError
 from bisar_budget.effects.random_errors import random_errors
 from bisar_budget.effects.spectra import (
@@ -39,7 +40,6 @@ from bisar_budget.effects.spectra import (
     parts,
     set_parts,
     synchronized_parts,
-    tone,
 )
 from bisar_budget.effects.vibration import SLOWEST, counted, displacement_rms, pieces_of_vibration, power_of
 from bisar_budget.findings.row import Row
@@ -315,11 +315,31 @@ def _oscillator(mission: Mission, error: RandomError) -> Iterator[Step]:
         yield step(no_effect(mission, error))
         return
     yield from _integrals(pieces, mission, sync)
+    for spur in spurs_of(mission):
+        if spur.name == error.owner and spur.left.is_folded:
+            yield from _slow("Spur", spur.frequency, spur.left, spur.free, mission, "rad")
     if sync is not None and sync.is_holdover:
         yield from _setting(pieces, mission, sync)
     k = mission.allocation.coverage_factor
     if k != 1:
         yield step(f"Phases times the coverage factor {number(k)}; what is left is a mean power and has none")
+
+
+def _slow(what: str, frequency: float, left: LeftTone, free: float, mission: Mission, unit: str) -> Iterator[Step]:
+    """A tone, or what it is folded to, below one cycle per aperture; its squares add to those of the noise."""
+    T = mission.collection.aperture_time
+    slow = [
+        f"{place:.6g} Hz, {place * T:.3g} cycles per aperture: {number(share)} of the amplitude"
+        for place, share in zip(left.frequencies, left.shares, strict=True)
+        if place * T < SLOWEST and share > 0
+    ]
+    if slow:
+        parts = left.slow_parts(T)
+        quadratic, cubic = (free * math.sqrt(float(part)) for part in (parts.quadratic, parts.cubic))
+        where = "folded by straight lines" if left.is_folded else f"{frequency * T:.3g} cycles per aperture"
+        shown = slow if left.is_folded else ()
+        title = f"{what} at {frequency:.6g} Hz, {where}, in its worst phase"
+        yield step(title, *shown, *_by_unit((quadratic, cubic), unit))
 
 
 def _written(pieces: Sequence[PowerLawPiece]) -> list[str]:
@@ -462,13 +482,8 @@ def _acceleration(mission: Mission, error: RandomError) -> Iterator[Step]:
         )
         yield from _integrals(pieces, mission, sync, _PER_SENSITIVITY)
     for line in accelerated_tones(mission):
-        cycles = line.frequency * mission.collection.aperture_time
-        if line.name == name and cycles < SLOWEST:
-            quadratic, cubic = (float(part) * line.per_unit for part in tone(math.pi * cycles)[:2])
-            yield step(
-                f"Vibration at {line.frequency:.6g} Hz, {cycles:.3g} cycles per aperture, in its worst phase",
-                *_by_unit((abs(quadratic), abs(cubic)), _PER_SENSITIVITY),
-            )
+        if line.name == name:
+            yield from _slow("Vibration", line.frequency, line.left, line.free, mission, _PER_SENSITIVITY)
     if flies_a_turn(mission, name):
         state: PlatformState = getattr(mission.platforms, name).state
         acceleration = float(np.linalg.norm(state.acceleration))

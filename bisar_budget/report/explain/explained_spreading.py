@@ -30,7 +30,7 @@ from bisar_budget.constants import ROUNDING
 from bisar_budget.effects.declared import CUBIC
 from bisar_budget.effects.effect import subject
 from bisar_budget.effects.oscillator_acceleration import accelerated_tones, felt
-from bisar_budget.effects.oscillators import spurs_of
+from bisar_budget.effects.oscillator_tones import spurs_of
 from bisar_budget.faults import printable
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import GroundVector
@@ -123,11 +123,11 @@ def explained_pslr(mission: Mission, row: Row) -> Iterator[Step]:
         yield step("Tones: peak phase, and distance of their echoes from the response", *listed)
         together = [one for one, is_in in zip(found, echo.is_of, strict=True) if is_in]
         pairs = {together[other].subject.id: together[one] for one, other in quadratures(together)}
-        apart = {one.subject.id for one in pairs.values()}
+        apart = list(pairs.values())
         terms = " + ".join(
             f"{_with_its_pair(one, pairs.get(one.subject.id))}*{number(abs(np.sinc(echo.cycles - one.cycles)))}"
             for one in together
-            if one.subject.id not in apart
+            if one not in apart
         )
         title = (
             f"Highest echo: at x = {number(echo.cycles)} cells, of {', '.join(one.subject.id for one in together)}"
@@ -215,7 +215,7 @@ def explained_spur(mission: Mission, allocation: Allocation, row: Row) -> Iterat
     yield step(f"Declared in {place(mission, path)}", f"{frequency:.6g} Hz: {level:.6g} dBc")
     f_0 = mission.radar.center_frequency
     values, formula = {"L": level, "f_0": f_0, "f_osc": oscillator.frequency or f_0}, "L + 20*log(f_0/f_osc)/log(10)"
-    left = next(one.left for one in spurs_of(mission) if (one.name, one.entry) == (row.owner, entry))
+    left = next(one.echo for one in spurs_of(mission) if (one.name, one.entry) == (row.owner, entry))
     title = "At the centre frequency; an echo has the amplitude of the sideband"
     if left != 1:
         values, formula = {**values, "left": left}, f"{formula} + 20*log(left)/log(10)"
@@ -256,8 +256,8 @@ def explained_tone(mission: Mission, allocation: Allocation, row: Row) -> Iterat
     yield step(f"Acceleration of the vibration, declared in {place(mission, path)}", f"a = {with_unit(a, 'm/s^2')}")
     values, formula = {"f_0": f_0, "Γ": one.sensitivity, "a": a, "f": one.frequency}, "f_0*Γ*a/f"
     title = "Derived: peak phase of the tone, a quarter of a turn from the motion itself"
-    if one.left != 1:
-        values, formula = {**values, "left": one.left}, f"{formula}*left"
+    if one.echo != 1:
+        values, formula = {**values, "left": one.echo}, f"{formula}*left"
         title += ", times what the synchronization leaves of it"
     yield step(title, WorkedEquation("φ", formula, values, one.phase, "rad"))
     if one.phase:

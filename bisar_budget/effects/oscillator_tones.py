@@ -1,0 +1,144 @@
+"""Tones of oscillators: spurs, and what the synchronization leaves of any tone, at which frequencies.
+
+Straight lines between samples every T_s of a tone at f are tones at f + m/T_s of sinc²((f + m/T_s)·T_s) of its
+amplitude. Less these lines 1 − sinc²(fT_s) of it stay where it is, and the others, m ≠ 0, are tones that it is folded
+to. Their phases follow from where in its interval an exchange falls, which nobody knows. Derived here.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from bisar_budget.effects.effect import PLATFORMS, Subject, subject
+from bisar_budget.effects.spectra import Parts, tone
+from bisar_budget.effects.vibration import SLOWEST
+from bisar_budget.geometry import BistaticGeometry
+from bisar_budget.mission.model import Mission
+
+_SEEN = 0.01  # of the amplitude of a tone, below which an echo beside the mainlobe is nothing
+_NEIGHBOURS = 3  # rates around 0 Hz beyond which a tone is folded with less than a hundredth of its amplitude
+
+
+class LeftTone(NamedTuple):
+    """What is left of a tone of amplitude 1: its own frequency first, then those that it is folded to. [Hz]
+
+    `shares` are amplitudes, 0 of one that is not there.
+    """
+
+    frequencies: tuple[Any, ...]
+    shares: tuple[Any, ...]
+
+    @property
+    def is_folded(self) -> bool:
+        """Whether pulses are exchanged."""
+        return len(self.shares) > 1
+
+    def echoes(self, aperture_time: Any) -> list[Any]:
+        """Amplitudes of what makes echoes, from one cycle per aperture on; its own of one not folded."""
+        if not self.is_folded:
+            return [self.shares[0]]
+        return [
+            np.where(frequency * aperture_time >= SLOWEST, share, 0.0)[()]
+            for frequency, share in zip(self.frequencies, self.shares, strict=True)
+        ]
+
+    def echo(self, mission: Mission) -> Any:
+        """Amplitude of the largest echo; of all together by their powers where ISLR holds tones."""
+        echoes = self.echoes(mission.collection.aperture_time)
+        if mission.requirements.pslr is None and mission.requirements.islr is not None:
+            return np.sqrt(sum(np.square(one) for one in echoes))
+        return np.max(np.broadcast_arrays(*echoes), axis=0)[()]
+
+    def slowest_echo(self, aperture_time: Any) -> Any:
+        """Lowest frequency of an echo of a hundredth of the amplitude at least; its own of one not folded. [Hz]"""
+        if not self.is_folded:
+            return self.frequencies[0]
+        seen = zip(self.frequencies, self.echoes(aperture_time), strict=True)
+        return np.min([np.where(share > _SEEN, frequency, math.inf) for frequency, share in seen], axis=0)[()]
+
+    def place(self, aperture_time: Any) -> Any:
+        """Frequency of the largest echo. [Hz]"""
+        both = np.array(np.broadcast_arrays(*self.echoes(aperture_time), *self.frequencies))
+        echoes, frequencies = np.split(both, 2)
+        return np.take_along_axis(frequencies, echoes.argmax(axis=0)[None], axis=0)[0]
+
+    def slow_parts(self, aperture_time: Any) -> Parts:
+        """Parts over the aperture of those below one cycle per aperture, each of them in its worst phase. [rad²]
+
+        Those of one tone know of each other, so that their amplitudes add.
+        """
+        total: Any = np.zeros((5, *np.broadcast_shapes(*map(np.shape, (aperture_time, *self.frequencies)))))
+        for frequency, share in zip(self.frequencies, self.shares, strict=True):
+            cycles = frequency * aperture_time
+            if not np.any(cycles < SLOWEST):
+                continue
+            quadratic, cubic, left, constant, linear = tone(math.pi * np.minimum(cycles, SLOWEST))
+            parts = np.array((quadratic, cubic, np.sqrt(left), constant, linear))
+            total = total + np.where(cycles < SLOWEST, share, 0.0) * parts
+        quadratic, cubic, left, constant, linear = total
+        products = (-constant * quadratic, -linear * cubic)
+        return Parts(quadratic**2, cubic**2, left**2, constant**2, linear**2, *products)
+
+
+def left_of_tone(frequency: Any, mission: Mission, geometry: BistaticGeometry) -> LeftTone:
+    """All of a tone, or what exchanged pulses leave; a receiver that hears the transmitter has 2|sin(πfΔt)| of it."""
+    sync = mission.synchronization
+    if mission.has_direct_path:
+        return LeftTone((frequency,), (2 * np.abs(np.sin(math.pi * frequency * geometry.echo_delay)),))
+    if sync is None or sync.interval is None:
+        return LeftTone((frequency,), (1.0,))
+    turns = frequency * np.asarray(sync.interval)
+    folds = [np.rint(turns) + n for n in range(-_NEIGHBOURS, _NEIGHBOURS + 1)]
+    places = [np.abs(turns - fold) for fold in folds]
+    folded = [np.where(fold == 0, 0.0, np.sinc(place) ** 2)[()] for fold, place in zip(folds, places, strict=True)]
+    frequencies = (frequency, *(place / sync.interval for place in places))
+    return LeftTone(frequencies, (1 - np.sinc(turns) ** 2, *folded))
+
+
+class Spur(NamedTuple):
+    """A tone of an oscillator: platform, entry by frequency, frequency [Hz], peak phase at centre frequency [rad].
+
+    `free` is the phase of a free oscillator, `left` what the synchronization leaves of it, `echo` the share of that
+    which makes echoes.
+    """
+
+    name: str
+    entry: int
+    frequency: float
+    free: Any
+    left: LeftTone
+    echo: Any
+
+    @property
+    def subject(self) -> Subject:
+        """That of its row."""
+        return subject(self.name, "oscillator", "spur", entry=self.entry)
+
+    @property
+    def phase(self) -> Any:
+        """Peak phase of its echo. [rad]"""
+        return self.free * self.echo
+
+    def slow_parts(self, aperture_time: Any) -> Parts | None:
+        """Parts over the aperture of what is below one cycle per aperture; None of one not folded. [rad²]"""
+        if not self.left.is_folded:
+            return None
+        return self.left.slow_parts(aperture_time).times(np.square(self.free))
+
+
+def spurs_of(mission: Mission, geometry: BistaticGeometry | None = None) -> list[Spur]:
+    """Tones that reach the image: with a direct path as clock those of the receiver alone, heard twice.
+
+    `geometry` is that of many cases, where numbers of the mission are arrays.
+    """
+    found = []
+    for name in PLATFORMS[mission.has_direct_path :]:
+        oscillator = getattr(mission.platforms, name).oscillator
+        for index, (frequency, level) in enumerate(oscillator.spurs if oscillator is not None else ()):
+            scale = mission.radar.center_frequency / oscillator.frequency
+            left = left_of_tone(frequency, mission, geometry or mission.geometry)
+            # A sideband of a phase φ has the amplitude φ/2 of the carrier.
+            free = 2 * 10 ** (level / 20) * scale
+            found.append(Spur(name, index, frequency, free, left, left.echo(mission)))
+    return found
