@@ -8,6 +8,7 @@ __all__ = [
     "effect",
     "navigation_errors",
     "oscillator_acceleration",
+    "oscillator_tones",
     "oscillators",
     "random_effect",
     "random_errors",

@@ -21,7 +21,7 @@ _NEIGHBOURS = 3  # rates around 0 Hz beyond which a tone is folded with less tha
 
 
 class LeftTone(NamedTuple):
-    """What is left of a tone of amplitude 1: its own frequency first, then those that it is folded to. [Hz]
+    """Tones that are left of one of amplitude 1: at its own frequency first, then those that it is folded to. [Hz]
 
     `shares` are amplitudes, 0 of one that is not there.
     """
