@@ -725,6 +725,18 @@ def tone_is_folded(frequency: float, cycles: float, qpe: float, cubic: float, ro
     )
 
 
+@phrase
+def folded_spurs_count() -> str:
+    """Said of the row of an oscillator."""
+    return "spurs that exchanges fold below one cycle per aperture count in it; a level does not shift them"
+
+
+@phrase
+def spur_is_folded(frequency: float) -> str:
+    """Said of the row of an oscillator, of the phases of which a spur is most. [Hz]"""
+    return f"mostly its spur at {format_quantity(frequency, 'Hz')}, which exchanges fold below one cycle per aperture"
+
+
 # ---------------------------------------------------------------------- vibration
 @phrase
 def share_of_power_over(metric: str, rule: str) -> str:

@@ -25,6 +25,7 @@ from bisar_budget.budget.judged_rows import BOUND, CODE, FamilyRow, Judging, wor
 from bisar_budget.effects.combined import Phases, correlation_notes
 from bisar_budget.effects.declared import CUBIC, LOCATION, OTHER_MODEL, QUADRATIC
 from bisar_budget.effects.effect import Subject, subject
+from bisar_budget.effects.oscillator_tones import spurs_of
 from bisar_budget.effects.vibration import DeclaredPhase
 from bisar_budget.faults import KeyPath
 from bisar_budget.findings.row import Row
@@ -318,8 +319,20 @@ def _largest(case: Case, model: str, one: Aggregate) -> tuple[str, float, Note]:
     else:
         parts = together.phase_parts(one.phases, one.rule, case.place)
     row_id, largest = parts[int(first_highest(np.abs([size for _, size in parts])))]
-    extrapolated = {} if kind in (LOCATION, PULL_IN) else {error.id: error.extrapolated for error in case.random}
-    return row_id, largest, extrapolated.get(row_id, NOTHING)
+    if kind in (LOCATION, PULL_IN):
+        return row_id, largest, NOTHING
+    extrapolated = {error.id: error.extrapolated for error in case.random}
+    return row_id, largest, _folded_spur(case, row_id, largest, kind) or extrapolated.get(row_id, NOTHING)
+
+
+def _folded_spur(case: Case, row_id: str, size: float, kind: str) -> Note:
+    """Name the spur that makes most of an oscillator's phase, as exchanges fold it; nothing where noise does."""
+    T, factor = case.mission.collection.aperture_time, case.mission.allocation.coverage_factor
+    for spur in spurs_of(case.mission):
+        slow = spur.slow_parts(T) if f"{spur.name}.oscillator" == row_id else None
+        if slow is not None and 2 * factor**2 * float(slow.cubic if kind == CUBIC else slow.quadratic) > size**2:
+            return phrases.spur_is_folded(spur.frequency)
+    return NOTHING
 
 
 def _doubt(case: Case, other: str, one: Aggregate, said: _Words, limit: float | None) -> Note:

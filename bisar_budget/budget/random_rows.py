@@ -33,6 +33,7 @@ from bisar_budget.effects.declared import CUBIC, LOCATION, OTHER_MODEL, QUADRATI
 from bisar_budget.effects.effect import PLATFORMS, override_notes, subject
 from bisar_budget.effects.navigation_errors import process_of
 from bisar_budget.effects.oscillator_acceleration import lacks_a_spectrum
+from bisar_budget.effects.oscillator_tones import spurs_of
 from bisar_budget.effects.oscillators import POOR_FIT
 from bisar_budget.effects.random_effect import RandomEffect, RandomError
 from bisar_budget.effects.vibration import counted, displacement_rms, power_of, projected
@@ -421,6 +422,11 @@ def _said_of_oscillator(mission: Mission, error: RandomError) -> tuple[str, str 
     if own is not None and is_heard:
         notes += [note for note in (own.extrapolated, *own.notes) if note]
         notes += _kept_by(mission, sync)
+        slow = [
+            one.slow_parts(mission.collection.aperture_time) for one in spurs_of(mission) if one.name == error.owner
+        ]
+        if any(one is not None and one.quadratic > 0 for one in slow):
+            notes.append(phrases.folded_spurs_count())
     if own is not None and _GOOD_FIT < own.misfit <= POOR_FIT:
         notes.append(phrases.power_law_fits(own.misfit))
     return "phase noise", oscillator.source, tuple(notes)

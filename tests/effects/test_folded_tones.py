@@ -84,6 +84,19 @@ def test_both_sides_of_the_limit_of_its_quadratic_phase(over: float, status: str
     assert found["receiver.quadratic_phase_error"].status == ("warn" if status == "pass" else status)
 
 
+@pytest.mark.parametrize(("level", "is_most"), [(LEVEL, True), (-130.0, False)])
+def test_an_aggregate_names_the_spur_that_makes_most_of_it(level: float, is_most: bool) -> None:
+    """It said of the phase of a spur that a mask was continued."""
+    noise = "{1 Hz: -85 dBc/Hz, 10 Hz: -115 dBc/Hz, 100 Hz: -130 dBc/Hz}"
+    of_file = spur(50.2, level=level).replace("power_law: {h0: 1e-30}", f"phase_noise: {noise}")
+    of_file = of_file.replace("quadratic_phase_error: 20 deg", "quadratic_phase_error: 1e-4 deg")
+    found = bb.check(bb.loads(of_file))
+    reason = str(found["receiver.quadratic_phase_error"].reason)
+    assert ("mostly its spur at 50.2 Hz, which exchanges fold" in reason) is is_most
+    assert ("the mask begins at 1 Hz" in reason) is not is_most
+    assert any("a level does not shift them" in note for note in found["receiver.oscillator"].notes)
+
+
 def test_what_is_folded_on_the_mainlobe_is_no_echo() -> None:
     """50.5 Hz is 2 cycles of the aperture; its own 202 would pass."""
     found = bb.check(bb.loads(spur(50.5)))["receiver.oscillator.spur.0"]
