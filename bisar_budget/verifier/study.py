@@ -81,7 +81,7 @@ class Study:
 
     def allowed(self, source: ErrorSource) -> tuple[float | None, str | None]:
         """Allowable of an error's row by all requirements, autofocus included, and which one binds."""
-        limit = self.allocation.qpe_limit(source.owner) * self.allocation.autofocus_gain
+        limit = self.allocation.qpe_allowed(source.owner)
         needs = self.mission.requirements
         limits = (limit, needs.cubic_phase_error, needs.location_error)
         found = [model.allowed(source, limits) for model in self.models]

@@ -581,7 +581,7 @@ def _allowable(mission: Mission, allocation: Allocation, error: RandomError, row
         return
     effect = error.effect(model)
     held = held_effect(mission, effect, error.coverage(mission))
-    limit = allocation.qpe_limit(error.owner) * allocation.autofocus_gain
+    limit = allocation.qpe_allowed(error.owner)
     if error.is_covered:  # an effect from elsewhere has no quadratic phase here
         yield from limit_steps(allocation, error.owner, limit)
     sizes: dict[str, float] = {}

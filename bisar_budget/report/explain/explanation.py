@@ -179,7 +179,7 @@ def collection_chain(found: MissionFindings) -> Iterator[Step]:
 def _budget(analysis: Analysis, source: ErrorSource, row: Row) -> Iterator[Step]:
     """From the requirements to the smallest size that one of them allows."""
     allocation, requirements = analysis.allocation, analysis.mission.requirements
-    limit = allocation.qpe_limit(source.owner) * allocation.autofocus_gain
+    limit = allocation.qpe_allowed(source.owner)
     yield from limit_steps(allocation, source.owner, limit)
     model = analysis.full if row.model == "full" else analysis.published
     by_quadratic = row.allowable_full if row.model == "full" else row.allowable_published
@@ -342,7 +342,7 @@ def _slow_vibration(mission: Mission, allocation: Allocation, row: Row, cycles: 
     values = {"A": row.declared or 0.0, "λ": wavelength, "c": cubic_part(cycles)}
     worked = WorkedEquation("cubic", "2*π*A*c/λ", values, row.cubic_rad or 0.0, "rad")
     yield step("Cubic phase in the worst phase, c = 17.5·j₃(π·f·T)", worked)
-    limit = allocation.qpe_limit(platform) * allocation.autofocus_gain
+    limit = allocation.qpe_allowed(platform)
     yield from limit_steps(allocation, platform, limit)
     limits, required = slow_limits(mission, allocation, platform, cycles), mission.requirements.cubic_phase_error
     values = {"limit": limit, "λ": wavelength, "q": quadratic_part(cycles)}

@@ -9,12 +9,11 @@ from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.monte_carlo import MonteCarlo, Requirement
 from bisar_budget.findings.requirement import DeclaredKinds, JudgedRequirement
 from bisar_budget.findings.row import SPECIFICATION, Row
-from bisar_budget.findings.status import STATUS
+from bisar_budget.findings.status import BROKEN, STATUS
 from bisar_budget.report.words.sentences import requirement_size, use_words, wrapped
 from bisar_budget.units import format_quantity
 
 COLUMNS = ("requirement", "allowed", "reached", "use", "status", "decided by")
-_BREAKS = ("fail", "not_evaluated")
 
 
 class RequirementLine(NamedTuple):
@@ -110,7 +109,7 @@ def verdict(mission: MissionFindings, *, is_brief: bool = False) -> str:
             named = what
     if said:
         return ", ".join(said)
-    broken = [row for row in mission.rows if row.status in _BREAKS]
+    broken = [row for row in mission.rows if row.status in BROKEN]
     if broken:
         return f"{len(broken)} row{' fails' if len(broken) == 1 else 's fail'} or cannot be judged"
     if mission.is_unverified:
@@ -137,7 +136,7 @@ def unjudged_effects(mission: MissionFindings) -> list[UnjudgedEffect]:
     """List the effects of declared errors that no requirement takes, above what is negligible."""
     found: dict[str, tuple[str, list[Row]]] = {}
     for row in mission.rows:
-        if row.status not in _BREAKS or row.reason is None:
+        if row.status not in BROKEN or row.reason is None:
             continue
         for note in (row.reason, *(value for value in row.reason.values if isinstance(value, phrases.Note))):
             if note.code == "effect-is-not-judged":
@@ -162,7 +161,7 @@ def unseen(mission: MissionFindings) -> list[JudgedRequirement]:
     return [
         one
         for one in mission.requirements
-        if one.status in (*_BREAKS, "waived") and not any(statuses.get(row) == one.status for row in one.rows)
+        if one.status in (*BROKEN, "waived") and not any(statuses.get(row) == one.status for row in one.rows)
     ]
 
 
