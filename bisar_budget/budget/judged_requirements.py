@@ -139,9 +139,8 @@ def requirement_states(
         if key == LOCATION:
             is_unjudged = is_unjudged | np.asarray(is_misplaced)
         status = np.where(is_unjudged & (worst != RANK["fail"]), RANK["not_evaluated"], worst)
-        if waived.get(key):  # a row that breaks it has a waiver of its own, or none
-            is_broken, is_by_row = (np.isin(one, [RANK[name] for name in BROKEN]) for one in (status, worst))
-            status = np.where(is_broken & ~is_by_row, RANK["waived"], status)
+        if waived.get(key):
+            status = np.where(np.isin(status, [RANK[name] for name in BROKEN]), RANK["waived"], status)
         found.append(RequirementState(key, status.astype(np.int8), decider, utilization, mine))
     return found
 

@@ -147,7 +147,7 @@ def _entry(
         rows=tuple(row.id for row, judges in zip(rows, state.judges[:, case.place], strict=True) if row and judges),
         reason=reason,
         line=mission.line(path),
-        waivers=waived.requirements.get(f"mission.{key}", ()) if status == "waived" else (),
+        waivers=waived.requirements.get(f"mission.{key}", ()),
     )
 
 

@@ -461,18 +461,6 @@ def test_a_waiver_covers_the_quadratic_requirement_though_each_error_stands_alon
     assert code(check(allocation=allocation, waivers=[waiver("mission.quadratic_phase_error")], **changes)) == 0
 
 
-def test_a_waiver_of_a_requirement_does_not_cover_the_row_that_breaks_it() -> None:
-    """The table had the receiver's row as waived, which fails."""
-    changes = {RECEIVER: {"velocity": [0, "0.3 m/s", 0]}, "waivers": [waiver("mission.quadratic_phase_error")]}
-    found = check(**changes)
-    said = requirement(found, "quadratic_phase_error")
-    assert (said.row, said.status, said.waivers) == ("receiver.quadratic_phase_error", "fail", ())
-    assert row(found, "receiver.quadratic_phase_error").status == "fail"
-    both = [*changes["waivers"], waiver("receiver.quadratic_phase_error")]
-    assert requirement(check(**changes | {"waivers": both}), "quadratic_phase_error").status == "waived"
-    assert code(check(**changes | {"waivers": both})) == 0
-
-
 def test_an_expired_waiver_covers_nothing() -> None:
     old = waiver("mission.islr") | {"until": "2026-01-31"}
     found = check(requirements={"islr": "-20 dB"}, waivers=[old], **SMALL)
