@@ -986,7 +986,7 @@ def drawn_as_bounds(row_ids: Sequence[str]) -> str:
 @phrase
 def vibration_is_not_drawn() -> str:
     """Said of Monte Carlo."""
-    return "vibration is not drawn; the phase of a slow vibration is not included"
+    return "tones and wideband vibration are not drawn: their phases and displacements are in check alone"
 
 
 @phrase

@@ -119,7 +119,7 @@ class Analysis:
     @cached_property
     def displacing_tones(self) -> list[ToneDisplacement]:
         """Displacement by each vibration and each tone of an oscillator, slow or fast."""
-        return tone_displacements(self.mission, self.geometry, self.exact, self.tones)
+        return tone_displacements(self.mission, self.geometry, self.exact)
 
     def together(self, model: str) -> Together:
         """The declared errors together, by a model."""

@@ -11,24 +11,23 @@ The axes of a vibration may be in any phase: what each displaces adds. What is f
 """
 
 import math
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from bisar_budget.constants import ROUNDING
 from bisar_budget.effects.declared import published_planes
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
+from bisar_budget.effects.oscillator_acceleration import accelerated_tones
+from bisar_budget.effects.oscillator_tones import LeftTone, spurs_of
 from bisar_budget.effects.random_effect import orders_at
 from bisar_budget.effects.spectra import tone
-from bisar_budget.effects.vibration import counted
+from bisar_budget.effects.vibration import SLOWEST, counted
 from bisar_budget.geometry import BistaticGeometry
-from bisar_budget.mission.model import Mission
+from bisar_budget.mission.model import Mission, has_instruments
 from bisar_budget.mission.platforms import MotionError
 from bisar_budget.ranges.exact_ranges import ExactRanges, Floats
-
-if TYPE_CHECKING:
-    from bisar_budget.analysis.spread import Tone
 
 
 class TonePart(NamedTuple):
@@ -63,18 +62,17 @@ class ToneDisplacement(NamedTuple):
         return np.asarray(sum(part.displacement for part in self.parts(model)))
 
 
-def tone_displacements(
-    mission: Mission, geometry: BistaticGeometry, exact: ExactRanges, tones: Sequence["Tone"]
-) -> list[ToneDisplacement]:
-    """Displacement by every vibration of a platform, and by those of the `tones` that are an oscillator's.
+def tone_displacements(mission: Mission, geometry: BistaticGeometry, exact: ExactRanges) -> list[ToneDisplacement]:
+    """Displacement by every vibration of a platform, and by every tone of an oscillator, whatever its echoes do.
 
-    An oscillator's tone below one cycle per aperture counts in the random row of its acceleration.
+    One that exchanges fold has a part at each frequency. What is below one cycle per aperture, of a vibration that an
+    oscillator feels or of a folded tone, counts in the row of the acceleration or of the oscillator.
     """
-    plane, found = _by_plane(geometry, exact), list[ToneDisplacement]()
+    T, plane, found = mission.collection.aperture_time, _by_plane(geometry, exact), list[ToneDisplacement]()
     for place, name in enumerate(PLATFORMS):
         error: MotionError = getattr(mission.platforms, name).motion_error
         for index, line in enumerate(error.vibration.sinusoidal):
-            value, cycles = line.displacement, line.frequency * mission.collection.aperture_time
+            value, cycles = line.displacement, line.frequency * T
             if isinstance(value, tuple):
                 ways, sizes = getattr(geometry, name).frame(error.frame), value
             else:  # along the line of sight, as it turns
@@ -88,15 +86,22 @@ def tone_displacements(
     by_models = [plane, _by_ranges(exact, np.ones_like(exact.times))]
     if mission.has_direct_path:  # the constant phase between direct path and echo moves nothing
         by_models = [per_metre * np.array([0.0, 1.0, 1.0, 1.0])[:, None, None] for per_metre in by_models]
-    of_oscillators: dict[Subject, list[Floats]] = {}
-    for one in tones:
-        if one.subject.kind == "oscillator":  # one that exchanges fold has several, of which phases are not known
-            orders = _orders(one.cycles, one.is_there * one.phase / exact.k)
-            of_oscillators.setdefault(one.subject, []).append(orders)
-    for what, of_one in of_oscillators.items():
-        both = ([TonePart(orders, per_metre) for orders in of_one] for per_metre in by_models)
-        found.append(ToneDisplacement(what, *both))
+    for what, free, left in _tones_of_oscillators(mission, geometry) if has_instruments(mission) else ():
+        echoes = zip(left.frequencies, left.echoes(T), strict=True)
+        orders = [_orders(frequency * T, free * share / exact.k) for frequency, share in echoes]
+        if np.any(orders):
+            both = ([TonePart(one, per_metre) for one in orders] for per_metre in by_models)
+            found.append(ToneDisplacement(what, *both))
     return found
+
+
+def _tones_of_oscillators(mission: Mission, geometry: BistaticGeometry) -> Iterator[tuple[Subject, Any, LeftTone]]:
+    """Row, peak phase of a free oscillator [rad], and what the synchronization leaves of each tone."""
+    for spur in spurs_of(mission, geometry):
+        yield spur.subject, spur.free, spur.left
+    for one in accelerated_tones(mission, geometry):
+        is_fast = one.left.is_folded | (one.frequency * mission.collection.aperture_time >= SLOWEST)
+        yield one.subject, is_fast * one.free * one.sensitivity, one.left
 
 
 def _orders(cycles: Any, size: Any) -> Floats:

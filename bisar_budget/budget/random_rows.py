@@ -151,7 +151,8 @@ class RandomRows:
             binding=np.array([-1, *map(REQUIREMENTS.index, HELD)], np.int8)[binds + 1],
             qpe_published_rad=published.quadratic * declared,
             cubic_rad=mine.cubic * declared,
-            quadratic_use=qpe / (limit * gain),
+            # Beside an aggregate, which holds it, a row that cannot be judged breaks no quadratic requirement.
+            quadratic_use=np.where(is_open & (combine != "each"), math.nan, qpe / (limit * gain)),
         )
         judged = judged._replace(utilization=np.where(is_open, math.nan, judged.utilization))
         if self.judging.is_whole:

@@ -15,7 +15,6 @@ from bisar_budget.budget.judged_rows import BOUND, FamilyRow, Judging, worded
 from bisar_budget.effects.declared import OTHER_MODEL
 from bisar_budget.effects.effect import override_notes, subject
 from bisar_budget.effects.oscillator_acceleration import (
-    AcceleratedTone,
     accelerated_tones,
     felt,
     flies_a_turn,
@@ -27,6 +26,7 @@ from bisar_budget.findings.row import Row
 from bisar_budget.mission.instruments import Oscillator
 from bisar_budget.mission.model import Mission, has_instruments
 from bisar_budget.phrases import NOTHING, Note
+from bisar_budget.ranges.exact_ranges import Truths
 
 SENSITIVITY = "acceleration_sensitivity"
 
@@ -80,20 +80,20 @@ def spur_rows(judging: Judging, analysis: Analysis, model: str) -> Iterator["Spu
     mission = analysis.mission
     metric, by_platform = tone_limits(mission, analysis.allocation)
     for place, spur in enumerate(spurs_of(mission, analysis.geometry) if has_instruments(mission) else ()):
-        what, phase = spur.subject, judging.array(spur.phase)
+        what, phase, T = spur.subject, judging.array(spur.phase), mission.collection.aperture_time
         limits, is_over_other = by_platform.get(spur.name), np.zeros(judging.cases, dtype=bool)
+        is_over_phase = _is_over_phase(judging, analysis, spur.name, _phases_beside(spur.left, spur.free, T))
         if limits is None:
-            judged = judging.row(what, phase / 2, None, is_info=True)
+            judged = judging.row(what, phase / 2, None, doubt=is_over_phase, is_info=~is_over_phase)
         else:
             limits = VibrationLimits(*(2 * math.pi / mission.radar.wavelength * limit for limit in limits))
             is_over_other = phase > limits.by(OTHER_MODEL[model]) * BOUND
-            T = mission.collection.aperture_time
             is_near = spur.left.slowest_echo(T) * T < ECHO_CYCLES
             judged = judging.row(  # the amplitude of an echo over that of the response
                 what,
                 phase / 2,
                 judging.array(limits.by(model) / 2),
-                doubt=is_over_other,
+                doubt=is_over_other | is_over_phase,
                 is_unknown=is_near & (metric == "pslr"),
             )
             published, full = (judging.array(limit / 2) for limit in limits)
@@ -102,7 +102,7 @@ def spur_rows(judging: Judging, analysis: Analysis, model: str) -> Iterator["Spu
         if metric == "islr":
             judged = judged._replace(islr_db=islr_of(mission, phase**2 / 2))
         is_there = (phase > 0) | (not spur.left.is_folded)
-        yield SpurRow(judged, place, is_over_other, is_there=is_there)
+        yield SpurRow(judged, place, is_over_other, is_over_phase, is_there=is_there)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -111,6 +111,7 @@ class SpurRow(FamilyRow):
 
     place: int
     is_over_other: Any
+    is_over_phase: Any
 
     def in_words(self, case: Case, model: str) -> Row:
         """The row of one case, by the model that judges it."""
@@ -123,6 +124,8 @@ class SpurRow(FamilyRow):
             if self.is_over_other[case.place]:
                 other = OTHER_MODEL[model]
                 doubt = phrases.other_model_allows(other, case.number(row.allowable_by(other)), "dB")
+        if self.is_over_phase[case.place]:
+            doubt = _phase_over(case, spur.name, _phases_beside(spur.left, spur.free, T))
         return worded(
             case,
             row,
@@ -174,10 +177,8 @@ def accelerated_rows(judging: Judging, analysis: Analysis, model: str) -> Iterat
             continue
         declared, limits = judging.array(one.sensitivity), by_platform.get(one.name)
         phase = declared * per_unit
-        qpe, cubic = map(judging.array, _phases_beside(one, T))
-        is_over_phase = qpe > analysis.allocation.qpe_allowed(one.name) * BOUND
-        if mission.requirements.cubic_phase_error is not None:
-            is_over_phase = is_over_phase | (cubic > mission.requirements.cubic_phase_error * BOUND)
+        beside = _phases_beside(one.left, one.free * one.sensitivity, T)
+        is_over_phase = _is_over_phase(judging, analysis, one.name, beside)
         if limits is None:
             judged = judging.row(one.subject, declared, None, doubt=is_over_phase, is_info=~is_over_phase)
             is_over_other = np.zeros(judging.cases, dtype=bool)
@@ -216,9 +217,7 @@ class AcceleratedRow(FamilyRow):
                 other = OTHER_MODEL[model]
                 doubt = phrases.other_model_allows(other, case.number(row.allowable_by(other)), "s^2/m")
         if self.is_over_phase[case.place]:
-            limit, allowed = case.allocation.qpe_allowed(one.name), mission.requirements.cubic_phase_error
-            qpe, cubic = map(float, _phases_beside(one, T))
-            doubt = phrases.phase_of_vibration_over(qpe, limit, cubic, allowed)
+            doubt = _phase_over(case, one.name, _phases_beside(one.left, one.free * one.sensitivity, T))
         oscillator: Oscillator = getattr(mission.platforms, one.name).oscillator
         return worded(
             case,
@@ -242,15 +241,29 @@ class AcceleratedRow(FamilyRow):
         )
 
 
-def _phases_beside(one: AcceleratedTone, aperture_time: Any) -> tuple[Any, Any]:
+def _phases_beside(left: LeftTone, free: Any, aperture_time: Any) -> tuple[Any, Any]:
     """Quadratic and cubic phase of the echoes that lie beside the mainlobe, in their worst phases. [rad]"""
     qpe: Any = 0.0
     cubic: Any = 0.0
-    for frequency, share in zip(one.left.frequencies, one.left.echoes(aperture_time), strict=True):
+    for frequency, share in zip(left.frequencies, left.echoes(aperture_time), strict=True):
         cycles = frequency * aperture_time
-        phase = np.where(cycles < ECHO_CYCLES, one.free * one.sensitivity * share, 0.0)
+        phase = np.where(cycles < ECHO_CYCLES, free * share, 0.0)
         qpe, cubic = qpe + phase * quadratic_part(cycles), cubic + phase * cubic_part(cycles)
     return qpe, cubic
+
+
+def _is_over_phase(judging: Judging, analysis: Analysis, name: str, phases: tuple[Any, Any]) -> Truths:
+    """Whether these phases break what a platform's quadratic, or the cubic phase may be, in which cases."""
+    qpe, cubic = map(judging.array, phases)
+    allowed = analysis.mission.requirements.cubic_phase_error
+    is_over = qpe > analysis.allocation.qpe_allowed(name) * BOUND
+    return np.asarray(is_over if allowed is None else is_over | (cubic > allowed * BOUND))
+
+
+def _phase_over(case: Case, name: str, phases: tuple[Any, Any]) -> Note:
+    qpe, cubic = map(float, phases)
+    allowed = case.mission.requirements.cubic_phase_error
+    return phrases.phase_of_vibration_over(qpe, case.allocation.qpe_allowed(name), cubic, allowed)
 
 
 def evidence(oscillator: Oscillator) -> str | None:

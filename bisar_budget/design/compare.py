@@ -142,7 +142,9 @@ def compare_parts(
     hold_to_decisions(found, row)
     # A frequency alone makes another scale of what the file states, and no part.
     if all(set(one.figures) <= {"frequency"} for one in tried):
-        raise QuestionError(f"{key}: the file states every figure itself; nothing of a part would be taken")
+        raise QuestionError(
+            f"{key}: the file states every figure itself; no more than a frequency would be taken of a part"
+        )
     states = [search.state(one, row, breaking(target)) for one in tried]
     return Comparison(
         file=mission.file,

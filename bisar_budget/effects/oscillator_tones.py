@@ -44,9 +44,9 @@ class LeftTone(NamedTuple):
         ]
 
     def echo(self, mission: Mission) -> Any:
-        """Amplitude of the largest echo; of all together by their powers where ISLR holds tones."""
+        """Amplitude of the largest echo; of all together by their powers where PSLR does not hold tones."""
         echoes = self.echoes(mission.collection.aperture_time)
-        if mission.requirements.pslr is None and mission.requirements.islr is not None:
+        if mission.requirements.pslr is None:
             return np.sqrt(sum(np.square(one) for one in echoes))
         return np.max(np.broadcast_arrays(*echoes), axis=0)[()]
 

@@ -191,12 +191,12 @@ def oscillator_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
         return
     found = _left_at_1_hz(seen, name, oscillator)
     scale = mission.radar.center_frequency**2 * 10 ** (np.asarray(oscillator.level) / 10)
-    found = found * scale
+    tones = np.zeros_like(found)
     for spur in spurs_of(mission, seen.geometry):
         slow = spur.slow_parts(seen.aperture_time)
         if spur.name == name and slow is not None:
-            found += slow.rows.reshape(len(found), -1)
-    published, full = _of_clock(seen, Parts(*found))
+            tones += slow.rows.reshape(len(tones), -1)
+    published, full = _of_clock(seen, Parts(*found * scale), Parts(*tones))
     key = ("platforms", name, "oscillator")
     path = key if oscillator.sensor is None else (*key, "sensor")
     yield RandomError(
@@ -204,32 +204,29 @@ def oscillator_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
     )
 
 
-def _of_clock(seen: SensorCases, found: Parts) -> tuple[RandomEffect, RandomEffect]:
+def _of_clock(seen: SensorCases, found: Parts, tones: Parts) -> tuple[RandomEffect, RandomEffect]:
     """Effects by both models of a phase with these parts [rad²]; those of orders 0 and 1 where they are known.
 
-    Where the file states both terms of the clock, these stand for what a free oscillator displaces.
+    Where the file states both terms of the clock, these stand for what a free oscillator displaces, but not for what
+    its slow `tones` do.
     """
     k, timing = 2 * math.pi / np.asarray(seen.mission.radar.wavelength), seen.mission.timing_error
-    quadratic, cubic, spread = (np.sqrt(one) for one in found[:3])
+    quadratic, cubic, spread = np.sqrt(found.rows[:3] + tones.rows[:3])
     is_stated = not seen.mission.has_direct_path and timing.constant is not None and timing.linear is not None
     is_known = np.isfinite(found.constant + found.linear)
     nothing = np.where(is_stated | (quadratic + cubic == 0), 0.0, math.nan)
     counts = is_known & ~np.asarray(is_stated)
-    with np.errstate(invalid="ignore"):
-        square = 1 / k**2
-        covariance = np.where(counts, found.covariance * square, 0.0)
-        east, north = (
-            np.where(counts, one, nothing)
-            for one in seen.moved(found.constant * square, found.linear * square, found.constant_linear * square)
-        )
-    published = RandomEffect(quadratic, cubic, spread, east, north)
-    (*phases, east, north), whole = seen.of_orders(covariance)
-    own = np.zeros_like(whole)
-    own[0, 0], own[1, 1] = quadratic**2, cubic**2
-    quadratic, cubic, east, north = (
-        np.where(counts, *both)
-        for both in zip((*phases, east, north), (quadratic, cubic, nothing, nothing), strict=True)
+    known = Parts(*np.where(counts, found.rows, 0.0) + tones.rows).times(1 / k**2)
+    is_placed = counts | is_stated
+    east, north = (
+        np.where(is_placed, one, nothing) for one in seen.moved(known.constant, known.linear, known.constant_linear)
     )
+    published = RandomEffect(quadratic, cubic, spread, east, north)
+    (*phases, east, north), whole = seen.of_orders(known.covariance)
+    own = np.where(is_placed, whole, 0.0)
+    own[0, 0], own[1, 1] = quadratic**2, cubic**2
+    quadratic, cubic = (np.where(counts, *both) for both in zip(phases, (quadratic, cubic), strict=True))
+    east, north = (np.where(is_placed, one, nothing) for one in (east, north))
     return published, RandomEffect(quadratic, cubic, spread, east, north, np.where(counts, whole, own))
 
 
@@ -282,7 +279,8 @@ def link_noise(seen: SensorCases) -> Iterator[RandomError]:
         for interval, places in seen.alike(sync.interval):
             times, place = np.unique(seen.aperture_time[places], return_inverse=True)
             found[:, places] = link_parts(times, interval).rows[:, place]
-    published, full = _of_clock(seen, Parts(*found).without_constant())  # a constant phase moves nothing
+    left = Parts(*found).without_constant()  # a constant phase moves nothing
+    published, full = _of_clock(seen, left, Parts(*np.zeros_like(found)))
     published, full = (one._replace(spread=one.spread / seen.factor) for one in (published, full))
     what = subject("clock", "synchronization")
     yield RandomError(what, "rad", sync.error * seen.factor, ("synchronization", "error"), published, full)

@@ -307,7 +307,7 @@ def _notes(mission: Mission, analysis: Analysis, *, is_exact: bool, is_placed: b
     if bounds:
         yield phrases.drawn_as_bounds(bounds)
     vibrations = [getattr(mission.platforms, name).motion_error.vibration for name in PLATFORMS]
-    if any(one.sinusoidal or one.wideband for one in vibrations):
+    if analysis.displacing_tones or any(one.wideband for one in vibrations):
         yield phrases.vibration_is_not_drawn()
     if mission.requirements.location_error is not None and not is_placed:
         yield phrases.unset_clocks_are_not_drawn()

@@ -111,7 +111,7 @@ def test_a_frequency_alone_is_no_part() -> None:
     """The mask is the file's own: every part would show it at another frequency."""
     mask = "phase_noise: {1 Hz: -95 dBc/Hz, 10 Hz: -125 dBc/Hz, 1 kHz: -150 dBc/Hz}"
     own = f"platforms.receiver.oscillator={{sensor: gps-3500, {mask}, aging: 1e-10 /day}}"
-    with pytest.raises(QuestionError, match="nothing of a part would be taken"):
+    with pytest.raises(QuestionError, match="no more than a frequency would be taken of a part"):
         ask(OSCILLATOR, own, file=OCXO)
 
 

@@ -148,3 +148,48 @@ def test_cases_together_are_what_each_is_alone(one: str, key: str, values: list[
         assert alone.status == table["status"][place]
         worst = alone[table["worst_row"][place]]
         assert worst.utilization == pytest.approx(table["utilization"][place], rel=1e-9)
+
+
+WHATEVER_HOLDS_IT = ("pslr: -17 dB", "islr: -10 dB", "pslr: -17 dB, islr: -10 dB", "location_error: 1 m")
+
+
+def placed(of_file: str) -> float:
+    use = bb.check(bb.loads(of_file)).requirements["location_error"].utilization
+    assert use is not None
+    return use
+
+
+@pytest.mark.parametrize("others", WHATEVER_HOLDS_IT)
+def test_a_folded_tone_displaces_whatever_requirement_holds_it(others: str) -> None:
+    """Without PSLR it was taken to displace at its own frequency: a thousandth of it."""
+    needs = others if "location" in others else f"{others}, location_error: 1 m"
+    free = spur(0.3, needs).replace("synchronization", "x").partition("x:")[0]  # what 50.3 Hz is folded to
+    assert placed(spur(50.3, needs)) == pytest.approx(placed(free), rel=0.02)
+    assert placed(free) > 0.01
+
+
+@pytest.mark.parametrize("frequency", [50.2, 50.3])  # folded below one cycle, and above
+def test_terms_of_the_clock_do_not_stand_for_a_tone(frequency: float) -> None:
+    """A stated timing error, be it zero, hid what a spur displaces that is folded below one cycle."""
+    of_file = spur(frequency, "pslr: -17 dB, location_error: 1 m")
+    stated = of_file + "timing_error: {constant: 0 s, linear: 0}\n"
+    assert placed(stated) == pytest.approx(placed(of_file), rel=1e-3)
+
+
+@pytest.mark.parametrize(("over", "is_over"), [(1.01, True), (0.99, False)])
+def test_by_islr_its_phases_beside_the_mainlobe_are_a_doubt(over: float, is_over: bool) -> None:
+    """A spur that is folded to 1.6 cycles had a cubic phase of any size, and nothing said so."""
+    _, cubic, _ = sampled(50.4)
+    level = LEVEL + 20 * math.log10(over * math.radians(10) / (cubic * PHASE))
+    row = bb.check(bb.loads(spur(50.4, "islr: -1 dB", level=level)))["receiver.oscillator.spur.0"]
+    assert ("or a cubic of" in str(row.reason)) is is_over
+    assert row.status == ("warn" if is_over else "pass")
+
+
+def test_without_a_requirement_all_power_counts_as_by_islr() -> None:
+    """Two echoes of a spur near half of the exchanges counted as the larger one."""
+    one, other = (
+        bb.check(bb.loads(spur(4.95, needs)))["receiver.oscillator.spur.0"].declared
+        for needs in ("islr: -1 dB", "location_error: 1 m")
+    )
+    assert one == pytest.approx(other)

@@ -287,7 +287,7 @@ def _flown(mission: Mission) -> str:
     if mission.propagation is not None:
         drawn += f"; of delays in the air one draw each, seed {seed}"
     if any(platform.oscillator and platform.oscillator.spurs for platform in mission.platforms):
-        drawn += "; tones of oscillators are left out"
+        drawn += "; spurs are left out, but for what exchanges fold below one cycle per aperture"
     if has_instruments(mission) and has_unset_clocks(mission):
         drawn += "; of oscillators without mean and slope, since the file does not say how they are set"
     return (

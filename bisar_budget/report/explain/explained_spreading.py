@@ -176,9 +176,11 @@ def _use_of_amplitudes(row: Row) -> Iterator[Step]:
 
 
 def moved_by_tone(parts: Sequence[TonePart], model: str, moved: GroundVector) -> Iterator[Step]:
-    """The orders of a tone, and what they displace; of one along three axes those of each axis, which add."""
+    """The orders of a tone, and what they displace; of several axes, and of one that is folded, each."""
     by = "(25)" if model == "published" else "exact ranges"
     for index, part in enumerate(parts):
+        if (part.displacement[:, 0] < 1e-3 * np.abs(moved)).all():
+            continue
         axis = f"_{index + 1}" if len(parts) > 1 else ""
         c, worked = part.orders[:, 0].tolist(), list[WorkedEquation]()
         for name, each, size in zip(
@@ -203,7 +205,7 @@ def moved_by_tone(parts: Sequence[TonePart], model: str, moved: GroundVector) ->
             Sum(f"{name} = {' + '.join(map(number, sizes))} = {with_unit(total, 'm')}")
             for name, sizes, total in zip(("east", "north"), of_axes, moved, strict=True)
         )
-        yield step("Axes may vibrate in any phase: displacements add", *sums)
+        yield step("Each may be in any phase: displacements add", *sums)
 
 
 def explained_spur(mission: Mission, allocation: Allocation, row: Row) -> Iterator[Step]:
