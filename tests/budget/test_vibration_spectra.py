@@ -146,7 +146,8 @@ def test_what_wideband_does_to_an_oscillator_is_not_evaluated(beside: str, combi
 def test_beside_an_aggregate_a_row_that_cannot_be_judged_decides_no_quadratic_phase() -> None:
     """The reason for ISLR was given for the quadratic phase, and stood in the way of waivers."""
     turn = "acceleration: [-1 m/s^2, 0.5 m/s^2, 0 m/s^2]"
-    found = checked("wideband: {rms: 10 um}", "acceleration_sensitivity: 1e-4 /g", "islr: -1 dB", "combine: rss", turn)
+    sensitive = "acceleration_sensitivity: 1e-4 /g"
+    found = checked("wideband: {rms: 10 um}", sensitive, "islr: -1 dB", "combine: rss", turn)
     assert row(found, "receiver.oscillator.acceleration").status == "not_evaluated"
     quadratic = required(found, "quadratic_phase_error")
     assert (quadratic.row, quadratic.status) == ("receiver.quadratic_phase_error", "fail")
