@@ -986,7 +986,7 @@ def drawn_as_bounds(row_ids: Sequence[str]) -> str:
 @phrase
 def vibration_is_not_drawn() -> str:
     """Said of Monte Carlo."""
-    return "tones and wideband vibration are not drawn: their phases and displacements are in check alone"
+    return "what vibrations and tones do is not drawn: it is in check alone"
 
 
 @phrase
