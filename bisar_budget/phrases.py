@@ -717,6 +717,12 @@ def tone_lies(frequency: float, cells: float) -> str:
 
 
 @phrase
+def echo_is_folded(frequency: float, reason: Note) -> str:
+    """Said of an echo of a tone between exchanges, and what follows. [Hz]"""
+    return f"straight lines between exchanges fold it to {format_quantity(frequency, 'Hz')}; {reason}"
+
+
+@phrase
 def tone_is_folded(frequency: float, cycles: float, qpe: float, cubic: float, row_id: str) -> str:
     """Said of a tone of an oscillator between exchanges. [Hz]"""
     return (

@@ -119,6 +119,8 @@ class SpurRow(FamilyRow):
         spur = spurs_of(mission)[self.place]
         oscillator: Oscillator = getattr(mission.platforms, spur.name).oscillator
         T, missing = mission.collection.aperture_time, phrases.no_requirement_of("pslr")
+        near = float(spur.left.slowest_echo(T))
+        on_mainlobe = phrases.echoes_on_the_mainlobe(near * T, ECHO_CYCLES)
         if not math.isnan(row.allowable[case.place]):
             over = phrases.echoes_over(case.number(row.declared), case.number(row.allowable))
             if self.is_over_other[case.place]:
@@ -135,7 +137,7 @@ class SpurRow(FamilyRow):
             over=over,
             doubt=doubt,
             no_limit=missing,
-            not_evaluated=phrases.echoes_on_the_mainlobe(spur.left.slowest_echo(T) * T, ECHO_CYCLES),
+            not_evaluated=phrases.echo_is_folded(near, on_mainlobe) if spur.left.is_folded else on_mainlobe,
             info=missing,
             evidence=oscillator.source,
             remarks=(

@@ -1,6 +1,8 @@
 """Tones of oscillators between exchanged pulses, against tones that are sampled and joined by straight lines."""
 
 import math
+from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -193,3 +195,19 @@ def test_without_a_requirement_all_power_counts_as_by_islr() -> None:
         for needs in ("islr: -1 dB", "location_error: 1 m")
     )
     assert one == pytest.approx(other)
+
+
+def test_an_echo_beside_the_mainlobe_says_where_exchanges_fold_it_to() -> None:
+    """It named 1.2 cycles of a spur of 50.3 Hz, and not why."""
+    reason = str(bb.check(bb.loads(spur(50.3)))["receiver.oscillator.spur.0"].reason)
+    assert reason.startswith("straight lines between exchanges fold it to 0.3 Hz; 1.2 cycles per aperture: below 3 ")
+    reason = str(bb.check(bb.loads(spur(0.3).partition("synchronization")[0]))["receiver.oscillator.spur.0"].reason)
+    assert reason.startswith("1.2 cycles per aperture: below 3 ")
+
+
+def test_the_use_of_a_spur_is_explained_last(tmp_path: Path, run: Callable) -> None:
+    """Its percentage stood below what the spur displaces."""
+    file = tmp_path / "m.yaml"
+    file.write_text(spur(51.0, "pslr: -17 dB, location_error: 1 m"), encoding="utf-8")
+    said = run("check", str(file), "--explain", "receiver.oscillator.spur.0").stdout
+    assert "Orders of the tone at the aperture edge" in said.partition("Utilization, of amplitudes")[0]

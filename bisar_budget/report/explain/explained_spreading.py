@@ -145,7 +145,7 @@ def explained_pslr(mission: Mission, row: Row) -> Iterator[Step]:
         return
     worked = WorkedEquation("allowable", "required", {"required": row.allowable}, row.allowable, "dB")
     yield step(f"requirements.pslr, all of it, {place(mission, ('requirements', 'pslr'))}", worked)
-    yield from _use_of_amplitudes(row)
+    yield from use_of_amplitudes(row)
 
 
 def _with_its_pair(one: Tone, other: Tone | None) -> str:
@@ -167,7 +167,8 @@ def _echo_level(echo: Echo) -> Iterator[Step]:
     )
 
 
-def _use_of_amplitudes(row: Row) -> Iterator[Step]:
+def use_of_amplitudes(row: Row) -> Iterator[Step]:
+    """Utilization of a row in decibel, where it has one."""
     if row.utilization is None or row.declared is None or row.allowable is None:
         return
     values = {"declared": row.declared, "allowable": row.allowable}
@@ -230,7 +231,6 @@ def explained_spur(mission: Mission, allocation: Allocation, row: Row) -> Iterat
     phase, at_limit = _phase_at_limit(mission, row, limits, "φ")
     yield at_limit
     yield step("Its echoes", WorkedEquation("allowable", "20*log(φ/2)/log(10)", {"φ": phase}, row.allowable, "dB"))
-    yield from _use_of_amplitudes(row)
 
 
 def _phase_at_limit(mission: Mission, row: Row, limits: VibrationLimits, symbol: str) -> tuple[float, Step]:

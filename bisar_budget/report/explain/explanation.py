@@ -57,6 +57,7 @@ from bisar_budget.report.explain.explained_spreading import (
     explained_spur,
     explained_tone,
     moved_by_tone,
+    use_of_amplitudes,
 )
 from bisar_budget.report.explain.notation import Step, Sum, WorkedEquation, number, step, with_unit
 from bisar_budget.report.words.requirements import requirement_finding, requirement_id
@@ -152,7 +153,9 @@ def _to_utilization(mission: Mission, found: MissionFindings, row: Row) -> Itera
     for tone in analysis.displacing_tones:
         if tone.subject.id == row.id and row.displacement_m is not None:
             yield from moved_by_tone(tone.parts(together.model), together.model, row.displacement_m)
-    if row.declared is not None and row.allowable is not None and row.utilization is not None and row.unit != "dB":
+    if row.subject.axis == "spur" and row.allowable is not None:
+        yield from use_of_amplitudes(row)
+    elif row.declared is not None and row.allowable is not None and row.utilization is not None and row.unit != "dB":
         values = {"declared": row.declared, "allowable": row.allowable}
         yield step("Utilization", WorkedEquation("utilization", "declared/allowable", values, row.utilization, ""))
 
