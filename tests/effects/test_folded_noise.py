@@ -1,4 +1,4 @@
-"""What straight lines between exchanged pulses leave of noise, against sampled tones and against sums of aliases."""
+"""Noise that straight lines between exchanged pulses leave, against sampled tones and against sums of aliases."""
 
 import math
 
@@ -118,7 +118,7 @@ def powers(low: float, high: float) -> st.SearchStrategy[float]:
 
 @given(st.tuples(powers(-2, 2), powers(-7, 1), st.floats(-24, 24), powers(-1, 1.7)))
 def test_any_piece_is_the_sum_of_its_aliases(one: tuple[float, float, float, float]) -> None:
-    """Of what turns more than 24 times within the aperture phases are means, to 3e-3 of its power."""
+    """Phases are means of whatever turns more than 24 times within the aperture, to 3e-3 of its power."""
     low, width, _, exchanges = one
     assume(low * width * max(4 * exchanges, 8) < 2000)
     agrees(one, 3e-3)

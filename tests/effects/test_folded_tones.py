@@ -114,7 +114,7 @@ def test_the_note_says_where_it_is_folded_to() -> None:
 
 @pytest.mark.parametrize("frequency", [51.0, 54.0, 33.0, 9.0])
 def test_by_islr_all_power_counts_that_is_left(frequency: float) -> None:
-    """Of 51 Hz every 100 ms twice that of the tone: its own, and that at 1 Hz."""
+    """A tone of 51 Hz has twice its power every 100 ms: its own, and that at 1 Hz."""
     found = bb.check(bb.loads(spur(frequency, "islr: -10 dB")))["receiver.oscillator.spur.0"]
     *_, power = sampled(frequency)
     assert found.declared == pytest.approx(20 * math.log10(PHASE / 2 * math.sqrt(2 * power)), abs=0.02)

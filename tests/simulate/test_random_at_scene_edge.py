@@ -58,7 +58,7 @@ def checked(**changes: Any) -> MissionFindings:
 
 
 def ranges(paths: np.ndarray, point: np.ndarray) -> np.ndarray:
-    """Of paths (2, ..., 3, times) to ground points (..., 2), summed, (..., times)."""
+    """Ranges from paths (2, ..., 3, times) to ground points (..., 2), summed, (..., times)."""
     east, north, up = np.moveaxis(paths, -2, 0)
     return np.sqrt((east - point[..., 0, None]) ** 2 + (north - point[..., 1, None]) ** 2 + up**2).sum(axis=0)
 
@@ -281,7 +281,7 @@ def test_a_clock_that_feels_a_turn_displaces_otherwise_there() -> None:
 
 @pytest.mark.parametrize("amplitude", [[2e-3, 1e-3, 3e-3], 2e-3])
 def test_a_slow_vibration_differs_in_its_worst_phase(amplitude: Any) -> None:
-    """Of several axes each in a phase of its own; of one along the line of sight, along that of the centre."""
+    """Several axes have a phase each; one along the line of sight moves along that of the centre."""
     line = {"amplitude": amplitude, "frequency": 0.2}
     found = checked(of_receiver={"motion_error": {"vibration": {"sinusoidal": [line]}}})
     look = PATHS[1][0] / np.linalg.norm(PATHS[1][0])

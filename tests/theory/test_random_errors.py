@@ -201,7 +201,7 @@ def test_check_value_of_gnss_noise() -> None:
 
 @pytest.mark.parametrize("step", [0.3, 1.0, 5.0, 40.0])
 def test_synchronisation_leaves_the_error_of_linear_interpolation(step: float) -> None:
-    """What straight lines miss of a tone, and the same power by frequency: its own, and those it is folded to."""
+    """The part of a tone that straight lines miss, by samples and by frequency: its own, and where it is folded."""
     part = (np.arange(20_000) + 0.5) / 20_000
     missed = np.mean(np.abs(np.exp(1j * step * part) - (1 - part) - part * np.exp(1j * step)) ** 2)
     y = random_errors.step
