@@ -251,6 +251,6 @@ def test_a_library_that_is_missing(suffix: str, monkeypatch: pytest.MonkeyPatch)
         raise ImportError(name)
 
     monkeypatch.setattr(tables, "import_module", missing)
-    with pytest.raises(MissingTablesError, match=r"pip install 'bisar-budget\[tables\]'") as error:
+    with pytest.raises(MissingTablesError, match=r"pip install netCDF4 pyarrow xarray") as error:
         writer_of(suffix)
     assert TABLES[suffix].library in str(error.value)
