@@ -231,7 +231,7 @@ class TestDatasets:
 
     def test_without_xarray(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setitem(sys.modules, "xarray", None)
-        with pytest.raises(MissingTablesError, match=r"needs xarray.*tables"):
+        with pytest.raises(MissingTablesError, match=r"needs xarray.*pip install netCDF4 pyarrow xarray"):
             bb.sweep(MISSION, GRID, date=DAY).to_xarray()
 
 
