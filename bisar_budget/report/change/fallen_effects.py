@@ -1,4 +1,4 @@
-"""Declared errors that do less to the image than before, although neither their part nor their source changed by name.
+"""Declared errors that do less to the image than before although neither part nor source changed by name.
 
 Both versions are held to the earlier geometry, waveform, aperture and requirements: what these change is no fall.
 """
@@ -27,7 +27,7 @@ _ANY_DAY = date(2000, 1, 1)  # waivers decide no use of a limit
 
 @dataclass(frozen=True)
 class FallenEffect:
-    """A row of which less than before is declared, or which uses less of its limit; `after` is None where it is gone."""
+    """A row that declares less than before, or uses less of its limit; `after` is None where it is gone."""
 
     before: Row
     after: Row | None
