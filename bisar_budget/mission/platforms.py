@@ -56,6 +56,7 @@ from bisar_budget.mission.readers import (
     TextList,
     Triple,
     Whole,
+    date_schema,
     either,
 )
 from bisar_budget.mission.vibrations import Vibration
@@ -216,7 +217,7 @@ class _Lines(Reader):
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
         """Array of two lines."""
-        return {"type": "array", "items": {"type": "string"}, "minItems": 2, "maxItems": 2}
+        return {"type": "array", "items": Reference().schema(definitions), "minItems": 2, "maxItems": 2}
 
 
 class OrbitSource(NamedTuple):
@@ -260,7 +261,7 @@ class _Instant(Reader):
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
         """Date and time."""
-        return {"type": "string", "format": "date-time"}
+        return date_schema(r"^\s*\d{4}-\d\d-\d\d[T ]")
 
 
 class TrajectorySource(NamedTuple):
