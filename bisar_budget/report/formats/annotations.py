@@ -16,7 +16,7 @@ from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
 from bisar_budget.report.words.heading import overrides_words
 from bisar_budget.report.words.identity import Identity, digest, identities, source_path
-from bisar_budget.report.words.requirements import requirement_finding, requirement_id, unseen
+from bisar_budget.report.words.requirements import requirement_finding, requirement_id, share_columns, unseen
 from bisar_budget.report.words.sentences import (
     command_property,
     command_text,
@@ -292,9 +292,10 @@ def _requirement(
         metric=one.key,
         unit=one.unit or None,
         declared=one.reached,
-        allowable=one.value if one.allowed is None else one.allowed,
+        allowable=one.allowed,
         utilization=one.utilization,
         decided_by=one.row,
+        **share_columns(one),
     )
     return result | _suppressed(one.status, one.waivers, artifact)
 

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -191,6 +192,7 @@ def verdict_item(verdict: Verdict) -> dict[str, Any]:
 def _requirement(one: JudgedRequirement) -> dict[str, Any]:
     found: dict[str, Any] = one._asdict()
     found["waivers"] = [waiver.words for waiver in one.waivers]
+    found["share"] = None if one.share is None else asdict(one.share)
     return found | {"reason_code": None if one.reason is None else one.reason.code}
 
 

@@ -267,10 +267,14 @@ def _required(sheet: SpecificationSheet) -> Iterator[doc.Block]:
     heads = doc.heads("Requirement", *doc.numbers("Allowed", "Reached", "Use"), "Status", "Decided by")
     if sheet.findings is not None and not sheet.broken:
         rows: list[doc.Line] = [
-            [one.name, one.allowed, one.reached, one.use, doc.Badge(one.status), doc.Name(one.decided_by)]
+            [one.name, one.allowed, one.reached, one.use, doc.Badge(one.status), (doc.Name(one.decided_by), _after_name(one.remark))]
             for one in requirement_lines(sheet.findings)
         ]
         yield doc.TextTable("Requirements", "Requirements, with what is ordered in place", heads, rows)
+
+
+def _after_name(remark: str) -> str:
+    return f", {remark}" if remark else ""
 
 
 def specified(sheet: SpecificationSheet, anchor: str) -> Iterator[doc.Block]:

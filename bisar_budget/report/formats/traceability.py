@@ -15,7 +15,7 @@ from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
 from bisar_budget.report.words.heading import overrides_words
 from bisar_budget.report.words.identity import Identity, distinct, identities, stem
-from bisar_budget.report.words.requirements import declared_words, requirement_finding, requirement_id
+from bisar_budget.report.words.requirements import declared_words, requirement_finding, requirement_id, share_columns
 from bisar_budget.report.words.sentences import cause, counted, measure, need_text, rst_text, xml_text
 
 
@@ -98,6 +98,7 @@ def _requirement_case(one: JudgedRequirement, class_name: str, file: str) -> Ite
         ("reached", one.reached),
         ("utilization", one.utilization),
         ("decided_by", one.row),
+        *share_columns(one).items(),
         ("line", one.line),
     )
     yield from _properties(values)
