@@ -36,8 +36,9 @@ class JudgedRequirement(NamedTuple):
     `value` and `allowed` are the requirement as the file, or the default, states it; `reached` is the total of the
     mission, with `combine: each` the largest row's. `utilization` is that of what decides: the ratio of the two, or
     that of `share`, where a share decides. `autofocus_gain` is the factor by which autofocus lets quadratic phases
-    exceed what is allowed, in all and of a platform's share; None of other requirements. `row` is the row that decides the status, `use_row` the
-    one with the utilization, `rows` are all that judge the requirement. `reason` says why it cannot be judged, or why it is not met.
+    exceed what is allowed, in all and of a platform's share; None of other requirements. `row` is the row that decides
+    the status, `use_row` the one with the utilization, `rows` are all that judge the requirement. `reason` says why it
+    cannot be judged, or why it is not met.
     """
 
     key: str

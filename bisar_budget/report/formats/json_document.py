@@ -120,6 +120,7 @@ def _mission(mission: MissionFindings) -> dict[str, Any]:
         "model": mission.model,
         "model_doubt": mission.model_doubt or None,
         "model_doubt_code": mission.model_doubt.code or None,
+        "confidence": mission.confidence,
         "combine": mission.combine,
         "coverage_factor": mission.coverage_factor,
         "geometry": {

@@ -92,12 +92,23 @@ def share_columns(one: JudgedRequirement) -> dict[str, str | float | None]:
     }
 
 
-def requirement_finding(one: JudgedRequirement) -> str:
-    """Say in a sentence how a requirement stands."""
+def confidence_words(mission: MissionFindings) -> str:
+    """Say behind the status of a mission with which confidence its requirements are met; nothing where one is not."""
+    status = STATUS[mission.status]
+    return f" {mission.confidence}" if status.is_held and not status.fails else ""
+
+
+_HAS_CONFIDENCE = ("quadratic_phase_error", "cubic_phase_error", "location_error")  # levels are of mean powers
+
+
+def requirement_finding(one: JudgedRequirement, mission: MissionFindings) -> str:
+    """Say in a sentence how a requirement stands; where it is met, with which confidence."""
     text = one.name
     if one.value is not None:
         text += f" of {requirement_limit(one.value, one)}{' (default)' if one.is_default else ''}"
     text += f": {STATUS[one.status].words}"
+    if STATUS[one.status].is_held and not STATUS[one.status].fails and one.key in _HAS_CONFIDENCE:
+        text += f" {mission.confidence}"
     if one.reached is not None:
         text += f", {requirement_size(one.reached, one)} reached"
     if one.row is not None and one.status != "not_evaluated":
@@ -138,7 +149,7 @@ def verdict(mission: MissionFindings, *, is_brief: bool = False) -> str:
 
 def _met(mission: MissionFindings) -> str:
     waived = "waived" in [*(one.status for one in mission.requirements), *(row.status for row in mission.rows)]
-    text = f"every requirement is judged and {'met or waived' if waived else 'met'}"
+    text = f"every requirement is judged and {'met or waived' if waived else 'met'} {mission.confidence}"
     if mission.status == "warn":
         return f"{text}, with warnings"
     return f"{text}, with autofocus" if mission.status == "pass_with_autofocus" else text
