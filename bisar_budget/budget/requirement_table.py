@@ -26,7 +26,7 @@ from bisar_budget.budget.judged_rows import FamilyRow, Judged, Why, statuses
 from bisar_budget.budget.waivers import Waived
 from bisar_budget.effects.declared import CUBIC, LOCATION, MODELS, QUADRATIC
 from bisar_budget.findings.requirement import DecidingShare, JudgedRequirement
-from bisar_budget.findings.row import DECLARE, Row
+from bisar_budget.findings.row import DECLARE, AppliedWaiver, Row, holding, in_order
 from bisar_budget.phrases import NOTHING, Note
 
 _EXAMPLES = {CUBIC: "22.5 deg", "islr": "-20 dB", "pslr": "-30 dB"}
@@ -125,18 +125,20 @@ def _entry(
 ) -> JudgedRequirement:
     mission, key = case.mission, state.key
     value = None if key == DECLARE else getattr(mission.requirements, key)
-    status = statuses(state.status[case.place])
-    decider, user = (
-        rows[place] if place >= 0 else None for place in (state.decider[case.place], state.user[case.place])
+    status, place = statuses(state.status[case.place]), state.decider[case.place]
+    decider, user = (rows[one] if one >= 0 else None for one in (place, state.user[case.place]))
+    is_open = status == "not_evaluated" or (
+        status == "waived" and (place < 0 or statuses(judged.before[place].status[case.place]) == "not_evaluated")
     )
     utilization = case.number(state.utilization)  # an error without an image has no phase to compare
     has_use = user is not None and user.utilization is not None and math.isfinite(utilization)
-    use = utilization if has_use else None
+    use = utilization if has_use and not is_open else None
     reason: Note | None = None
     if status == "not_evaluated" and (decider is None or decider.status != status):
         reason = (unknown_place(judged, case) if key == LOCATION else NOTHING) or phrases.nothing_judges(key)
     elif decider is not None and status not in ("pass", "info"):
         reason = decider.reason
+    judges = [row for row, is_one in zip(rows, state.judges[:, case.place], strict=True) if row and is_one]
     path = ("requirements", key)
     return JudgedRequirement(
         key=key,
@@ -145,17 +147,24 @@ def _entry(
         is_default=path not in mission.places and not mission.is_changed(path),
         status=status,
         allowed=value,
-        reached=None if status == "not_evaluated" else _total(key, judged, case, rows),
+        reached=None if is_open else _total(key, judged, case, rows),
         utilization=use,
         row=None if decider is None else decider.id,
-        rows=tuple(row.id for row, judges in zip(rows, state.judges[:, case.place], strict=True) if row and judges),
+        rows=tuple(row.id for row in judges),
         reason=reason,
         line=mission.line(path),
-        waivers=waived.requirements.get(f"mission.{key}", ()),
-        share=None if user is None or status == "not_evaluated" else _share(user, key, case, use),
+        waivers=_waivers(status, waived.requirements.get(f"mission.{key}", ()), judges),
+        share=None if user is None or is_open else _share(user, key, case, use),
         autofocus_gain=case.allocation.autofocus_gain if key == QUADRATIC else None,
         use_row=None if user is None or use is None else user.id,
     )
+
+
+def _waivers(
+    status: str, of_requirement: Sequence[AppliedWaiver], judges: Sequence[Row]
+) -> tuple[AppliedWaiver, ...]:
+    """Waivers that cover a requirement that is waived: its own, and those of the rows that judge it."""
+    return holding(status, in_order([*of_requirement, *(waiver for row in judges for waiver in row.waived_by)]))
 
 
 def _total(key: str, judged: JudgedMission, case: Case, rows: Sequence[Row | None]) -> float | None:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from bisar_budget.findings.row import AppliedWaiver
+from bisar_budget.findings.row import AppliedWaiver, holding
 from bisar_budget.phrases import Note
 
 NAMES = {
@@ -36,9 +36,10 @@ class JudgedRequirement(NamedTuple):
     `value` and `allowed` are the requirement as the file, or the default, states it; `reached` is the total of the
     mission, with `combine: each` the largest row's. `utilization` is that of what decides: the ratio of the two, or
     that of `share`, where a share decides. `autofocus_gain` is the factor by which autofocus lets quadratic phases
-    exceed what is allowed, in all and of a platform's share; None of other requirements. `row` is the row that decides
-    the status, `use_row` the one with the utilization, `rows` are all that judge the requirement. `reason` says why it
-    cannot be judged, or why it is not met.
+    exceed what is allowed, in all and of a platform's share; None of other requirements. `row` is the row that
+    decides the status, `use_row` the one with the utilization, `rows` are all that judge the requirement. `reason`
+    says why it cannot be judged, or why it is not met. `waivers` cover it or rows that judge it; empty unless it is
+    waived.
     """
 
     key: str
@@ -62,6 +63,11 @@ class JudgedRequirement(NamedTuple):
         """Key, what is reached of what is allowed, and status, on one line."""
         sizes = ("-" if one is None else f"{one:.6g}" for one in (self.reached, self.allowed))
         return f"<{self.key}: {' of '.join(sizes)} {self.unit}, {self.status}>"
+
+    @property
+    def waived_by(self) -> tuple[AppliedWaiver, ...]:
+        """Waivers that hold; none unless it is waived."""
+        return holding(self.status, self.waivers)
 
     @property
     def id(self) -> str:

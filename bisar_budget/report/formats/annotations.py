@@ -315,7 +315,12 @@ def _requirement(
 
 def _properties(mission: MissionFindings, **values: str | float | None) -> dict[str, str | float]:
     """Properties that have a value, made harmless, with those of the mission."""
-    values = {"mission": mission.name, **values, "overrides": overrides_words(mission) or None}
+    values = {
+        "mission": mission.name,
+        "confidence": mission.confidence,
+        **values,
+        "overrides": overrides_words(mission) or None,
+    }
     return {
         key: printable(value) if isinstance(value, str) else value
         for key, value in values.items()

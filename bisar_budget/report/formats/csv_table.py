@@ -52,10 +52,12 @@ COLUMNS = (
     "kind",
     "decided_by",
     "overrides",
+    "waived_by",
     "share_owner",
     "share_allowed",
     "share_reached",
     "autofocus_gain",
+    "confidence",
 )
 
 
@@ -100,8 +102,15 @@ def _rows(mission: MissionFindings) -> Iterator[list[object]]:
     file, name = spreadsheet_text(mission.file), spreadsheet_text(mission.name)
     changed = spreadsheet_text(changes_words(mission.changes)) or None
     outside = spreadsheet_text(overrides_words(mission)) or None
+    of_mission = {
+        "file": file,
+        "mission": name,
+        "set": changed,
+        "overrides": outside,
+        "confidence": None if mission.is_empty else mission.confidence,
+    }
     for one in mission.requirements:
-        cells = {"file": file, "mission": name, "set": changed, "overrides": outside, **_requirement(one)}
+        cells = of_mission | _requirement(one)
         yield [cells.get(column) for column in COLUMNS]
     verdicts = {verdict.id: verdict.verdict for verdict in mission.verdicts or ()}
     for row in mission.rows:
@@ -119,6 +128,7 @@ def _rows(mission: MissionFindings) -> Iterator[list[object]]:
             "set": changed,
             "kind": "row",
             "overrides": outside,
+            "waived_by": _waived_by(row),
         }
         yield [cells.get(column) for column in COLUMNS]
 
@@ -138,4 +148,10 @@ def _requirement(one: JudgedRequirement) -> dict[str, object]:
         "kind": "requirement",
         "decided_by": spreadsheet_text(one.row),
         **share_columns(one),
+        "waived_by": _waived_by(one),
     }
+
+
+def _waived_by(one: Row | JudgedRequirement) -> str | None:
+    """Ids of the waivers that hold, as the file writes them; None where nothing is waived."""
+    return spreadsheet_text("; ".join(waiver.id for waiver in one.waived_by)) or None
