@@ -22,13 +22,13 @@ from typing import NamedTuple, NoReturn
 
 import numpy as np
 
+from bisar_budget.extras import install_command
 from bisar_budget.faults import shown
 from bisar_budget.paths.earth import Floats
 from bisar_budget.paths.flight import Log, PathFileError, hold_to_bytes
 from bisar_budget.paths.instant import DAY, Instant, parse_instant
 from bisar_budget.paths.log_places import LogKeys, LogRows, counted, from_sea_level, geodetic_log, hold_to_scale
 
-INSTALL = "pip install 'bisar-budget[logs]'"
 LARGEST = 200_000_000  # bytes; ten hours at 10 Hz of eight sentences
 _LONGEST = 256  # characters of a sentence; the standard has 82
 _SENTENCE = re.compile(r"\$[A-Z]{2}(?:GGA|GNS|RMC|ZDA|GST),", re.ASCII)
@@ -110,7 +110,7 @@ def read_nmea(data: bytes, name: str, keys: LogKeys) -> Log:
         from pynmea2 import ParseError
         from pynmea2 import parse as parse_sentence
     except ImportError:
-        raise PathFileError(f"{name}: needs the package pynmea2: {INSTALL}") from None
+        raise PathFileError(f"{name}: needs the package pynmea2: {install_command('logs')}") from None
     fixes: defaultdict[str, defaultdict[str, list[_Fix]]] = defaultdict(lambda: defaultdict(list))
     accuracies: defaultdict[str, list[_Accuracy]] = defaultdict(list)
     dates: list[tuple[int, Instant]] = []

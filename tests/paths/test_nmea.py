@@ -194,9 +194,7 @@ def test_years_have_two_digits_and_the_century_of_gps() -> None:
 
 def test_without_the_package_the_message_says_how_to_install_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pynmea2", None)
-    with pytest.raises(
-        PathFileError, match=r"^a\.nmea: needs the package pynmea2: pip install 'bisar-budget\[logs\]'$"
-    ):
+    with pytest.raises(PathFileError, match=r"^a\.nmea: needs the package pynmea2: pip install pynmea2$"):
         read(nmea(SHORT))
 
 
