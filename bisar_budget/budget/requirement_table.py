@@ -168,7 +168,7 @@ def _waivers(
 
 
 def _total(key: str, judged: JudgedMission, case: Case, rows: Sequence[Row | None]) -> float | None:
-    """What the mission reaches of a requirement: its own row, or the largest quadratic phase of a single error."""
+    """Total of the mission: that of its own row, or the largest quadratic phase of a single error."""
     own = next((row for row in rows if row is not None and row.id == f"mission.{key}"), None)
     if own is not None and key != DECLARE:
         return own.declared

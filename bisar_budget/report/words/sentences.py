@@ -209,7 +209,8 @@ def wrapped(text: str, indent: str) -> list[str]:
 def wrapped_counts(text: str) -> list[str]:
     """Break `file: 1 FAIL, 2 pass` before 80 columns, after a colon or comma."""
     joined = text.replace(" ", "\u00a0").replace(",\u00a0", ", ").replace(":\u00a0", ": ").replace(";\u00a0", "; ")
-    return [line.replace("\u00a0", " ") for line in wrapped(joined, "  ")]
+    first, *rest = (line.replace("\u00a0", " ") for line in wrapped(joined, "  "))
+    return [first, *(part for line in rest for part in wrapped(line, "    "))]  # the first has the file, to be copied
 
 
 def spaced(cells: Sequence[str], widths: Sequence[int], sides: str) -> str:
