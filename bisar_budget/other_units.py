@@ -258,11 +258,11 @@ def _respelt(unit: str, dimension: Dimension) -> str:
         is_unsure = len(folded) > 1 or folded[0][0] != unit[0]  # Mhz is no millihertz, and nobody knows what Nm is
         folded = [] if is_unsure else folded
     is_level = _powers_of(dimension) is None  # one letter of dBc makes it a power
-    is_long = len(unit) >= _SHORTEST_TYPO and not is_level
-    near = [*folded, *(one for one in candidates if is_long and _is_one_slip(unit, one))]
-    if not _is_one_size([candidates[one] for one in near]):
+    slips = [one for one in candidates if _is_one_slip(unit, one)]
+    if not _is_one_size([candidates[one] for one in (*folded, *slips)]):
         return ""
-    return next((one for one in near if one in dimension.units), "")
+    offered = [*folded, *(slips if len(unit) >= _SHORTEST_TYPO and not is_level else ())]
+    return next((one for one in offered if one in dimension.units), "")
 
 
 def _is_one_size(factors: list[float]) -> bool:

@@ -309,7 +309,7 @@ def format_quantity(value: float, unit: str, digits: int = 3, rounding: str = "n
 
 
 def unit_behind(text: str) -> str:
-    """What stands behind the number of a text, or the whole text where it has none."""
+    """Unit that stands behind the number of a text, as written; the whole text where it has no number."""
     text = text.strip()
     match = _NUMBER.match(text)
     return text[match.end() :].strip() if match else text
