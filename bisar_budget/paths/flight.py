@@ -15,6 +15,7 @@ import numpy as np
 from numpy.polynomial import chebyshev, legendre
 
 from bisar_budget.geometry import STRAIGHT, PlatformState, Vector
+from bisar_budget.paths.accuracy import StatedAccuracy
 from bisar_budget.paths.earth import Floats
 from bisar_budget.paths.instant import Instant
 
@@ -75,6 +76,7 @@ class Orbit:
     `place` takes an instant and gives Earth-fixed coordinates [m]. `words` says what it is, for reports; `epoch` is
     that of the elements. `doubt` says at an instant how far the truth may be; `doubts` are warnings of it, where it
     is more than usual, and `remedy` is what makes it less. An orbit that `is_turned` comes from axes of the stars.
+    `stated` is the accuracy that its file states at an instant, along the axes of the Earth.
     """
 
     place: Callable[[Instant], Vector]
@@ -85,6 +87,12 @@ class Orbit:
     doubt: Callable[[Instant], PathDoubt] = lambda _: NO_DOUBT
     remedy: str = ""
     is_turned: bool = False
+    stated: Callable[[Instant], StatedAccuracy | None] = lambda _: None
+
+    def largest_doubt_m(self, instant: Instant) -> float:
+        """How far the truth may be at an instant, by what its file states of itself or by anything else. [m]"""
+        stated = self.stated(instant)
+        return max(self.doubt(instant).size, 0.0 if stated is None else stated.position_m)
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,8 +100,8 @@ class Log:
     """Measured places (n, 3) [m] at rising times (n,) [s], Earth-fixed or in the scene's axes.
 
     Times count from `start`; without one they are those of the log itself. `words` says what it is, for reports.
-    `sigmas` (n, 3) are one-sigma errors east, north, up, where the log states them [m]. `typical_sigmas` (n,) are those
-    that a fix of the stated quality usually has, on each axis; NaN where the log says no quality [m].
+    `sigmas` (n, 3) are one-sigma errors east, north, up, where the log states them [m]. `typical_sigmas` (n,) are
+    those that a fix of the stated quality usually has, on each axis; NaN where the log says no quality [m].
     """
 
     times: Floats
