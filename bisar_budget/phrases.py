@@ -1065,10 +1065,10 @@ def drawn_without_coverage() -> str:
 
 # ---------------------------------------------------------------------- waivers
 @phrase
-def waived(line: int | None, until: date, reason: str, is_expired: bool) -> str:
-    """Said of a row that fails."""
+def waived(line: int | None, until: date, reason: str, is_expired: bool, waiver_id: str) -> str:
+    """Said of a row, or a requirement, that fails."""
     place = "--set" if line is None else f"line {line}"
-    return f"{'expired ' if is_expired else ''}waiver of {place}, until {until}: {reason}"
+    return f"{'expired ' if is_expired else ''}waiver {waiver_id} of {place}, until {until}: {reason}"
 
 
 @phrase

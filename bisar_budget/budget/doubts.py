@@ -179,7 +179,7 @@ def _stack(rows: Sequence[Sequence[Any]]) -> Floats:
 
 
 def _stated_doubt(platform: Platform, name: str, kind: str, stated: StatedAccuracy) -> InputDoubt:
-    """What a source states and what the file declares, along the axis where they differ most."""
+    """The errors that a source states and that the file declares, along the axis where they differ most."""
     error = platform.motion_error
     key = f"platforms.{name}.motion_error.{kind if error.covariance is None else 'covariance'}"
     own, declared = _stated_covariance(stated, kind), _declared_covariance(platform, kind)

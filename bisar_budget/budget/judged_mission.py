@@ -11,6 +11,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.scene import SceneEdges, scene_edges
@@ -33,7 +34,7 @@ from bisar_budget.budget.judged_rows import CODE, REQUIREMENTS, Codes, FamilyRow
 from bisar_budget.budget.random_rows import RandomRows
 from bisar_budget.budget.tone_rows import accelerated_rows, pslr_row, spur_rows
 from bisar_budget.budget.vibration_rows import Vibrations
-from bisar_budget.budget.waivers import is_waived
+from bisar_budget.budget.waivers import holding_place
 from bisar_budget.effects.declared import END_OF_IMAGE, LOCATION, MODELS
 from bisar_budget.effects.effect import PLATFORMS, subject
 from bisar_budget.findings.row import DECLARE, SPECIFICATION
@@ -64,6 +65,7 @@ class JudgedMission:
     unplaced: Mapping[str, Truths]
     scene: JudgedScene | None
     floor: Codes  # the best status that each case can have
+    waived_by: Sequence[tuple[str, Truths]] = ()  # ids of waivers in the file's order, and the cases that each covers
 
     @property
     def is_empty(self) -> bool:
@@ -123,7 +125,9 @@ class _Judgement:
         of_all.judge_place(is_misplaced)
         of_all.judge_spread(has_noise)
         before = of_all.status
-        after = of_all.waived(self.today)
+        waivers = of_all.waivers(self.today)
+        after = np.where(waivers >= 0, CODE["waived"], before)
+        of_requirements = {key: holding_place(mission, self.today, [f"mission.{key}"]) for key in KEYS}
         states = requirement_states(
             mission,
             # A requirement judges effects by itself, and is waived where its row is.
@@ -131,11 +135,10 @@ class _Judgement:
             np.array([row.utilization for row in rows]),
             of_all.judges(),
             np.array([row.quadratic_use for row in rows]),
-            {key: is_waived(mission, self.today, [f"mission.{key}"]) for key in KEYS},
+            {key: place >= 0 for key, place in of_requirements.items()},
             has_noise=has_noise,
             is_misplaced=is_misplaced,
         )
-        after_waivers = (np.where(one.status == CODE["waived"], CODE["pass"], one.status) for one in states)
         return JudgedMission(
             analysis=analysis,
             families=families,
@@ -145,7 +148,14 @@ class _Judgement:
             untaken=untaken,
             unplaced=drifting,
             scene=self._scene,
-            floor=np.min([self._floor(), *after_waivers], axis=0),
+            floor=np.min([self._floor(), *(one.status for one in states)], axis=0),
+            waived_by=[
+                (
+                    waiver.id,
+                    np.any([(waivers == place).any(axis=0), *_waived(states, of_requirements, place)], axis=0),
+                )
+                for place, waiver in enumerate(mission.waivers)
+            ],
         )
 
     # ---------------------------------------------------------------- rows of the families
@@ -334,14 +344,18 @@ class RowStatuses:
     def _is_open(self) -> Truths:
         return np.asarray((self.status != CODE["fail"]) & (self.status != CODE["not_declared"]))
 
-    def waived(self, today: date) -> Codes:
-        """The statuses with rows waived that fail or are not evaluated and that a waiver that holds names."""
+    def waivers(self, today: date) -> NDArray[np.intp]:
+        """Place in the file of the first waiver that holds and covers each row that is broken; -1: none does."""
+        places = np.full(self.status.shape, -1)
         if not self.mission.waivers:
-            return self.status
-        is_named = np.array([[is_waived(self.mission, today, [what.id])] for what in self.subjects])
-        if is_waived(self.mission, today, [DECLARATIONS.id]):
-            is_named = is_named | (self.why == Why.NOT_DECLARED_AS_REQUIRED)
-        return np.where(is_named & np.isin(self.status, _BROKEN), CODE["waived"], self.status)
+            return places
+        is_missing = self.why == Why.NOT_DECLARED_AS_REQUIRED
+        of_missing = holding_place(self.mission, today, [DECLARATIONS.id])
+        for row, what in enumerate(self.subjects):
+            own = holding_place(self.mission, today, [what.id])
+            both = [place for place in (own, of_missing) if place >= 0]
+            places[row] = np.where(is_missing[row], min(both, default=-1), own)
+        return np.where(np.isin(self.status, _BROKEN), places, -1)
 
     def judges(self) -> Codes:
         """Place in `KEYS` of the requirement that judges each row, -1: none, since it is not declared."""
@@ -358,6 +372,13 @@ class RowStatuses:
             use = np.where(is_info, np.nan, row.utilization) if is_info.any() else row.utilization
             found.append(row._replace(status=code, why=why, utilization=use))
         return tuple(found)
+
+
+def _waived(states: Sequence[RequirementState], of_requirements: Mapping[str, int], waiver: int) -> Iterator[Truths]:
+    """Cases in which a waiver, by its place in the file, covers each of the requirements that it names."""
+    for one in states:
+        if of_requirements[one.key] == waiver:
+            yield np.asarray(one.status == CODE["waived"])
 
 
 def _stricter(full: Mapping[str, Judged], published: Mapping[str, Judged] | None = None) -> list[Judged]:

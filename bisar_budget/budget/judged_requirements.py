@@ -119,10 +119,13 @@ def requirement_states(
         mine = IS_JUDGED[codes] & (judges == KEYS.index(key))
         levels, used = np.where(mine, codes, _NONE), uses
         if key == QUADRATIC:  # a row that another requirement binds is held to this one too
-            is_other = IS_JUDGED[codes] & ~mine & (codes != RANK["waived"]) & ~np.isnan(quadratic_use)
+            is_other = IS_JUDGED[codes] & ~mine & ~np.isnan(quadratic_use)
             by_autofocus = np.where(codes == RANK["pass_with_autofocus"], codes, RANK["pass"])
+            broken = np.where(
+                codes == RANK["waived"], codes, RANK["fail"]
+            )  # a waiver of the row covers all it breaks
             breaks = np.nan_to_num(quadratic_use) > BOUND
-            levels = np.where(is_other, np.where(breaks, RANK["fail"], by_autofocus), levels)
+            levels = np.where(is_other, np.where(breaks, broken, by_autofocus), levels)
             used = np.where(is_other, quadratic_use, uses)
             mine = mine | is_other
         else:  # autofocus corrects a quadratic phase alone

@@ -22,7 +22,7 @@ from bisar_budget.budget.judged_rows import FamilyRow, Judged, Why, statuses
 from bisar_budget.budget.waivers import Waived
 from bisar_budget.effects.declared import CUBIC, LOCATION, MODELS, QUADRATIC
 from bisar_budget.findings.requirement import JudgedRequirement
-from bisar_budget.findings.row import DECLARE, Row
+from bisar_budget.findings.row import DECLARE, AppliedWaiver, Row, holding, in_order
 from bisar_budget.phrases import NOTHING, Note
 
 _EXAMPLES = {CUBIC: "22.5 deg", "islr": "-20 dB", "pslr": "-30 dB"}
@@ -132,6 +132,7 @@ def _entry(
         reason = (unknown_place(judged, case) if key == LOCATION else NOTHING) or phrases.nothing_judges(key)
     elif decider is not None and status not in ("pass", "info"):
         reason = decider.reason
+    judges = [row for row, is_one in zip(rows, state.judges[:, case.place], strict=True) if row and is_one]
     path = ("requirements", key)
     return JudgedRequirement(
         key=key,
@@ -145,11 +146,18 @@ def _entry(
         if decider and decider.utilization is not None and math.isfinite(utilization)
         else None,
         row=None if decider is None else decider.id,
-        rows=tuple(row.id for row, judges in zip(rows, state.judges[:, case.place], strict=True) if row and judges),
+        rows=tuple(row.id for row in judges),
         reason=reason,
         line=mission.line(path),
-        waivers=waived.requirements.get(f"mission.{key}", ()),
+        waivers=_waivers(status, waived.requirements.get(f"mission.{key}", ()), judges),
     )
+
+
+def _waivers(
+    status: str, of_requirement: Sequence[AppliedWaiver], judges: Sequence[Row]
+) -> tuple[AppliedWaiver, ...]:
+    """Waivers that cover a requirement that is waived: its own, and those of the rows that judge it."""
+    return holding(status, in_order([*of_requirement, *(waiver for row in judges for waiver in row.waived_by)]))
 
 
 def _sizes(row: Row, key: str, case: Case) -> tuple[float | None, float | None]:

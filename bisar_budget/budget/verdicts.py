@@ -9,7 +9,7 @@ from bisar_budget.budget.waivers import apply_waivers
 from bisar_budget.findings.images import Verdict, VerifiedMission
 from bisar_budget.findings.mission import FileWarning, MissionFindings
 from bisar_budget.findings.requirement import JudgedRequirement
-from bisar_budget.findings.row import AppliedWaiver, Row
+from bisar_budget.findings.row import AppliedWaiver, Row, holding, in_order
 from bisar_budget.findings.status import RANK
 from bisar_budget.phrases import NOTHING
 from bisar_budget.units import format_limit
@@ -125,7 +125,8 @@ def _with_refuted(
     status = "waived" if waivers and row.status == "fail" else row.status
     if RANK[status] > RANK[requirement.status]:
         return requirement
-    found = requirement._replace(status=status, row=row.id, reason=row.reason, waivers=waivers or row.waivers)
+    covering = in_order([*requirement.waivers, *waivers, *row.waived_by])
+    found = requirement._replace(status=status, row=row.id, reason=row.reason, waivers=holding(status, covering))
     if row.id == requirement.row:
         return found
     is_alike = row.unit == requirement.unit

@@ -76,7 +76,7 @@ def apply_waivers(rows: Sequence[Row], mission: Mission, today: date) -> Waived:
             named = sorted({*named, *missing})
         failing = broken.intersection(named)
         covered.append((len(named), len(failing)))
-        applied = AppliedWaiver(line, waiver.until, waiver.reason, is_expired=today > waiver.until)
+        applied = AppliedWaiver(line, waiver.until, waiver.reason, today > waiver.until, waiver.id, index)
         if applied.is_expired:
             over.append((applied, failing))
             continue
@@ -96,9 +96,10 @@ def _waived(row: Row, holding: AppliedWaiver | None, last: AppliedWaiver | None)
     return row._replace(status=status, waivers=(*row.waivers, *applied)) if applied else row
 
 
-def is_waived(mission: Mission, today: date, ids: Sequence[str]) -> bool:
-    """Whether a waiver that holds names one of some ids."""
-    return any(today <= one.until and named_by(one.id, ids) for one in mission.waivers)
+def holding_place(mission: Mission, today: date, ids: Sequence[str]) -> int:
+    """Place in the file of the first waiver that holds and names one of some ids; -1: none does."""
+    held = (place for place, one in enumerate(mission.waivers) if today <= one.until and named_by(one.id, ids))
+    return next(held, -1)
 
 
 def named_by(pattern: str, ids: Sequence[str]) -> list[int]:

@@ -232,7 +232,8 @@ def check(
     """Check mission files against their requirements.
 
     MISSION is a YAML file, a glob pattern, or - for standard input. Exit code: 0 every requirement is judged and
-    met, 1 a requirement is broken or not judged, 2 wrong usage or an unusable mission file, 3 a fault of the tool.
+    met, or waived, 1 a requirement is broken or not judged, 2 wrong usage or an unusable mission file, 3 a fault of
+    the tool.
 
     Defaults of --format, --report, --strict, --exit-zero, --model, --monte-carlo, --seed and --color:
     [tool.bisar-budget] in the nearest pyproject.toml, and over it the variables BISAR_BUDGET_FORMAT and so on.
@@ -276,7 +277,7 @@ def check(
         if says_faults:
             _say_faults(one.unusable for one in texts)
         deliver(joined(format_name, texts, __version__, style), output, format_name)
-        statuses = {one.status for one in texts}
+        statuses = frozenset[str]().union(*(one.statuses for one in texts))
     else:
         from bisar_budget.findings.mission import Report
         from bisar_budget.front.checks import checked, drawn_by
@@ -301,7 +302,7 @@ def check(
         _write_report(output or "-", format_name, report, style)
         if summary := _step_summary(format_name):
             _append_step_summary(summary, report, style)
-        statuses = {mission.status for mission in report.missions}
+        statuses = frozenset[str]().union(*(mission.statuses for mission in report.missions))
     code = exit_code(statuses, strict)
     sys.exit(0 if exit_zero and code == EXIT_BROKEN else code)
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.faults import Fault, SetValue, shown
 from bisar_budget.findings.requirement import DeclaredKinds, JudgedRequirement, Override
-from bisar_budget.findings.row import Row
+from bisar_budget.findings.row import AppliedWaiver, Row, in_order
 from bisar_budget.findings.status import STATUSES, worst
 from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.model import Document, Mission
@@ -107,15 +107,25 @@ class MissionFindings(NamedTuple):
 
     @property
     def status(self) -> str:
-        """Worst status of the rows, of the requirements and of what is doubtful about the whole.
+        """Worst of its statuses."""
+        return worst(self.statuses)
 
-        No better than `not_evaluated` if nothing was judged, or if images were formed and verified nothing; no better
-        than `warn` if a warning doubts what was checked.
+    @property
+    def statuses(self) -> frozenset[str]:
+        """Statuses of the rows, of the requirements and of what is doubtful about the whole.
+
+        `not_evaluated` is one if nothing was judged, or if images were formed and verified nothing; `warn` if a
+        warning doubts what was checked. Strictness needs all of them: what is waived may also warn.
         """
         doubts = ["not_evaluated"] if self.is_unverified or self.is_empty else []
         doubts += ["warn" for warning in self.warnings if warning.is_doubt]
-        statuses = [row.status for row in self.rows] + [one.status for one in self.requirements]
-        return worst([*statuses, *doubts])
+        return frozenset([*(row.status for row in self.rows), *(one.status for one in self.requirements), *doubts])
+
+    @property
+    def waived_by(self) -> tuple[AppliedWaiver, ...]:
+        """Waivers that cover rows or requirements, in the order of the file."""
+        of_requirements = (waiver for one in self.requirements for waiver in one.waived_by)
+        return in_order([*(waiver for row in self.rows for waiver in row.waived_by), *of_requirements])
 
     @property
     def summary(self) -> dict[str, int]:
@@ -133,6 +143,11 @@ class UnusableMission(NamedTuple):
     faults: tuple[Fault, ...]
     status: str = "error"
     data: bytes | None = None
+
+    @property
+    def statuses(self) -> frozenset[str]:
+        """Its one status."""
+        return frozenset([self.status])
 
 
 class Report(NamedTuple):

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from bisar_budget.findings.row import AppliedWaiver
+from bisar_budget.findings.row import AppliedWaiver, holding
 from bisar_budget.phrases import Note
 
 NAMES = {
@@ -21,6 +21,7 @@ class JudgedRequirement(NamedTuple):
     `value` is what the file, or the default, requires in all; `allowed` what the deciding row is held to (the share
     of a platform, autofocus included) and `reached` what is declared there, in the unit of the requirement. `row` is
     the deciding one, `rows` are all that judge it. `reason` says why it cannot be judged, or why it is not met.
+    `waivers` cover it or rows that judge it; empty unless it is waived.
     """
 
     key: str
@@ -41,6 +42,11 @@ class JudgedRequirement(NamedTuple):
         """Key, what is reached of what is allowed, and status, on one line."""
         sizes = ("-" if one is None else f"{one:.6g}" for one in (self.reached, self.allowed))
         return f"<{self.key}: {' of '.join(sizes)} {self.unit}, {self.status}>"
+
+    @property
+    def waived_by(self) -> tuple[AppliedWaiver, ...]:
+        """Waivers that hold; none unless it is waived."""
+        return holding(self.status, self.waivers)
 
     @property
     def id(self) -> str:

@@ -17,17 +17,32 @@ SPECIFICATION = "specification"  # the metric of rows that hold what is declared
 
 
 class AppliedWaiver(NamedTuple):
-    """A waiver that names a failing row: line of the file, last day, reason; expired if that day is over."""
+    """A waiver that names a failing row or requirement; expired if its last day is over.
+
+    Line of the file, last day, reason, and `id` as the file writes it, which is the `place`-th of the file's waivers.
+    """
 
     line: int | None
     until: date
     reason: str
     is_expired: bool
+    id: str
+    place: int
 
     @property
     def words(self) -> Note:
         """The waiver in a sentence."""
-        return phrases.waived(*self)
+        return phrases.waived(self.line, self.until, self.reason, self.is_expired, self.id)
+
+
+def in_order(waivers: Iterable[AppliedWaiver]) -> tuple[AppliedWaiver, ...]:
+    """Each waiver once, in the order of the file."""
+    return tuple(sorted(dict.fromkeys(waivers), key=lambda waiver: waiver.place))
+
+
+def holding(status: str, waivers: Iterable[AppliedWaiver]) -> tuple[AppliedWaiver, ...]:
+    """Waivers that something of a status is waived by; none if it is not."""
+    return tuple(waiver for waiver in waivers if not waiver.is_expired) if status == "waived" else ()
 
 
 class Row(NamedTuple):
@@ -85,6 +100,11 @@ class Row(NamedTuple):
     def owner(self) -> str:
         """Whose share it counts against: transmitter, receiver, clock or mission."""
         return self.subject.owner
+
+    @property
+    def waived_by(self) -> tuple[AppliedWaiver, ...]:
+        """Waivers that hold; none unless it is waived."""
+        return holding(self.status, self.waivers)
 
     @property
     def is_of_declare(self) -> bool:

@@ -40,8 +40,13 @@ class Status(NamedTuple):
         """Whether a number was held to a limit and the outcome stands: neither waived nor without a value."""
         return self.is_judged and not self.junit_words
 
+    @property
+    def complies(self) -> bool:
+        """Whether all was judged and is met, with warnings or without; a waiver meets nothing."""
+        return self.is_held and not self.fails
 
-# Worst first, for reading. What is waived breaks its requirement: it stands before all that meets one.
+
+# Worst first. What is waived breaks its requirement: it breaks no run, and is worse than all that meets one.
 _WORST_FIRST = (
     Status(
         "error", "ERROR", "unusable",
@@ -61,15 +66,16 @@ _WORST_FIRST = (
         verdict="Not shown to comply", sgr="35", color="doubt", symbol="diamond",
     ),
     Status(
+        "waived", "waived", "waived",
+        gates=True, is_judged=True, is_explained=True,
+        sarif="error", github="notice", junit="skipped", junit_words="waived",
+        verdict="Not met; accepted by waiver", sgr="36", color="doubt", symbol="open square",
+    ),
+    Status(
         "warn", "WARN", "warning",
         gates=True, fails_strict=True, is_judged=True, is_explained=True,
         sarif="warning", github="warning", junit="remark", verdict="Complies, with warnings",
         sgr="33", color="doubt", symbol="diamond",
-    ),
-    Status(
-        "waived", "waived", "waived",
-        is_judged=True, is_explained=True,
-        sarif="error", github="notice", junit="skipped", junit_words="waived", sgr="36",
     ),
     Status(
         "pass_with_autofocus", "pass AF", "pass with autofocus",
@@ -97,8 +103,8 @@ def worst(statuses: Iterable[str]) -> str:
 
 
 def complying(counts: Mapping[str, int]) -> int:
-    """Number of missions that break nothing, by the number of each status."""
-    return sum(count for name, count in counts.items() if name != "error" and not STATUS[name].fails)
+    """Number of missions that comply, by the number of each status; those that are waived do not."""
+    return sum(count for name, count in counts.items() if STATUS[name].complies)
 
 
 def exit_code(statuses: Container[str], strict: bool) -> int:

@@ -444,9 +444,12 @@ def _stated_of_log(log: Log, near: slice, file: str) -> Iterator[StatedAccuracy]
         if largest.all():  # 0 is not known
             yield StatedAccuracy(f"solution {file}", diagonal(largest**2))
     if log.typical_sigmas is not None:
-        usual = np.nan_to_num(log.typical_sigmas[near][unstated]).max(initial=0.0)
-        if usual:
-            yield StatedAccuracy(f"fixes of {file}", diagonal([usual**2] * 3), is_typical=True)
+        usual = np.where(unstated, np.nan_to_num(log.typical_sigmas[near]), 0.0)
+        worst = int(usual.argmax())
+        if usual[worst]:
+            quality = log.quality_words(worst + (near.start or 0))
+            words = f"fixes of {file} ({quality})" if quality else f"fixes of {file}"
+            yield StatedAccuracy(words, diagonal([usual[worst] ** 2] * 3), is_typical=True)
 
 
 def _filled(error: MotionError, stated: StatedAccuracy, state: PlatformState) -> MotionError:

@@ -41,7 +41,9 @@ class StatedAccuracy(NamedTuple):
     @property
     def position_m(self) -> float:
         """Root-sum-square of the position error over its axes, or what the source states without a direction. [m]"""
-        variances = [row[axis] for axis, row in enumerate(self.covariance[:3])] if self.covariance else [self.total**2]
+        variances = (
+            [row[axis] for axis, row in enumerate(self.covariance[:3])] if self.covariance else [self.total**2]
+        )
         return math.sqrt(max(math.fsum(variances), 0.0))
 
 

@@ -94,11 +94,15 @@ def render(format_name: str, report: "Report", style: Style) -> str:
 
 
 class Piece(NamedTuple):
-    """The text of a format for one mission; `unusable` is the file if it cannot be used."""
+    """The text of a format for one mission; `unusable` is the file if it cannot be used.
+
+    `statuses` are all of its rows and requirements, of which `status` is the worst.
+    """
 
     status: str
     text: str
     unusable: "UnusableMission | None"
+    statuses: frozenset[str] = frozenset()
 
 
 def piece(mission: "MissionFindings | UnusableMission", format_name: str, style: Style) -> Piece:
@@ -106,7 +110,7 @@ def piece(mission: "MissionFindings | UnusableMission", format_name: str, style:
     from bisar_budget.findings.mission import UnusableMission
 
     text: str = _module(format_name).piece(mission, style)
-    return Piece(mission.status, text, mission if isinstance(mission, UnusableMission) else None)
+    return Piece(mission.status, text, mission if isinstance(mission, UnusableMission) else None, mission.statuses)
 
 
 def joined(format_name: str, pieces: Sequence[Piece], version: str, style: Style) -> str:

@@ -1,15 +1,18 @@
 """Missions whose platform is a log of some format: the same verdict as by the CSV of the flight."""
 
 import json
+import math
 import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from bisar_budget.budget.check import check_mission
 from bisar_budget.mission.load import load_mission
+from tests import conftest
 from tests.conftest import TODAY
 from tests.mission.test_path_files import aircraft
 from tests.paths.flown import flight, geodetic_csv
@@ -93,8 +96,8 @@ class TestSolutionsSayTheirErrors:
         (tmp_path / "a.pos").write_bytes(solution(FLOWN))
         found = checked(tmp_path, {"file": "a.pos"}, motion_error={"velocity": "2 mm/s", "distribution": "bound"})
         assert load_mission(str(tmp_path / "m.yaml")).platforms.receiver.motion_error.position is None
-        assert row(found, "receiver.position.x").status == "not_evaluated"
-        assert "no position error is declared" in str(row(found, "receiver.position.x").reason)
+        assert conftest.row(found, "receiver.position.x").status == "not_evaluated"
+        assert "no position error is declared" in str(conftest.row(found, "receiver.position.x").reason)
 
     def test_other_axes_have_at_least_as_much_in_every_direction(self, tmp_path: Path) -> None:
         """Independent errors along the track that cover sigmas along east, north, up."""

@@ -122,7 +122,11 @@ class TestText:
         changes = {**UNJUDGED, "requirements": {"location_error": "10 m", "cubic_phase_error": "22.5 deg"}}
         first = said("text", findings(**changes)).splitlines()[0]
         assert first == "pass mission.yaml: every requirement is judged and met"
-        assert "met or waived" in said("text", findings(**WAIVED)).splitlines()[0]
+
+    def test_a_requirement_that_is_waived_is_not_met(self) -> None:
+        words = " ".join(said("text", findings(**WAIVED)).split())
+        assert words.startswith("waived mission.yaml: 1 requirement is waived, not met (waiver ")
+        assert "requirement is judged and met" not in words
 
     def test_what_is_broken_and_what_is_not_judged_are_counted_apart(self) -> None:
         changes = {**UNJUDGED, "platforms__receiver__motion_error__velocity": "5 m/s"}

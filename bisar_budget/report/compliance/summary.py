@@ -254,8 +254,7 @@ def _verdict(page: Page) -> Iterator[doc.Block]:
     found, waived = page.found, _waived(page.found)
     said = _NOTHING if found.is_empty else _judged(found.status, waived)
     said += (_CHANGED if found.changes else "") + (_ALONE if _is_alone(found) else "")
-    tone = "warn" if STATUS[found.status].is_met and any(waived) else found.status
-    yield doc.Paragraph(said, f"verdict {tone}")
+    yield doc.Paragraph(said, f"verdict {found.status}")
     if doubt := doubtful_model(found):
         yield doc.Paragraph(doubt)
     yield doc.Paragraph(f"{sentence(verdict(found))}. {sentence(rule_words(found))}.")

@@ -51,6 +51,7 @@ COLUMNS = (
     "kind",
     "decided_by",
     "overrides",
+    "waived_by",
 )
 
 
@@ -114,6 +115,7 @@ def _rows(mission: MissionFindings) -> Iterator[list[object]]:
             "set": changed,
             "kind": "row",
             "overrides": outside,
+            "waived_by": _waived_by(row),
         }
         yield [cells.get(column) for column in COLUMNS]
 
@@ -132,4 +134,10 @@ def _requirement(one: JudgedRequirement) -> dict[str, object]:
         "notes": "; ".join(waiver.words for waiver in one.waivers),
         "kind": "requirement",
         "decided_by": spreadsheet_text(one.row),
+        "waived_by": _waived_by(one),
     }
+
+
+def _waived_by(one: Row | JudgedRequirement) -> str | None:
+    """Ids of the waivers that hold, as the file writes them; None where nothing is waived."""
+    return spreadsheet_text("; ".join(waiver.id for waiver in one.waived_by)) or None

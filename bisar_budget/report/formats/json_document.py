@@ -117,6 +117,7 @@ def _mission(mission: MissionFindings) -> dict[str, Any]:
         "name": mission.name,
         "document": mission.document._asdict(),
         "status": mission.status,
+        "waived_by": [waiver.id for waiver in mission.waived_by],
         "set": [change._asdict() for change in mission.changes],
         "model": mission.model,
         "model_doubt": mission.model_doubt or None,
@@ -193,6 +194,7 @@ def verdict_item(verdict: Verdict) -> dict[str, Any]:
 def _requirement(one: JudgedRequirement) -> dict[str, Any]:
     found: dict[str, Any] = one._asdict()
     found["waivers"] = [waiver.words for waiver in one.waivers]
+    found["waived_by"] = [waiver.id for waiver in one.waived_by]
     return found | {"reason_code": None if one.reason is None else one.reason.code}
 
 
@@ -202,6 +204,7 @@ def _row(row: Row) -> dict[str, Any]:
     found |= {
         "id": row.id,
         "notes": notes,
+        "waived_by": [waiver.id for waiver in row.waived_by],
         "reason_code": None if row.reason is None else row.reason.code,
         "note_codes": [note.code for note in notes],
     }

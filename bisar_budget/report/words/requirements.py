@@ -10,7 +10,7 @@ from bisar_budget.findings.monte_carlo import MonteCarlo, Requirement
 from bisar_budget.findings.requirement import DeclaredKinds, JudgedRequirement
 from bisar_budget.findings.row import SPECIFICATION, Row
 from bisar_budget.findings.status import BROKEN, STATUS
-from bisar_budget.report.words.sentences import requirement_size, use_words, wrapped
+from bisar_budget.report.words.sentences import counted, requirement_size, use_words, waiver_names, wrapped
 from bisar_budget.units import format_quantity
 
 COLUMNS = ("requirement", "allowed", "reached", "use", "status", "decided by")
@@ -107,20 +107,32 @@ def verdict(mission: MissionFindings, *, is_brief: bool = False) -> str:
             verb = "" if is_brief and verbs[0] == "is" else f"{verbs[count > 1]} "
             said.append(f"{subject} {verb}{outcome}")
             named = what
+    waived = _waived(mission, is_brief=is_brief)
     if said:
-        return ", ".join(said)
+        return ", ".join([*said, *waived])
     broken = [row for row in mission.rows if row.status in BROKEN]
     if broken:
-        return f"{len(broken)} row{' fails' if len(broken) == 1 else 's fail'} or cannot be judged"
+        fails = f"{len(broken)} row{' fails' if len(broken) == 1 else 's fail'} or cannot be judged"
+        return ", ".join([fails, *waived])
     if mission.is_unverified:
         return "images were asked for, and none gave a verdict"
-    return _met(mission)
+    return _met(mission, waived)
 
 
-def _met(mission: MissionFindings) -> str:
-    waived = "waived" in [*(one.status for one in mission.requirements), *(row.status for row in mission.rows)]
-    text = f"every requirement is judged and {'met or waived' if waived else 'met'}"
-    if mission.status == "warn":
+def _waived(mission: MissionFindings, *, is_brief: bool) -> list[str]:
+    """Say how many requirements are waived, else how many rows, and by which waivers; nothing where none is."""
+    counts = [sum(one.status == "waived" for one in each) for each in (mission.requirements, mission.rows)]
+    count, what = (counts[0], "requirement") if counts[0] else (counts[1], "row")
+    if not count:
+        return []
+    verb = "" if is_brief else " is" if count == 1 else " are"
+    return [f"{counted(count, what)}{verb} waived, not met ({waiver_names([one.id for one in mission.waived_by])})"]
+
+
+def _met(mission: MissionFindings, waived: Sequence[str]) -> str:
+    """Say that nothing is broken that is not waived, and what bears on that."""
+    text = ", ".join(waived) or "every requirement is judged and met"
+    if "warn" in mission.statuses:
         return f"{text}, with warnings"
     return f"{text}, with autofocus" if mission.status == "pass_with_autofocus" else text
 

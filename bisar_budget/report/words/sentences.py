@@ -95,6 +95,16 @@ def counted(count: int, noun: str) -> str:
     return f"{count} {noun}{'s' if count != 1 else ''}"
 
 
+_WAIVERS = 3  # whose ids a sentence has room for
+
+
+def waiver_names(ids: Sequence[str]) -> str:
+    """Ids of waivers as the file writes them: `waiver receiver.*`, of many the first and how many there are more."""
+    shown = [printable(one) for one in ids[:_WAIVERS]]
+    shown += [f"{len(ids) - _WAIVERS} more"] if len(ids) > _WAIVERS else []
+    return f"waiver{'s' if len(ids) > 1 else ''} {', '.join(shown)}"
+
+
 def dotted(path: KeyPath) -> str:
     """Write a path of keys as `--set` takes it."""
     return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path).lstrip(".")
