@@ -192,6 +192,12 @@ class CommonMotionError(NamedTuple):
     ] = None
     source: Source = None
 
+    @property
+    def is_stated(self) -> bool:
+        """Whether the file states any error of it; a zero does, axes or a source alone do not."""
+        figures = (self.position, self.velocity, self.acceleration, self.time_tag)
+        return bool(self.random) or any(figure is not None for figure in figures)
+
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
         """Hold names to one each."""

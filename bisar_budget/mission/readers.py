@@ -407,7 +407,8 @@ class Section(Reader):
     """A mapping with known keys, read into a `NamedTuple`; an unknown key is an error.
 
     A section's own `problems(values)` says what is wrong between its values. It is given those that are right,
-    defaults included, so that a fault in one place does not hide one between two others.
+    defaults included, so that a fault in one place does not hide one between two others. A key with an empty section
+    or list, where that is no fault, is read as if the file did not have it: it declares nothing and hides nothing.
     """
 
     def __init__(self, kind: type[Any]) -> None:
@@ -436,7 +437,9 @@ class Section(Reader):
                 report((*path, name), Problem("is not a known key", known, hint, is_of_key=True))
                 is_valid = False
                 continue
-            values[name] = item if item is INVALID else key.reader.read(item, (*path, name), report)
+            value_read = item if item is INVALID else key.reader.read(item, (*path, name), report)
+            if value_read is INVALID or name not in self.defaults or not is_empty(item):
+                values[name] = value_read
         if INVALID in values.values():
             is_valid = False
         for name in self.required:
@@ -589,6 +592,13 @@ class CurveReader(Reader):
 def either(kind: type, form: Reader, other: Reader) -> OneOf:
     """One form for a list or a mapping, which is the `kind`, and another for all else."""
     return OneOf(lambda value: form if isinstance(value, kind) else other, (other, form))
+
+
+def is_empty(item: Any) -> bool:
+    """Whether an item of a file is a section or a list in which nothing stands but empty ones."""
+    if isinstance(item, dict):
+        return all(map(is_empty, item.values()))
+    return isinstance(item, list) and all(map(is_empty, item))
 
 
 def is_place(part: str) -> bool:
