@@ -90,8 +90,9 @@ def _why(judged: JudgedMission, case: Case, one: Judged, row: Row) -> Note:
         first = next(missing)
         return phrases.not_declared_as_required(first.key, first.lacks)
     if why is Why.INPUT_IN_DOUBT:
-        doubts = (each for each in input_doubts(mission) if is_in_doubt(one.subject, each.owner, mission))
-        return next(doubts).note
+        doubts = input_doubts(mission)
+        said = [each.note for each in doubts if is_in_doubt(one.subject, each.owner, mission, each.kind)]
+        return said[0].then(*said[1:])
     if why is Why.NO_PLACE:
         return unknown_place(judged, case)
     if why is Why.NOTHING_SPREADS:
