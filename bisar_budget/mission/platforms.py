@@ -48,7 +48,6 @@ from bisar_budget.mission.readers import (
     VELOCITY,
     Choice,
     Key,
-    Label,
     Quantity,
     Reader,
     Reference,
@@ -325,7 +324,7 @@ class TrajectorySource(NamedTuple):
     track: Annotated[
         str | None,
         Key(
-            Label(),
+            Reference(),
             "Track of a GPX file with several, by its name or number; omitted: the one that covers the aperture.",
         ),
     ] = None
