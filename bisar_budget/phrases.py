@@ -75,6 +75,19 @@ def _level(db: float, rounding: str = "nearest") -> str:
     return format_quantity(db, "dB", 3, rounding)
 
 
+# ---------------------------------------------------------------------- how a mission stands
+@phrase
+def confidence(coverage_factor: float, *, has_sigma: bool, has_bounds: bool) -> str:
+    """Said of a mission whose requirements are met, behind `met`."""
+    covered = f"with coverage factor {coverage_factor:g}"
+    if not has_sigma:
+        if not has_bounds:
+            return "for the stated values"
+        return "for the stated bounds" if coverage_factor == 1 else f"for the stated bounds {covered}"
+    sigma = "at 1 sigma" if coverage_factor == 1 else covered
+    return f"{sigma} and for the stated bounds" if has_bounds else sigma
+
+
 # ---------------------------------------------------------------------- how a row stands
 @phrase
 def over_the_limit_without_autofocus(times: float) -> str:

@@ -80,7 +80,7 @@ def explain(mission: Mission, found: MissionFindings, row_id: str) -> str:
 def explain_requirement(mission: Mission, found: MissionFindings, one: JudgedRequirement) -> str:
     """Write how a requirement of a mission stands, and the rows that judge it."""
     title = f"{STATUS[one.status].text} {requirement_id(one)}"
-    return _text(mission, title, [*_lines(finding_of(mission, found, one)), "", requirement_finding(one)])
+    return _text(mission, title, [*_lines(finding_of(mission, found, one)), "", requirement_finding(one, found)])
 
 
 def _lines(steps: Iterable[Step]) -> list[str]:

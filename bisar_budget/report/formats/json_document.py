@@ -3,6 +3,7 @@
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -122,6 +123,7 @@ def _mission(mission: MissionFindings) -> dict[str, Any]:
         "model": mission.model,
         "model_doubt": mission.model_doubt or None,
         "model_doubt_code": mission.model_doubt.code or None,
+        "confidence": None if mission.is_empty else mission.confidence,
         "combine": mission.combine,
         "coverage_factor": mission.coverage_factor,
         "geometry": {
@@ -194,6 +196,7 @@ def verdict_item(verdict: Verdict) -> dict[str, Any]:
 def _requirement(one: JudgedRequirement) -> dict[str, Any]:
     found: dict[str, Any] = one._asdict()
     found["waivers"] = [waiver.words for waiver in one.waivers]
+    found["share"] = None if one.share is None else asdict(one.share)
     found["waived_by"] = [waiver.id for waiver in one.waived_by]
     return found | {"reason_code": None if one.reason is None else one.reason.code}
 
