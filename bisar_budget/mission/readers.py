@@ -16,6 +16,7 @@ from bisar_budget.faults import InvalidValueError, KeyPath, Problem
 from bisar_budget.resources import docstring
 from bisar_budget.units import Dimension, format_quantity, parse_quantity
 
+MISSING = "is missing"  # of a key that a section does not go without
 INVALID: Any = object()  # in place of a value that was reported
 Report = Callable[[KeyPath, Problem], None]
 
@@ -28,6 +29,14 @@ _MAX_IDS = 4000  # more rows than all lists together make
 _MAX_WILDCARDS = 20  # an id has four parts; patterns of hundreds take a second for each fifty
 # Controls, line separators, lone surrogates, byte order mark, and the marks that turn the reading direction.
 _UNPRINTABLE = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff\ufeff\u202a-\u202e\u2066-\u2069]")
+
+
+_MANY = {"type": ["array", "object", "null"]}  # JSON Schema: what is no single value
+
+
+def date_schema(pattern: str) -> dict[str, Any]:
+    """JSON Schema of a date or an instant: as text, or as what a reader of YAML makes of it, which JSON has not."""
+    return {"not": {"type": ["array", "object", "null", "boolean", "number"]}, "pattern": pattern}
 
 
 class Reader:
@@ -117,17 +126,29 @@ class Quantity(Reader):
         if self.dimension.usual:
             return ""  # only a zero comes so far without its unit
         if "%" in self.dimension.units:
-            try:
-                return f"Did you mean '{text} %'?" if self.leaf(f"{text} %") is not None else ""
-            except InvalidValueError:
-                return ""
+            return f"A bare number is a ratio: {text} is {100 * float(text):.6g} %"
         return f"A bare number is in {self.dimension.si}" if self.dimension.si not in ("", "dB") else ""
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
-        """Text with a unit, or a bare number; of an angle only zero is bare."""
-        if self.dimension.usual:
-            return {"anyOf": [{"type": "string"}, {"const": 0}]}
-        return {"type": ["string", "number"]}
+        """Text with a unit, or a bare number within the bounds; of an angle only zero is bare."""
+        name = re.sub(r"\W", "", self.dimension.name.partition(" ")[2].title()) + "Quantity"
+        if name not in definitions:
+            definitions[name] = _quantity_schema(self.dimension)
+        accepted: dict[str, Any] = {"$ref": f"#/definitions/{name}"}
+        words = ("exclusiveMinimum", "minimum", "exclusiveMaximum", "maximum")
+        bounds = {word: bound for word, bound in zip(words, self.bounds, strict=True) if math.isfinite(bound)}
+        return {"allOf": [accepted], **bounds} if bounds and not self.dimension.usual else accepted
+
+
+def _quantity_schema(dimension: Dimension) -> dict[str, Any]:
+    """JSON Schema of a kind of quantity: text that begins with a number and has no unit of another kind behind it."""
+    number = r"[+-]?(?!0\d)(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
+    known = {unit for other in units.DIMENSIONS for unit in other.units if unit}
+    foreign = sorted(unit for unit in known if dimension.scales.keys().isdisjoint((unit, units.normal_unit(unit))))
+    of_others = "|".join(re.sub(r"([\^$.*+?()|/])", r"\\\1", unit) for unit in foreign)
+    text: dict[str, Any] = {"type": "string", "pattern": rf"^\s*(?!{number}\s*(?:{of_others})\s*$){number}"}
+    words = dimension.accepted.removeprefix("accepted: ")
+    return {"description": words, "anyOf": [text, {"const": 0} if dimension.usual else {"type": "number"}]}
 
 
 class Triple(Reader):
@@ -139,16 +160,35 @@ class Triple(Reader):
 
     def read(self, value: Any, path: KeyPath, report: Report) -> Any:
         """Read each component at its own place."""
-        if self.or_scalar and not isinstance(value, list):
+        bracketed = "" if isinstance(value, list) else self._bracketed(value)
+        if self.or_scalar and not isinstance(value, list) and not bracketed:
             one = self.component.read(value, path, report)
             return one if one is INVALID else (one, one, one)
         if not isinstance(value, list) or len(value) != 3:
             given = f", {len(value)} given" if isinstance(value, list) else ""
-            hint = _POINT if isinstance(value, list) and len(value) > 3 else ""
+            hint = _POINT if isinstance(value, list) and len(value) > 3 else bracketed
             report(path, Problem(f"must be three components{given}", "accepted: [a, b, c]", hint))
             return INVALID
         parts = tuple([read_part(self.component, part, (*path, index), report) for index, part in enumerate(value)])
         return INVALID if INVALID in parts else parts
+
+    def _bracketed(self, value: Any) -> str:
+        """Hint at brackets around three values that are written without; empty where it is not three values.
+
+        Each has its own unit, or is 0: `1,234,567 m` may be one number, and `1, 2, 3 km` are not three of km.
+        """
+        texts = value.strip(" ()").split(",") if isinstance(value, str) else ()
+        if len(texts) != 3 or not any(map(units.unit_behind, texts)):
+            return ""
+        try:
+            bare = [self.component.leaf(text.strip()) for text in texts if not units.unit_behind(text)]
+            for text in texts:
+                self.component.leaf(text.strip())
+        except InvalidValueError:
+            bare = [math.nan]
+        if any(bare):
+            return "Write brackets, and the unit of each" if value.count(", ") == 2 else ""
+        return f"Did you mean [{', '.join(text.strip() for text in texts)}]?"
 
     def below(self, part: str) -> Reader | None:
         """Give the reader of one component."""
@@ -177,22 +217,17 @@ class Text(Reader):
         return value
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
-        """Text that is not empty."""
-        return {"type": "string", "minLength": 1, "maxLength": _MAX_TEXT}
+        """Any single value: readers of YAML make a number of 007, true of `yes` and a date of 2026-06-01."""
+        pattern = r"^(?=.*\S)[^\u0000-\u001f\u007f-\u009f\u2028\u2029\ufeff\u202a-\u202e\u2066-\u2069]*$"
+        words = {"description": "One line of text."}
+        definitions.setdefault("Text", {**words, "not": _MANY, "maxLength": _MAX_TEXT, "pattern": pattern})
+        return {"$ref": "#/definitions/Text"}
 
 
 class Reference(Text):
     """Name of a part or of a file, from which values come."""
 
     is_word = True
-
-
-class Label(Text):
-    """Text that may look like a number to an editor, such as the issue of a document."""
-
-    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
-        """Text or a number, of which the digits are kept as they stand."""
-        return {"type": ["string", "number"], "minLength": 1, "maxLength": _MAX_TEXT}
 
 
 class Glob(Text):
@@ -287,8 +322,9 @@ class Whole(Reader):
         raise InvalidValueError(f"must be a whole number from {self.low} to {self.high}")
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
-        """Integer."""
-        return {"type": "integer", "minimum": self.low, "maximum": self.high}
+        """Integer, or its digits in quotes."""
+        number = {"type": "integer", "minimum": self.low, "maximum": self.high}
+        return {"anyOf": [number, {"type": "string", "pattern": r"^\s*(?:0|-?[1-9]\d{0,17})\s*$"}]}
 
 
 class Version(Reader):
@@ -301,8 +337,8 @@ class Version(Reader):
         return 1
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
-        """Constant."""
-        return {"const": 1}
+        """Constant, in quotes or not."""
+        return {"enum": [1, "1"]}
 
 
 class Day(Reader):
@@ -320,8 +356,8 @@ class Day(Reader):
             raise InvalidValueError("must be a calendar date", "accepted: 2027-03-31 and the like") from None
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
-        """Date."""
-        return {"type": "string", "format": "date"}
+        """Date, which readers of YAML may have made of its text."""
+        return date_schema(r"^\d{4}-\d\d-\d\d$")
 
 
 def _is_few(
@@ -352,7 +388,7 @@ class TextMap(Reader):
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
         """Object."""
-        return {"type": "object", "additionalProperties": Label().schema(definitions), "maxProperties": _MAX_IDS}
+        return {"type": "object", "additionalProperties": Text().schema(definitions), "maxProperties": _MAX_IDS}
 
 
 class SizeMap(Reader):
@@ -394,7 +430,7 @@ class Weights(Reader):
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
         """Object of numbers, or array of text."""
-        label, weight = Label().schema(definitions), _WEIGHT.schema(definitions)
+        label, weight = Text().schema(definitions), _WEIGHT.schema(definitions)
         return {
             "anyOf": [
                 {"type": "object", "additionalProperties": weight, "maxProperties": _MAX_IDS},
@@ -444,7 +480,7 @@ class Section(Reader):
             is_valid = False
         for name in self.required:
             if name not in value:
-                report((*path, name), Problem("is missing"))
+                report((*path, name), Problem(MISSING))
                 is_valid = False
         if self.problems is not None:
             right = self.defaults | values
