@@ -95,9 +95,10 @@ def diff(
     (u2 - u1)/(1 - u1), u1 and u2 being declared over allowable before and after. A row that had nothing left has
     u2/u1 - 1.
 
-    Numbers do not show what is loosened: a mission file, a requirement, an error, its source or a word of
+    Margins do not show what is loosened: a mission file, a requirement, an error, its source or a word of
     requirements.declare that is gone, a larger requirement, a waiver that is new or lasts longer, a row that is newly
-    waived, more autofocus, and less coverage, reserve, model or combination.
+    waived, more autofocus, and less coverage, reserve, model or combination. Nor do they show an error that does less
+    than before in the same geometry while neither its part nor its source has another name.
 
     Exit code: 0; 1 with --fail-on-erosion; 2 for wrong usage, an unusable file or an unknown revision.
     """

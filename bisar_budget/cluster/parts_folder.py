@@ -18,6 +18,7 @@ from bisar_budget import __version__
 from bisar_budget.design.cases import Cases
 from bisar_budget.design.sweep import Asked, Chunks
 from bisar_budget.design.table import Part
+from bisar_budget.extras import install_command
 from bisar_budget.faults import ClusterError, changes_words
 from bisar_budget.memory import hold_room
 from bisar_budget.resources import locked
@@ -33,7 +34,7 @@ def check_libraries(option: str, room: int, extra: str, *modules: str) -> None:
         for module in modules:
             import_module(module)
     except ImportError as error:
-        said = f"{option} needs {error.name}, which is not installed; pip install 'bisar-budget[{extra}]' brings it"
+        said = f"{option} needs {error.name}, which is not installed; {install_command(extra)} brings it"
         raise ClusterError(said) from None
 
 

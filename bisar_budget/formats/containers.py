@@ -15,13 +15,13 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from bisar_budget.extras import install_command
 from bisar_budget.faults import printable, shown
 from bisar_budget.geometry import Vector
 from bisar_budget.paths.earth import Floats
 
 _HIGHEST_POWER = 30  # of a polynomial; more is no polynomial that anybody fitted
 _INCLUDE = "{http://www.w3.org/2001/XInclude}"
-MISSING_EXTRA = "reads and writes radar formats with sarkit: pip install 'bisar-budget[formats]'"
 
 
 class FormatError(Exception):
@@ -35,7 +35,7 @@ class MissingExtraError(Exception):
     """The extra `formats` is not installed."""
 
     def __init__(self) -> None:
-        super().__init__(f"bisar-budget {MISSING_EXTRA}")
+        super().__init__(f"bisar-budget reads and writes radar formats with sarkit: {install_command('formats')}")
 
 
 def check_extra() -> None:

@@ -5,6 +5,7 @@ from datetime import date
 from typing import TYPE_CHECKING
 
 from bisar_budget.budget.waivers import overrides
+from bisar_budget.extras import install_command
 from bisar_budget.faults import printable
 from bisar_budget.findings.images import VerifiedMission
 from bisar_budget.findings.requirement import NOTHING_OUTSIDE, Outside
@@ -80,7 +81,7 @@ def verify_all(
 def faster(jobs: int | None = None) -> str:
     """Say what would make image formation faster here."""
     if not is_compiled():
-        return ", and pip install 'bisar-budget[fast]' makes it tens of times faster"
+        return f", and {install_command('fast')} makes it tens of times faster"
     return f", --jobs {cores()} uses all cores" if jobs is not None and 1 < jobs < cores() else ""
 
 

@@ -372,8 +372,9 @@ def _log_path(
         words += f", {route.center or 0.0:.12g} s of it at mid-aperture"
     path = _flown(fitted, words, route.file, digest)
     if log.sigmas is not None:
-        east, north, up = log.sigmas[around_aperture(times, aperture_time)].max(axis=0).tolist()
-        path = path._replace(sigmas=(east, north, up) if east and north and up else None)  # 0 is not known
+        east, north, up = np.fmax.reduce(log.sigmas[around_aperture(times, aperture_time)], axis=0).tolist()
+        is_known = east > 0 and north > 0 and up > 0  # NaN and 0 are not
+        path = path._replace(sigmas=(east, north, up) if is_known else None)
     # The root mean square is what a sigma is compared with: the largest of thousands of places is four of them.
     words = "residual of the smoothed log at places left out, root mean square"
     return path._replace(doubt_m=fitted.missed, doubt_of=words, is_doubted=fitted.missed > _NOISE_M)

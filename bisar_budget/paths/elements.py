@@ -22,6 +22,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
+from bisar_budget.extras import install_command
 from bisar_budget.faults import shown
 from bisar_budget.geometry import Vector
 from bisar_budget.paths.flight import Orbit, PathDoubt, PathFileError, Sample, interpolate
@@ -38,7 +39,7 @@ from bisar_budget.paths.messages import (
     one_object,
     parse_markup,
 )
-from bisar_budget.paths.orientation import INSTALL, UNKNOWN, Orientation, from_teme
+from bisar_budget.paths.orientation import UNKNOWN, Orientation, from_teme
 
 # CCSDS 502.0-B-3, EPHEMERIS_TYPE; 0 is SGP4 in all that is distributed, 4 is SGP4-XP. Two-line sets have a digit.
 _PROPAGATED = ("", "0", "2", "SGP4")
@@ -98,7 +99,7 @@ def teme(elements: Elements) -> Callable[[Instant], Vector]:
     try:
         from sgp4.api import WGS72, Satrec
     except ImportError:
-        raise PathFileError(f"{elements.where}: needs the package sgp4: {INSTALL}") from None
+        raise PathFileError(f"{elements.where}: needs the package sgp4: {install_command('orbits')}") from None
     satellite = Satrec()
     epoch = elements.epoch.day - _DAY_OF_1950 + elements.epoch.seconds / DAY
     # The derivatives of the mean motion are no part of SGP4, and the number is ours to keep.

@@ -92,8 +92,9 @@ class Log:
     """Measured places (n, 3) [m] at rising times (n,) [s], Earth-fixed or in the scene's axes.
 
     Times count from `start`; without one they are those of the log itself. `words` says what it is, for reports.
-    `sigmas` (n, 3) are one-sigma errors east, north, up, where the log states them [m]. `typical_sigmas` (n,) are those
-    that a fix of the stated quality usually has, on each axis; NaN where the log says no quality [m].
+    `sigmas` (n, 3) are one-sigma errors east, north, up, where the log states them; NaN at fixes without [m].
+    `typical_sigmas` (n,) are those that a fix of the stated quality usually has, on each axis; NaN where the log says
+    no quality [m]. `quality_words` names the quality of the fix of an index: "GGA quality 1, autonomous".
     """
 
     times: Floats
@@ -103,6 +104,7 @@ class Log:
     start: Instant | None = None
     sigmas: Floats | None = None
     typical_sigmas: Floats | None = None
+    quality_words: Callable[[int], str] = lambda _: ""
 
 
 @dataclass(frozen=True)

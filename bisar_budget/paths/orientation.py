@@ -13,13 +13,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from bisar_budget.extras import install_command
 from bisar_budget.faults import shown
 from bisar_budget.geometry import Vector
 from bisar_budget.paths.earth import ROTATION_RATE
 from bisar_budget.paths.flight import PathFileError
 from bisar_budget.paths.instant import DAY, TAI_LESS, Instant, tai, tai_less_utc
 
-INSTALL = "pip install 'bisar-budget[orbits]'"
 Turn = Callable[[Vector, Instant], Vector]
 _JULIAN_DATE_OF_MJD = 2400000.5
 _J2000 = 51544  # modified Julian day, at noon
@@ -102,7 +102,7 @@ def celestial_turn(is_j2000: bool, orientation: Orientation = UNKNOWN) -> Turn:
     try:
         import erfa
     except ImportError:
-        raise PathFileError(f"needs the package pyerfa: {INSTALL}") from None
+        raise PathFileError(f"needs the package pyerfa: {install_command('orbits')}") from None
 
     bias: NDArray[np.float64] = erfa.bp06(_JULIAN_DATE_OF_MJD, _J2000 + 0.5)[0].T if is_j2000 else np.eye(3)
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from bisar_budget.design.cases import Cases, Values, in_unit
 from bisar_budget.design.table import Column, Part, Swept
+from bisar_budget.extras import install_command
 from bisar_budget.faults import changes_words, printable
 from bisar_budget.findings.requirement import Override
 from bisar_budget.findings.status import STATUS
@@ -324,7 +325,7 @@ def writer_of(suffix: str) -> TableFormat:
 
 
 def _missing(name: str, library: str) -> str:
-    return f"{name} needs {library}, which is not installed; pip install 'bisar-budget[tables]' brings it"
+    return f"{name} needs {library}, which is not installed; {install_command('tables')} brings it"
 
 
 def dataset(described: Described, whole: Mapping[str, Any]) -> "Dataset":

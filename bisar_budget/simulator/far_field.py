@@ -11,6 +11,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.extras import install_command
 from bisar_budget.geometry import GroundVector
 from bisar_budget.simulator.image_formation import direct_sum
 from bisar_budget.simulator.impulse_response import lagrange_weight
@@ -59,7 +60,7 @@ def far_field_filter(
             image = _by_nufft(history, sight, flat, bounded=method == "auto")
         except ImportError:
             if method == "nufft":
-                raise ImportError("finufft is missing: pip install 'bisar-budget[fast]'") from None
+                raise ImportError(f"finufft is missing: {install_command('fast')}") from None
             image = None
         if image is not None:
             return image.reshape(np.shape(points)[:-1])

@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 
 from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.extras import install_command
 from bisar_budget.memory import is_spacious
 from bisar_budget.simulator.phase_history import Complexes, Floats, PhaseHistory, is_even, split
 
@@ -109,7 +110,7 @@ def backprojection(history: PhaseHistory, points: Floats, kernel: Kernel = "auto
     if kernel == "numpy":
         return _backprojection(history, points)
     if not is_compiled():
-        raise ImportError(f"kernel {kernel} needs Numba, which is missing: pip install 'bisar-budget[fast]'")
+        raise ImportError(f"kernel {kernel} needs Numba, which is missing: {install_command('fast')}")
     from bisar_budget.simulator.compiled import backproject
 
     image = backproject(history, points, kernel)

@@ -227,7 +227,7 @@ def test_a_scheduler_needs_a_file_and_its_library(run, tmp_path: Path, monkeypat
     monkeypatch.setitem(sys.modules, "distributed", None)
     found = run(*ASKED, "--scheduler", "local:2", "-o", str(tmp_path / "t.csv"))
     assert found.exit_code == 2
-    assert "pip install 'bisar-budget[cluster]'" in found.stderr
+    assert "pip install distributed pyarrow" in found.stderr
 
 
 class Future:

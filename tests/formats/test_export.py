@@ -338,4 +338,4 @@ class TestCommand:
         monkeypatch.setitem(sys.modules, "sarkit.cphd", None)
         result = run("simulate", mission, "-o", tmp_path / "m.cphd")
         assert result.exit_code == 2
-        assert "pip install 'bisar-budget[formats]'" in result.stderr
+        assert "pip install sarkit" in result.stderr

@@ -148,6 +148,12 @@ def gns(time: float, latitude: float, longitude: float, above: float, modes: str
     return sentence(f"GNGNS,{clock},{place},{modes},12,0.7,{height},{SEPARATION:.4f},1.0,0000")
 
 
+def gst(time: float, east: float, north: float, up: float, talker: str = "GN", start: datetime = START) -> str:
+    """One-sigma errors of a fix, which the sentence has as latitude, longitude, height."""
+    clock = f"{at(time, start=start):%H%M%S.%f}"
+    return sentence(f"{talker}GST,{clock},9.9,,,,{north:.4f},{east:.4f},{up:.4f}")
+
+
 def nmea(flown: Flight, place: Callable[..., str] = gga, date: Callable[..., str] = rmc, **more: Any) -> bytes:
     """Log of sentences, with dates behind places and with sentences that say nothing of either."""
     dated = {"start": more["start"]} if "start" in more else {}

@@ -220,4 +220,4 @@ def test_without_sgp4_an_error_says_what_to_install(monkeypatch: pytest.MonkeyPa
     monkeypatch.setitem(sys.modules, "sgp4.api", None)
     with pytest.raises(PathFileError) as error:
         orbit_of(TLE)
-    assert str(error.value) == "s.tle:2: needs the package sgp4: pip install 'bisar-budget[orbits]'"
+    assert str(error.value) == "s.tle:2: needs the package sgp4: pip install pyerfa sgp4"

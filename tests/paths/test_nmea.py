@@ -13,7 +13,7 @@ from bisar_budget.paths.instant import parse_instant
 from bisar_budget.paths.log_places import LogKeys
 from bisar_budget.paths.nmea import read_nmea
 from tests.paths.flown import flight, stamp
-from tests.paths.log_files import METRES_A_DEGREE, SEPARATION, gga, gns, nmea, rmc, sentence, zda
+from tests.paths.log_files import METRES_A_DEGREE, SEPARATION, gga, gns, gst, nmea, rmc, sentence, zda
 
 pynmea2 = pytest.importorskip("pynmea2")
 
@@ -194,9 +194,7 @@ def test_years_have_two_digits_and_the_century_of_gps() -> None:
 
 def test_without_the_package_the_message_says_how_to_install_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pynmea2", None)
-    with pytest.raises(
-        PathFileError, match=r"^a\.nmea: needs the package pynmea2: pip install 'bisar-budget\[logs\]'$"
-    ):
+    with pytest.raises(PathFileError, match=r"^a\.nmea: needs the package pynmea2: pip install pynmea2$"):
         read(nmea(SHORT))
 
 
@@ -208,3 +206,63 @@ def test_a_void_sentence_dates_nothing() -> None:
     lines[2] = sentence(",".join(fields))
     log = read("\n".join(lines))
     assert log.times[1] - log.times[0] == pytest.approx(1, abs=1e-6)
+
+
+class TestALogSaysItsAccuracy:
+    def test_gst_states_sigmas_of_latitude_longitude_height(self) -> None:
+        lines = [rmc(0)]
+        for number, fix in enumerate(_places()):
+            lines.append(gga(*fix))
+            if number % 10 == 0:  # 5 Hz of 50 Hz
+                lines.append(gst(fix[0], 0.02 + fix[0] / 1e3, 0.01, 0.05))
+        log = read("\n".join(lines))
+        assert log.sigmas is not None
+        assert log.sigmas[0] == pytest.approx([0.02, 0.01, 0.05])
+        assert log.sigmas[250] == pytest.approx([0.025, 0.01, 0.05])
+        # Between two of them the larger one counts.
+        assert log.sigmas[251] == pytest.approx([0.0252, 0.01, 0.05])
+
+    def test_a_fix_without_gst_near_it_has_none(self) -> None:
+        lines = [rmc(0), gst(0, 0.02, 0.01, 0.05), *(gga(*fix) for fix in _places())]
+        log = read("\n".join(lines))
+        assert log.sigmas is not None
+        assert np.isfinite(log.sigmas[: 5 * 50 + 1]).all()
+        assert np.isnan(log.sigmas[5 * 50 + 1 :]).all()
+
+    @pytest.mark.parametrize("fields", [",,,,,,", "9.9,,,,0,0,0", "9.9,,,,0.01,,0.02", "9.9,,,,-1,1,1"])
+    def test_a_gst_that_states_nothing_is_none(self, fields: str) -> None:
+        lines = [rmc(0), gga(0, 48, 11, 3000), sentence(f"GNGST,052001.25,{fields}")]
+        assert read("\n".join(lines)).sigmas is None
+
+    @pytest.mark.parametrize("is_own", [True, False])
+    def test_the_gst_of_the_talker_of_the_fixes_counts(self, is_own: bool) -> None:
+        """Those of another receiver do not speak for it, where it has its own."""
+        lines = [rmc(0), gga(0, 48, 11, 3000), gst(0, 3, 2, 5, talker="GP")]
+        lines += [gst(0, 0.02, 0.01, 0.05)] if is_own else []
+        log = read("\n".join(lines))
+        assert log.sigmas is not None
+        assert log.sigmas[0] == pytest.approx([0.02, 0.01, 0.05] if is_own else [3, 2, 5])
+
+    @pytest.mark.parametrize(
+        ("quality", "sigma_m", "words"),
+        [
+            (1, 3, "GGA quality 1, autonomous"),
+            (2, 1, "GGA quality 2, differential"),
+            (5, 0.3, "GGA quality 5, RTK float"),
+            (4, 0.01, "GGA quality 4, RTK fixed"),
+            (6, 3, "GGA quality 6, dead reckoning"),
+        ],
+    )
+    def test_a_quality_of_gga_has_a_usual_error(self, quality: int, sigma_m: float, words: str) -> None:
+        log = read(nmea(SHORT, quality=quality))
+        assert log.typical_sigmas == pytest.approx(np.full(6, sigma_m))
+        assert log.quality_words(3) == words
+
+    @pytest.mark.parametrize(
+        ("modes", "sigma_m", "words"),
+        [("RR", 0.01, "mode R, RTK fixed"), ("RNN", 0.01, "mode R, RTK fixed"), ("RA", 3, "mode A, autonomous")],
+    )
+    def test_the_worst_mode_of_gns_counts(self, modes: str, sigma_m: float, words: str) -> None:
+        log = read("\n".join([rmc(0), gns(0, 48, 11, 3000, modes=modes)]))
+        assert log.typical_sigmas == pytest.approx([sigma_m])
+        assert log.quality_words(0) == f"GNS {words}"

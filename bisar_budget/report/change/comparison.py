@@ -1,20 +1,21 @@
 """Effects of a change on missions: what goes in, what it loosens, how much of each limit it erodes, and a gate."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 from bisar_budget.constants import GATING_MODELS, UTILIZATION_TOLERANCE
 from bisar_budget.effects.effect import MOTION, PLATFORMS
 from bisar_budget.faults import Changed, KeyPath
 from bisar_budget.findings.mission import MissionFindings
-from bisar_budget.findings.requirement import NAMES
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.model import Mission, Requirements, Waiver
 from bisar_budget.mission.parts import figure_text
+from bisar_budget.report.change.fallen_effects import SUMS, fallen_effects
 from bisar_budget.report.words.sentences import dotted, percent
 from bisar_budget.settings import TABLE
 
@@ -111,11 +112,11 @@ def _numbers(found: MissionFindings) -> Iterator[tuple[str, str, float | None]]:
 
 
 # ---------------------------------------------------------------------- what is looser
-_SUMS = (*NAMES, "autofocus_pull_in")  # kinds of rows that are no error
 _COMPUTED = ("oscillator", "spatial_variance")  # the file states no such number: a zero is a result, as a level is
 # Each asks for more than the one before it.
 _RULES = {"combine": ("each", "rss", "sum"), "model": GATING_MODELS}
 
+_WIDEST_FIRST = ("normal", "bound", "uniform")
 _NAMED = ("other", "random")  # kinds of error of which a file may state several, each with a name
 _NUMBERS = (("autofocus", "n_pull", 1), ("allocation", "coverage_factor", -1), ("allocation", "warn_above", 1))
 
@@ -145,7 +146,10 @@ def loosenings(before: MissionFindings, after: MissionFindings) -> Iterator[Loos
     yield from _rules(before, after)
     yield from _waivers(*missions)
     yield from _waived_rows(before, after)
-    yield from _errors(before, after)
+    gone = list(_errors(before, after))
+    yield from gone
+    yield from _distributions(*missions)
+    yield from _fallen(before, after, [one.id for one in gone])
     yield from _sources(before, after)
 
 
@@ -249,11 +253,29 @@ def _errors(before: MissionFindings, after: MissionFindings) -> Iterator[Loosene
     """Errors that the file declares no more, or as zero; of motion along whatever axes."""
     old, new = _declared(before), _declared(after)
     stated = (row for row in before.rows if row.declared is not None and row.is_independent)
-    for name in dict.fromkeys(_error(row) for row in stated if row.subject.kind not in _SUMS):
+    for name in dict.fromkeys(_error(row) for row in stated if row.subject.kind not in SUMS):
         if name not in new:
             yield Loosened(name, "declared", "not declared")
         elif old[name] and not new[name]:
             yield Loosened(name, "declared", "zero")
+
+
+def _fallen(before: MissionFindings, after: MissionFindings, gone: Sequence[str]) -> Iterator[Loosened]:
+    """Rows whose declared effect fell; an error that is `gone` is named already."""
+    for fall in fallen_effects(before, after):
+        if not any(fall.id == name or fall.id.startswith(f"{name}.") for name in gone):
+            yield Loosened(fall.id, *fall.words)
+
+
+def _distributions(before: Mission, after: Mission) -> Iterator[Loosened]:
+    """Distributions that are narrower for the same values: a bound is never exceeded, one sigma is."""
+    sections = [
+        (f"platforms.{name}.motion_error", attrgetter(f"platforms.{name}.motion_error")) for name in PLATFORMS
+    ]
+    for key, section in (*sections, ("common_motion_error", attrgetter("common_motion_error"))):
+        old, new = (getattr(section(mission), "distribution", None) for mission in (before, after))
+        if old and new and _WIDEST_FIRST.index(new) > _WIDEST_FIRST.index(old):
+            yield Loosened(f"{key}.distribution", old, new)
 
 
 def _declared(found: MissionFindings) -> dict[str, bool]:

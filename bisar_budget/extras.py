@@ -1,0 +1,21 @@
+"""Packages of each optional part of the tool, and the command that installs them.
+
+Messages name the packages, not the extra: bisar-budget is not on PyPI, and its name there may become a stranger's.
+"""
+
+from collections.abc import Mapping
+
+# As `optional-dependencies` of pyproject.toml has them, without the versions. Extras for developers have no messages.
+PACKAGES_OF_EXTRA: Mapping[str, tuple[str, ...]] = {
+    "cluster": ("distributed", "pyarrow"),
+    "fast": ("finufft", "numba"),
+    "formats": ("sarkit",),
+    "logs": ("pynmea2",),
+    "orbits": ("pyerfa", "sgp4"),
+    "tables": ("netCDF4", "pyarrow", "xarray"),
+}
+
+
+def install_command(extra: str) -> str:
+    """Command that installs the packages of an extra into the running environment."""
+    return f"pip install {' '.join(PACKAGES_OF_EXTRA[extra])}"
