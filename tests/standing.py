@@ -15,7 +15,7 @@ def standing(found: MissionFindings, row_id: str | None, breaks: Container[str])
     status = found.status if row_id is None else rows[0].status if rows else "not_evaluated"
     complies = status not in breaks
     deciding = [row for row in rows if _decides(row, breaks) and (complies or row.status in breaks)]
-    deciding = [row for row in deciding if (row.status == "waived") == (status == "waived")]
+    deciding = [row for row in deciding if row.status != "waived" or status == "waived"]
     waivers = (found if row_id is None else rows[0]).waived_by if rows and status == "waived" else ()
     waived_by = tuple(waiver.id for waiver in waivers)
     if not deciding:
@@ -23,7 +23,8 @@ def standing(found: MissionFindings, row_id: str | None, breaks: Container[str])
         return Standing(complies, status, requirement=broken[0] if broken else None, waived_by=waived_by)
     highest = max(map(_use, deciding))
     worst = next(row for row in deciding if _use(row) >= highest - ALIKE * abs(highest) or _use(row) == highest)
-    use = None if status == "not_evaluated" else worst.utilization  # it need not be that of what decides
+    is_unknown = (status == "not_evaluated" and not complies) or _use(worst) < 0
+    use = None if is_unknown else worst.utilization  # it need not be that of what decides
     return Standing(complies, status, worst.id, worst.binding_requirement or worst.metric, use, waived_by)
 
 
@@ -34,4 +35,5 @@ def _decides(row: Row, breaks: Container[str]) -> bool:
 
 
 def _use(row: Row) -> float:
-    return -1.0 if row.utilization is None else row.utilization
+    is_unknown = row.utilization is None or (row.status == "waived" and row.is_unjudged)
+    return -1.0 if is_unknown else row.utilization

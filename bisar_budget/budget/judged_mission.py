@@ -145,6 +145,7 @@ class _Judgement:
             of_all.judges(),
             np.array([row.quadratic_use for row in rows]),
             {key: place >= 0 for key, place in of_requirements.items()},
+            before=own,
             has_noise=has_noise,
             is_misplaced=is_misplaced,
         )

@@ -55,7 +55,8 @@ class UntakenEffect(NamedTuple):
 class RequirementState(NamedTuple):
     """How a requirement stands: its status, the place of the row that decides or -1, and the places that judge it.
 
-    `utilization` is that of the requirement by the deciding row.
+    `utilization` is that of the requirement by the deciding row. `is_unjudged` is where it cannot be judged, be that
+    waived or not.
     """
 
     key: str
@@ -63,6 +64,7 @@ class RequirementState(NamedTuple):
     decider: NDArray[np.intp]
     utilization: Floats
     judges: Truths  # (rows, n)
+    is_unjudged: Truths
 
 
 def first_highest(uses: Floats) -> NDArray[np.intp]:
@@ -90,6 +92,7 @@ def requirement_states(
     quadratic_use: Floats,
     waived: Mapping[str, Any],
     *,
+    before: Codes,
     has_noise: Any,
     is_misplaced: Any,
 ) -> list[RequirementState]:
@@ -109,12 +112,15 @@ def requirement_states(
         Quadratic phase of each over what that may be, whatever sets its allowable; not a number where it has none.
     waived : mapping of str to bool
         Keys of the requirements that a valid waiver names.
+    before : (rows, n)
+        Statuses of the rows before waivers.
     has_noise : (n,) bool
         Whether something that spreads, or a tone that ISLR holds, is declared: without it ISLR is not judged.
     is_misplaced : (n,) bool
         Whether a declared error displaces the image by an amount that no row holds.
     """
     uses, found = np.nan_to_num(utilization, nan=0.0, posinf=np.inf), []
+    is_open = before == RANK["not_evaluated"]
     for key in required_keys(mission):
         mine = IS_JUDGED[codes] & (judges == KEYS.index(key))
         levels, used = np.where(mine, codes, _NONE), uses
@@ -133,8 +139,10 @@ def requirement_states(
         worst = levels.min(axis=0)
         # What passes by itself may come nearer to breaking the requirement than what autofocus brings to pass.
         is_met = (worst == RANK["pass_with_autofocus"]) & (levels == RANK["pass"])
-        decider = first_highest(np.where((levels == worst) | is_met, used, -1.0))
-        utilization = np.take_along_axis(used, decider[None], axis=0)[0]
+        # Of what is waived the first is what has a number that breaks the requirement.
+        shown = np.where((codes == RANK["waived"]) & is_open, -0.5, used)
+        decider = first_highest(np.where((levels == worst) | is_met, shown, -1.0))
+        utilization, is_unknown = (np.take_along_axis(one, decider[None], axis=0)[0] for one in (used, is_open))
         is_unjudged = ~mine.any(axis=0)
         decider = np.where(is_unjudged, -1, decider)
         if key == "islr":
@@ -142,9 +150,10 @@ def requirement_states(
         if key == LOCATION:
             is_unjudged = is_unjudged | np.asarray(is_misplaced)
         status = np.where(is_unjudged & (worst != RANK["fail"]), RANK["not_evaluated"], worst)
+        is_unknown = (is_unknown & (worst == RANK["waived"])) | (status == RANK["not_evaluated"])
         if waived.get(key):
             status = np.where(np.isin(status, [RANK[name] for name in BROKEN]), RANK["waived"], status)
-        found.append(RequirementState(key, status.astype(np.int8), decider, utilization, mine))
+        found.append(RequirementState(key, status.astype(np.int8), decider, utilization, mine, is_unknown))
     return found
 
 

@@ -46,7 +46,7 @@ def rows_in_words(judged: JudgedMission, case: Case) -> Iterator[Row]:
         if found is None:  # only other cases have it
             continue
         row, status = found.in_words(case, model), statuses(one.status[case.place])
-        changes: dict[str, Any] = {"model": model, "status": status}
+        changes: dict[str, Any] = {"model": model, "status": status, "is_unjudged": status == "not_evaluated"}
         if status != row.status and status == "info":
             changes |= {"utilization": None, "margin": None}
         row = row._replace(**changes)
@@ -67,6 +67,7 @@ def _declarations(case: Case, one: Judged) -> Row:
         equation="requirements.declare",
         requirement_id=mission.requirement_ids.get(DECLARATIONS.id),
         model=mission.gating_model,
+        is_unjudged=bool(missing),
     )
 
 
@@ -122,12 +123,12 @@ def _entry(
     mission, key = case.mission, state.key
     value = getattr(mission.requirements, key)
     utilization = case.number(state.utilization)  # an error without an image has no phase to compare
-    status = statuses(state.status[case.place])
+    status, is_unjudged = statuses(state.status[case.place]), bool(state.is_unjudged[case.place])
     place = state.decider[case.place]
     decider = rows[place] if place >= 0 else None
     allowed, reached = _sizes(decider, key, case) if decider is not None else (None, None)
     reason: Note | None = None
-    if status == "not_evaluated" and (decider is None or decider.status != status):
+    if is_unjudged and (decider is None or not decider.is_unjudged):
         reason = (unknown_place(judged, case) if key == LOCATION else NOTHING) or phrases.nothing_judges(key)
     elif decider is not None and status not in ("pass", "info"):
         reason = decider.reason
@@ -142,13 +143,14 @@ def _entry(
         allowed=allowed,
         reached=reached,
         utilization=utilization
-        if decider and decider.utilization is not None and math.isfinite(utilization)
+        if decider and not is_unjudged and decider.utilization is not None and math.isfinite(utilization)
         else None,
         row=None if decider is None else decider.id,
         rows=tuple(row.id for row in judges),
         reason=reason,
         line=mission.line(path),
         waivers=_waivers(status, waived.requirements.get(f"mission.{key}", ()), judges),
+        is_unjudged=is_unjudged,
     )
 
 

@@ -109,7 +109,8 @@ class Solution(NamedTuple):
     below the key. `low` and `high` are the ends of the range, `is_circle` whether they are one direction. `nearest`
     is the nearest miss where nothing complies, or where everything does the value with the least left. `given` is
     the value of the file. `texts` has every value as the file would have it. `is_constant` is whether the number
-    changes no utilization that decides. `skipped` counts the places of the range at which there is no mission.
+    changes no utilization that decides. `skipped` counts the places of the range at which there is no mission,
+    `waived` those that are waived, by the waivers `waived_by`.
     `imaged` is what images say at the best crossing, if any were formed. `overrides` is what from outside the file
     bears on it.
     """
@@ -134,6 +135,8 @@ class Solution(NamedTuple):
     changes: tuple[SetValue, ...] = ()
     imaged: Imaged | None = None
     overrides: tuple[Override, ...] = ()
+    waived: int = 0
+    waived_by: tuple[str, ...] = ()
 
     @property
     def value(self) -> float | None:
@@ -155,7 +158,7 @@ class Solution(NamedTuple):
         """`crossing`, or `all` or `none` of the range complies; `waived` where none does and some of it is waived."""
         if self.crossings:
             return "crossing"
-        return "all" if self.nearest.complies else "waived" if self.nearest.status == "waived" else "none"
+        return "all" if self.nearest.complies else "waived" if self.waived else "none"
 
 
 def solve(
@@ -209,6 +212,8 @@ def solve(
             one.row == missions[0].row and _is_alike(one.utilization, missions[0].utilization) for one in missions[1:]
         ),
         skipped=sum(bool(state.reason) for state in scanned),
+        waived=sum(state.status == "waived" for state in scanned),
+        waived_by=tuple(dict.fromkeys(waiver for state in scanned for waiver in state.waived_by)),
         changes=mission.changes,
         texts=search.texts(crossings, nearest),
     )

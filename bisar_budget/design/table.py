@@ -123,9 +123,13 @@ def _verdict(
     may_decide = np.array([["warn" in breaks or one.subject.kind != "autofocus_pull_in"] for one in rows])
     may_decide = may_decide & (does_break[codes] | np.array([[one.metric != SPECIFICATION] for one in rows]))
     decides = may_decide & _IS_JUDGED[codes] & (does_break[codes] | ~does_break[status])
-    decides &= (codes == RANK["waived"]) == (status == RANK["waived"])
+    decides &= (codes != RANK["waived"]) | (status == RANK["waived"])
     decides &= ~np.isnan(uses) | (codes != RANK["not_evaluated"])
-    known = np.where(decides, np.where(np.isnan(uses), -1.0, uses), -2.0)
+    # Of what is waived the first is what has a number that breaks a limit.
+    before = {row.subject.id: row.status for row in judged.before}
+    is_open = np.array([before.get(row.subject.id, row.status) for row in rows]) == RANK["not_evaluated"]
+    is_numbered = ~np.isnan(uses) & ~(is_open & (codes == RANK["waived"]))
+    known = np.where(decides, np.where(is_numbered, uses, -1.0), -2.0)
     has_one = decides.any(axis=0)
     place = (
         np.where(has_one, first_highest(known), -1),
@@ -141,7 +145,8 @@ def _verdict(
     if row_id is None:
         for one in reversed(judged.requirements):
             unmet = np.where((one.status == status) & does_break[status], one.key, unmet)
-    is_known = has_one & (status != RANK["not_evaluated"])
+    is_unjudged = (status == RANK["not_evaluated"]) & does_break[status]
+    is_known = has_one & ~is_unjudged & is_numbered[place]
     return {
         "status": statuses(status),
         "worst_row": np.where(has_one, ids, ""),

@@ -21,7 +21,8 @@ class JudgedRequirement(NamedTuple):
     `value` is what the file, or the default, requires in all; `allowed` what the deciding row is held to (the share
     of a platform, autofocus included) and `reached` what is declared there, in the unit of the requirement. `row` is
     the deciding one, `rows` are all that judge it. `reason` says why it cannot be judged, or why it is not met.
-    `waivers` cover it or rows that judge it; empty unless it is waived.
+    `waivers` cover it or rows that judge it; empty unless it is waived. `is_unjudged` is whether it cannot be judged,
+    be that waived or not.
     """
 
     key: str
@@ -37,6 +38,7 @@ class JudgedRequirement(NamedTuple):
     reason: Note | None = None
     line: int | None = None
     waivers: tuple[AppliedWaiver, ...] = ()
+    is_unjudged: bool = False
 
     def __repr__(self) -> str:
         """Key, what is reached of what is allowed, and status, on one line."""

@@ -26,6 +26,7 @@ from bisar_budget.report.words.sentences import (
     markdown_text,
     percent,
     uri,
+    waiver_names,
 )
 
 _ORDER = ("error", "warning", "notice")
@@ -114,6 +115,8 @@ def step_summary(report: Report, style: Style) -> str:
         if outside := overrides_words(mission, with_changes=False):
             file += "; from outside the file: " + markdown_text(outside)
         status = STATUS[mission.status].text + ("; each error alone" if mission.combine == "each" else "")
+        if mission.waived_by:
+            file += "; " + markdown_text(waiver_names([one.id for one in mission.waived_by]))
         lines.append(markdown_row((status, file, markdown_text(row.id), use)))
     usable = [mission for mission in report.missions if isinstance(mission, MissionFindings)]
     broken = [requirement_finding(one) for found in usable for one in found.requirements if STATUS[one.status].fails]
@@ -353,7 +356,7 @@ def _suppressed(status: str, waivers: Sequence[AppliedWaiver], artifact: dict[st
         "status": "accepted",
         "justification": printable(waiver.reason),
         "location": _location(artifact, {"startLine": int(waiver.line or 1)}),
-        "properties": {"until": waiver.until.isoformat()},
+        "properties": {"id": printable(waiver.id), "until": waiver.until.isoformat()},
     }
     return {"suppressions": [suppression]}
 

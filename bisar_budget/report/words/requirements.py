@@ -41,7 +41,7 @@ def requirement_id(one: JudgedRequirement) -> str:
 def requirement_lines(mission: MissionFindings) -> Iterator[RequirementLine]:
     """Write the table of requirements, in the order of the contract."""
     for one in mission.requirements:
-        is_open = one.status == "not_evaluated"
+        is_open = one.is_unjudged
         allowed, reached = one.value if one.allowed is None else one.allowed, one.reached
         if is_open and one.row != one.id:  # what a share has reached is not what all of it would
             allowed, reached = one.value, None
@@ -60,7 +60,7 @@ def requirement_lines(mission: MissionFindings) -> Iterator[RequirementLine]:
 
 def _remarks(one: JudgedRequirement, mission: MissionFindings) -> Iterator[str]:
     """Say what is allowed, where that is not the requirement as it stands, and which waivers hold."""
-    if one.allowed is not None and one.value is not None and one.status != "not_evaluated":
+    if one.allowed is not None and one.value is not None and not one.is_unjudged:
         gain = mission.allocation.autofocus_gain if one.key == "quadratic_phase_error" else 1.0
         is_share = abs(one.allowed - gain * one.value) > 1e-9 * abs(one.value)
         is_gained = gain > 1 and abs(one.allowed - one.value) > 1e-9 * one.value
@@ -78,11 +78,11 @@ def requirement_finding(one: JudgedRequirement) -> str:
     if one.value is not None:
         text += f" of {requirement_size(one.value, one)}{' (default)' if one.is_default else ''}"
     text += f": {STATUS[one.status].words}"
-    if one.reached is not None and one.allowed is not None and one.status != "not_evaluated":
+    if one.reached is not None and one.allowed is not None and not one.is_unjudged:
         text += (
             f", {requirement_size(one.reached, one)} reached, {requirement_size(one.allowed, one, 'down')} allowed"
         )
-    if one.row is not None and one.status != "not_evaluated":
+    if one.row is not None and not one.is_unjudged:
         text += f", decided by {one.row}"
     return "; ".join([text, *filter(None, [one.reason]), *(waiver.words for waiver in one.waivers)])
 
