@@ -187,8 +187,17 @@ def clocks_are_not_set(row_ids: Sequence[str]) -> str:
 
 
 @phrase
-def not_declared_as_required(key: str) -> str:
-    """Said of an error that the file should declare."""
+def drift_is_not_stated(platforms: Sequence[str]) -> str:
+    """Said of the location, beside clocks in holdover without an oscillator."""
+    keys = " and ".join(f"platforms.{name}.oscillator" for name in platforms)
+    return f"in holdover a clock drifts as its oscillator does, and the file does not state it: add {keys}"
+
+
+@phrase
+def not_declared_as_required(key: str, lacks: str = "") -> str:
+    """Said of an error that the file should declare; `lacks` is what half of it needs to have an effect."""
+    if lacks:
+        return f"requirements.declare asks for {key}, and half of it is declared: the file has no {lacks}"
     return f"the file has no {key}, which requirements.declare asks for"
 
 
@@ -993,6 +1002,13 @@ def drawn_as_bounds(row_ids: Sequence[str]) -> str:
 def vibration_is_not_drawn() -> str:
     """Said of Monte Carlo."""
     return "what vibrations and tones do is not drawn: it is in check alone"
+
+
+@phrase
+def unknown_drift_is_not_drawn(platforms: Sequence[str]) -> str:
+    """Said of Monte Carlo, of a location beside clocks in holdover without an oscillator."""
+    keys = " and ".join(f"platforms.{name}.oscillator" for name in platforms)
+    return f"the file does not state {keys}, by which the clocks drift: the location is not drawn"
 
 
 @phrase

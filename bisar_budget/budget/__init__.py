@@ -4,6 +4,7 @@
 __all__ = [
     "aggregates",
     "check",
+    "declarations",
     "doubts",
     "judged_mission",
     "judged_requirements",

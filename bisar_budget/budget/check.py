@@ -17,10 +17,10 @@ import numpy as np
 
 from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Analysis, Case, by_nodes
+from bisar_budget.budget.declarations import declared_kinds
 from bisar_budget.budget.doubts import collection_notes, model_doubt
 from bisar_budget.budget.file_warnings import file_warnings
 from bisar_budget.budget.judged_mission import JudgedMission, judged_mission
-from bisar_budget.budget.judged_requirements import declared_kinds
 from bisar_budget.budget.requirement_table import negligible_effects, requirements_in_words, rows_in_words
 from bisar_budget.budget.waivers import apply_waivers, overrides
 from bisar_budget.constants import SPEED_OF_LIGHT

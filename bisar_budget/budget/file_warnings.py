@@ -9,19 +9,21 @@ from typing import NamedTuple
 
 from bisar_budget.analysis.allocation import ROOM, caps, rounded_down
 from bisar_budget.analysis.analysis import Case
+from bisar_budget.budget.declarations import swings_nothing
 from bisar_budget.budget.doubts import input_doubts
 from bisar_budget.effects.effect import PLATFORMS
-from bisar_budget.effects.navigation_errors import TILTS
-from bisar_budget.effects.oscillator_acceleration import felt
-from bisar_budget.effects.oscillators import POOR_FIT
+from bisar_budget.effects.oscillator_acceleration import is_unshaken
+from bisar_budget.effects.oscillators import POOR_FIT, clocks_without_oscillator
 from bisar_budget.faults import KeyPath, changes_words
 from bisar_budget.findings.mission import FileWarning, Resolution
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import norm
 from bisar_budget.mission.model import Mission
-from bisar_budget.mission.platforms import MotionError, Platform
+from bisar_budget.mission.platforms import Platform
 from bisar_budget.phrases import Note, phrase
 from bisar_budget.units import format_quantity
+
+_SENSITIVITY = "acceleration_sensitivity"
 
 
 class _Warned(NamedTuple):
@@ -180,12 +182,9 @@ def _of_instruments(case: Case) -> Iterator[_Warned]:
     T = mission.collection.aperture_time
     if sync is not None and not sync.is_direct_path and (sync.interval or 0.0) > T:
         yield _Warned(("synchronization", "interval"), exchanges_are_rare(T))
-    if sync is not None and sync.is_holdover:
-        perfect = [name for name in PLATFORMS if getattr(mission.platforms, name).oscillator is None]
-        if perfect:  # clocks of which nobody says how they drift were not judged
-            yield _Warned(
-                ("synchronization", "age"), nothing_drifts(perfect), is_doubt=len(perfect) == len(PLATFORMS)
-            )
+    undriven = clocks_without_oscillator(mission)
+    if undriven and mission.requirements.location_error is None:  # else the location says that it is not judged
+        yield _Warned(("synchronization", "age"), nothing_drifts(undriven))
     for error in case.random:
         if error.noise is not None and error.noise.misfit > POOR_FIT:
             key = f"platforms.{error.owner}.oscillator"
@@ -198,11 +197,7 @@ def _of_instruments(case: Case) -> Iterator[_Warned]:
 def _of_lever_arms(mission: Mission) -> Iterator[_Warned]:
     """Arms that nothing swings, as far as the file says."""
     for name in PLATFORMS:
-        error: MotionError = getattr(mission.platforms, name).motion_error
-        lever = error.lever_arm
-        if lever is None or lever.arm is None or not any(lever.arm):
-            continue
-        if error.imu is None or all(getattr(error.imu, figure) is None for figure in TILTS):
+        if swings_nothing(getattr(mission.platforms, name)):
             yield _Warned(("platforms", name, "motion_error", "lever_arm", "arm"), nothing_swings_the_arm(name))
 
 
@@ -215,23 +210,28 @@ def nothing_swings_the_arm(platform: str) -> str:
     )
 
 
+def calm_oscillators(mission: Mission) -> list[str]:
+    """Platforms of whose oscillators the file states a sensitivity to acceleration, and that nothing shakes."""
+    return [
+        name
+        for name in PLATFORMS
+        if ("platforms", name, "oscillator", _SENSITIVITY) in mission.places and is_unshaken(mission, name)
+    ]
+
+
 def _of_calm_oscillators(mission: Mission) -> Iterator[_Warned]:
     """Sensitivities to acceleration that the file states, of oscillators that nothing shakes or turns."""
-    for name in PLATFORMS:
-        key, one = ("platforms", name, "oscillator", "acceleration_sensitivity"), felt(mission, name)
-        if one is None or key not in mission.places or one.vibration.is_stated:
-            continue
-        state = getattr(mission.geometry, name)
-        if not (state.bends or any(state.acceleration)):
-            yield _Warned(key, nothing_shakes_the_oscillator(name))
+    for name in calm_oscillators(mission):
+        key = ("platforms", name, "oscillator", _SENSITIVITY)
+        yield _Warned(key, nothing_shakes_the_oscillator(name), is_doubt=True)
 
 
 @phrase
 def nothing_shakes_the_oscillator(platform: str) -> str:
     """Said of a sensitivity to acceleration without vibration."""
     return (
-        f"platforms.{platform}.oscillator.acceleration_sensitivity: vibration and turns act on it, and the file has "
-        "none: add oscillator.vibration, or sinusoidal or spectrum to motion_error.vibration"
+        f"platforms.{platform}.oscillator.acceleration_sensitivity judges nothing: vibration and turns act on it, "
+        "and the file has none: add oscillator.vibration, or sinusoidal or spectrum to motion_error.vibration"
     )
 
 

@@ -17,17 +17,15 @@ from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.scene import SceneEdges, scene_edges
 from bisar_budget.analysis.spread import noise
 from bisar_budget.budget.aggregates import Aggregates, JudgedScene, unplaced, untaken_effects
+from bisar_budget.budget.declarations import DECLARATIONS, is_asked_for, missing_declarations
 from bisar_budget.budget.doubts import declared_position_error, is_in_doubt, least_doubt
 from bisar_budget.budget.error_rows import ErrorRows, specification_rows
-from bisar_budget.budget.file_warnings import FASTEST_FLIGHT
+from bisar_budget.budget.file_warnings import FASTEST_FLIGHT, calm_oscillators
 from bisar_budget.budget.judged_requirements import (
-    DECLARATIONS,
     KEYS,
     RequirementState,
     UntakenEffect,
     is_as_high,
-    is_asked_for,
-    missing_declarations,
     requirement_states,
 )
 from bisar_budget.budget.judged_rows import CODE, REQUIREMENTS, Codes, FamilyRow, Judged, Judging, Why
@@ -37,6 +35,7 @@ from bisar_budget.budget.vibration_rows import Vibrations
 from bisar_budget.budget.waivers import holding_place
 from bisar_budget.effects.declared import END_OF_IMAGE, LOCATION, MODELS
 from bisar_budget.effects.effect import PLATFORMS, subject
+from bisar_budget.effects.oscillators import clocks_without_oscillator
 from bisar_budget.findings.row import DECLARE, SPECIFICATION
 from bisar_budget.findings.status import BROKEN, STATUS
 from bisar_budget.geometry import BistaticGeometry, norm
@@ -127,7 +126,9 @@ class _Judgement:
         untaken = untaken_effects(analysis)
         drifting = unplaced(analysis.together("full"))
         nowhere = np.zeros(self.cases, dtype=bool)
-        is_misplaced = np.any([nowhere, *drifting.values(), *self._in_doubt.values()], axis=0)
+        # A clock in holdover whose oscillator the file does not state drifts by nobody knows how much.
+        is_unknown = np.full(self.cases, bool(clocks_without_oscillator(mission)))
+        is_misplaced = np.any([nowhere, is_unknown, *drifting.values(), *self._in_doubt.values()], axis=0)
         has_noise = self._has_noise()
         own = of_all.status.copy()
         of_all.judge_effects(untaken)
@@ -275,6 +276,8 @@ class _Judgement:
                 floor[~self._in_doubt[name] | bool(platform.path.samples)] = CODE["warn"]
             if platform.acceleration is None and not platform.is_of_the_earth:
                 floor[np.broadcast_to(np.asarray(norm(path.velocity)) > FASTEST_FLIGHT, floor.shape)] = CODE["warn"]
+        if calm_oscillators(self.mission):
+            floor[:] = CODE["warn"]
         is_random = any(one.declared is not None for one in analysis.random)
         if not (analysis.errors.stated or self._vibrates or is_random):
             floor[:] = CODE["not_evaluated"]

@@ -8,19 +8,18 @@ from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Case
 from bisar_budget.analysis.spread import islr_db, mainlobe_energy, spread_limit
 from bisar_budget.analysis.vibration_limits import level_of, tone_limits
+from bisar_budget.budget.declarations import DECLARATIONS, Missing, is_asked_for, missing_declarations
 from bisar_budget.budget.doubts import input_doubts, is_in_doubt
 from bisar_budget.budget.judged_mission import JudgedMission
 from bisar_budget.budget.judged_requirements import (
-    DECLARATIONS,
     TAKEN_BY,
     UNITS,
     RequirementState,
-    is_asked_for,
-    missing_declarations,
 )
 from bisar_budget.budget.judged_rows import FamilyRow, Judged, Why, statuses
 from bisar_budget.budget.waivers import Waived
 from bisar_budget.effects.declared import CUBIC, LOCATION, MODELS, QUADRATIC
+from bisar_budget.effects.oscillators import clocks_without_oscillator
 from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.findings.row import DECLARE, AppliedWaiver, Row, holding, in_order
 from bisar_budget.phrases import NOTHING, Note
@@ -63,7 +62,7 @@ def _declarations(case: Case, one: Judged) -> Row:
         unit="",
         status=statuses(one.status[case.place]),
         line=mission.line(("requirements", "declare")),
-        reason=phrases.declarations_are_missing([one.key for one in missing]) if missing else None,
+        reason=_declarations_missing(missing) if missing else None,
         equation="requirements.declare",
         requirement_id=mission.requirement_ids.get(DECLARATIONS.id),
         model=mission.gating_model,
@@ -71,12 +70,22 @@ def _declarations(case: Case, one: Judged) -> Row:
     )
 
 
+def _declarations_missing(missing: Sequence[Missing]) -> Note:
+    """Say what the file should declare and does not: whole errors first, then those of which it states half."""
+    halves = [phrases.not_declared_as_required(one.key, one.lacks) for one in missing if one.lacks]
+    keys = [one.key for one in missing if not one.lacks]
+    if not keys:
+        return halves[0].then(*halves[1:])
+    return phrases.declarations_are_missing(keys).then(*halves)
+
+
 def _why(judged: JudgedMission, case: Case, one: Judged, row: Row) -> Note:
     """Why a row is not judged by its own numbers."""
     mission, why = case.mission, Why(one.why[case.place])
     if why is Why.NOT_DECLARED_AS_REQUIRED:
         missing = (each for each in missing_declarations(mission) if is_asked_for(one.subject, each))
-        return phrases.not_declared_as_required(next(missing).key)
+        first = next(missing)
+        return phrases.not_declared_as_required(first.key, first.lacks)
     if why is Why.INPUT_IN_DOUBT:
         doubts = (each for each in input_doubts(mission) if is_in_doubt(one.subject, each.owner, mission))
         return next(doubts).note
@@ -94,10 +103,13 @@ def _why(judged: JudgedMission, case: Case, one: Judged, row: Row) -> Note:
 
 
 def unknown_place(judged: JudgedMission, case: Case) -> Note:
-    """Say what displaces the image by an amount that no row holds: clocks that are not set, a path in doubt."""
+    """Say what displaces the image by an amount that no row holds: clocks, by their setting or drift, or a path."""
     clocks = [row_id for row_id, is_there in judged.unplaced.items() if is_there[case.place]]
     if clocks:
         return phrases.clocks_are_not_set(clocks)
+    unstated = clocks_without_oscillator(case.mission)
+    if unstated:
+        return phrases.drift_is_not_stated(unstated)
     doubts = input_doubts(case.mission)
     return doubts[0].note if doubts else NOTHING
 

@@ -64,6 +64,16 @@ def lacks_a_spectrum(mission: Mission, name: str) -> Any:
     return is_heard & (np.asarray(rms if not isinstance(rms, tuple) else sum(rms)) * one.sensitivity > 0)
 
 
+def is_unshaken(mission: Mission, name: str) -> bool:
+    """Whether an oscillator is sensitive to acceleration, and the file has neither vibration nor turn for it."""
+    one = felt(mission, name)
+    is_heard = name == "receiver" or not mission.has_direct_path
+    if one is None or not is_heard or not np.any(one.sensitivity) or one.vibration.is_stated:
+        return False
+    state: PlatformState = getattr(mission.geometry, name)
+    return not (state.bends or any(map(np.any, state.acceleration)))
+
+
 class AcceleratedTone(NamedTuple):
     """A vibration as an oscillator's tone: platform, entry, frequency [Hz], amplitude of the acceleration [m/s²].
 

@@ -12,11 +12,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bisar_budget import evaluators, phrases
-from bisar_budget.effects.effect import subject
+from bisar_budget.effects.effect import PLATFORMS, subject
 from bisar_budget.effects.oscillator_tones import spurs_of
 from bisar_budget.effects.random_effect import RandomEffect, RandomError, SensorCases
 from bisar_budget.effects.spectra import Parts, PowerLawPiece, heard_parts, left_parts, link_parts, set_parts
 from bisar_budget.mission.instruments import Oscillator, PowerLaw
+from bisar_budget.mission.model import Mission
 from bisar_budget.mission.readers import Points, SortedPoints
 from bisar_budget.phrases import NOTHING, Note
 from bisar_budget.ranges.exact_ranges import Floats
@@ -183,6 +184,17 @@ def _least_squares(rows: Sequence[Sequence[float]]) -> list[float] | None:
 
 
 # ---------------------------------------------------------------------- errors of clocks
+def clocks_without_oscillator(mission: Mission) -> tuple[str, ...]:
+    """Platforms whose clocks were set and run free, and whose oscillators the file does not state.
+
+    Nobody knows how such a clock drifts: the location has half of its causes, or none.
+    """
+    sync = mission.synchronization
+    if sync is None or not sync.is_holdover:
+        return ()
+    return tuple(name for name in PLATFORMS if getattr(mission.platforms, name).oscillator is None)
+
+
 def oscillator_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
     """Phase noise of a platform's oscillator, or what exchanged pulses leave of it, and spurs that they make slow."""
     mission = seen.mission

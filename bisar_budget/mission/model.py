@@ -201,12 +201,13 @@ class OtherError(NamedTuple):
 OTHER_EFFECTS = ("quadratic_phase_error", "cubic_phase_error", "location_error", "islr")
 
 
-# Kinds of error that each platform has, and the clock's.
+# Kinds of error that each platform has, and those of the mission as a whole.
 OF_PLATFORMS = (
     *("position", "velocity", "acceleration", "covariance", "vibration", "imu", "random", "oscillator"),
     *("time_tag", "lever_arm"),
 )
-DECLARABLE = (*OF_PLATFORMS, "timing")
+OF_MISSION = ("timing", "synchronization", "propagation", "common", "other")
+DECLARABLE = (*OF_PLATFORMS, *OF_MISSION)
 _OF_ONE = tuple(f"{name}.{kind}" for name in Platforms._fields for kind in OF_PLATFORMS)
 
 
@@ -232,7 +233,8 @@ class Requirements(NamedTuple):
             ),
             "Errors that the file must declare, for both platforms or for one (receiver.imu); what is missing is "
             "not_evaluated. A zero declares; a still platform owes its position only. A covariance declares position "
-            "and velocity; timing: any term of timing_error.",
+            "and velocity; timing: any term of timing_error; propagation: the delays of each leg; common: "
+            "common_motion_error; other: other_errors.",
         ),
     ] = ()
 

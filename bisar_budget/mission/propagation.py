@@ -92,6 +92,12 @@ def elevation_deg(position: Vectors) -> Any:
     return np.degrees(np.arctan2(z, np.hypot(x, y)))
 
 
+def least_elevation_deg(path: PlatformState, aperture_time_s: Any) -> Any:
+    """Least elevation of a platform over the aperture, as the scene centre sees it. [deg]"""
+    half = np.asarray(aperture_time_s, dtype=float) / 2
+    return elevation_deg(path.place(_PLACES * half)).min(axis=0)
+
+
 def least_elevations(
     propagation: Propagation, paths: Mapping[str, PlatformState], aperture_time_s: Any
 ) -> Iterator[tuple[str, str, Any]]:
@@ -100,7 +106,7 @@ def least_elevations(
         leg = propagation.leg(name)
         if leg is None:
             continue
-        least = elevation_deg(path.place(_PLACES * (np.asarray(aperture_time_s, dtype=float) / 2))).min(axis=0)
+        least = least_elevation_deg(path, aperture_time_s)
         if leg.zenith_delay is not None:
             yield name, DELAYS[0], least
         if leg.zenith_electron_content is not None:

@@ -16,6 +16,7 @@ from bisar_budget.faults import InvalidValueError, KeyPath, Problem
 from bisar_budget.resources import docstring
 from bisar_budget.units import Dimension, format_quantity, parse_quantity
 
+MISSING = "is missing"  # of a key that a section does not go without
 INVALID: Any = object()  # in place of a value that was reported
 Report = Callable[[KeyPath, Problem], None]
 
@@ -117,10 +118,7 @@ class Quantity(Reader):
         if self.dimension.usual:
             return ""  # only a zero comes so far without its unit
         if "%" in self.dimension.units:
-            try:
-                return f"Did you mean '{text} %'?" if self.leaf(f"{text} %") is not None else ""
-            except InvalidValueError:
-                return ""
+            return f"A bare number is a ratio: {text} is {100 * float(text):.6g} %"
         return f"A bare number is in {self.dimension.si}" if self.dimension.si not in ("", "dB") else ""
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
@@ -139,16 +137,35 @@ class Triple(Reader):
 
     def read(self, value: Any, path: KeyPath, report: Report) -> Any:
         """Read each component at its own place."""
-        if self.or_scalar and not isinstance(value, list):
+        bracketed = "" if isinstance(value, list) else self._bracketed(value)
+        if self.or_scalar and not isinstance(value, list) and not bracketed:
             one = self.component.read(value, path, report)
             return one if one is INVALID else (one, one, one)
         if not isinstance(value, list) or len(value) != 3:
             given = f", {len(value)} given" if isinstance(value, list) else ""
-            hint = _POINT if isinstance(value, list) and len(value) > 3 else ""
+            hint = _POINT if isinstance(value, list) and len(value) > 3 else bracketed
             report(path, Problem(f"must be three components{given}", "accepted: [a, b, c]", hint))
             return INVALID
         parts = tuple([read_part(self.component, part, (*path, index), report) for index, part in enumerate(value)])
         return INVALID if INVALID in parts else parts
+
+    def _bracketed(self, value: Any) -> str:
+        """Hint at brackets around three values that are written without; empty where it is not three values.
+
+        Each has its own unit, or is 0: `1,234,567 m` may be one number, and `1, 2, 3 km` are not three of km.
+        """
+        texts = value.strip(" ()").split(",") if isinstance(value, str) else ()
+        if len(texts) != 3 or not any(map(units.unit_behind, texts)):
+            return ""
+        try:
+            bare = [self.component.leaf(text.strip()) for text in texts if not units.unit_behind(text)]
+            for text in texts:
+                self.component.leaf(text.strip())
+        except InvalidValueError:
+            bare = [math.nan]
+        if any(bare):
+            return "Write brackets, and the unit of each" if value.count(", ") == 2 else ""
+        return f"Did you mean [{', '.join(text.strip() for text in texts)}]?"
 
     def below(self, part: str) -> Reader | None:
         """Give the reader of one component."""
@@ -407,7 +424,8 @@ class Section(Reader):
     """A mapping with known keys, read into a `NamedTuple`; an unknown key is an error.
 
     A section's own `problems(values)` says what is wrong between its values. It is given those that are right,
-    defaults included, so that a fault in one place does not hide one between two others.
+    defaults included, so that a fault in one place does not hide one between two others. A key with an empty section
+    or list, where that is no fault, is read as if the file did not have it: it declares nothing and hides nothing.
     """
 
     def __init__(self, kind: type[Any]) -> None:
@@ -436,12 +454,14 @@ class Section(Reader):
                 report((*path, name), Problem("is not a known key", known, hint, is_of_key=True))
                 is_valid = False
                 continue
-            values[name] = item if item is INVALID else key.reader.read(item, (*path, name), report)
+            value_read = item if item is INVALID else key.reader.read(item, (*path, name), report)
+            if value_read is INVALID or name not in self.defaults or not is_empty(item):
+                values[name] = value_read
         if INVALID in values.values():
             is_valid = False
         for name in self.required:
             if name not in value:
-                report((*path, name), Problem("is missing"))
+                report((*path, name), Problem(MISSING))
                 is_valid = False
         if self.problems is not None:
             right = self.defaults | values
@@ -589,6 +609,13 @@ class CurveReader(Reader):
 def either(kind: type, form: Reader, other: Reader) -> OneOf:
     """One form for a list or a mapping, which is the `kind`, and another for all else."""
     return OneOf(lambda value: form if isinstance(value, kind) else other, (other, form))
+
+
+def is_empty(item: Any) -> bool:
+    """Whether an item of a file is a section or a list in which nothing stands but empty ones."""
+    if isinstance(item, dict):
+        return all(map(is_empty, item.values()))
+    return isinstance(item, list) and all(map(is_empty, item))
 
 
 def is_place(part: str) -> bool:

@@ -20,6 +20,7 @@ from bisar_budget.analysis.analysis import Analysis, Model
 from bisar_budget.analysis.together import Together, cubics, quadratics
 from bisar_budget.constants import MAX_DRAWS
 from bisar_budget.effects.effect import PLATFORMS, ErrorSource
+from bisar_budget.effects.oscillators import clocks_without_oscillator
 from bisar_budget.effects.random_effect import RandomError
 from bisar_budget.findings.monte_carlo import MonteCarlo, Requirement
 from bisar_budget.mission.model import Mission, Simulation, has_instruments
@@ -66,7 +67,8 @@ def monte_carlo(
     if seed is None:
         seed = (mission.simulation or Simulation()).seed
     variables = list(_variables(analysis))
-    is_placed = not any(error.displaces_unknown for error in analysis.random)
+    is_set = not any(error.displaces_unknown for error in analysis.random)
+    is_placed = is_set and not clocks_without_oscillator(mission)
     judged = list(_requirements(mission, analysis.allocation, variables, is_placed=is_placed))
     drawing = drawing_of(analysis, variables, judged, draws, seed)
     holds, mean_squares, all_hold = joined((tally for _, tally in (share or in_turn)(drawing)), len(judged))
@@ -310,7 +312,8 @@ def _notes(mission: Mission, analysis: Analysis, *, is_exact: bool, is_placed: b
     if analysis.displacing_tones or any(one.wideband for one in vibrations):
         yield phrases.vibration_is_not_drawn()
     if mission.requirements.location_error is not None and not is_placed:
-        yield phrases.unset_clocks_are_not_drawn()
+        undriven = clocks_without_oscillator(mission)
+        yield phrases.unknown_drift_is_not_drawn(undriven) if undriven else phrases.unset_clocks_are_not_drawn()
     stated = any(other.islr is not None for other in mission.other_errors)
     if mission.requirements.islr is not None and (stated or has_instruments(mission)):
         yield phrases.mean_power_is_not_drawn()

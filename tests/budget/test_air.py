@@ -10,7 +10,7 @@ import pytest
 
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.budget.check import check_mission
-from bisar_budget.budget.judged_requirements import declared_kinds
+from bisar_budget.budget.declarations import declared_kinds
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.report.explain.explanation import explain

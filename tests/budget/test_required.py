@@ -7,11 +7,11 @@ from datetime import timedelta
 
 import pytest
 
-from bisar_budget.budget.judged_requirements import Missing, missing_declarations
+from bisar_budget.budget.declarations import Missing, missing_declarations
 from bisar_budget.faults import MissionError
 from bisar_budget.findings.mission import Report
 from bisar_budget.mission.load import parse_mission
-from bisar_budget.mission.model import DECLARABLE, OF_PLATFORMS, Document
+from bisar_budget.mission.model import DECLARABLE, OF_MISSION, OF_PLATFORMS, Document
 from bisar_budget.report import FORMATS, Style, render
 from tests.conftest import TODAY, findings, mission_text, row
 
@@ -37,6 +37,12 @@ OTHERS = (
     "time_tag",
     "lever_arm",
 )  # kinds that are no position, velocity or acceleration
+OF_MISSION_ZERO = {
+    "synchronization": {"interval": "1 s", "error": 0},
+    "propagation": {"zenith_delay": 0},
+    "common_motion_error": {"position": 0},
+    "other_errors": [{"name": "antenna", "location_error": 0}],
+}
 OSCILLATOR = {"power_law": {"h0": 0}}
 STILL = {"position": ["6 km", "6 km", "2 km"], "velocity": [0, 0, 0]}
 
@@ -173,12 +179,13 @@ def test_a_platform_that_does_not_move_owes_its_position_only(receiver: dict) ->
     }
     changes = {f"platforms__transmitter__{key}": value for key, value in of_transmitter.items()}
     asked = [kind for kind in DECLARABLE if kind != "covariance"]
-    changes |= {"requirements__declare": asked, "timing_error": {"linear": 0}}
+    changes |= {"requirements__declare": asked, "timing_error": {"linear": 0}, **OF_MISSION_ZERO}
     found = missing(platforms__receiver=receiver, **changes)
     assert found == [Missing("receiver", "position", "platforms.receiver.motion_error.position")]
     assert missing(platforms__receiver=receiver | {"motion_error": {"position": "1 cm"}}, **changes) == []
     moving = STILL | {"velocity": [0, "1 mm/s", 0], "motion_error": {"position": "1 cm"}}
-    assert {one.kind for one in missing(platforms__receiver=moving, **changes)} == {*asked} - {"position", "timing"}
+    of_receiver = {*asked} - {"position", *OF_MISSION}
+    assert {one.kind for one in missing(platforms__receiver=moving, **changes)} == of_receiver
 
 
 def test_a_platform_that_starts_from_rest_moves() -> None:

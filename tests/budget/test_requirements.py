@@ -151,7 +151,6 @@ def test_what_passes_by_itself_may_decide_beside_what_autofocus_corrects(n_pull:
         ("common", {"common_motion_error": {"position": "1 m"}}, False),
         ("common", {"common_motion_error": {"position": "1 m", "source": "GNSS"}}, True),
         ("other", {"other_errors": [{"name": "air", "quadratic_phase_error": "1 deg"}]}, False),
-        ("synchronization", {"synchronization": {"interval": "1 s", "error": "1 deg", "source": "link"}}, True),
     ],
 )
 def test_what_nobody_owes_counts_where_it_is_declared(kind: str, changes: dict[str, Any], has_source: bool) -> None:
@@ -160,6 +159,15 @@ def test_what_nobody_owes_counts_where_it_is_declared(kind: str, changes: dict[s
     assert found.declared == (*before.declared, kind)
     assert (found.missing, found.in_all) == (before.missing, before.in_all + 1)
     assert found.without_source == (() if has_source else (kind,))
+
+
+def test_a_link_and_the_air_are_owed() -> None:
+    """Both are in every mission with two oscillators; a file that was silent about them was not told so."""
+    link = {"synchronization": {"interval": "1 s", "error": "1 deg", "source": "link"}}
+    before, found = check().kinds, check(**link).kinds
+    assert {"synchronization", "propagation"} <= {*before.missing}
+    assert (found.declared, found.in_all) == ((*before.declared, "synchronization"), before.in_all)
+    assert "synchronization" not in (*found.missing, *found.without_source)
 
 
 # ---------------------------------------------------------------------- the cubic

@@ -221,7 +221,7 @@ def test_the_first_table_of_a_page_is_that_of_requirements(format_name: str) -> 
         assert "nothing declared that spreads" in cells[-1][5]
     else:
         assert "| ISLR | -20 dB | – | – | not evaluated | nothing declared that spreads" in text
-    assert re.search("1 of 15 kinds of error", text)
+    assert re.search("1 of 17 kinds of error", text)
 
 
 @pytest.mark.parametrize("format_name", FORMATS)

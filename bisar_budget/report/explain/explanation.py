@@ -12,13 +12,13 @@ from bisar_budget.analysis.spread import mainlobe_energy
 from bisar_budget.analysis.together import Together, cubics, quadratics
 from bisar_budget.analysis.vibration_limits import amplitude_share, echo_phase, slow_limits
 from bisar_budget.budget.aggregates import effect_parts, untaken_effects
+from bisar_budget.budget.declarations import missing_declarations
 from bisar_budget.budget.doubts import declared_position_error, input_doubts, is_in_doubt
 from bisar_budget.budget.judged_requirements import (
     MAKES_UP,
     SMALL_RAD,
     TENTH,
     UntakenEffect,
-    missing_declarations,
 )
 from bisar_budget.effects.combined import phase_parts
 from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
@@ -506,7 +506,7 @@ def finding_of(mission: Mission, found: MissionFindings, one: JudgedRequirement)
 def declarations(mission: Mission) -> Iterator[Step]:
     """The errors that must be declared, and those of them that the file lacks."""
     yield from _asked_for(mission)
-    missing = [one.key for one in missing_declarations(mission)]
+    missing = [one.lacks or one.key for one in missing_declarations(mission)]
     yield step("Not in the file", *(missing or ["nothing: all of it is declared"]))
 
 

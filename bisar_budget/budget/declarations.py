@@ -1,0 +1,328 @@
+"""Kinds of error that a mission can declare: which it does, which it lacks, and what `requirements.declare` asks for.
+
+A kind is declared by a figure of it, a zero included. An empty section declares nothing, and neither does half of a
+cause: a lever arm that nothing swings, an oscillator that is sensitive to an acceleration which the file does not
+state.
+"""
+
+from collections.abc import Callable, Container, Iterator, Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from bisar_budget.effects.effect import PLATFORMS, Subject, subject
+from bisar_budget.effects.navigation_errors import TILTS
+from bisar_budget.effects.oscillator_acceleration import is_unshaken
+from bisar_budget.findings.requirement import DeclaredKinds
+from bisar_budget.findings.row import DECLARE
+from bisar_budget.mission.instruments import LeverArm
+from bisar_budget.mission.model import Mission
+from bisar_budget.mission.platforms import Platform
+from bisar_budget.mission.propagation import LEAST_ELEVATION_DEG, least_elevation_deg
+
+DECLARATIONS = subject("mission", DECLARE)  # the row of all that is asked for
+
+
+class Missing(NamedTuple):
+    """An error that the file should declare and does not: owner and kind of its rows, and its key in the file.
+
+    `lacks` says which key is absent where the file states half of the error: the other half does nothing alone.
+    """
+
+    owner: str
+    kind: str
+    key: str
+    lacks: str = ""
+
+
+# ---------------------------------------------------------------------- half of a cause
+def swings_nothing(platform: Platform) -> bool:
+    """Whether a platform has a lever arm, and no attitude error that swings it, as far as the file says."""
+    lever, imu = platform.motion_error.lever_arm, platform.motion_error.imu
+    if lever is None or lever.arm is None or not any(lever.arm):
+        return False
+    return imu is None or all(getattr(imu, figure) is None for figure in TILTS)
+
+
+def _lacks_an_attitude(mission: Mission, name: str) -> str:
+    platform: Platform = getattr(mission.platforms, name)
+    lever: LeverArm | None = platform.motion_error.lever_arm
+    is_uncertain = lever is not None and lever.uncertainty is not None and any(lever.uncertainty)
+    if is_uncertain or not swings_nothing(platform):
+        return ""
+    return "imu.attitude, gyro_bias or angle_random_walk, which swings the arm"
+
+
+def _lacks_a_vibration(mission: Mission, name: str) -> str:
+    if not is_unshaken(mission, name):
+        return ""
+    return (
+        "oscillator.vibration, and no sinusoidal or spectrum of motion_error.vibration, on which "
+        "acceleration_sensitivity acts"
+    )
+
+
+# ---------------------------------------------------------------------- the table of kinds
+def _whole(mission: Mission, name: str) -> str:
+    """Nothing is lacking of a kind that has no halves."""
+    return ""
+
+
+@dataclass(frozen=True)
+class _OfPlatform:
+    """A kind of error that each platform has: its key below the platform, and which platforms state it.
+
+    `lacks` names the key without which what a platform states of it does nothing; empty where it is whole. A kind
+    that is not `is_owed` is listed only where the file says something of it.
+    """
+
+    key: str
+    is_stated: Callable[[Platform], bool]
+    has_source: Callable[[Platform], bool]
+    lacks: Callable[[Mission, str], str] = _whole
+    is_owed: bool = True
+
+
+def _is_sourced(figure: str) -> Callable[[Platform], bool]:
+    return lambda platform: bool(platform.motion_error.evidence(figure))
+
+
+def _has_own_source(platform: Platform) -> bool:
+    return bool(platform.motion_error.source)
+
+
+def _has_source_of_imu(platform: Platform) -> bool:
+    error = platform.motion_error
+    stated = {} if error.imu is None else error.imu._asdict()
+    source = stated.pop("source", None)
+    return bool(source) or all(error.evidence(key) for key, figure in stated.items() if figure is not None)
+
+
+def _has_source_of_random(platform: Platform) -> bool:
+    error = platform.motion_error
+    return bool(error.evidence("random")) or all(process.source for process in error.random)
+
+
+def _has_source_of_lever_arm(platform: Platform) -> bool:
+    lever = platform.motion_error.lever_arm
+    return bool(lever is not None and lever.source) or bool(platform.motion_error.source)
+
+
+_KINDS_OF_PLATFORMS: Mapping[str, _OfPlatform] = {
+    "position": _OfPlatform(
+        "motion_error.position",
+        lambda platform: platform.motion_error.stated("position") is not None,
+        _is_sourced("position"),
+    ),
+    "velocity": _OfPlatform(
+        "motion_error.velocity",
+        lambda platform: platform.motion_error.stated("velocity") is not None,
+        _is_sourced("velocity"),
+    ),
+    "acceleration": _OfPlatform(
+        "motion_error.acceleration",
+        lambda platform: platform.motion_error.acceleration is not None,
+        _is_sourced("acceleration"),
+    ),
+    "covariance": _OfPlatform(
+        "motion_error.covariance",
+        lambda platform: platform.motion_error.covariance is not None,
+        _is_sourced("covariance"),
+    ),
+    "vibration": _OfPlatform(
+        "motion_error.vibration", lambda platform: platform.motion_error.vibration.is_stated, _has_own_source
+    ),
+    "imu": _OfPlatform(
+        "motion_error.imu",
+        lambda platform: platform.motion_error.imu is not None and platform.motion_error.imu.is_stated,
+        _has_source_of_imu,
+    ),
+    "random": _OfPlatform(
+        "motion_error.random", lambda platform: bool(platform.motion_error.random), _has_source_of_random
+    ),
+    "oscillator": _OfPlatform(
+        "oscillator",
+        lambda platform: platform.oscillator is not None,
+        lambda platform: platform.oscillator is not None and bool(platform.oscillator.source),
+        _lacks_a_vibration,
+    ),
+    "time_tag": _OfPlatform(
+        "motion_error.time_tag",
+        lambda platform: platform.motion_error.time_tag is not None,
+        _has_own_source,
+        is_owed=False,
+    ),
+    "lever_arm": _OfPlatform(
+        "motion_error.lever_arm",
+        lambda platform: platform.motion_error.lever_arm is not None,
+        _has_source_of_lever_arm,
+        _lacks_an_attitude,
+        is_owed=False,
+    ),
+}
+
+
+@dataclass(frozen=True)
+class _OfMission:
+    """A kind of error of the clocks, of the air, of both platforms or of nobody, and when a mission states it."""
+
+    owner: str
+    is_stated: Callable[[Mission], bool]
+    has_source: Callable[[Mission], bool]
+    missing: Callable[[Mission], list[str]]  # keys that the file should have
+    is_owed: Callable[[Mission], bool] = lambda mission: False
+
+
+def _states_clock(mission: Mission) -> bool:
+    """Whether the file says what the clock is wrong by: any of its terms, or what setting it left."""
+    sync = mission.synchronization
+    setting = () if sync is None else (sync.time_error, sync.frequency_error)
+    return any(term is not None for term in (*mission.timing_error, *setting))
+
+
+def _key_of_clock(mission: Mission) -> list[str]:
+    sync = mission.synchronization
+    return ["synchronization.time_error" if sync is not None and sync.is_holdover else "timing_error"]
+
+
+def _runs_two_clocks(mission: Mission) -> bool:
+    """Whether both oscillators count: with a direct path the receiver takes the transmitter's signal as its clock."""
+    return not mission.has_direct_path
+
+
+def _legs_without_delay(mission: Mission) -> list[str]:
+    """Keys of the air that the file should have: of both legs, or of each leg of which a file may state a delay."""
+    if mission.propagation is None:
+        return ["propagation"]
+    T, lacking = mission.collection.aperture_time, []
+    for name, path in zip(PLATFORMS, mission.geometry.both, strict=True):
+        is_high = np.any(least_elevation_deg(path, T) >= LEAST_ELEVATION_DEG)
+        if mission.propagation.leg(name) is None and is_high:
+            lacking.append(f"propagation.{name}")
+    return lacking
+
+
+def _has_source_of_air(mission: Mission) -> bool:
+    legs = [] if mission.propagation is None else [mission.propagation.leg(name) for name in PLATFORMS]
+    return all(leg.source for leg in legs if leg is not None)
+
+
+_KINDS_OF_MISSION: Mapping[str, _OfMission] = {
+    "timing": _OfMission("clock", _states_clock, lambda mission: True, _key_of_clock, _runs_two_clocks),
+    "terrain": _OfMission(
+        "mission",
+        lambda mission: mission.scene.height_error is not None,
+        lambda mission: True,
+        lambda mission: ["scene.height_error"],
+    ),
+    "common": _OfMission(
+        "mission",
+        lambda mission: mission.common_motion_error is not None and mission.common_motion_error.is_stated,
+        lambda mission: mission.common_motion_error is not None and bool(mission.common_motion_error.source),
+        lambda mission: ["common_motion_error"],
+    ),
+    "synchronization": _OfMission(
+        "clock",
+        lambda mission: mission.synchronization is not None,
+        lambda mission: mission.synchronization is not None and bool(mission.synchronization.source),
+        lambda mission: ["synchronization"],
+        _runs_two_clocks,
+    ),
+    "propagation": _OfMission(
+        "mission",
+        lambda mission: mission.propagation is not None,
+        _has_source_of_air,
+        _legs_without_delay,
+        lambda mission: True,
+    ),
+    "other": _OfMission(
+        "mission",
+        lambda mission: bool(mission.other_errors),
+        lambda mission: all(other.source for other in mission.other_errors),
+        lambda mission: ["other_errors"],
+    ),
+}
+
+
+# ---------------------------------------------------------------------- what a mission declares
+def declared_kinds(mission: Mission) -> DeclaredKinds:
+    """List the kinds of error that a mission owes or declares, by owner: which it declares, and which lack a source.
+
+    A covariance is position and velocity. With a direct path as clock there are no timing errors and no oscillators.
+    """
+    declared, missing, without_source = list[str](), list[str](), list[str]()
+    still = still_platforms(mission)
+    for name in PLATFORMS:
+        platform: Platform = getattr(mission.platforms, name)
+        for kind, of_platform in _KINDS_OF_PLATFORMS.items():
+            if kind == "covariance" or (kind == "oscillator" and mission.has_direct_path):
+                continue
+            is_stated = of_platform.is_stated(platform)
+            if is_stated and (kind != "lever_arm" or not of_platform.lacks(mission, name)):
+                declared.append(f"{name}.{kind}")
+                if not of_platform.has_source(platform):
+                    without_source.append(f"{name}.{kind}")
+            elif is_stated or (of_platform.is_owed and (name not in still or kind in ("position", "oscillator"))):
+                missing.append(f"{name}.{kind}")
+    for kind, of_mission in _KINDS_OF_MISSION.items():
+        if of_mission.is_stated(mission):
+            declared.append(kind)
+            if not of_mission.has_source(mission):
+                without_source.append(kind)
+        elif of_mission.is_owed(mission):
+            missing.append(kind)
+    return DeclaredKinds(tuple(declared), tuple(missing), tuple(without_source))
+
+
+def still_platforms(mission: Mission) -> list[str]:
+    """Names of the platforms that do not move in the frame of the scene."""
+    return [name for name in PLATFORMS if getattr(mission.platforms, name).state.is_still]
+
+
+# ---------------------------------------------------------------------- what it must declare
+def missing_declarations(mission: Mission, still: Container[str] | None = None) -> list[Missing]:
+    """List what `requirements.declare` asks for and the file does not declare: all of it, each once.
+
+    A covariance declares position and velocity. The clock is declared by any term of its error, a vibration by lines
+    or noise, an inertial sensor by any of its figures, the air by the delays of each leg. A platform that does not
+    move owes its position only, and an oscillator where it is asked for by the platform's name. An error that is
+    common to both platforms says nothing of their own.
+
+    Parameters
+    ----------
+    mission : Mission
+        As loaded.
+    still : container of str, optional
+        Names of the platforms that do not move; omitted: by their paths.
+    """
+    if not mission.requirements.declare:
+        return []
+    if still is None:
+        still = still_platforms(mission)
+    return list(dict.fromkeys(_missing(mission, still)))
+
+
+def _missing(mission: Mission, still: Container[str]) -> Iterator[Missing]:
+    for asked in mission.requirements.declare:
+        owner, dot, kind = asked.rpartition(".")
+        if kind in _KINDS_OF_MISSION:
+            of_mission = _KINDS_OF_MISSION[kind]
+            if kind == "propagation" or not of_mission.is_stated(mission):
+                yield from (Missing(of_mission.owner, kind, key) for key in of_mission.missing(mission))
+            continue
+        of_platform = _KINDS_OF_PLATFORMS[kind]
+        for name in (owner,) if dot else PLATFORMS:
+            owes = name not in still or kind == "position" or (kind == "oscillator" and bool(dot))
+            if not owes:
+                continue
+            key = f"platforms.{name}.{of_platform.key}"
+            if not of_platform.is_stated(getattr(mission.platforms, name)):
+                yield Missing(name, kind, key)
+            elif lacks := of_platform.lacks(mission, name):
+                yield Missing(name, kind, key, lacks)
+
+
+def is_asked_for(what: Subject, missing: Missing) -> bool:
+    """Whether a row is about what is asked for and missing."""
+    return what.owner == missing.owner and (what.kind == missing.kind or missing.kind == "timing")
