@@ -32,6 +32,8 @@ TAKEN_BY = {"cubic": (CUBIC, "islr"), "spread": ("islr",), "tone": ("pslr", "isl
 
 _NONE = np.int8(len(STATUS))  # of a row that judges nothing
 IS_JUDGED = np.array([one.is_judged for one in STATUS.values()])
+# Whether a status leaves a requirement met, with or without a warning; the last is that of `_NONE`.
+IS_MET = np.array([*(one.complies for one in STATUS.values()), False])
 
 
 class UntakenEffect(NamedTuple):
@@ -51,13 +53,15 @@ class UntakenEffect(NamedTuple):
 class RequirementState(NamedTuple):
     """How a requirement stands: its status, the place of the row that decides or -1, and the places that judge it.
 
-    `utilization` is that of the requirement by the deciding row. `is_unjudged` is where it cannot be judged, be that
-    waived or not.
+    `utilization` is that of the requirement by the row at `user`. Where the requirement is met, with or without a
+    warning, that is the row with the largest utilization: a warning of the other model alone may use less.
+    `is_unjudged` is where it cannot be judged, be that waived or not.
     """
 
     key: str
     status: Codes
     decider: NDArray[np.intp]
+    user: NDArray[np.intp]
     utilization: Floats
     judges: Truths  # (rows, n)
     is_unjudged: Truths
@@ -138,9 +142,12 @@ def requirement_states(
         # Of what is waived the first is what has a number that breaks the requirement.
         shown = np.where((codes == RANK["waived"]) & is_open, -0.5, used)
         decider = first_highest(np.where((levels == worst) | is_met, shown, -1.0))
-        utilization, is_unknown = (np.take_along_axis(one, decider[None], axis=0)[0] for one in (used, is_open))
+        largest = first_highest(np.where(mine & IS_MET[levels], used, -1.0))
+        user = np.where(IS_MET[worst], largest, decider)
+        utilization = np.take_along_axis(used, user[None], axis=0)[0]
+        is_unknown = np.take_along_axis(is_open, decider[None], axis=0)[0]
         is_unjudged = ~mine.any(axis=0)
-        decider = np.where(is_unjudged, -1, decider)
+        decider, user = np.where(is_unjudged, -1, decider), np.where(is_unjudged, -1, user)
         if key == "islr":
             is_unjudged = is_unjudged | ~np.asarray(has_noise)
         if key == LOCATION:
@@ -149,5 +156,5 @@ def requirement_states(
         is_unknown = (is_unknown & (worst == RANK["waived"])) | (status == RANK["not_evaluated"])
         if waived.get(key):
             status = np.where(np.isin(status, [RANK[name] for name in BROKEN]), RANK["waived"], status)
-        found.append(RequirementState(key, status.astype(np.int8), decider, utilization, mine, is_unknown))
+        found.append(RequirementState(key, status.astype(np.int8), decider, user, utilization, mine, is_unknown))
     return found

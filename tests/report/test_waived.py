@@ -115,7 +115,11 @@ def test_without_waivers_all_is_as_before(run: Run, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("waivers", "more", "status"),
     [
-        ((WAIVER,), ", quadratic_phase_error: 0.1 deg", "fail"),  # another requirement is broken, and no waiver names it
+        (
+            (WAIVER,),
+            ", quadratic_phase_error: 0.1 deg",
+            "fail",
+        ),  # another requirement is broken, and no waiver names it
         (("receiver.position.x",), "", "fail"),  # what the errors make up fails, whoever waives one of them
         (("mission.*",), "", "waived"),
         (("*location*",), "", "waived"),
