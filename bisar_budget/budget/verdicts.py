@@ -95,7 +95,7 @@ def _with_verdict(row: Row, verdict: Verdict) -> Row:
     refuted = (*row.refuted, *said)
     if not reason:
         return row._replace(refuted=refuted)
-    return row._replace(status="fail", reason=reason, refuted=refuted, is_unjudged=False)
+    return row._replace(status="fail", reason=reason, refuted=refuted)._replace(is_unjudged=False)
 
 
 def _is_gate(row: Row) -> bool:
