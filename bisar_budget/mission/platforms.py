@@ -48,7 +48,6 @@ from bisar_budget.mission.readers import (
     VELOCITY,
     Choice,
     Key,
-    Label,
     Quantity,
     Reader,
     Reference,
@@ -59,6 +58,7 @@ from bisar_budget.mission.readers import (
     TextList,
     Triple,
     Whole,
+    date_schema,
     either,
 )
 from bisar_budget.mission.vibrations import Vibration
@@ -227,7 +227,7 @@ class _Lines(Reader):
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
         """Array of two lines."""
-        return {"type": "array", "items": {"type": "string"}, "minItems": 2, "maxItems": 2}
+        return {"type": "array", "items": Reference().schema(definitions), "minItems": 2, "maxItems": 2}
 
 
 class OrbitSource(NamedTuple):
@@ -271,7 +271,7 @@ class _Instant(Reader):
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
         """Date and time."""
-        return {"type": "string", "format": "date-time"}
+        return date_schema(r"^\s*\d{4}-\d\d-\d\d[T ]")
 
 
 class _Talker(Text):
@@ -324,7 +324,7 @@ class TrajectorySource(NamedTuple):
     track: Annotated[
         str | None,
         Key(
-            Label(),
+            Reference(),
             "Track of a GPX file with several, by its name or number; omitted: the one that covers the aperture.",
         ),
     ] = None
