@@ -15,6 +15,7 @@ from bisar_budget.cli.options import (
     FILE,
     MISSIONS,
     SET,
+    SETTINGS_FILE,
     ParamType,
     date_option,
     day_and_outside,
@@ -23,10 +24,11 @@ from bisar_budget.cli.options import (
     origin_of,
     output_option,
     scheduler_options,
-    settings_here,
+    settings_of,
 )
 from bisar_budget.cli.streams import (
     EXIT_BROKEN,
+    MISSION_SUFFIXES,
     complain,
     deliver,
     expand,
@@ -48,14 +50,19 @@ if TYPE_CHECKING:
     from bisar_budget.findings.mission import MissionFindings, Report, UnusableMission
     from bisar_budget.findings.requirement import Outside, Override
     from bisar_budget.report import Style
+    from bisar_budget.settings import Settings
 
 
 class _Gate(click.Command):
     """A command whose options default to the project's settings; BISAR_BUDGET_… stands above them."""
 
-    def make_context(self, *args: Any, **extra: Any) -> click.Context:
+    def make_context(self, info_name: str | None, args: list[str], *more: Any, **extra: Any) -> click.Context:
+        names = [name for name in args if not name.startswith("-") and name.endswith(MISSION_SUFFIXES)]
+        settings = settings_of(expand(names))
         try:
-            return super().make_context(*args, default_map=self._defaults(), **extra)
+            context = super().make_context(info_name, args, *more, default_map=self._defaults(settings), **extra)
+            context.meta[SETTINGS_FILE] = settings.file if settings else None
+            return context
         except click.BadParameter as error:
             if error.ctx is not None and error.param is not None and error.param.envvar:
                 source = error.ctx.get_parameter_source(str(error.param.name))
@@ -63,7 +70,7 @@ class _Gate(click.Command):
                     error.param_hint = str(error.param.envvar)  # not the option that nobody wrote
             raise
 
-    def _defaults(self) -> dict[str, Any]:
+    def _defaults(self, settings: "Settings | None") -> dict[str, Any]:
         from bisar_budget.settings import TABLE
 
         options = {p.opts[0].removeprefix("--"): p for p in self.params if isinstance(p, click.Option) and p.envvar}
@@ -75,7 +82,6 @@ class _Gate(click.Command):
                 near = did_you_mean(name, tuple(known))
                 problem = fault_words("is not a known variable", "", f"accepted: {', '.join(known)}", near)
                 raise click.UsageError(f"{printable(name)}: {closed(problem)}")
-        settings = settings_here()
         defaults = {}
         for key, value in settings.values.items() if settings else ():
             if key == "sensors":  # `parts` reads it
@@ -263,6 +269,10 @@ def check(
     written = [(name, _format_of(name)) for name in reports]
     formats = [format_name, *(its_format for _, its_format in written)]
     files = _touched(missions) if is_of_change else expand(missions)
+    if any(map(os.path.isfile, files)):
+        nearest = settings_of(files)
+        if (nearest.file if nearest else None) != click.get_current_context().meta.get(SETTINGS_FILE):
+            raise click.UsageError("the missions have other settings than those that were read; name their files.")
     folders = [_folder_of_pictures(name, its_format) for name, its_format in [*written, (output or "-", format_name)]]
     spare(files, [output, *reports, _step_summary(format_name)], [*filter(None, folders)])
     given = click.get_current_context().get_parameter_source

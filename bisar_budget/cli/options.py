@@ -32,6 +32,7 @@ else:
 
 
 COMMAND_LINE = "command line"
+SETTINGS_FILE = "bisar_budget.settings"  # in the context of a command: where its defaults come from
 _Option = Callable[[Callable[..., Any]], Callable[..., Any]]  # it is put on a command
 _BEARING = ("model", "strict", "exit_zero")  # on the verdict, besides the day and --set
 
@@ -149,16 +150,33 @@ def origin_of(parameter: click.Parameter) -> str:
         return f"environment, {parameter.envvar}"
     if source is not ParameterSource.DEFAULT_MAP:
         return "default"
-    found = settings_here()
-    return os.path.relpath(found.file) if found else "pyproject.toml"
+    file = click.get_current_context().meta.get(SETTINGS_FILE)
+    return os.path.relpath(file) if file else "pyproject.toml"
 
 
-def settings_here(files: Files = DISK) -> "Settings | None":
-    """Settings of the project for the current folder, now or in a revision; None where there are none."""
+def settings_of(names: Sequence[str]) -> "Settings | None":
+    """Settings of the folders nearest to some mission files, which must be the same; without a file those of here.
+
+    Two projects in one run are wrong usage: one of them would be held to the settings of the other.
+    """
+    found: dict[str, tuple[str, Settings | None]] = {}
+    for name in names:
+        if os.path.isfile(name):
+            settings = settings_here(folder=os.path.dirname(os.path.abspath(name)))
+            found.setdefault(settings.file if settings else "", (name, settings))
+    if len(found) > 1:
+        words = (f"{name} has {os.path.relpath(file) if file else 'none'}" for file, (name, _) in found.items())
+        said = f"the missions have different settings: {', '.join(words)}; check each project in a run of its own."
+        raise click.UsageError(printable(said))
+    return next((settings for _, settings in found.values()), None) if found else settings_here()
+
+
+def settings_here(files: Files = DISK, folder: str | None = None) -> "Settings | None":
+    """Settings of the project for the current folder, or another; now or in a revision; None where there are none."""
     from bisar_budget.settings import SettingsError, project_settings
 
     try:
-        return project_settings(os.getcwd(), files)
+        return project_settings(os.getcwd() if folder is None else folder, files)
     except SettingsError as error:
         raise click.UsageError(printable(str(error))) from None
     except OSError:  # somebody removed the current folder

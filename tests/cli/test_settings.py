@@ -161,3 +161,24 @@ def test_a_report_of_the_settings_leads_nowhere_else(run, project, tmp_path, nam
     assert "tool.bisar-budget.report: " in done.stderr
     assert "leads out of the folder of this file" in done.stderr
     assert not list(outside.iterdir())
+
+
+def test_settings_are_those_of_the_folder_of_the_mission(run, tmp_path, monkeypatch) -> None:
+    """From the top of a repository a project below it was checked without its `strict`."""
+    for name in ("a", "b"):
+        (tmp_path / name / "missions").mkdir(parents=True)
+        (tmp_path / name / "missions" / "m.yaml").write_text(WARNING)
+    (tmp_path / "a" / "pyproject.toml").write_text(table("strict = true"))
+    monkeypatch.chdir(tmp_path)
+    done = run("check", "a/missions/m.yaml")
+    assert done.exit_code == 1
+    assert "--strict" in done.stdout
+    assert "a/pyproject.toml" in done.stdout
+    assert run("check", "a/**/*.yaml").exit_code == 1
+    assert run("check", "b/missions/m.yaml").exit_code == 0
+    both = run("check", "a/missions/m.yaml", "b/missions/m.yaml")
+    assert both.exit_code == 2
+    said = (
+        "a/missions/m.yaml has a/pyproject.toml, b/missions/m.yaml has none; check each project in a run of its own."
+    )
+    assert said in " ".join(both.stderr.split())
