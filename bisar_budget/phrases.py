@@ -454,9 +454,18 @@ def runs_along_the_ground(platform: str) -> str:
 
 
 @phrase
-def disperses_over_the_band(phase: float) -> str:
-    """Said of an electron content."""
-    return f"bends the phase by {phase:.3g} rad at the ends of the band, which no requirement takes"
+def dispersion_over(phase: float, limit: float) -> str:
+    """Said of the electrons of the air. [rad]"""
+    return (
+        f"at the edges of the band the phase is bent by {_against(phase, limit, 'rad')}; autofocus corrects a phase "
+        "over slow time, and does not take it out"
+    )
+
+
+@phrase
+def content_allowed(content: float) -> str:
+    """Said of the same, of one air. [1/m²]"""
+    return f"allowed with a zenith_electron_content of {format_limit(content, '1/m^2')}"
 
 
 @phrase

@@ -25,10 +25,9 @@ from bisar_budget.analysis.spread import (
     spread_limit,
     stated_powers,
 )
-from bisar_budget.budget.judged_requirements import SMALL_RAD
 from bisar_budget.budget.judged_rows import BOUND, CODE, EFFECTS, REQUIREMENTS, FamilyRow, Judging, worded
 from bisar_budget.budget.tone_rows import evidence, notes_of_acceleration
-from bisar_budget.effects.air_delays import CONTENT, dispersion
+from bisar_budget.effects.air_delays import CONTENT
 from bisar_budget.effects.declared import CUBIC, LOCATION, OTHER_MODEL, QUADRATIC
 from bisar_budget.effects.effect import PLATFORMS, override_notes, subject
 from bisar_budget.effects.navigation_errors import process_of
@@ -446,14 +445,9 @@ def _kept_by(mission: Mission, sync: Synchronization | None) -> Iterator[Note]:
 
 
 def _said_of_air(mission: Mission, error: RandomError) -> tuple[str, str | None, tuple[Note, ...]]:
-    """The same of a delay on a leg. Free electrons bend the phase over the band, which no requirement takes."""
-    leg = None if mission.propagation is None else mission.propagation.leg(error.owner)
-    source, notes = None if leg is None else leg.source, tuple[Note, ...]()
-    if error.subject.axis == CONTENT and error.declared is not None:
-        phase = error.declared * dispersion(mission, getattr(mission.geometry, error.owner))
-        if phase >= SMALL_RAD:
-            notes = (phrases.disperses_over_the_band(phase),)
-    return "delay of the air", source, notes
+    """The same of a delay on a leg."""
+    source = None if mission.propagation is None else mission.propagation.source_of(error.owner)
+    return "delay of the air", source, ()
 
 
 def _unlimited(mission: Mission, error: RandomError, effect: RandomEffect) -> Note:

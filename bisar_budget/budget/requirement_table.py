@@ -180,7 +180,7 @@ def _sizes(row: Row, key: str, case: Case) -> tuple[float | None, float | None]:
         row.unit == UNITS[key]
         and row.binding_requirement in (key, None)
         and (
-            row.subject.kind in (key, QUADRATIC, "spatial_variance", "autofocus_pull_in", "other")
+            row.subject.kind in (key, QUADRATIC, "spatial_variance", "autofocus_pull_in", "other", "dispersion")
             or (key == "pslr" and row.unit == "dB")
         )
     ):

@@ -16,9 +16,10 @@ from typing import Any
 import numpy as np
 
 from bisar_budget.constants import EARTH_RADIUS
+from bisar_budget.effects.combined import combined
 from bisar_budget.effects.effect import PLATFORMS, subject
 from bisar_budget.effects.random_effect import RandomError, SensorCases
-from bisar_budget.geometry import PlatformState, Vectors, norm
+from bisar_budget.geometry import BistaticGeometry, PlatformState, Vectors, norm
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.propagation import (
     ABOVE_THE_AIR,
@@ -100,13 +101,35 @@ def delay_course(delay: str, track: Vectors, middle: Vectors, scale: Any, fit: A
     return seen_course(group, fit[0] @ group, delay)
 
 
-def dispersion(mission: Mission, path: PlatformState) -> float:
-    """Phase at the ends of the band that a unit of electron content bends it by, of one case. [rad/unit]
+def dispersion_per_unit(mission: Mission, path: PlatformState) -> Any:
+    """Quadratic phase at the edges of the band by a unit of electron content at the zenith. [rad/unit]
 
     Of exp(2πi·K/(c·f)), K = g·f₀², the second order in f − f₀: (2π/λ)·g·(B/2f₀)².
     """
-    radar, g = mission.radar, float(group_delay(mission, path, CONTENT, 0.0))
-    return 2 * math.pi / radar.wavelength * g * (radar.bandwidth / radar.center_frequency / 2) ** 2
+    radar = mission.radar
+    g = metres_per_unit(mission, CONTENT) * leg_factor(CONTENT, path.position, path.position)
+    return 2 * math.pi / np.asarray(radar.wavelength) * g * (radar.bandwidth / radar.center_frequency / 2) ** 2
+
+
+def dispersed_legs(mission: Mission, geometry: BistaticGeometry) -> dict[str, Any]:
+    """Quadratic phase at the edges of the band by the declared electron content of each leg. [rad]
+
+    The coverage factor is in it. Legs of which no content is declared are left out.
+    """
+    propagation, factor = mission.propagation, mission.allocation.coverage_factor
+    found: dict[str, Any] = {}
+    for name, path in zip(PLATFORMS, geometry.both, strict=True):
+        content = None if propagation is None else propagation.content(name)
+        if content is not None:
+            found[name] = content * factor * dispersion_per_unit(mission, path)
+    return found
+
+
+def dispersed(mission: Mission, geometry: BistaticGeometry) -> Any:
+    """Quadratic phase at the edges of the band by both legs: of one air they add, those of two combine. [rad]"""
+    legs = list(dispersed_legs(mission, geometry).values())
+    is_one_air = mission.propagation is not None and mission.propagation.is_one_air
+    return combined(np.broadcast_arrays(*legs), "sum" if is_one_air else mission.allocation.combine)
 
 
 def delay_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:

@@ -122,7 +122,12 @@ def dashed(text: str) -> str:
 
 
 _PHASE_UNIT = "deg"  # of the phase requirement that a file does not state
-_OF_PHASES = ("quadratic_phase_error", "cubic_phase_error", "spatial_variance")  # rows that add phases up
+_OF_PHASES = (
+    "quadratic_phase_error",
+    "cubic_phase_error",
+    "spatial_variance",
+    "dispersion",
+)  # rows that add phases up
 
 
 def row_size(value: float | None, row: Row, mission: MissionFindings, rounding: str = "nearest") -> str:
