@@ -444,12 +444,16 @@ def across_the_line_of_sight() -> str:
 @phrase
 def below_the_ionosphere(platform: str) -> str:
     """Said of the electron content on a leg that lies within the air."""
+    if platform == "mission":
+        return "both platforms fly below the ionosphere: no electrons on their legs"
     return f"the {platform} flies below the ionosphere: no electrons on its leg"
 
 
 @phrase
 def runs_along_the_ground(platform: str) -> str:
     """Said of the delay on a leg that is seen too low, and of which nothing may be stated."""
+    if platform == "mission":
+        return "both legs run along the ground: no delay follows from that of the zenith"
     return f"the leg of the {platform} runs along the ground: no delay follows from that of the zenith"
 
 

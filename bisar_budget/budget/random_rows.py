@@ -27,7 +27,7 @@ from bisar_budget.analysis.spread import (
 )
 from bisar_budget.budget.judged_rows import BOUND, CODE, EFFECTS, REQUIREMENTS, FamilyRow, Judging, worded
 from bisar_budget.budget.tone_rows import evidence, notes_of_acceleration
-from bisar_budget.effects.air_delays import CONTENT
+from bisar_budget.effects.air_delays import CONTENT, legs_of
 from bisar_budget.effects.declared import CUBIC, LOCATION, OTHER_MODEL, QUADRATIC
 from bisar_budget.effects.effect import PLATFORMS, override_notes, subject
 from bisar_budget.effects.navigation_errors import process_of
@@ -446,8 +446,11 @@ def _kept_by(mission: Mission, sync: Synchronization | None) -> Iterator[Note]:
 
 def _said_of_air(mission: Mission, error: RandomError) -> tuple[str, str | None, tuple[Note, ...]]:
     """The same of a delay on a leg."""
-    source = None if mission.propagation is None else mission.propagation.source_of(error.owner)
-    return "delay of the air", source, ()
+    source = None if mission.propagation is None else mission.propagation.source_of(legs_of(error.owner)[0])
+    if error.counted_in and error.declared is None:  # else it is the reason of the row
+        return "delay of the air", source, (phrases.counted_in_another_row(error.counted_in),)
+    notes = () if error.owner in PLATFORMS else (phrases.held_to_the_total("both legs, by one air"),)
+    return "delay of the air", source, notes
 
 
 def _unlimited(mission: Mission, error: RandomError, effect: RandomEffect) -> Note:

@@ -10,7 +10,7 @@ displacement Q⁻¹[ḡ, −g₁] and the phases of −g, with what the displace
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -28,6 +28,7 @@ from bisar_budget.mission.propagation import (
     elevation_deg,
     height_of,
 )
+from bisar_budget.ranges.exact_ranges import Floats
 
 ELECTRONS = 40.308  # m³/s²: e²/(8π²ε₀mₑ), the group delay of 1/m² is so much over f² (CODATA 2018)
 TROPOSPHERE = 7e3  # m, height at which a spherical troposphere is crossed as a whole
@@ -132,26 +133,59 @@ def dispersed(mission: Mission, geometry: BistaticGeometry) -> Any:
     return combined(np.broadcast_arrays(*legs), "sum" if is_one_air else mission.allocation.combine)
 
 
-def delay_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
-    """Delays on the leg of a platform, declared or not; none where nothing is stated of it."""
+def legs_of(owner: str) -> tuple[str, ...]:
+    """Platforms on whose legs an error of the air is: one, or both where the air is one."""
+    return PLATFORMS if owner == "mission" else (owner,)
+
+
+def delay_errors(seen: SensorCases) -> Iterator[RandomError]:
+    """Delays of the air, declared or not; none where nothing is stated of it.
+
+    A figure that the file states once is one random number over the scene: both legs have it, each by its own
+    elevation, and what they do adds with its signs before it is squared. Then each leg has a row of its own, which
+    counts in that of the air.
+    """
     propagation = seen.mission.propagation
-    leg = None if propagation is None else propagation.leg(name)
-    if propagation is None or leg is None:
+    if propagation is None:
         return
-    exact, place = seen.exact, PLATFORMS.index(name)
-    track, middle = exact.tracks[place], getattr(seen.geometry, name).position
-    for delay, unit in UNITS.items():
-        scale = metres_per_unit(seen.mission, delay)
-        still = np.broadcast_to(scale * leg_factor(delay, middle, middle), exact.times.shape)
-        moving = delay_course(delay, track, middle, scale, exact.fit)
-        published, full = seen.of_courses(moving[None], still[None])
-        value = getattr(leg, delay)
-        yield RandomError(
-            subject=subject(name, "propagation", delay),
-            unit=unit,
-            declared=None if value is None else value * seen.factor,
-            path=propagation.path(name, delay),
-            published=published,
-            full=full,
-            spreads=False,
-        )
+    by_leg = {
+        (name, delay): _courses_of_leg(seen, name, delay)
+        for name in PLATFORMS
+        if propagation.leg(name) is not None
+        for delay in DELAYS
+    }
+    for name, delay in by_leg:
+        counted = subject("mission", "propagation", delay).id if propagation.is_one_air else ""
+        yield _delay_error(seen, name, delay, [by_leg[name, delay]], counted)
+    for delay in DELAYS if propagation.is_one_air else ():
+        yield _delay_error(seen, "mission", delay, [by_leg[name, delay] for name in PLATFORMS])
+
+
+def _courses_of_leg(seen: SensorCases, name: str, delay: str) -> tuple[Floats, Floats]:
+    """Range error at the nodes by a unit of a delay on one leg, as it turns and held at mid-aperture. [m/unit]"""
+    exact, middle = seen.exact, getattr(seen.geometry, name).position
+    scale = metres_per_unit(seen.mission, delay)
+    moving = delay_course(delay, exact.tracks[PLATFORMS.index(name)], middle, scale, exact.fit)
+    return moving, np.broadcast_to(scale * leg_factor(delay, middle, middle), exact.times.shape)
+
+
+def _delay_error(
+    seen: SensorCases, owner: str, delay: str, courses: Sequence[tuple[Floats, Floats]], counted_in: str = ""
+) -> RandomError:
+    """A delay of one leg, or of one air over both."""
+    propagation = seen.mission.propagation
+    name = legs_of(owner)[0]
+    leg = None if propagation is None else propagation.leg(name)
+    value = None if leg is None else getattr(leg, delay)
+    moving, held = (sum(parts) for parts in zip(*courses, strict=True))
+    published, full = seen.of_courses(np.asarray(moving)[None], np.asarray(held)[None])
+    return RandomError(
+        subject=subject(owner, "propagation", delay),
+        unit=UNITS[delay],
+        declared=None if value is None else value * seen.factor,
+        path=("propagation", delay) if propagation is None else propagation.path(name, delay),
+        published=published,
+        full=full,
+        spreads=False,
+        counted_in=counted_in,
+    )

@@ -46,8 +46,8 @@ def subject(owner: str, kind: str, axis: str = "", frame: str = "scene", entry: 
     """Name an error or a sum as the contract does."""
     if kind in ("timing", "other", "specification"):  # of one owner each
         parts = [kind, axis]
-    elif kind == "propagation":
-        parts = [kind, owner, axis]
+    elif kind == "propagation":  # of one air over both legs, or of one leg
+        parts = [kind, "" if owner == "mission" else owner, axis]
     elif kind == "dispersion":
         parts = ["propagation", kind]
     elif owner == "clock":

@@ -43,7 +43,7 @@ def random_errors(mission: Mission, geometry: BistaticGeometry | None = None, ca
     found += [error for name in PLATFORMS for error in oscillator_noise(seen, name)]
     found += [error for name in PLATFORMS for error in oscillator_acceleration(seen, name)]
     found += link_noise(seen)
-    found += [error for name in PLATFORMS for error in delay_errors(seen, name)]
+    found += delay_errors(seen)
     found += _stated_effects(mission)
     return [in_one_case(mission, error) for error in found] if geometry is None else found
 

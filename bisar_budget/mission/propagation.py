@@ -41,11 +41,13 @@ _LEG = Section(LegDelay)
 
 
 class Propagation(NamedTuple):
-    """Delays in the air that correction leaves, 1 sigma: the same for each leg, or of each leg its own."""
+    """Delays in the air that correction leaves, 1 sigma: one air for both legs, or of each leg its own."""
 
-    zenith_delay: Annotated[float | None, Key(_ZENITH_DELAY, "Of the troposphere, on each leg.")] = None
+    zenith_delay: Annotated[
+        float | None, Key(_ZENITH_DELAY, "Of the troposphere: one air, which both legs have over them.")
+    ] = None
     zenith_electron_content: Annotated[
-        float | None, Key(_ELECTRON_CONTENT, "Of the ionosphere, on each leg; 1 TECU is 1e16/m².")
+        float | None, Key(_ELECTRON_CONTENT, "Of the ionosphere, likewise; 1 TECU is 1e16/m².")
     ] = None
     transmitter: Annotated[LegDelay | None, Key(_LEG, "From the transmitter to the scene, alone.")] = None
     receiver: Annotated[LegDelay | None, Key(_LEG, "From the scene to the receiver, alone.")] = None

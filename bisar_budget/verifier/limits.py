@@ -162,7 +162,7 @@ def _cases(study: Study) -> Iterator[tuple[str, Case]]:
             yield one.id, swaying[one]
     yield from _of_instruments(study)
     requirements = mission.requirements
-    if dispersed_legs(mission, mission.geometry):
+    if any(map(np.any, dispersed_legs(mission, mission.geometry).values())):
         yield "propagation.dispersion", partial(phase_cases.dispersion, study)
     if mission.allocation.combine == "each":
         if _warns_of_the_total(study):

@@ -460,7 +460,7 @@ def _dispersion(analysis: Analysis, found: MissionFindings, row: Row) -> Iterato
             WorkedEquation(f"phase_{name[0]}", "2*π*K/(c*f_0)*(B/(2*f_0))^2", values, float(phase), "rad"),
         )
     is_one_air = mission.propagation is not None and mission.propagation.is_one_air
-    rule = "sum" if is_one_air else found.combine
+    rule = "sum" if is_one_air else found.combine  # of one air the legs add
     yield from combined("Both legs", rule, [(name, float(phase)) for name, phase in legs.items()], row.declared)
     yield step("Allowable: all of the requirement, without share and gain", f"allowable = {row.allowable:.6g} rad")
 
