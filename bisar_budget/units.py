@@ -23,17 +23,30 @@ class Dimension:
 
     `scales` maps what can stand behind a number to a factor and a divisor, of which one is 1: dividing by a whole
     number keeps decimals exact, 5 mm is 0.005 m to the bit. `usual` names the units of which one has to stand there;
-    empty where a bare number is in SI.
+    empty where a bare number is in SI. `offsets` are units of decibels that are read by adding a number.
     """
 
-    def __init__(self, name: str, si: str, units: dict[str, float], usual: tuple[str, ...] = ()) -> None:
+    def __init__(
+        self,
+        name: str,
+        si: str,
+        units: dict[str, float],
+        usual: tuple[str, ...] = (),
+        offsets: dict[str, float] | None = None,
+    ) -> None:
         self.name, self.si, self.units, self.usual = name, si, units, usual
+        self.offsets = offsets or {}
         self.scales = {unit: _scale(factor) for unit, factor in units.items()} | ({} if usual else {"": (1.0, 1.0)})
+
+    @property
+    def unit_names(self) -> tuple[str, ...]:
+        """Units that are read, as messages and documents list them."""
+        return (*filter(None, self.units), *self.offsets)
 
     @property
     def accepted(self) -> str:
         """Say which units may stand behind the number."""
-        units = ", ".join(unit for unit in self.units if unit)
+        units = ", ".join(self.unit_names)
         if self.usual:
             return f"accepted: {self.name} in {units}; only zero needs no unit"
         return f"accepted: {self.name} in {units}; a bare number is {'in ' + self.si if self.si else 'a ratio'}"
@@ -105,7 +118,7 @@ ANGULAR_RATE = Dimension(
     "an angular rate",
     "rad/s",
     {f"{unit}/s": factor for unit, factor in _scaled("rad", "mun").items()}
-    | {"deg/s": _DEGREE, "deg/min": _DEGREE / 60, "deg/h": _DEGREE / 3600},
+    | {"deg/s": _DEGREE, "mdeg/s": 1e-3 * _DEGREE, "deg/min": _DEGREE / 60, "deg/h": _DEGREE / 3600},
     usual=("deg/h", "deg/s"),
 )
 _ROOT_HOUR = 1 / 60  # of an hour's root, in roots of a second
@@ -132,6 +145,7 @@ ANGLE_RANDOM_WALK = Dimension(
         "deg/sqrt(s)": _DEGREE,
         "rad/s/sqrt(Hz)": 1.0,
         "deg/s/sqrt(Hz)": _DEGREE,
+        "mdeg/s/sqrt(Hz)": 1e-3 * _DEGREE,
         "deg/h/sqrt(Hz)": _DEGREE / 3600,
     },
     usual=("deg/sqrt(h)", "rad/sqrt(s)"),
@@ -142,7 +156,14 @@ ELECTRON_CONTENT = Dimension(
     {"TECU": 1e16, "1/m^2": 1.0, "/m^2": 1.0, "m^-2": 1.0},
     usual=("TECU",),
 )
-PHASE_NOISE = Dimension("a phase noise L(f)", "dBc/Hz", {"dBc/Hz": 1.0}, usual=("dBc/Hz",))
+# L(f) is half of the one-sided density of phase: IEEE Std 1139.
+PHASE_NOISE = Dimension(
+    "a phase noise L(f)",
+    "dBc/Hz",
+    {"dBc/Hz": 1.0},
+    usual=("dBc/Hz",),
+    offsets={"dBrad^2/Hz": -10 * math.log10(2)},
+)
 _G_DENSITIES = {"g^2/Hz": _G**2, "mg^2/Hz": (1e-3 * _G) ** 2, "ug^2/Hz": (1e-6 * _G) ** 2}
 ACCELERATION_DENSITY = Dimension(
     "a spectral density of acceleration",
@@ -186,33 +207,19 @@ _SPELLINGS = (
     ("³", "^3"),
     ("⁴", "^4"),
     ("s([23])", r"s^\1"),
+    ("rad2", "rad^2"),
+    (r"^dB\s*(?:re\s*1?\s*)?[(\[]?rad\^2/Hz[)\]]?$", "dBrad^2/Hz"),
+    (r"\b(?:micro-?|u-)g\b", "ug"),
+    (r"\bmilli-?g\b", "mg"),
     (r"^\(([^()]*)\)/", r"\1/"),  # (deg/h)/√Hz
-    ("^°/", "deg/"),
+    ("^(m?)°/", r"\1deg/"),
+    (r"^(m?)dps\b(?!\^)", r"\1deg/s"),
+    (r"^dph\b(?!\^)", "deg/h"),
     (r"\bhr\b", "h"),
     (r"(?:√|\b(?:sqrt|root|rt))[\s-]*\(?(s|h|hr|Hz)\b\)?", r"sqrt(\1)"),
     (r"/(s|h|Hz)\^(?:0?\.5|\(?1/2\)?|½)$", r"/sqrt(\1)"),
     (r"\(hr\)", "(h)"),
 )
-# What people write for a unit that is not spelt like it.
-_MEANT = {
-    "arcminute": "arcmin",
-    "arcsecond": "arcsec",
-    "as": "arcsec",
-    "asec": "arcsec",
-    "degree": "deg",
-    "dph": "deg/h",
-    "feet": "ft",
-    "foot": "ft",
-    "knot": "kn",
-    "meter": "m",
-    "metre": "m",
-    "micro-g": "ug",
-    "milli-g": "mg",
-    "percent": "%",
-    "radian": "rad",
-    "sec": "s",
-    "second": "s",
-}
 # Decibels against a carrier have no other unit near them: what is meant where one stands in the place of another.
 _DECIBELS = ("dB", "dBc")
 
@@ -275,8 +282,10 @@ def _parse_closely(value: object, dimension: Dimension) -> float:
         return _bare(_finite(number, dimension), text, dimension)
     if scale is None:
         scale = dimension.scales.get(normal_unit(unit))
+    if scale is None and (offset := dimension.offsets.get(normal_unit(unit))) is not None:
+        return _finite(number + offset, dimension)
     if scale is None:
-        raise _wrong_unit(unit, dimension)
+        raise _wrong_unit(match[0], unit, dimension)
     return _finite(number * scale[0] / scale[1], dimension)
 
 
@@ -297,6 +306,13 @@ def format_quantity(value: float, unit: str, digits: int = 3, rounding: str = "n
     if "e" in text or (rounding == "down" and abs(float(text)) > abs(value)):
         text = _rounded(value, digits, rounding)
     return text + suffix
+
+
+def unit_behind(text: str) -> str:
+    """Unit that stands behind the number of a text, as written; the whole text where it has no number."""
+    text = text.strip()
+    match = _NUMBER.match(text)
+    return text[match.end() :].strip() if match else text
 
 
 def given_unit(text: str, unit: str) -> str:
@@ -419,7 +435,7 @@ def _invalid(problem: str, dimension: Dimension, hint: str = "") -> InvalidValue
     return InvalidValueError(problem, dimension.accepted, hint)
 
 
-def _wrong_unit(written: str, dimension: Dimension) -> InvalidValueError:
+def _wrong_unit(digits: str, written: str, dimension: Dimension) -> InvalidValueError:
     """Say that a unit is none of a dimension, or of another one, and which was meant."""
     unit = normal_unit(written)
     if unit.startswith(","):
@@ -428,20 +444,8 @@ def _wrong_unit(written: str, dimension: Dimension) -> InvalidValueError:
     if others:
         meant = dimension.si if unit in _DECIBELS and dimension.si.startswith("dB") else ""
         problem = f"must be {dimension.name}, but {written!r} makes it {others[0].name}"
-    else:
-        meant = _nearest_unit(unit, dimension)
-        problem = f"has the unknown unit {written!r}"
-    return _invalid(problem, dimension, f"Did you mean {meant!r}?" if meant else "")
+        return _invalid(problem, dimension, f"Did you mean {meant!r}?" if meant else "")
+    from bisar_budget.other_units import about_unit
 
-
-def _nearest_unit(unit: str, dimension: Dimension) -> str:
-    """Unit of a dimension that is spelt nearly like one that nobody knows; empty if none is."""
-    from difflib import get_close_matches
-
-    word = unit.lower()
-    for spelling in (word, word.removesuffix("s")):
-        if (meant := _MEANT.get(spelling, "")) in dimension.units:
-            return meant
-    folded = {known.lower(): known for known in dimension.units if known}
-    spelt = normal_unit(word.replace("hz", "Hz")).lower()  # in capitals, as in `DEG/HR`
-    return folded.get(word) or folded.get(spelt) or next(iter(get_close_matches(unit, dimension.units, 1, 0.6)), "")
+    problem, hint = about_unit(digits, written, dimension)
+    return _invalid(problem, dimension, hint)

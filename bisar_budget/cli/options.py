@@ -96,7 +96,7 @@ def set_option(what: str) -> _Option:
         metavar="KEY=VALUE",
         callback=_read_changes,
         help=f"{what}: KEY is its path in the file, such as platforms.receiver.azimuth or other_errors.0.name, VALUE "
-        "as the file would have it. Repeatable; every report says it.",
+        "as the file would have it; null takes the key out. Repeatable; every report says it.",
     )
 
 

@@ -288,7 +288,7 @@ def _read(option: str, number: Number, texts: Sequence[str]) -> tuple[Number, tu
 
 
 def _said_in(unit: str, dimension: Dimension) -> str:
-    unit = unit or dimension.si
+    unit = unit if unit and unit not in dimension.offsets else dimension.si
     return unit if unit in dimension.scales else ""
 
 
@@ -464,6 +464,8 @@ def _column(tree: dict[str, Any], cell: str) -> Varied:
             "has no unit", number.dimension.accepted.partition(";")[0], f"Did you mean {example}?"
         )
     parse_quantity(f"1 {unit}", number.dimension)
+    if unit in number.dimension.offsets:
+        raise InvalidValueError(f"cannot be in {unit} in a table", f"accepted: '{key} [{number.dimension.si}]'")
     return number._replace(unit=_said_in(unit, number.dimension))
 
 

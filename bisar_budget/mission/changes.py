@@ -1,7 +1,8 @@
 """Paths of keys: the values that options put at them, and the key that somebody meant.
 
 `--set KEY=VALUE` is for a question that is asked once. The value is put into the tree that was read, before anybody
-asks what it means: every check works as for a file. The keys of the file are those of the readers.
+asks what it means: every check works as for a file. `KEY=null` takes the key out. The keys of the file are those of
+the readers.
 """
 
 from collections.abc import Iterator, Sequence
@@ -14,7 +15,7 @@ import yaml
 from bisar_budget.faults import Changed, InvalidValueError, KeyPath, Problem, SetNumber, SetValue, shown
 from bisar_budget.mission.model import MISSION
 from bisar_budget.mission.readers import INVALID, ListOf, OneOf, Reader, Section, did_you_mean, is_place
-from bisar_budget.mission.tree import MAX_BYTES, Tree
+from bisar_budget.mission.tree import MAX_BYTES, NULLS, Tree
 
 _ACCEPTED = "accepted: KEY=VALUE, such as radar.bandwidth=150MHz"
 _MAX_KEY = 500  # characters; a path of the schema has a tenth
@@ -60,7 +61,46 @@ def apply_changes(tree: Tree, changes: Sequence[SetValue]) -> None:
         Nothing after it is worth reading; the fault is in the tree.
     """
     for change in changes:
-        _apply(tree, change)
+        if takes_out(change):
+            _take_out(tree, change)
+        else:
+            _apply(tree, change)
+
+
+def takes_out(change: SetValue) -> bool:
+    """Whether an option takes a key out: its value is the null of YAML, as `--set requirements.islr=null` has it."""
+    return not isinstance(change, SetNumber) and change.text in NULLS and change.text != ""
+
+
+def _take_out(tree: Tree, change: SetValue) -> None:
+    """Take a key out of the tree. One that the file does not have is left out already, if there is such a key."""
+    parts = parts_of(change.key)
+    container: Any = tree.root
+    path: KeyPath = ()
+    while True:
+        name, rest = next_name(container, parts, is_of_ids=path in _OF_DOTTED)
+        is_entry = isinstance(container, list)
+        if name is None or (is_entry and (not rest or int(name) >= len(container))) or container is INVALID:
+            break
+        if not is_entry and name not in container:
+            break
+        path = (*path, name)
+        if not rest:
+            del container[name]
+            _forget(tree, path)
+            tree.changes[path] = change
+            return
+        container, parts = container[name], rest
+    if container is INVALID:
+        return  # the file's own fault says what is wrong
+    here = tuple(parts_of(change.key))
+    if isinstance(container, list):
+        tree.changes[here] = change
+        accepted = "accepted: null for a key, or the list without the entry"
+        tree.fault(None, here, "is an entry of a list, which null does not take out", accepted=accepted)
+    elif ".".join(part for part in here if not is_place(part)) not in all_keys():
+        tree.changes[here] = change
+        tree.fault(None, here, "is not in the file, and null takes nothing out", hint=nearest_keys(change.key))
 
 
 def _apply(tree: Tree, change: SetValue) -> None:
@@ -130,7 +170,7 @@ def _value(tree: Tree, change: SetValue, path: KeyPath) -> Any:
         _forget(tree, path)
         value = tree.document(change.text, path, "one value")
         if value is INVALID and path not in tree.values:
-            tree.fault(None, path, "has no value", hint="Give it one")
+            tree.fault(None, path, "has no value", hint="Give it one; null takes the key out")
         return value
     except yaml.MarkedYAMLError as error:
         said = ", ".join(filter(None, (error.context, error.problem)))

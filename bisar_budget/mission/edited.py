@@ -8,7 +8,7 @@ from typing import Any
 import yaml
 
 from bisar_budget.faults import SetValue
-from bisar_budget.mission.changes import next_name, parts_of
+from bisar_budget.mission.changes import next_name, parts_of, takes_out
 from bisar_budget.mission.load import folder_of
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.parts import is_file
@@ -25,7 +25,10 @@ def with_values(text: str, changes: Sequence[SetValue]) -> str:
     is_of_dos = "\r\n" in text
     text = text.replace("\r\n", "\n")
     for change in changes:
-        text = _with_value(text, parts_of(change.key), change.text)
+        if takes_out(change):
+            text = _without_key(text, parts_of(change.key))
+        else:
+            text = _with_value(text, parts_of(change.key), change.text)
     return text.replace("\n", "\r\n") if is_of_dos else text
 
 
@@ -91,6 +94,34 @@ def _with_value(text: str, parts: tuple[str, ...], value: str) -> str:
         if not isinstance(inner, yaml.MappingNode | yaml.SequenceNode):  # a section that has nothing in it
             return _replaced(text, inner, _nested(rest, value), _end_of_key(node, key))
         node, parts = inner, rest
+
+
+def _without_key(text: str, parts: tuple[str, ...]) -> str:
+    """The text without a key and its value; a section that had no other key is empty. Comments of others stay."""
+    node: Any = yaml.compose(text, Loader=_LOADER)
+    end_of_key = 0
+    while True:
+        key, rest = _next(node, parts)
+        inner = _below(node, key)
+        if inner is None or not rest:
+            break
+        end_of_key = _end_of_key(node, key)
+        node, parts = inner, rest
+    if inner is None or not isinstance(node, yaml.MappingNode):
+        return text
+    entries = node.value
+    place = next(n for n, (name, _) in enumerate(entries) if name.value == key)
+    if len(entries) == 1:
+        return _replaced(text, node, "{}", end_of_key)
+    start = entries[place][0].start_mark.index
+    whole = _without_comments(text[start : inner.end_mark.index])
+    line_start = text.rfind("\n", 0, start) + 1
+    if node.flow_style and place:
+        return text[: entries[place - 1][1].end_mark.index] + text[start + len(whole) :]
+    if node.flow_style or text[line_start:start].strip():  # the first behind a brace, or behind the dash of an entry
+        return text[:start] + text[entries[place + 1][0].start_mark.index :]
+    line_end = text.find("\n", start + len(whole))
+    return text[:line_start] + ("" if line_end < 0 else text[line_end + 1 :])
 
 
 def _next(node: Any, parts: tuple[str, ...]) -> tuple[str, tuple[str, ...]]:

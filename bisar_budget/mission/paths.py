@@ -35,10 +35,13 @@ from bisar_budget.paths.flight import (
     PathDoubt,
     PathFileError,
     around_aperture,
+    dated,
+    hold_to_usable_records,
     interpolated,
     slow_times,
     smoothed,
     stretch_around,
+    track_around,
 )
 from bisar_budget.paths.instant import DAY, Instant
 from bisar_budget.paths.log_places import LogKeys, hold_to_motion
@@ -360,11 +363,13 @@ def _of_log(mission: Mission, route: TrajectorySource, axes: earth.SceneAxes | N
 def _log_path(
     mission: Mission, route: TrajectorySource, axes: earth.SceneAxes | None, data: bytes, digest: str
 ) -> FlownPath:
-    log, aperture_time = _log(route, data, digest), mission.collection.aperture_time
+    center, aperture_time = mission.collection.center_time, mission.collection.aperture_time
+    log = dated(track_around(_log(route, data, digest), center, route.center, aperture_time, route.file), center)
     if log.is_earth_fixed:
         known = _known(axes, "trajectory")
         log = replace(log, places=known.places(log.places), is_earth_fixed=False)
-    times = slow_times(log, mission.collection.center_time, route.center, aperture_time, route.file)
+    times = slow_times(log, center, route.center, aperture_time, route.file)
+    hold_to_usable_records(log, times, stretch_around(times, aperture_time))
     hold_to_motion(times, log.places, stretch_around(times, aperture_time), route.file)
     fitted = smoothed(times, log.places, aperture_time)
     words = log.words
@@ -382,7 +387,7 @@ def _log_path(
 
 def _log(route: TrajectorySource, data: bytes, digest: str) -> Log:
     """Read a log, or take it as it was read before."""
-    keys = LogKeys(route.week, route.time_scale, route.geoid_separation)
+    keys = LogKeys(route.week, route.time_scale, route.geoid_separation, route.talker, route.track, route.instance)
     key = (route.file, route.format, keys, digest)
 
     def made() -> Log:

@@ -1,5 +1,6 @@
 """Platforms of a mission file: where they fly, in one of five ways, and how wrong their motion is measured."""
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, NamedTuple
@@ -47,12 +48,14 @@ from bisar_budget.mission.readers import (
     VELOCITY,
     Choice,
     Key,
+    Label,
     Quantity,
     Reader,
     Reference,
     Report,
     Section,
     Source,
+    Text,
     TextList,
     Triple,
     Whole,
@@ -205,6 +208,7 @@ class CommonMotionError(NamedTuple):
 
 # ---------------------------------------------------------------------- where a platform flies
 _FILE = Reference()
+_TALKER = "[A-Z]{2}"
 
 
 class _Lines(Reader):
@@ -269,6 +273,22 @@ class _Instant(Reader):
         return {"type": "string", "format": "date-time"}
 
 
+class _Talker(Text):
+    """Talker of a sentence of NMEA 0183."""
+
+    is_word = True
+
+    def leaf(self, value: Any) -> str:
+        """Refuse what is no talker."""
+        if not isinstance(value, str) or not re.fullmatch(_TALKER, value, re.ASCII):
+            raise InvalidValueError("must be two capital letters", "accepted: GN, GP and the like")
+        return value
+
+    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
+        """Two capital letters."""
+        return {"type": "string", "pattern": f"^{_TALKER}$"}
+
+
 class TrajectorySource(NamedTuple):
     """A log of a flight."""
 
@@ -296,6 +316,19 @@ class TrajectorySource(NamedTuple):
     ] = None
     accuracy: Annotated[
         str | None, Key(_FILE, "SBET accuracy file (smrmsg): fills position and velocity of motion_error.")
+    ] = None
+    talker: Annotated[
+        str | None, Key(_Talker(), "Receiver of an NMEA log with fixes of several: the two letters behind the $.")
+    ] = None
+    track: Annotated[
+        str | None,
+        Key(
+            Label(),
+            "Track of a GPX file with several, by its name or number; omitted: the one that covers the aperture.",
+        ),
+    ] = None
+    instance: Annotated[
+        int | None, Key(Whole(0, 255), "Receiver of a log of PX4 or ArduPilot with fixes of several, from 0.")
     ] = None
 
 

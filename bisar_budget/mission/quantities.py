@@ -6,7 +6,6 @@ A caller gives values as a file has them: texts, numbers in SI, quantities of ot
 import functools
 import math
 import numbers
-import re
 from collections.abc import Callable, Mapping, Sequence
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 from typing import Any, NamedTuple
@@ -47,7 +46,6 @@ from bisar_budget.units import Dimension, parse_quantity
 
 DIGITS = 8  # of values that are said: both sides of a crossing stay within 1e-6
 _DECADE = 10.0
-_UNIT = re.compile(r"^[^A-Za-z°µμ/%√]*", re.ASCII)
 FACTOR = Quantity(units.RATIO, gt=0, ge=1e-12, le=1e12)
 
 
@@ -107,7 +105,8 @@ class Number(NamedTuple):
 
     def said_like(self, between: str | None) -> "Number":
         """The number said in the unit of the range's end, where the file has no value to say it like."""
-        unit = _UNIT.sub("", (between or "").rpartition("..")[2].strip()).strip()
+        unit = units.unit_behind((between or "").rpartition("..")[2])
+        unit = unit if unit in self.dimension.scales else units.normal_unit(unit)
         return self._replace(unit=unit) if self.value is None and unit in self.dimension.scales and unit else self
 
     def read(self, text: str) -> float:
@@ -188,7 +187,7 @@ def as_number(key: str, reader: Quantity, value: Any) -> Number:
     """Put together a number and the unit that it is said in; `value` is what the file says, None if nothing."""
     dimension = reader.dimension
     number = parse_quantity(value, dimension) if isinstance(value, str) else value if type(value) is float else None
-    unit = _UNIT.sub("", value).strip() if isinstance(value, str) else ""
+    unit = units.unit_behind(value) if isinstance(value, str) else ""
     unit = unit if unit in dimension.scales else units.normal_unit(unit)
     if unit not in dimension.scales or not unit:
         unit = "deg" if dimension is units.ANGLE else dimension.usual[0] if dimension.usual else dimension.si
@@ -278,8 +277,8 @@ def range_of(number: Number, between: str | None) -> Range:
             example = (1.0, 10.0) if number.value is None else (number.value / 2, number.value * 2)
             said = "..".join(map(number.text, example)).replace(" ", "")
             raise QuestionError(f"{option}: is no range; accepted: A..B, such as {said}")
-        if first and not _UNIT.sub("", first):  # 1..10 km starts at 1 km
-            first += f" {_UNIT.sub('', last)}".rstrip()
+        if first and not units.unit_behind(first):  # 1..10 km starts at 1 km
+            first += f" {units.unit_behind(last)}".rstrip()
         found = []
         for text in (first, last):
             try:
@@ -448,9 +447,9 @@ def changed(mission: Mission, values: Mapping[str, Any]) -> Mission:
     ----------
     mission : Mission
         As loaded.
-    values : mapping of str to str, float, sequence or quantity
+    values : mapping of str to str, float, sequence, quantity or None
         By the path of a key in the mission file, such as `collection.aperture_time`: a text as the file would have
-        it, `"8 s"`; a number in SI; a list of three; a quantity of pint or astropy.
+        it, `"8 s"`; a number in SI; a list of three; a quantity of pint or astropy; None takes the key out.
 
     Raises
     ------
@@ -473,7 +472,7 @@ def _si_of(tree: dict[str, Any], key: str) -> str:
 
 
 def text_of(si: str, value: Any) -> str:
-    """A text, number, quantity or list of them as a mission file has it; numbers are in the SI unit.
+    """A text, number, quantity, list of them, or None as a mission file has it; numbers are in the SI unit.
 
     Raises
     ------
@@ -482,6 +481,8 @@ def text_of(si: str, value: Any) -> str:
     """
     if isinstance(value, str):
         return value
+    if value is None:
+        return "null"
     if isinstance(value, bool | np.bool_):
         return "true" if value else "false"
     if is_quantity(value):
@@ -491,7 +492,9 @@ def text_of(si: str, value: Any) -> str:
         return f"{float(value)!r} {si}".rstrip() if not isinstance(value, numbers.Integral) or si else str(int(value))
     if isinstance(value, Sequence | np.ndarray):
         return f"[{', '.join(text_of(si, one) for one in value)}]"
-    raise TypeError(f"{type(value).__name__} is no value of a mission; accepted: text with its unit, number, list")
+    raise TypeError(
+        f"{type(value).__name__} is no value of a mission; accepted: text with its unit, number, list, None"
+    )
 
 
 # Quantities of other packages are known by what they do: no such package has to be there.

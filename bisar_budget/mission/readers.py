@@ -16,6 +16,7 @@ from bisar_budget.faults import InvalidValueError, KeyPath, Problem
 from bisar_budget.resources import docstring
 from bisar_budget.units import Dimension, format_quantity, parse_quantity
 
+MISSING = "is missing"  # of a key that a section does not go without
 INVALID: Any = object()  # in place of a value that was reported
 Report = Callable[[KeyPath, Problem], None]
 
@@ -117,10 +118,7 @@ class Quantity(Reader):
         if self.dimension.usual:
             return ""  # only a zero comes so far without its unit
         if "%" in self.dimension.units:
-            try:
-                return f"Did you mean '{text} %'?" if self.leaf(f"{text} %") is not None else ""
-            except InvalidValueError:
-                return ""
+            return f"A bare number is a ratio: {text} is {100 * float(text):.6g} %"
         return f"A bare number is in {self.dimension.si}" if self.dimension.si not in ("", "dB") else ""
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
@@ -139,16 +137,35 @@ class Triple(Reader):
 
     def read(self, value: Any, path: KeyPath, report: Report) -> Any:
         """Read each component at its own place."""
-        if self.or_scalar and not isinstance(value, list):
+        bracketed = "" if isinstance(value, list) else self._bracketed(value)
+        if self.or_scalar and not isinstance(value, list) and not bracketed:
             one = self.component.read(value, path, report)
             return one if one is INVALID else (one, one, one)
         if not isinstance(value, list) or len(value) != 3:
             given = f", {len(value)} given" if isinstance(value, list) else ""
-            hint = _POINT if isinstance(value, list) and len(value) > 3 else ""
+            hint = _POINT if isinstance(value, list) and len(value) > 3 else bracketed
             report(path, Problem(f"must be three components{given}", "accepted: [a, b, c]", hint))
             return INVALID
         parts = tuple([read_part(self.component, part, (*path, index), report) for index, part in enumerate(value)])
         return INVALID if INVALID in parts else parts
+
+    def _bracketed(self, value: Any) -> str:
+        """Hint at brackets around three values that are written without; empty where it is not three values.
+
+        Each has its own unit, or is 0: `1,234,567 m` may be one number, and `1, 2, 3 km` are not three of km.
+        """
+        texts = value.strip(" ()").split(",") if isinstance(value, str) else ()
+        if len(texts) != 3 or not any(map(units.unit_behind, texts)):
+            return ""
+        try:
+            bare = [self.component.leaf(text.strip()) for text in texts if not units.unit_behind(text)]
+            for text in texts:
+                self.component.leaf(text.strip())
+        except InvalidValueError:
+            bare = [math.nan]
+        if any(bare):
+            return "Write brackets, and the unit of each" if value.count(", ") == 2 else ""
+        return f"Did you mean [{', '.join(text.strip() for text in texts)}]?"
 
     def below(self, part: str) -> Reader | None:
         """Give the reader of one component."""
@@ -444,7 +461,7 @@ class Section(Reader):
             is_valid = False
         for name in self.required:
             if name not in value:
-                report((*path, name), Problem("is missing"))
+                report((*path, name), Problem(MISSING))
                 is_valid = False
         if self.problems is not None:
             right = self.defaults | values

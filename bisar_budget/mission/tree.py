@@ -13,7 +13,7 @@ import yaml
 from yaml import AliasEvent, MappingEndEvent, ScalarEvent
 
 from bisar_budget.faults import Fault, KeyPath, MissionError, Problem, SetValue, file_fault, printable, shown, upwards
-from bisar_budget.mission.readers import INVALID
+from bisar_budget.mission.readers import INVALID, MISSING
 
 MAX_BYTES = 1 << 20  # a mission file has a few kilobytes
 MAX_DEPTH = 20  # containers inside each other; the schema needs 9
@@ -22,7 +22,7 @@ MAX_VALUES = 100_000  # the longest lists that the schema takes come to a third
 MAX_FAULTS = 200  # nobody mends more at once, and each costs a line of every report
 
 _PARSER = yaml.CSafeLoader if yaml.__with_libyaml__ else yaml.SafeLoader
-_NULLS = ("", "~", "null", "Null", "NULL")
+NULLS = ("", "~", "null", "Null", "NULL")
 
 
 def _decoded(data: bytes | str, file: str, what: str) -> str:
@@ -72,6 +72,8 @@ class Tree:
         change = self._change_at(path)
         if change is not None:
             more["option"] = change.option
+            if problem == MISSING and change.text in NULLS:
+                problem = "must not be taken out: it is required"
             self.faults.append(Fault(line=None, column=None, key=_dotted(path), problem=problem, **more))
         else:
             line, column = (mark.line + 1, mark.column + 1) if mark else (1, 1)
@@ -131,7 +133,7 @@ class Tree:
         kind = type(event)
         if kind is ScalarEvent:
             value: Any = event.value
-            if not event.style and value in _NULLS:  # plain: "" from libyaml, None from pure Python
+            if not event.style and value in NULLS:  # plain: "" from libyaml, None from pure Python
                 hint = "Give it one" + ("" if self._change_at(path) else ", or remove the key")
                 self.fault(mark, path, "has no value", hint=hint)
                 value = INVALID
@@ -195,7 +197,7 @@ class Tree:
                 continue
             self.keys[here] = event
             event = next_event()
-            if type(event) is ScalarEvent and event.tag is None and event.value not in _NULLS:
+            if type(event) is ScalarEvent and event.tag is None and event.value not in NULLS:
                 self.values[here] = event  # as `node` would: most values are such
                 mapping[key] = event.value
             else:

@@ -5,11 +5,10 @@ from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, NamedTuple
 
 from bisar_budget import units
-from bisar_budget.faults import KeyPath, Problem
+from bisar_budget.faults import InvalidValueError, KeyPath, Problem, sentences
 from bisar_budget.geometry import Vector
 from bisar_budget.mission.readers import (
     INVALID,
-    SIZE,
     VIBRATION_FREQUENCY,
     CurveReader,
     Key,
@@ -25,8 +24,36 @@ from bisar_budget.mission.readers import (
 )
 from bisar_budget.units import Dimension, given_unit
 
+_OF_SPEED = "A velocity divided by 2πf is a displacement"
+
+
+class _Displacement(Quantity):
+    """A displacement, whose faults say how a vibration known by its velocity or acceleration is written."""
+
+    def __init__(self, of_acceleration: str, also: str = "") -> None:
+        super().__init__(units.LENGTH, ge=0, le=1e9)
+        self.of_acceleration, self.also = of_acceleration, also
+
+    def leaf(self, value: Any) -> float:
+        """Parse and hold to the bounds; a velocity or an acceleration gets a hint of its own."""
+        try:
+            return super().leaf(value)
+        except InvalidValueError as error:
+            from bisar_budget.other_units import is_of
+
+            unit = units.unit_behind(value) if isinstance(value, str) else ""
+            hints = {units.SPEED: _OF_SPEED, units.ACCELERATION: self.of_acceleration}
+            hint = next((hint for dimension, hint in hints.items() if unit and is_of(unit, dimension)), "")
+            problem = error.problem
+            accepted = f"{problem.accepted}{self.also}" if problem.accepted else ""
+            raise InvalidValueError(problem.problem, accepted, sentences(problem.hint, hint)) from None
+
+
 _ACCELERATION_SIZE = Quantity(units.ACCELERATION, ge=0, le=1e6)
-_DISPLACEMENT = either(list, Triple(SIZE), SIZE)
+_AMPLITUDE = _Displacement("Write it in g or m/s^2", "; or its acceleration in g, mg, ug, m/s^2")
+_RMS = _Displacement("Noise of acceleration is a spectrum, in g^2/Hz")
+_DISPLACEMENT = either(list, Triple(_AMPLITUDE), _AMPLITUDE)
+_NOISE = either(list, Triple(_RMS), _RMS)
 _ACCELERATION = either(list, Triple(_ACCELERATION_SIZE), _ACCELERATION_SIZE)
 _ALONG = "along the line of sight; a vector: along each axis"
 
@@ -103,7 +130,7 @@ SINUSOIDS = ListOf(OneOf(_form_of_sinusoid, (_SINUSOID, _ACCELERATED)))
 class Wideband(NamedTuple):
     """Noise-like vibration."""
 
-    rms: Annotated[float | Vector, Key(_DISPLACEMENT, f"Root mean square, {_ALONG}.")]
+    rms: Annotated[float | Vector, Key(_NOISE, f"Root mean square, {_ALONG}.")]
 
 
 class Spectrum(NamedTuple):

@@ -8,15 +8,16 @@ say how far the polynomial is from what the file has.
 import math
 from bisect import bisect_right
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.polynomial import chebyshev, legendre
+from numpy.typing import NDArray
 
 from bisar_budget.geometry import STRAIGHT, PlatformState, Vector
 from bisar_budget.paths.earth import Floats
-from bisar_budget.paths.instant import Instant
+from bisar_budget.paths.instant import DAY, Instant, gps_week
 
 _NODES = 15  # Chebyshev points of an interpolation, so many coefficients
 _LEAST_WINDOW = 10.0  # s; in a shorter one rounding of an Earth-fixed place, 1e-9 m, is an acceleration
@@ -29,6 +30,7 @@ _HIGHEST = 8  # order of a smoothed path
 _FEWEST = 5  # places of a log that give a path
 _ENOUGH = 9  # of them that say what is noise; of a log that has fewer in the aperture, places beside it help
 _WIDEST_GAP = 5  # usual intervals between samples
+_LISTED = 3  # tracks that an error names
 _ROUNDED = 1 + 1e-6  # of an interval whose ends are rounded
 
 
@@ -88,10 +90,21 @@ class Orbit:
 
 
 @dataclass(frozen=True, eq=False)
+class LeftOut:
+    """Records of a log that cannot be used: how many usable ones come before each (m,), and messages that say why."""
+
+    before: NDArray[np.int64]
+    faults: Sequence[str]
+
+
+@dataclass(frozen=True, eq=False)
 class Log:
     """Measured places (n, 3) [m] at rising times (n,) [s], Earth-fixed or in the scene's axes.
 
-    Times count from `start`; without one they are those of the log itself. `words` says what it is, for reports.
+    Times count from `start`; without one they are those of the log itself: from a midnight of UTC where `clock` is
+    "day", from the begin of a GPS week where it is "week". `words` says what the log is, for reports. `left_out` are
+    records that are not among the places. A file of several tracks, of which no key chooses one, has the log of each
+    in `tracks`; the log itself is then that of the first.
     `sigmas` (n, 3) are one-sigma errors east, north, up, where the log states them; NaN at fixes without [m].
     `typical_sigmas` (n,) are those that a fix of the stated quality usually has, on each axis; NaN where the log says
     no quality [m]. `quality_words` names the quality of the fix of an index: "GGA quality 1, autonomous".
@@ -105,6 +118,9 @@ class Log:
     sigmas: Floats | None = None
     typical_sigmas: Floats | None = None
     quality_words: Callable[[int], str] = lambda _: ""
+    clock: str = ""
+    left_out: LeftOut | None = None
+    tracks: tuple["Log", ...] = ()
 
 
 @dataclass(frozen=True)
@@ -284,6 +300,7 @@ def slow_times(
         intervals: medians, in the aperture or of the log. Or the middle is on a clock that the log does not have.
     """
     times, start = log.times, log.start
+    _hold_to_clock(log, center, center_seconds, name)
     if start is not None:
         if center_seconds is not None:
             raise PathFileError(
@@ -297,6 +314,13 @@ def slow_times(
         return start.after(slow + middle).as_text() if start is not None else f"{slow + middle:.12g} s"
 
     slow, half = times - middle, aperture_time_s / 2
+
+    def cause(place: int) -> str:
+        """Why there is no sample before that of a place, where there are records that cannot be used."""
+        if log.left_out is None or place not in log.left_out.before:
+            return ""
+        return f"; {log.left_out.faults[int((log.left_out.before == place).argmax())]}"
+
     # The interval before the aperture and the one behind it lead into it.
     inside = slow[around_aperture(slow, aperture_time_s)]
     steps = np.diff(inside)
@@ -304,17 +328,114 @@ def slow_times(
     usual = min(float(np.median(steps)), float(np.median(np.diff(slow)))) if steps.size else 0.0
     spare = usual * _ROUNDED
     if slow[0] > -half + spare or slow[-1] < half - spare:
+        is_own_clock = start is None and center_seconds is None
         raise PathFileError(
             f"{name}: covers {said(float(slow[0]))} to {said(float(slow[-1]))}, "
-            f"the aperture needs {said(-half)} to {said(half)}"
+            f"the aperture needs {said(-half)} to {said(half)}" + cause(0 if slow[0] > -half + spare else len(slow)),
+            hint="trajectory.center says which time of the log is the middle of the aperture" if is_own_clock else "",
         )
     if steps.size and steps.max() > _WIDEST_GAP * spare:
         at = int(steps.argmax())
         raise PathFileError(
             f"{name}: has a gap of {steps[at]:.4g} s after {said(float(inside[at]))}, in the aperture; "
             f"{usual:.4g} s is usual, at most {_WIDEST_GAP * usual:.4g} s are bridged"
+            + cause(int(np.searchsorted(slow, inside[at], "right")))
         )
     return slow
+
+
+def _hold_to_clock(log: Log, center: Instant | None, center_seconds: float | None, name: str) -> None:
+    """Refuse a middle of the aperture on a clock from which a log without a date, or a week, has no way."""
+    if log.start is not None or center_seconds is not None:
+        return
+    if log.clock == "day":
+        raise PathFileError(
+            f"{name}: has times of day and no date",
+            "accepted: collection.center_time, of which the nearest midnight dates the log",
+            "Sentences RMC or ZDA beside the fixes give the date, too",
+        )
+    if log.clock == "week":
+        week = "2421 and the like" if center is None else f"{gps_week(center)}, the week of collection.center_time"
+        raise PathFileError(
+            f"{name}: counts seconds of a GPS week, {log.times[0]:.12g} s to {log.times[-1]:.12g} s, and"
+            " trajectory.week does not say of which one",
+            f"accepted: trajectory.week: {week}",
+        )
+
+
+def dated(log: Log, center: Instant | None) -> Log:
+    """A log of times of day with the date that puts it nearest to the middle of the aperture; others as they are."""
+    if log.clock != "day" or log.start is not None or center is None:
+        return log
+    middle = float(log.times[len(log.times) // 2])
+    midnight = Instant(center.day + round((center.seconds - middle) / DAY), 0.0)
+    words = f"{log.words}, date by collection.center_time: {midnight.as_text()[:10]}"
+    return replace(log, start=midnight, words=words)
+
+
+def track_around(
+    log: Log, center: Instant | None, center_seconds: float | None, aperture_time_s: float, name: str
+) -> Log:
+    """The log itself, or of several tracks the one that covers the aperture; all else is as in `slow_times`.
+
+    Raises
+    ------
+    PathFileError
+        None or several of the tracks do.
+    """
+    if not log.tracks:
+        return log
+    covering, faults = [], []
+    for track in log.tracks:
+        try:
+            slow_times(track, center, center_seconds, aperture_time_s, name)
+        except PathFileError as fault:
+            faults.append(str(fault))
+        else:
+            covering.append(track)
+    if len(covering) == 1:
+        return covering[0]
+    if covering:
+        listed = "; ".join(track.words for track in covering[:_LISTED]) + "; …" * (len(covering) > _LISTED)
+        raise PathFileError(
+            f"{name}: has {len(covering)} tracks that cover the aperture: {listed}",
+            "accepted: trajectory.track: the name or the number of one",
+        )
+    raise PathFileError(
+        f"{name}: has {len(log.tracks)} tracks, and none covers the aperture; "
+        + "; ".join(fault.removeprefix(f"{name}: ") for fault in faults[:_LISTED])
+        + "; …" * (len(faults) > _LISTED)
+    )
+
+
+def hold_to_usable_records(log: Log, times: Floats, stretch_s: float) -> None:
+    """Refuse a log of which a record that cannot be used lies within the stretch that is fitted.
+
+    Parameters
+    ----------
+    log : Log
+        Its records that are left out lie between usable ones of which one is in the stretch.
+    times : (n,) ndarray
+        Slow times of the log. [s]
+    stretch_s : float
+        Time around the middle of the aperture whose places are used. [s]
+
+    Raises
+    ------
+    PathFileError
+        Names the first such record.
+    """
+    if log.left_out is None:
+        return
+    half = stretch_s / 2 * (1 + 1e-9)
+    edges = np.concatenate([[-np.inf], times, [np.inf]])
+    earlier, later = edges[log.left_out.before], edges[log.left_out.before + 1]
+    is_inside = (earlier <= half) & (later >= -half)
+    if is_inside.any():
+        raise PathFileError(
+            f"{log.left_out.faults[int(is_inside.argmax())]}; the record lies within the {stretch_s:.4g} s around"
+            " mid-aperture that are used"
+        )
 
 
 def _independent(left: Floats) -> float:

@@ -15,7 +15,7 @@ import csv
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import NamedTuple, NoReturn
 
@@ -30,16 +30,17 @@ from bisar_budget.paths.instant import DAY, GPS_EPOCH, SCALES, WEEK, Instant, pa
 from bisar_budget.paths.log_places import (
     NOTHING_SAID,
     LogKeys,
-    LogRows,
+    LogRecords,
     counted,
     from_sea_level,
     hold_to_ellipsoid,
-    hold_to_rise,
     hold_to_scale,
+    is_wgs84,
+    most_left_out,
     needs_separation,
-    scale_words,
+    one_instance,
     unix_instant,
-    utc_of,
+    usable_log,
 )
 
 LARGEST = 200_000_000  # bytes; four hours at 200 Hz
@@ -56,10 +57,12 @@ _DIMENSIONS = {"latitude": units.ANGLE, "longitude": units.ANGLE, "time": units.
 _HEADER = re.compile(r"([^\[\]()]*)(?:\[([^\[\]]*)\])?")
 _QUOTED = re.compile('"').search
 _IN_NUMBERS = b"0123456789+-.eE \t"
-_SECOND = r"[0-5]\d(?:[.,]\d{1,12})?"
-_ZONED = re.compile(_SECOND + r"(?:Z|\+00:00)", re.ASCII).fullmatch
+_SECOND = r"(?:[0-5]\d(?:[.,]\d{1,12})?|60(?:[.,]0{1,12})?)"  # 60.00 is what 59.996 is rounded to
+_ZONED = re.compile(_SECOND + r"(?:Z|\+00:?00)", re.ASCII).fullmatch
 _BARE = re.compile(_SECOND, re.ASCII).fullmatch
-_EITHER = re.compile(_SECOND + r"(?:Z|\+00:00)?", re.ASCII).fullmatch
+_EITHER = re.compile(_SECOND + r"(?:Z|\+00:?00)?", re.ASCII).fullmatch
+_DATUM = re.compile(r"#\W*(?:geodetic )?(?:datum|crs|reference (?:frame|system))\s*[:=]\s*(\S.*)", re.IGNORECASE)
+_LEAST_SEARCHED = 64  # rows that are looked at one by one
 _EXAMPLE = "2026-06-01T05:20:31.250Z"
 _CLOCKS_APART_S = 1.0  # of an exporter's two clocks, beyond the second to which one is written
 
@@ -147,22 +150,38 @@ def read_csv(data: bytes, name: str, keys: LogKeys = NOTHING_SAID) -> Log:
     """
     lines = _dataflash_as_csv(_text(data, name).split("\n"))
     header = _header(lines, name, keys)
-    table, left_out = _with_fix(_all_rows(lines, header, name), header, name)
-    rows = LogRows(name, table.lines)
-    times, start, clock_words = _times(table, header, rows)
-    in_utc = None if start is None else utc_of(start, header.scale)
-    hold_to_rise(times, rows, in_utc)
-    places = _places(table, header, rows, keys)
-    span = times[-1] - times[0]
+    _hold_to_datum(lines[: header.line], name)
+    found = _all_rows(lines, header, name)
+    table, without_fix = _with_fix(found.table, header, keys, name)
+    records = LogRecords(name, len(table.lines), table.lines, found.broken)
+    times, start, clock_words = _times(table, header, records)
+    places = _places(table, header, records, keys)
     words = header.vendor.words if header.vendor else f"CSV of {', '.join(header.axes)}"
-    words += f", {counted(len(times))} over {span:.6g} s{clock_words}"
-    words += "" if in_utc is None else scale_words(in_utc, header.scale)
-    words += f", {counted(left_out, 'row')} without a fix left out" if left_out else ""
-    return Log(times, places, header.axes != _KINDS[2], words, in_utc)
+    words += "" if keys.instance is None else f", instance {keys.instance}"
+    is_earth_fixed = header.axes != _KINDS[2]
+    log = usable_log(
+        records,
+        words,
+        times,
+        start,
+        header.scale,
+        lambda kept: _earth_fixed(places[:, kept], header),
+        clock_words=clock_words,
+        is_earth_fixed=is_earth_fixed,
+    )
+    without_fix += found.empty
+    said = f", {counted(without_fix, 'row')} without a fix left out" if without_fix else ""
+    return replace(log, words=log.words + said)
 
 
-def _with_fix(table: _Table, header: _Header, name: str) -> tuple[_Table, int]:
-    """The rows of an exporter that have a place, of the receiver with most of them; and how many have none."""
+def _with_fix(table: _Table, header: _Header, keys: LogKeys, name: str) -> tuple[_Table, int]:
+    """The rows of an exporter that have a place, of the receiver that is chosen; and how many have none.
+
+    Rows of several receivers are refused where the mission file does not choose one of them.
+    """
+    receiver = header.place("receiver")
+    if keys.instance is not None and receiver is None:
+        raise PathFileError(f"{name}: has no column that numbers receivers", key="instance")
     if header.vendor is None:
         return table, 0
     numbers = table.numbers
@@ -176,14 +195,25 @@ def _with_fix(table: _Table, header: _Header, name: str) -> tuple[_Table, int]:
     if not has_place.any():
         raise PathFileError(f"{name}: has no row with a fix")
     is_kept = has_place
-    receiver = header.place("receiver")
     if receiver is not None:
-        found, counts = np.unique(numbers[has_place, receiver], return_counts=True)
-        is_kept = has_place & (numbers[:, receiver] == found[counts.argmax()])
+        instances, counts = np.unique(numbers[has_place, receiver], return_counts=True)
+        chosen = one_instance(dict(zip(instances.tolist(), counts.tolist(), strict=True)), keys, name)
+        is_kept = has_place & (numbers[:, receiver] == chosen)
     return _Table(*(column[is_kept] for column in table)), int((~has_place).sum())
 
 
-def _times(table: _Table, header: _Header, rows: LogRows) -> tuple[Floats, Instant | None, str]:
+def _hold_to_datum(lines: Sequence[str], name: str) -> None:
+    """Refuse places of another datum than WGS-84, which a comment before the header says."""
+    for number, line in enumerate(lines, 1):
+        match = _DATUM.match(line.strip())
+        if match is not None and not is_wgs84(match[1]):
+            raise PathFileError(
+                f"{name}:{number}: has places of the datum {shown(match[1])}",
+                "accepted: WGS-84 or ITRF",
+            )
+
+
+def _times(table: _Table, header: _Header, records: LogRecords) -> tuple[Floats, Instant | None, str]:
     """Times [s], day and seconds of the scale from which they count, and how well that is known."""
     own = header.place("time")
     counted_s = np.zeros(len(table.lines))
@@ -191,33 +221,35 @@ def _times(table: _Table, header: _Header, rows: LogRows) -> tuple[Floats, Insta
         column, raw = header.numbers[own], table.numbers[:, own]
         with np.errstate(over="ignore"):
             counted_s = raw * column.scale
-        rows.refuse(
+        records.leave_out(
             np.abs(counted_s) > _LATEST_S, lambda i: f"time {raw[i]:.10g} {column.unit} is beyond {_LATEST_S:g} s"
         )
     unix, week = header.place("unix"), header.place("week")
     if unix is not None:
         raw = table.numbers[:, unix]
         scale = header.numbers[unix].scale
-        rows.refuse(raw * scale > _LATEST_S, lambda i: f"time {raw[i]:.10g} us is beyond {_LATEST_S:g} s")
-        return (raw - raw[0]) * scale, unix_instant(int(raw[0])), ""
+        records.leave_out(raw * scale > _LATEST_S, lambda i: f"time {raw[i]:.10g} us is beyond {_LATEST_S:g} s")
+        first = raw[records.first]
+        return (raw - first) * scale, unix_instant(int(first)), ""
     if week is not None:
         weeks = table.numbers[:, week]
-        rows.refuse(
+        records.leave_out(
             (weeks % 1 != 0) | (weeks < 0) | (weeks > 9999),
             lambda i: f"GPS week must be a whole number from 0 to 9999 (got {weeks[i]:g})",
         )
-        start = Instant(GPS_EPOCH + 7 * int(weeks[0]), 0.0).after(float(counted_s[0]))
-        return (weeks - weeks[0]) * WEEK + (counted_s - counted_s[0]), start, ""
+        first = records.first
+        start = Instant(GPS_EPOCH + 7 * int(weeks[first]), 0.0).after(float(counted_s[first]))
+        return (weeks - weeks[first]) * WEEK + (counted_s - counted_s[first]), start, ""
     if header.stamp is None:
         return counted_s, None, ""
     minutes, seconds = table.minutes, table.seconds
     if own is not None:
-        return _by_two_clocks(counted_s, minutes + seconds, rows)
+        return _by_two_clocks(counted_s, minutes + seconds, records)
     start = Instant(0, 0.0).after(float(minutes[0])).after(float(seconds[0]))
     return (minutes - minutes[0]) + (seconds - seconds[0]), start, ""
 
 
-def _by_two_clocks(counted_s: Floats, instants: Floats, rows: LogRows) -> tuple[Floats, Instant, str]:
+def _by_two_clocks(counted_s: Floats, instants: Floats, records: LogRecords) -> tuple[Floats, Instant, str]:
     """Times of a clock that counts fractions, in UTC by another that writes whole seconds.
 
     An instant is cut to its second: the start is at or behind every instant less its time, and less than a second
@@ -225,20 +257,21 @@ def _by_two_clocks(counted_s: Floats, instants: Floats, rows: LogRows) -> tuple[
     """
     is_said = np.isfinite(instants)
     if not is_said.any():
-        raise PathFileError(f"{rows.name}: has no instant of UTC")
+        raise PathFileError(f"{records.name}: has no instant of UTC")
     behind = (instants - counted_s)[is_said]
     earliest, latest = float(behind.max()), float(behind.min()) + 1.0
     if earliest - latest > _CLOCKS_APART_S:
         raise PathFileError(
-            f"{rows.name}: its clocks, time(millisecond) and datetime(utc), drift apart by {earliest - latest:.3g} s",
+            f"{records.name}: its clocks, time(millisecond) and datetime(utc), drift apart by "
+            f"{earliest - latest:.3g} s",
             "accepted: the log of one flight",
         )
     start = Instant(0, 0.0).after((earliest + latest) / 2 + float(counted_s[0]))
     return counted_s - counted_s[0], start, f", UTC to {abs(latest - earliest) / 2:.2g} s by whole seconds"
 
 
-def _places(table: _Table, header: _Header, rows: LogRows, keys: LogKeys) -> Floats:
-    """Places (n, 3), Earth-fixed or of the scene. [m]"""
+def _places(table: _Table, header: _Header, records: LogRecords, keys: LogKeys) -> Floats:
+    """Coordinates (3, n) of the header's axes, a height above the ellipsoid; those that cannot be are left out."""
     kind = header.axes
     is_geodetic = kind == _GEODETIC
     is_above_sea = is_geodetic and "height" not in header.names
@@ -251,7 +284,7 @@ def _places(table: _Table, header: _Header, rows: LogRows, keys: LogKeys) -> Flo
             values = raw * column.scale
         limit = {"latitude": _RIGHT_ANGLE, "longitude": 2 * math.pi * (1 + 1e-12)}.get(axis, _FARTHEST_M)
         at_most = {"latitude": "90 deg", "longitude": "360 deg"}.get(axis, f"{_FARTHEST_M:g} m")
-        rows.refuse(
+        records.leave_out(
             np.abs(values) > limit,
             lambda i, raw=raw, column=column, at_most=at_most: (  # type: ignore[misc]
                 f"{column.name} {raw[i]:.10g} {column.unit} is beyond {at_most}"
@@ -260,7 +293,7 @@ def _places(table: _Table, header: _Header, rows: LogRows, keys: LogKeys) -> Flo
         found.append(values)
     if not is_above_sea:
         hold_to_ellipsoid(
-            keys, rows.name, "has heights above the ellipsoid" if is_geodetic else f"has {', '.join(kind)}"
+            keys, records.name, "has heights above the ellipsoid" if is_geodetic else f"has {', '.join(kind)}"
         )
     else:
         at_separation = header.place("geoid_separation")
@@ -268,23 +301,25 @@ def _places(table: _Table, header: _Header, rows: LogRows, keys: LogKeys) -> Flo
         if at_separation is not None:
             column, raw = header.numbers[at_separation], table.numbers[:, at_separation]
             separations = raw * column.scale
-            rows.refuse(
+            records.leave_out(
                 np.abs(separations) > 200, lambda i: f"geoid_separation {raw[i]:.10g} {column.unit} is beyond 200 m"
             )
-        found[2] = from_sea_level(found[2], separations, keys, rows.name)
-    if is_geodetic:
-        return earth_fixed_places(*found)
-    places: Floats = np.stack(found, axis=1)
+        found[2] = from_sea_level(found[2], separations, keys, records.name)
     if kind == _KINDS[1]:
-        radius = np.sqrt((places**2).sum(axis=1))
-        rows.refuse(
+        radius = np.sqrt(sum(axis**2 for axis in found))
+        records.leave_out(
             radius < _DEEPEST_M,
             lambda i: (
                 f"x, y, z are {radius[i] / 1e3:.4g} km from the Earth's centre; Earth-fixed coordinates are wanted, "
                 "places of the scene are named east, north, up"
             ),
         )
-    return places
+    return np.array(found)
+
+
+def _earth_fixed(coordinates: Floats, header: _Header) -> Floats:
+    """Places (n, 3) from coordinates (3, n): Earth-fixed, or those of the scene. [m]"""
+    return earth_fixed_places(*coordinates) if header.axes == _GEODETIC else np.ascontiguousarray(coordinates.T)
 
 
 def _text(data: bytes, name: str) -> str:
@@ -439,43 +474,70 @@ def _measured(name: str, index: int, unit: str | None, refuse: Callable[[str], N
         refuse(fault_words(f"{name} {error.problem.problem}", "", f"write '{example}'", error.problem.hint))
 
 
-def _all_rows(lines: list[str], header: _Header, name: str) -> _Table:
+@dataclass(eq=False)
+class _Rows:
+    """Rows that are read, messages about those that cannot be by their lines, and how many an exporter left empty."""
+
+    tables: list[_Table]
+    broken: dict[int, str]
+    most_broken: int
+    empty: int = 0
+
+    @property
+    def table(self) -> _Table:
+        """All rows."""
+        return _Table(*(np.concatenate(columns) for columns in zip(*self.tables, strict=True)))
+
+
+def _all_rows(lines: list[str], header: _Header, name: str) -> _Rows:
     """Every row behind the header; a chunk of lines at a time, which is fast and needs little memory."""
-    parts = []
+    nothing = np.zeros(0)
+    empty = _Table(np.zeros(0, dtype=np.int64), np.zeros((0, len(header.numbers))), nothing, nothing)
+    rows = _Rows([empty], {}, most_left_out(len(lines) - header.line))
+    is_any = False
     for first in range(header.line, len(lines), _CHUNK):
         chunk = lines[first : first + _CHUNK]
         kept = [n for n, line in enumerate(chunk) if line[:1] > "#" or _is_said(line)]  # numbers begin behind #
         if kept:
-            parts.append(_rows([chunk[n] for n in kept], np.array(kept) + first + 1, header, name))
-    if not parts:
+            is_any = True
+            _read_rows([chunk[n] for n in kept], np.array(kept) + first + 1, header, name, rows)
+    if not is_any:
         raise PathFileError(f"{name}:{header.line}: has a header and no places")
-    return _Table(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+    return rows
 
 
-def _rows(texts: list[str], lines: NDArray[np.int64], header: _Header, name: str) -> _Table:
-    """Numbers of some rows at once; where that fails, look for the cell that is none."""
+def _read_rows(texts: list[str], lines: NDArray[np.int64], header: _Header, name: str, rows: _Rows) -> None:
+    """Read some rows at once; where that fails, halve them until the rows that are none are found."""
     read = _plain_cells(texts, header) or _quoted_cells(texts, header)
     if read is not None and np.isfinite(read[0]).all():
         numbers, stamps = read
-        if stamps is None:
-            nothing = np.zeros(len(lines))
-            return _Table(lines, numbers, nothing, nothing)
-        instants = _instants(stamps, header)
+        instants = (np.zeros(len(lines)),) * 2 if stamps is None else _instants(stamps, header)
         if instants is not None:
-            return _Table(lines, numbers, *instants)
-    if header.vendor is not None:  # rows before the first fix have empty cells
-        is_whole = [_is_whole(text, header) for text in texts]
-        if not all(is_whole):
-            kept = [n for n, whole in enumerate(is_whole) if whole]
-            if not kept:
-                nothing = np.zeros(0)
-                return _Table(lines[:0], np.zeros((0, len(header.numbers))), nothing, nothing)
-            return _rows([texts[n] for n in kept], lines[kept], header, name)
-    for text, line in zip(texts, lines, strict=True):
-        says = _row_fault(text, header)
-        if says:
-            raise PathFileError(f"{name}:{line}: {says}")
-    raise AssertionError("a row that has no fault was refused")
+            rows.tables.append(_Table(lines, numbers, *instants))
+            return
+    if len(texts) > _LEAST_SEARCHED:
+        half = len(texts) // 2
+        _read_rows(texts[:half], lines[:half], header, name, rows)
+        _read_rows(texts[half:], lines[half:], header, name, rows)
+        return
+    is_sound = []
+    for text, line in zip(texts, lines.tolist(), strict=True):
+        is_empty = header.vendor is not None and not _is_whole(text, header)  # before the first fix
+        fault = None if is_empty else _row_fault(text, header)
+        rows.empty += is_empty
+        if fault is not None:
+            rows.broken[line] = f"{name}:{line}: {fault}"
+            if len(rows.broken) > rows.most_broken:
+                raise PathFileError(
+                    rows.broken[min(rows.broken)]
+                    + ("; more than 1 % of the rows cannot be used" if len(rows.broken) > 1 else "")
+                )
+        is_sound.append(not is_empty and fault is None)
+    sound = [n for n, is_good in enumerate(is_sound) if is_good]
+    if len(sound) == len(texts):
+        raise AssertionError("a row that has no fault was refused")
+    if sound:
+        _read_rows([texts[n] for n in sound], lines[sound], header, name, rows)
 
 
 def _is_whole(text: str, header: _Header) -> bool:
@@ -530,7 +592,7 @@ def _instants(texts: list[str], header: _Header) -> tuple[Floats, Floats] | None
         header.zone(text) if said else True for text, said in zip(seconds, is_said, strict=True)
     ):
         return None
-    numbers = [text.replace("Z", "").replace("+00:00", "").replace(",", ".") for text in seconds]
+    numbers = [text.replace("Z", "").partition("+")[0].replace(",", ".") for text in seconds]
     return np.array(minutes, dtype=float), np.array(numbers, dtype=float)
 
 

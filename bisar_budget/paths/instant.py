@@ -11,6 +11,7 @@ WEEK = 604800.0  # s
 GPS_EPOCH = 44244  # MJD of 1980-01-06
 UNIX_EPOCH = 40587  # MJD of 1970-01-01
 _MJD_OF_ORDINAL = 678576  # date.toordinal() less the modified Julian day
+_ROUNDED = re.compile(r"(.*:)60((?:[.,]0{1,12})?(?:Z|[+-]\d\d:?\d\d)?)", re.ASCII)
 _FORM = re.compile(r"(\d{4})-(\d\d)-(\d\d)[T ](\d\d):(\d\d):(\d\d)(?:[.,](\d{1,12}))?(Z|\+00:00)?", re.ASCII)
 
 
@@ -65,6 +66,18 @@ def parse_instant(text: str, *, needs_zone: bool = True) -> Instant | None:
     return Instant(ordinal - _MJD_OF_ORDINAL, hour * 3600 + minute * 60 + second + float(f"0.{match[7] or 0}"))
 
 
+def parse_stamp(text: str, *, needs_zone: bool = True) -> Instant | None:
+    """Read the stamp of a record as `parse_instant` does.
+
+    Receivers round 59.996 s to 60.00 s: the second 60 is the first of the next minute.
+    """
+    rounded = _ROUNDED.fullmatch(text.strip())
+    if rounded is None:
+        return parse_instant(text, needs_zone=needs_zone)
+    instant = parse_instant(f"{rounded[1]}59{rounded[2]}", needs_zone=needs_zone)
+    return None if instant is None else instant.after(1.0)
+
+
 # ---------------------------------------------------------------------- other time systems
 # TAI - UTC: table of the Earth orientation centre of the IERS, Bulletin C 52 (2016-07-06) and before. No leap second
 # came after that of 2016-12-31; one that is announced later needs a line here.
@@ -89,6 +102,11 @@ def tai_less_utc(day: int) -> int:
 def has_leap_second(day: int) -> bool:
     """Whether a day of UTC has a second 23:59:60."""
     return day + 1 in _DAYS[1:]
+
+
+def gps_week(instant: Instant) -> int:
+    """Week of GPS at an instant of UTC, not rolled over."""
+    return (tai(instant).after(-TAI_LESS["GPS"]).day - GPS_EPOCH) // 7
 
 
 def tai(instant: Instant) -> Instant:

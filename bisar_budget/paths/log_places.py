@@ -1,57 +1,225 @@
 """Places of a flight, whatever log has them: scale, heights, times that rise, a motion that can be flown."""
 
-from collections.abc import Callable
+import re
+from bisect import bisect_left
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget.paths.earth import Floats, earth_fixed_places
-from bisar_budget.paths.flight import Log, PathFileError
+from bisar_budget.paths.flight import LeftOut, Log, PathFileError
 from bisar_budget.paths.instant import SCALES, TAI_LESS, UNIX_EPOCH, Instant, tai_less_utc, utc
 from bisar_budget.units import format_quantity
 
+# Realisations of both agree to some centimetres, those of WGS-84 from G730 on. EPSG: 4326 and 4979 are WGS-84.
+_WGS84 = re.compile(
+    r"WGS[-_ /]?(?:19)?84(?:[ (]+G\d+\)?)?|W84|(?:ITRF|IGS|IGb)[- ]?\d*|EPSG:+(?:4326|4979)", re.ASCII | re.IGNORECASE
+)
 _LEAPS_KNOWN = 61587  # MJD, 2027-07-01: Bulletin C 72 has no leap second before
+_CUT_SHARE = 1.5  # fixes with the same stamp, from which on a recorder is said to have cut fractions of seconds
+_WHOLE_S = 1e-6
 _LOWEST_M, _HIGHEST_M = -12e3, 100e3  # of what flies; below is the deepest trench
 
 
 class LogKeys(NamedTuple):
     """Keys of a mission file about a log.
 
-    The GPS week in which it begins, the scale of its times, and the height of the geoid above the ellipsoid [m].
+    The GPS week in which it begins, the scale of its times, and the height of the geoid above the ellipsoid [m]. Of a
+    file with several logs: the talker of NMEA, the track of GPX by name or number, the instance of a receiver.
     """
 
     week: int | None = None
     time_scale: str | None = None
     geoid_separation: float | None = None
+    talker: str | None = None
+    track: str | None = None
+    instance: int | None = None
 
 
 NOTHING_SAID = LogKeys()
 
 
-class LogRows(NamedTuple):
-    """Names of a log's places in messages: by the line of the file, or by the number of the record."""
+_SHARE = 100  # one record of so many may be one that cannot be used
+_SHORTEST = 20  # records, of which one may be left out
+_LISTED = 3  # records that the words of a log name
+_NOTHING_BROKEN: Mapping[int, str] = MappingProxyType({})
 
-    name: str
-    lines: NDArray[np.int64] | None = None
+
+def most_left_out(count: int) -> int:
+    """How many of a log's records may be left out: 1 % of them, and one of a short log, from 20 records on."""
+    return max(count // _SHARE, int(count >= _SHORTEST))
+
+
+class LogRecords:
+    """Records of a log that have a fix: how messages name them, and which of them cannot be used.
+
+    Parameters
+    ----------
+    name : str
+        What messages call the file.
+    count : int
+        How many records are read.
+    lines : (count,) array_like, optional
+        Their lines in the file, rising; omitted: they are numbered from 1.
+    broken : mapping, optional
+        Messages that say why further records cannot be read, by their lines or numbers.
+    lost : int
+        How many more were damaged on the way, and are nowhere.
+
+    Raises
+    ------
+    PathFileError
+        More than 1 % of the records cannot be used, and more than one of 20 to 200 records; or none can. Methods that
+        leave records out raise it, too.
+    """
+
+    def __init__(
+        self, name: str, count: int, lines: Any = None, broken: Mapping[int, str] = _NOTHING_BROKEN, lost: int = 0
+    ) -> None:
+        self.name, self._is_in_lines = name, lines is not None
+        self._numbers: NDArray[np.int64] = np.arange(1, count + 1) if lines is None else np.asarray(lines)
+        self._faults: dict[int, str] = {}
+        self._lost, self._total = lost, count + len(broken) + lost
+        self.is_usable: NDArray[np.bool_] = np.ones(count, dtype=bool)
+        if broken:
+            self._add(broken, len(broken))
+        elif lost > most_left_out(self._total):
+            raise PathFileError(f"{name}: {lost} of {self._total} records are damaged, at most 1 % may be")
+        if not count:
+            raise PathFileError(f"{name}: has no place")
+
+    @property
+    def first(self) -> int:
+        """Index of the first record that can be used."""
+        return int(self.is_usable.argmax())
 
     def where(self, index: int) -> str:
-        """The beginning of a message about a place."""
-        separator = ": record " if self.lines is None else ":"
-        return f"{self.name}{separator}{self._number(index)}"
+        """The beginning of a message about a record."""
+        return f"{self.name}{':' if self._is_in_lines else ': record '}{self._numbers[index]}"
 
     def words(self, index: int) -> str:
-        """The place in a sentence."""
-        return f"{'record' if self.lines is None else 'line'} {self._number(index)}"
+        """The record in a sentence."""
+        return f"{'line' if self._is_in_lines else 'record'} {self._numbers[index]}"
 
-    def refuse(self, bad: Any, says: Callable[[int], str]) -> None:
-        """Refuse the first place that is `bad` (n,), and say why by its index."""
-        if bad.any():
-            index = int(bad.argmax())
-            raise PathFileError(f"{self.where(index)}: {says(index)}")
+    def leave_out(self, bad: Any, says: Callable[[int], str]) -> None:
+        """Leave out records that are `bad` (count,); `says` gives the reason by their index."""
+        indices = np.flatnonzero(bad & self.is_usable)
+        if indices.size:
+            self.is_usable[indices] = False
+            few = indices[: most_left_out(self._total) + 1].tolist()
+            self._add(
+                {int(self._numbers[index]): f"{self.where(index)}: {says(index)}" for index in few}, len(indices)
+            )
 
-    def _number(self, index: int) -> int:
-        return index + 1 if self.lines is None else int(self.lines[index])
+    def keep_what_rises(self, times: Floats, start: Instant | None) -> None:
+        """Leave out records whose times (count,) are not between those around them; they count from `start`. [s]"""
+        indices = np.flatnonzero(self.is_usable)
+        at = times[indices]
+        steps = np.diff(at)
+        if (steps > 0).all():
+            return
+        late = np.flatnonzero(~(steps > 0)) + 1
+
+        def said(place: int) -> str:
+            return start.after(float(at[place])).as_text() if start else f"{at[place]:.12g} s"
+
+        def not_after(place: int) -> str:
+            before = place - 1
+            while before and is_out[before]:
+                before -= 1
+            if at[place] > at[before]:
+                behind = place + int(np.argmax(~is_out[place:] & (at[place:] <= at[place])))
+                return (
+                    f"time {said(place)} is not before {said(behind)} of {self.words(int(indices[behind]))}; "
+                    "times must rise"
+                )
+            return (
+                f"time {said(place)} is not after {said(before)} of {self.words(int(indices[before]))}; "
+                f"times must rise{cut}"
+            )
+
+        cut = _whole_seconds(at, start)
+        is_out = np.zeros(len(at), dtype=bool)
+        if len(late) > 2 * most_left_out(self._total):  # each record that is left out mends two steps at most
+            is_out[late] = True
+        else:
+            is_out = ~_longest_rise(at)
+        bad = np.zeros(len(times), dtype=bool)
+        bad[indices[is_out]] = True
+        places = {int(index): place for place, index in enumerate(indices.tolist()) if is_out[place]}
+        self.leave_out(bad, lambda index: not_after(places[index]))
+
+    def left_out(self) -> LeftOut | None:
+        """The records that are left out; None where all are used."""
+        if not self._faults:
+            return None
+        numbers = sorted(self._faults)
+        before = np.searchsorted(self._numbers[self.is_usable], numbers)
+        return LeftOut(before, tuple(self._faults[number] for number in numbers))
+
+    def left_out_words(self) -> str:
+        """How many records are left out, and which, for reports; empty where all are used."""
+        if not self._faults:
+            return ""
+        numbers = sorted(self._faults)
+        noun = ("line" if self._is_in_lines else "record") + "s" * (len(numbers) > 1)
+        listed = ", ".join(map(str, numbers[:_LISTED])) + ", …" * (len(numbers) > _LISTED)
+        return f", {counted(len(numbers), 'record')} that cannot be used left out ({noun} {listed})"
+
+    def _add(self, faults: Mapping[int, str], count: int) -> None:
+        """Add records that are left out; refuse the log where they become too many."""
+        self._faults |= faults
+        bad = len(self._faults) - len(faults) + count + self._lost
+        if bad > most_left_out(self._total) or bad >= self._total:
+            says = self._faults[min(self._faults)]
+            if 1 < bad < self._total:
+                says += f"; {bad} of {self._total} records cannot be used, at most 1 % may be left out"
+            raise PathFileError(says)
+
+
+def _longest_rise(times: Floats) -> NDArray[np.bool_]:
+    """Which of times (n,) are in the longest selection of them that rises; of equal ones it has the first."""
+    rises = np.ones(len(times), dtype=bool)
+    highest = np.maximum.accumulate(times)
+    lowest = np.minimum.accumulate(times[::-1])[::-1]
+    is_settled = np.ones(len(times), dtype=bool)
+    is_settled[1:] &= times[1:] > highest[:-1]
+    is_settled[:-1] &= times[:-1] < lowest[1:]
+    # Between settled times, which are after all before them and before all behind, each disorder is one of its own.
+    places = np.flatnonzero(~is_settled)
+    for disorder in np.split(places, np.flatnonzero(np.diff(places) > 1) + 1):
+        rises[disorder] = False
+        ends: list[float] = []  # least last times of selections, by their lengths
+        last: list[int] = []
+        earlier = [-1] * len(disorder)
+        for place, time in enumerate(times[disorder].tolist()):
+            length = bisect_left(ends, time)
+            earlier[place] = last[length - 1] if length else -1
+            if length == len(ends):
+                ends.append(time)
+                last.append(place)
+            elif time < ends[length]:
+                ends[length], last[length] = time, place
+        place = last[-1]
+        while place >= 0:
+            rises[disorder[place]] = True
+            place = earlier[place]
+    return rises
+
+
+def _whole_seconds(times: Floats, start: Instant | None) -> str:
+    """Why times that repeat do so, where a recorder has cut the fractions of seconds off all of them."""
+    seconds = times + (start.seconds if start else 0.0)
+    in_each = len(times) / max(len(np.unique(times)), 1)
+    if len(times) < _SHORTEST or in_each < _CUT_SHARE or not (np.abs(seconds - np.round(seconds)) < _WHOLE_S).all():
+        return ""
+    return (
+        f"; all stamps are whole seconds, and {in_each:.0f} fixes have the same: the recorder has cut the fractions "
+        "of seconds"
+    )
 
 
 def hold_to_scale(own: str, keys: LogKeys, name: str) -> None:
@@ -63,6 +231,28 @@ def hold_to_scale(own: str, keys: LogKeys, name: str) -> None:
             "Leave trajectory.time_scale out: the log says it",
             key="time_scale",
         )
+
+
+def one_instance(counts: Mapping[float, int], keys: LogKeys, name: str) -> float:
+    """The instance of a receiver that is read, of those with fixes: the only one, or that of the mission file.
+
+    `counts` has fixes of each. A `PathFileError` says that the chosen one has none, or that there are several.
+    """
+    listed = ", ".join(f"{instance:g} with {count}" for instance, count in sorted(counts.items()))
+    if keys.instance is not None and keys.instance not in counts:
+        raise PathFileError(f"{name}: has no fix of the instance {keys.instance}; it has {listed}", key="instance")
+    if keys.instance is None and len(counts) > 1:
+        raise PathFileError(
+            f"{name}: has fixes of {len(counts)} receivers: of the instances {listed}",
+            "accepted: one receiver",
+            f"trajectory.instance: {max(counts, key=counts.__getitem__):g} chooses one",
+        )
+    return next(iter(counts)) if keys.instance is None else float(keys.instance)
+
+
+def is_wgs84(datum: str) -> bool:
+    """Whether the name of a datum, or of a reference system, is that of WGS-84 or of a frame of the ITRF."""
+    return _WGS84.fullmatch(datum.strip()) is not None
 
 
 def utc_of(instant: Instant, scale: str) -> Instant:
@@ -83,18 +273,6 @@ def scale_words(start: Instant, scale: str) -> str:
     system = scale.upper()
     doubt = " if there was no leap second since" if start.day >= _LEAPS_KNOWN else ""
     return f", UTC is {system} less {tai_less_utc(start.day) - TAI_LESS[system]:g} s{doubt}"
-
-
-def hold_to_rise(times: Floats, rows: LogRows, start: Instant | None) -> None:
-    """Refuse times that do not rise; they count from `start`, or from anywhere. [s]"""
-
-    def said(index: int) -> str:
-        return start.after(times[index]).as_text() if start else f"{times[index]:.12g} s"
-
-    rows.refuse(
-        np.concatenate([[False], np.diff(times) <= 0]),
-        lambda i: f"time {said(i)} is not after {said(i - 1)} of {rows.words(i - 1)}; times must rise",
-    )
 
 
 def hold_to_ellipsoid(keys: LogKeys, name: str, own: str = "has heights above the ellipsoid") -> None:
@@ -132,7 +310,7 @@ def needs_separation(problem: str) -> PathFileError:
 
 
 def geodetic_log(
-    rows: LogRows,
+    records: LogRecords,
     words: str,
     times: Floats,
     start: Instant | None,
@@ -142,34 +320,75 @@ def geodetic_log(
 ) -> Log:
     """A log from geodetic places: latitude, longitude [rad] and height above the ellipsoid [m], (n,) each.
 
-    Times (n,) count from `start`, day and seconds of the first place in a scale of `SCALES`, or from anywhere [s].
-    `sigmas` (n, 3) are one-sigma errors east, north, up [m]. A `PathFileError` says that there is no place, that one
-    cannot be, or that times do not rise.
+    Times (n,) count from `start`, day and seconds in a scale of `SCALES`, or from anywhere [s]. `sigmas` (n, 3) are
+    one-sigma errors east, north, up [m]. Records with a place that cannot be, or a time that does not rise, are left
+    out; a `PathFileError` says that they are too many.
     """
     latitude, longitude, height = places
-    if not times.size:
-        raise PathFileError(f"{rows.name}: has no place")
     for name, values, most, says in (
         ("latitude", latitude, 90.0, "90 deg"),
         ("longitude", longitude, 360.0, "360 deg"),
     ):
         degrees = np.degrees(values)
-        rows.refuse(
+        records.leave_out(
             ~(np.abs(degrees) <= most * (1 + 1e-12)),
             lambda i, name=name, degrees=degrees, says=says: (  # type: ignore[misc]
                 f"{name} {degrees[i]:.10g} deg is beyond {says}"
             ),
         )
-    rows.refuse(
+    records.leave_out(
         ~((height >= _LOWEST_M) & (height <= _HIGHEST_M)),
         lambda i: f"height {height[i]:.10g} m is beyond {_LOWEST_M / 1e3:g} … {_HIGHEST_M / 1e3:g} km",
     )
-    in_utc = None if start is None else utc_of(start, scale)
-    hold_to_rise(times, rows, in_utc)
-    words += f", {counted(len(times))} over {times[-1] - times[0]:.6g} s"
-    if in_utc is not None:
-        words += scale_words(in_utc, scale)
-    return Log(times, earth_fixed_places(latitude, longitude, height), True, words, in_utc, sigmas)
+    return usable_log(
+        records,
+        words,
+        times,
+        start,
+        scale,
+        lambda kept: earth_fixed_places(latitude[kept], longitude[kept], height[kept]),
+        sigmas=sigmas,
+    )
+
+
+def usable_log(
+    records: LogRecords,
+    words: str,
+    times: Floats,
+    start: Instant | None,
+    scale: str,
+    places: Callable[[NDArray[np.bool_]], Floats],
+    *,
+    clock_words: str = "",
+    is_earth_fixed: bool = True,
+    sigmas: Floats | None = None,
+) -> Log:
+    """The log of the records that can be used, whose times rise.
+
+    `places` gives those of records that are kept (n,), `clock_words` says how well times are known. All else is as in
+    `geodetic_log`.
+    """
+    start_utc = None if start is None else utc_of(start, scale)
+    records.keep_what_rises(times, start_utc)
+    kept = records.is_usable
+    times = times[kept]
+    if start is not None and times[0]:
+        # The scale is that of the first record that can be used.
+        start, times = start.after(float(times[0])), times - times[0]
+        start_utc = utc_of(start, scale)
+    words += f", {counted(len(times))} over {times[-1] - times[0]:.6g} s{clock_words}"
+    if start_utc is not None:
+        words += scale_words(start_utc, scale)
+    words += records.left_out_words()
+    return Log(
+        times,
+        places(kept),
+        is_earth_fixed,
+        words,
+        start_utc,
+        None if sigmas is None else sigmas[kept],
+        left_out=records.left_out(),
+    )
 
 
 def counted(number: int, noun: str = "place") -> str:

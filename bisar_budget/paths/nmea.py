@@ -5,19 +5,20 @@
     $GNGST,052001.25,0.012,0.011,0.008,45.0,0.010,0.008,0.020*7C
 
 A height of a sentence is above mean sea level, and the geoid separation beside it makes one above the ellipsoid.
-Sentences may come from several talkers, and stand among other lines or behind something on their line. One whose
-checksum is wrong or missing is left out, and counted. GST states one-sigma errors of latitude, longitude and height.
+Sentences may stand among other lines or behind something on their line. Fixes are those of one talker. A sentence
+whose checksum is wrong or missing is left out, and counted. GST states one-sigma errors of latitude, longitude and
+height. DTM states a datum, which has to be W84. Without a date, fixes have times of day.
 
 Source: NMEA 0183 4.10 as RTKLIB 2.4.3 reads it (src/solution.c, decode_nmeagga, decode_nmearmc, decode_nmeazda: a
-time of day is within half a day of the date before it). The fields of GNS are those of pynmea2, which parses them.
+time of day is within half a day of the date before it). The fields of GNS, GST and DTM are those of pynmea2, which
+parses them.
 """
 
 import math
 import re
-from bisect import bisect_right
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import NamedTuple, NoReturn
 
 import numpy as np
@@ -27,16 +28,19 @@ from bisar_budget.faults import shown
 from bisar_budget.paths.earth import Floats
 from bisar_budget.paths.flight import Log, PathFileError, hold_to_bytes
 from bisar_budget.paths.instant import DAY, Instant, parse_instant
-from bisar_budget.paths.log_places import LogKeys, LogRows, counted, from_sea_level, geodetic_log, hold_to_scale
+from bisar_budget.paths.log_places import LogKeys, LogRecords, counted, from_sea_level, geodetic_log, hold_to_scale
+from bisar_budget.paths.messages import number_in
 
 LARGEST = 200_000_000  # bytes; ten hours at 10 Hz of eight sentences
 _LONGEST = 256  # characters of a sentence; the standard has 82
-_SENTENCE = re.compile(r"\$[A-Z]{2}(?:GGA|GNS|RMC|ZDA|GST),", re.ASCII)
+_SENTENCE = re.compile(r"\$[A-Z]{2}(?:GGA|GNS|RMC|ZDA|GST|DTM),", re.ASCII)
 _ANYWHERE = re.compile(rb"\$[A-Z]{2}(?:GGA|GNS|RMC|ZDA),[^\r\n$]{0,250}\*[0-9A-Fa-f]{2}")
-_CLOCK = re.compile(r"([01]\d|2[0-3])([0-5]\d)([0-5]\d(?:\.\d{1,9})?)", re.ASCII)
+_CLOCK = re.compile(r"([01]\d|2[0-3])([0-5]\d)([0-5]\d(?:\.\d{1,9})?|60(?:\.0{1,9})?)", re.ASCII)
 _ANGLE = re.compile(r"(\d{1,3})([0-5]\d(?:\.\d{1,12})?)", re.ASCII)
 _NUMBER = re.compile(r"[+-]?\d{1,9}(?:\.\d{0,12})?", re.ASCII)
 _TIME_STEP_S = 1e-4  # less than between two fixes, more than a rounding of days
+_KINDS = ("GGA", "GNS")  # of sentences with a place
+_DATES = ("RMC", "ZDA")
 _GST_REACH_S = 5.0  # from a fix to a GST that speaks for it; receivers write one a second, or fewer than fixes
 
 
@@ -93,6 +97,25 @@ class _Accuracy(NamedTuple):
     up: float
 
 
+class _Datum(NamedTuple):
+    """The datum of a DTM: its code, how far its places are from the reference datum, and the code of that."""
+
+    code: str
+    offsets: tuple[str, str, str]
+    reference: str
+    is_wgs84: bool
+
+    @property
+    def words(self) -> str:
+        """The datum in a sentence."""
+        north, east, up = (shown(offset) for offset in self.offsets)
+        known = {"W84": "WGS-84 with offsets", "999": "a user datum (999)"}
+        return (
+            f"{known.get(self.code, f'the datum {shown(self.code)}')}, {north}, {east} and {up} off "
+            f"{shown(self.reference or 'its reference')}"
+        )
+
+
 def is_nmea(data: bytes) -> bool:
     """Whether a file has a sentence with a place or a date, with a checksum, in its first megabyte."""
     return bool(_ANYWHERE.search(data[:1_000_000]))
@@ -101,88 +124,159 @@ def is_nmea(data: bytes) -> bool:
 def read_nmea(data: bytes, name: str, keys: LogKeys) -> Log:
     """Read a log of NMEA 0183 of at most `LARGEST` bytes, as every reader of `LOG_FORMATS` does; needs pynmea2.
 
-    Of GGA and GNS those count of which there are more. Where several talkers have a place at one time, those of the
-    talker with most count.
+    Of GGA and GNS those count of which there are more.
     """
     hold_to_scale("utc", keys, name)
     hold_to_bytes(data, LARGEST, name)
+    found = _sentences(data, name)
+    talker = found.talker_of_fixes(keys, name)
+    found.hold_to_datum(talker, name)
+    kind = max(_KINDS, key=lambda kind: len(found.fixes[talker, kind]))
+    return _log(talker, kind, found, name, keys)
+
+
+@dataclass(eq=False)
+class _Sentences:
+    """Sentences of a log that are read: fixes by talker and kind, other ones by talker, dates and datums with lines.
+
+    `broken` are messages about fixes that cannot be used, by their lines, `undated` those about dates that are none.
+    `lost` counts sentences with a wrong checksum.
+    """
+
+    fixes: defaultdict[tuple[str, str], list[_Fix]]
+    broken: defaultdict[tuple[str, str], dict[int, str]]
+    dates: defaultdict[str, list[tuple[int, Instant]]]
+    accuracies: defaultdict[str, list[_Accuracy]]
+    datums: defaultdict[str, list[tuple[int, _Datum]]]
+    undated: list[str]
+    lost: Counter[tuple[str, str]]
+
+    def talker_of_fixes(self, keys: LogKeys, name: str) -> str:
+        """The talker whose fixes are read: the one that the mission file chooses, or the only one."""
+        counts = Counter[str]()
+        for (talker, _), fixes in self.fixes.items():
+            counts[talker] += len(fixes)
+        listed = " and ".join(f"{talker} ({self._words(talker)})" for talker in sorted(+counts))
+        if keys.talker is not None:
+            if not counts[keys.talker]:
+                others = f"; it has fixes of {listed}" if listed else ""
+                raise PathFileError(f"{name}: has no fix of the talker {keys.talker}{others}", key="talker")
+            return keys.talker
+        if len(+counts) > 1:
+            raise PathFileError(
+                f"{name}: has fixes of {len(+counts)} talkers: {listed}; they may be those of several receivers",
+                "accepted: one talker",
+                f"trajectory.talker: {' or '.join(sorted(+counts))} chooses one",
+            )
+        if not +counts:
+            broken = {line: fault for faults in self.broken.values() for line, fault in faults.items()}
+            if broken or self.undated:
+                raise PathFileError(broken[min(broken)] if broken else self.undated[0])
+            raise PathFileError(f"{name}: has no sentence GGA or GNS with a fix{self.lost_words()}")
+        return next(iter(+counts))
+
+    def _words(self, talker: str) -> str:
+        """How many fixes of which quality a talker has, the most frequent first."""
+        of_talker = (f"{kind} {fix.quality.words}" for kind in _KINDS for fix in self.fixes.get((talker, kind), ()))
+        return ", ".join(f"{count} of {words}" for words, count in Counter(of_talker).most_common(2))
+
+    def hold_to_datum(self, talker: str, name: str) -> None:
+        """Refuse places of another datum than WGS-84, which a talker says itself, or another that has no places."""
+        others = {talker for (talker, _), fixes in self.fixes.items() if fixes} - {talker}
+        for speaker in self.datums.keys() - others:
+            for line, datum in self.datums[speaker]:
+                if not datum.is_wgs84:
+                    raise PathFileError(
+                        f"{name}:{line}: DTM says that the places are of {datum.words}",
+                        "accepted: WGS-84, W84 without offsets",
+                        "Let the receiver, or its converter, write WGS-84",
+                    )
+
+    def dates_for(self, talker: str) -> Sequence[tuple[int, Instant]]:
+        """Lines of dates and the dates: those of a talker, or else of all."""
+        return self.dates.get(talker) or sorted(date for dates in self.dates.values() for date in dates)
+
+    def accuracies_for(self, talker: str) -> Sequence[_Accuracy]:
+        """Errors that a talker states, or else all: of a receiver that states them under another name."""
+        own = self.accuracies.get(talker)
+        return own or sorted(gst for of_talker in self.accuracies.values() for gst in of_talker)
+
+    def lost_words(self) -> str:
+        """How many sentences are left out whose checksum is wrong or whose date is none, for reports."""
+        lost, undated = self.lost.total(), len(self.undated)
+        words = f", {counted(lost, 'sentence')} with a wrong checksum left out" if lost else ""
+        return words + (f", {counted(undated, 'sentence')} without a date that there is left out" if undated else "")
+
+
+def _sentences(data: bytes, name: str) -> _Sentences:
+    """Read every sentence."""
     try:
         from pynmea2 import ParseError
         from pynmea2 import parse as parse_sentence
     except ImportError:
         raise PathFileError(f"{name}: needs the package pynmea2: {install_command('logs')}") from None
-    fixes: defaultdict[str, defaultdict[str, list[_Fix]]] = defaultdict(lambda: defaultdict(list))
-    accuracies: defaultdict[str, list[_Accuracy]] = defaultdict(list)
-    dates: list[tuple[int, Instant]] = []
-    wrong = 0
+    found = _Sentences(
+        defaultdict(list), defaultdict(dict), defaultdict(list), defaultdict(list), defaultdict(list), [], Counter()
+    )
     # Bytes of another protocol between sentences are no text.
     for number, text in enumerate(data.decode("latin-1").split("\n"), 1):
         begin = _SENTENCE.search(text)
         if begin is None:
             continue
         sentence = text[begin.start() :].rstrip()
+        talker, kind = sentence[1:3], sentence[3:6]
         try:
             if len(sentence) > _LONGEST or not sentence.isascii():
                 raise ParseError("no sentence of the standard", sentence)
-            found = parse_sentence(sentence, check=True)
+            fields = [field.strip() for field in parse_sentence(sentence, check=True).data] + [""] * 14
         except ParseError:
-            wrong += 1
+            found.lost[talker, kind] += 1
             continue
-        kind, fields = sentence[3:6], [field.strip() for field in found.data]
-        read = _READERS[kind]
-        read_one = read(fields + [""] * 14, f"{name}:{number}: {kind}", number)
-        if isinstance(read_one, Instant):
-            dates.append((number, read_one))
+        try:
+            read_one = _READERS[kind](fields, f"{name}:{number}: {kind}", number)
+        except PathFileError as fault:
+            if kind in _KINDS:
+                found.broken[talker, kind][number] = str(fault)
+            elif kind in _DATES:
+                found.undated.append(str(fault))
+            continue
+        if isinstance(read_one, _Fix):
+            found.fixes[talker, kind].append(read_one)
+        elif isinstance(read_one, Instant):
+            found.dates[talker].append((number, read_one))
         elif isinstance(read_one, _Accuracy):
-            accuracies[sentence[1:3]].append(read_one)
-        elif read_one is not None:
-            fixes[kind][sentence[1:3]].append(read_one)
-    said = f", {counted(wrong, 'sentence')} with a wrong checksum left out" if wrong else ""
-    if not fixes:
-        raise PathFileError(f"{name}: has no sentence GGA or GNS with a fix{said}")
-    if not dates:
-        raise PathFileError(
-            f"{name}: has no date",
-            "accepted: a sentence RMC or ZDA beside those with places",
-            "Let the receiver write RMC or ZDA too",
-        )
-    kind = max(fixes, key=lambda one: sum(map(len, fixes[one].values())))
-    return _log(kind, fixes[kind], dates, accuracies, said, name, keys)
+            found.accuracies[talker].append(read_one)
+        elif isinstance(read_one, _Datum):
+            found.datums[talker].append((number, read_one))
+    return found
 
 
-def _log(
-    kind: str,
-    of_talkers: dict[str, list[_Fix]],
-    dates: Sequence[tuple[int, Instant]],
-    accuracies: dict[str, list[_Accuracy]],
-    said: str,
-    name: str,
-    keys: LogKeys,
-) -> Log:
-    """The log of sentences of one kind."""
-    talker = max(of_talkers, key=lambda one: len(of_talkers[one]))
-    fixes = sorted(fix for one in of_talkers.values() for fix in one)
-    days, seconds = _dated(fixes, dates)
-    if len(of_talkers) > 1 and not (np.diff(days * DAY + seconds) > 0).all():
-        fixes = of_talkers[talker]
-        days, seconds = _dated(fixes, dates)
-    rows = LogRows(name, np.array([fix.line for fix in fixes]))
+def _log(talker: str, kind: str, found: _Sentences, name: str, keys: LogKeys) -> Log:
+    """The log of a talker's sentences of one kind."""
+    fixes, dates = found.fixes[talker, kind], found.dates_for(talker)
+    records = LogRecords(
+        name, len(fixes), [fix.line for fix in fixes], found.broken.get((talker, kind), {}), found.lost[talker, kind]
+    )
     latitude, longitude, height, separation = np.array([fix[2:6] for fix in fixes], dtype=float).T
     has_none = np.isnan(separation)
-    if has_none.any() and not has_none.all():
-        rows.refuse(has_none, lambda _: f"{kind} has no geoid separation, others have one")
-    separations = None if has_none.any() else separation
+    if not has_none.all():
+        records.leave_out(has_none, lambda _: f"{kind} has no geoid separation, others have one")
+    separations = None if has_none.all() else separation
     heights = from_sea_level(height, separations, keys, name)
-    start = Instant(int(days[0]), float(seconds[0]))
-    times = (days - days[0]) * DAY + (seconds - seconds[0])
-    words = f"NMEA 0183 {kind}{said}"
-    qualities = [fix.quality for fix in fixes]
-    log = geodetic_log(rows, words, times, start, "utc", (latitude, longitude, heights))
-    # Without a GST of its own talker, those of others speak for a receiver.
-    stated = accuracies.get(talker) or sorted(gst for of_talker in accuracies.values() for gst in of_talker)
+    days, seconds = _dated(fixes, dates)
+    times, start = days * DAY + seconds, None
+    if dates:
+        start = Instant(int(days[0]), float(seconds[0]))
+        times = (days - days[0]) * DAY + (seconds - seconds[0])
+    words = f"NMEA 0183 {kind}" + (f" of the talker {talker}" if keys.talker else "") + found.lost_words()
+    log = geodetic_log(records, words, times, start, "utc", (latitude, longitude, heights))
+    qualities = [fix.quality for fix, is_usable in zip(fixes, records.is_usable.tolist(), strict=True) if is_usable]
+    # Without dates, times of day are those of day 0 or of its neighbours.
+    at = (days * DAY + seconds)[records.is_usable]
     return replace(
         log,
-        sigmas=_sigmas(days * DAY + seconds, stated, dates),
+        clock="" if dates else "day",
+        sigmas=_sigmas(at, found.accuracies_for(talker), dates),
         typical_sigmas=np.array([quality.typical_sigma_m for quality in qualities]),
         quality_words=lambda i: f"{kind} {qualities[i].words}",
     )
@@ -209,13 +303,16 @@ def _sigmas(times: Floats, stated: Sequence[_Accuracy], dates: Sequence[tuple[in
 
 
 def _dated(fixes: Sequence[_Fix | _Accuracy], dates: Sequence[tuple[int, Instant]]) -> tuple[Floats, Floats]:
-    """Modified Julian days of fixes and seconds of them: within half a day of the date before, or the first."""
-    lines = [line for line, _ in dates]
-    days = np.empty(len(fixes))
-    for n, fix in enumerate(fixes):
-        dated = dates[max(bisect_right(lines, fix.line) - 1, 0)][1]
-        days[n] = dated.day + round((dated.seconds - fix.seconds) / DAY)
-    return days, np.array([fix.seconds for fix in fixes])
+    """Modified Julian days of fixes and seconds of them: within half a day of the date before, or the first.
+
+    Without dates, days are counted from that of the sentence in the middle.
+    """
+    seconds = np.array([fix.seconds for fix in fixes])
+    if not dates:
+        return np.round((seconds[len(seconds) // 2] - seconds) / DAY), seconds
+    before = np.searchsorted([line for line, _ in dates], [fix.line for fix in fixes], "right") - 1
+    dated = np.array([[date.day, date.seconds] for _, date in dates])[np.maximum(before, 0)]
+    return dated[:, 0] + np.round((dated[:, 1] - seconds) / DAY), seconds
 
 
 # ---------------------------------------------------------------------- sentences
@@ -227,7 +324,7 @@ def _clock(text: str, where: str) -> float:
     match = _CLOCK.fullmatch(text)
     if match is None:
         _refused(where, "must have a time like 052001.25", text)
-    return int(match[1]) * 3600.0 + int(match[2]) * 60.0 + float(match[3])
+    return int(match[1]) * 3600.0 + int(match[2]) * 60.0 + float(match[3])  # 60.00 is what 59.996 is rounded to
 
 
 def _angle(text: str, side: str, sides: str, where: str) -> float:
@@ -279,6 +376,15 @@ def _gst(fields: Sequence[str], where: str, line: int) -> _Accuracy | None:
     return _Accuracy(line, _clock(fields[0], where), east, north, up) if is_stated and fields[0] else None
 
 
+def _dtm(fields: Sequence[str], where: str, line: int) -> _Datum | None:
+    """A datum; none where the receiver leaves its code empty."""
+    code, subdivision, north, north_side, east, east_side, up, reference = fields[:8]
+    offsets = (f"{north}' {north_side}", f"{east}' {east_side}", f"{up} m")
+    is_zero = all(number_in(offset or "0") == 0 for offset in (north, east, up))
+    name = f"{code}-{subdivision}" if subdivision else code
+    return _Datum(name, offsets, reference, is_wgs84=code == "W84" and is_zero) if code else None
+
+
 def _rmc(fields: Sequence[str], where: str, line: int) -> Instant | None:
     if fields[1] != "A" or not fields[8]:
         return None
@@ -303,10 +409,11 @@ def _dated_at(date: str, clock: str, given: str, where: str) -> Instant:
     return Instant(midnight.day, _clock(clock, where))
 
 
-_READERS: dict[str, Callable[[Sequence[str], str, int], _Fix | _Accuracy | Instant | None]] = {
+_READERS: dict[str, Callable[[Sequence[str], str, int], _Fix | _Accuracy | _Datum | Instant | None]] = {
     "GGA": _gga,
     "GNS": _gns,
     "RMC": _rmc,
     "ZDA": _zda,
     "GST": _gst,
+    "DTM": _dtm,
 }

@@ -16,7 +16,7 @@ from bisar_budget.paths.nmea import is_nmea, read_nmea
 from bisar_budget.paths.oem import read_oem
 from bisar_budget.paths.orientation import Orientation
 from bisar_budget.paths.rtklib import is_solution, read_solution
-from bisar_budget.paths.sbet import is_sbet, read_sbet
+from bisar_budget.paths.sbet import is_accuracy, is_sbet, read_sbet
 from bisar_budget.paths.sp3 import read_sp3
 from bisar_budget.paths.ulog import is_ulog, read_ulog
 
@@ -119,7 +119,13 @@ LOG_FORMATS: dict[str, LogFormat] = {
     "gpx": LogFormat("a GPX track", (".gpx",), is_gpx, read_gpx),
     "ulog": LogFormat("a PX4 ULog", (".ulg",), is_ulog, read_ulog),
 }
-_WITH_WEEK = ("sbet",)
+# Keys of a mission file that are for some formats alone: which, and what messages call a log of them.
+_KEYS_OF_FORMATS = {
+    "week": (("sbet",), "an SBET"),
+    "talker": (("nmea",), "an NMEA log"),
+    "track": (("gpx",), "a GPX file"),
+    "instance": (("ulog", "csv"), "a log of PX4 or ArduPilot"),
+}
 
 
 def log_format(data: bytes) -> str | None:
@@ -134,6 +140,12 @@ def read_log(data: bytes, name: str, stated: str | None, keys: LogKeys) -> Log:
     none; or what the reader says.
     """
     found = log_format(data)
+    if found is None and is_accuracy(data):
+        raise PathFileError(
+            f"{name}: is the accuracy file of an SBET (smrmsg), records of ten doubles, 80 bytes",
+            "accepted: a log of a flight",
+            "trajectory.accuracy reads it; trajectory.file names the SBET",
+        )
     if stated is not None and found not in (None, stated):
         raise PathFileError(
             f"{name}: is {LOG_FORMATS[found].words}",
@@ -150,10 +162,11 @@ def read_log(data: bytes, name: str, stated: str | None, keys: LogKeys) -> Log:
             f"accepted: {known}",
             "trajectory.format: csv says what is wrong with a header" if b"\0" not in data[:10_000] else "",
         )
-    if keys.week is not None and chosen not in _WITH_WEEK:
-        raise PathFileError(
-            f"is for an SBET; {name} is {LOG_FORMATS[chosen].words}",
-            hint="Leave trajectory.week out",
-            key="week",
-        )
+    for key, (formats, words) in _KEYS_OF_FORMATS.items():
+        if getattr(keys, key) is not None and chosen not in formats:
+            raise PathFileError(
+                f"is for {words}; {name} is {LOG_FORMATS[chosen].words}",
+                hint=f"Leave trajectory.{key} out",
+                key=key,
+            )
     return LOG_FORMATS[chosen].read(data, name, keys)

@@ -26,12 +26,14 @@ from bisar_budget.paths.flight import Log, PathFileError, hold_to_bytes
 from bisar_budget.paths.instant import DAY, GPS_EPOCH, WEEK, Instant, parse_instant
 from bisar_budget.paths.log_places import (
     LogKeys,
-    LogRows,
+    LogRecords,
     counted,
     from_sea_level,
     geodetic_log,
     hold_to_ellipsoid,
     hold_to_scale,
+    is_wgs84,
+    most_left_out,
     needs_separation,
 )
 from bisar_budget.paths.messages import decoded, number_in
@@ -39,9 +41,11 @@ from bisar_budget.paths.messages import decoded, number_in
 LARGEST = 200_000_000  # bytes; a million places
 _COLUMNS = re.compile(rb"(?m)^%[ \t]*(GPST|UTC|JST)\b[^\r\n]*(latitude\(|x-ecef\(m\)|e-baseline\(m\))")
 _HEADER = re.compile(r"% ?(GPST|UTC|JST) ?([,;]?) ?((?:latitude|x-ecef|e-baseline)\(.*)")
+_DATUM = re.compile(r"(?:height|ecef)=([^/,)]+)")
+_LEAST_ROW = 8  # bytes
 _NAME = re.compile(r"[a-z-]+\([^)]{0,9}\)|[A-Za-z]+")
 _DATE = re.compile(r"(\d{4})/(\d\d)/(\d\d)", re.ASCII)
-_CLOCK = re.compile(r"([01]\d|2[0-3]):([0-5]\d):([0-5]\d(?:\.\d{1,12})?)", re.ASCII)
+_CLOCK = re.compile(r"([01]\d|2[0-3]):([0-5]\d):([0-5]\d(?:\.\d{1,12})?|60(?:\.0{1,12})?)", re.ASCII)
 _JST = 9 * 3600.0  # s ahead of UTC
 _QUALITY = {1: "fix", 2: "float", 3: "sbas", 4: "dgps", 5: "single", 6: "ppp", 7: "dead reckoning"}
 _LARGEST_SIGMA_M = 1e5
@@ -72,11 +76,12 @@ def read_solution(data: bytes, name: str, keys: LogKeys) -> Log:
     """
     hold_to_bytes(data, LARGEST, name)
     header: _Columns | None = None
-    height_said, lines, days, numbers = "", [], [], []
+    said, lines, days, numbers = "", [], [], []
+    broken: dict[int, str] = {}
     for number, text in enumerate(decoded(data, name).splitlines(), 1):
         if text.startswith("%"):
-            if "height=" in text:
-                height_said = text
+            if _DATUM.search(text):
+                said = text
             found = _header(text, f"{name}:{number}")
             if found is not None and header not in (None, found):
                 raise PathFileError(f"{name}:{number}: names other columns than the lines before")
@@ -86,16 +91,24 @@ def read_solution(data: bytes, name: str, keys: LogKeys) -> Log:
                 raise PathFileError(
                     f"{name}:{number}: no line that begins with '%  GPST', UTC or JST names the columns before it"
                 )
-            day, row = _row(text, header, f"{name}:{number}")
+            try:
+                day, row = _row(text, header, f"{name}:{number}")
+            except PathFileError as fault:
+                broken[number] = str(fault)
+                if len(broken) > most_left_out(len(data) // _LEAST_ROW):
+                    break
+                continue
             if row[header.columns.get("Q", 0)] or "Q" not in header.columns:
                 lines.append(number)
                 days.append(day)
                 numbers.append(row)
-    if header is None or not lines:
+    if header is None or not (lines or broken):
         raise PathFileError(f"{name}: has no solution")
+    records = LogRecords(name, len(lines), lines, broken)
     scale = "gps" if header.system == "GPST" else "utc"
     hold_to_scale(scale, keys, name)
-    table, rows = np.array(numbers), LogRows(name, np.array(lines))
+    _hold_to_datum(said, name)
+    table = np.array(numbers)
     seconds = table[:, -1] - (_JST if header.system == "JST" else 0.0)
     start = Instant(days[0], 0.0).after(float(seconds[0]))
     times = (np.array(days) - days[0]) * DAY + (seconds - seconds[0])
@@ -106,10 +119,10 @@ def read_solution(data: bytes, name: str, keys: LogKeys) -> Log:
         with np.errstate(all="ignore"):  # a place that cannot be is refused later
             latitude, longitude, height = geodetic_places(table[:, at : at + 3])
     else:
-        latitude, longitude = (_radians(table, header, axis, rows) for axis in ("latitude", "longitude"))
-        height = _heights(table[:, header.columns["height(m)"]], height_said, keys, name)
-    sigmas = _sigmas(table, header, latitude, longitude, rows)
-    return geodetic_log(rows, words, times, start, scale, (latitude, longitude, height), sigmas)
+        latitude, longitude = (_radians(table, header, axis, records) for axis in ("latitude", "longitude"))
+        height = _heights(table[:, header.columns["height(m)"]], said, keys, name)
+    sigmas = _sigmas(table, header, latitude, longitude, records)
+    return geodetic_log(records, words, times, start, scale, (latitude, longitude, height), sigmas)
 
 
 def _header(text: str, where: str) -> _Columns | None:
@@ -178,7 +191,7 @@ def _day(text: str) -> int | None:
     return None if instant is None else instant.day
 
 
-def _radians(table: Floats, header: _Columns, axis: str, rows: LogRows) -> Floats:
+def _radians(table: Floats, header: _Columns, axis: str, records: LogRecords) -> Floats:
     at = header.columns[axis]
     if not header.is_in_minutes:
         return np.radians(table[:, at])
@@ -186,7 +199,7 @@ def _radians(table: Floats, header: _Columns, axis: str, rows: LogRows) -> Float
     # RTKLIB's deg2dms and dms2deg: the sign is that of the degrees, -0 too.
     sexagesimal = [(minutes, "minutes"), (seconds, "seconds")]
     for values, said in sexagesimal:
-        rows.refuse(
+        records.leave_out(
             ~((values >= 0) & (values <= 60)),
             lambda i, values=values, said=said: f"{axis} has {values[i]:.6g} {said}",  # type: ignore[misc]
         )
@@ -194,12 +207,17 @@ def _radians(table: Floats, header: _Columns, axis: str, rows: LogRows) -> Float
     return found
 
 
+def _hold_to_datum(said: str, name: str) -> None:
+    """Refuse places of another datum than WGS-84, or a frame of the ITRF, by the line of % that says it."""
+    match = _DATUM.search(said)
+    if match is not None and not is_wgs84(match[1]):
+        raise PathFileError(f"{name}: has places of the datum {shown(match[1])}", "accepted: WGS84")
+
+
 def _heights(heights: Floats, said: str, keys: LogKeys, name: str) -> Floats:
     """Heights above the ellipsoid, by the line of % that says what they and the places count from."""
-    match = re.search(r"height=([\w-]+)/(\w+)", said)
-    if match is not None and match[1] != "WGS84":
-        raise PathFileError(f"{name}: has places of the datum {shown(match[1])}", "accepted: WGS84")
-    if match is not None and match[2] == "ellipsoidal":
+    match = re.search(r"height=[^/,)]+/(\w+)", said)
+    if match is not None and match[1] == "ellipsoidal":
         hold_to_ellipsoid(keys, name)
         return heights
     if keys.geoid_separation is None and match is None:
@@ -219,7 +237,9 @@ def _qualities(table: Floats, header: _Columns) -> str:
     return f" ({', '.join(said)})"
 
 
-def _sigmas(table: Floats, header: _Columns, latitude: Floats, longitude: Floats, rows: LogRows) -> Floats | None:
+def _sigmas(
+    table: Floats, header: _Columns, latitude: Floats, longitude: Floats, records: LogRecords
+) -> Floats | None:
     """Standard deviations (n, 3) east, north, up [m]; None where the file has none, or zeros alone.
 
     Those of x, y, z are turned with their covariances, of which the file has the signed roots.
@@ -229,7 +249,7 @@ def _sigmas(table: Floats, header: _Columns, latitude: Floats, longitude: Floats
     if any(column not in header.columns for column in names):
         return None
     own = table[:, [header.columns[column] for column in names]]
-    rows.refuse(
+    records.leave_out(
         ~((own >= 0) & (own <= _LARGEST_SIGMA_M)).all(axis=1),
         lambda i: (
             f"standard deviations must be from 0 to {_LARGEST_SIGMA_M:g} m "

@@ -11,22 +11,30 @@ heading, which is true when the wander angle is taken off: x is the wander angle
 """
 
 import math
-from dataclasses import dataclass
-from typing import NoReturn
+from dataclasses import dataclass, replace
+from typing import NamedTuple, NoReturn
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bisar_budget.geometry import Vector
 from bisar_budget.paths.earth import Floats, curvature_radii
-from bisar_budget.paths.flight import Log, PathFileError, around_aperture, hold_to_bytes, slow_times
+from bisar_budget.paths.flight import (
+    Log,
+    PathFileError,
+    around_aperture,
+    hold_to_bytes,
+    hold_to_usable_records,
+    slow_times,
+)
 from bisar_budget.paths.instant import GPS_EPOCH, WEEK, Instant
 from bisar_budget.paths.log_places import (
     LogKeys,
-    LogRows,
+    LogRecords,
     geodetic_log,
     hold_to_ellipsoid,
     hold_to_scale,
-    utc_of,
+    usable_log,
 )
 
 LARGEST = 1_000_000_000  # bytes; ten hours at 200 Hz
@@ -52,6 +60,27 @@ _SIGMAS = (
     *((f"{axis} position RMS", 1 + n, 0.0, 1e4, "m") for n, axis in enumerate(("north", "east", "down"))),
     *((f"{axis} velocity RMS", 4 + n, 0.0, 1e3, "m/s") for n, axis in enumerate(("north", "east", "down"))),
 )
+_RECORDS_OF_ACCURACY = "accepted: an accuracy file (smrmsg), records of ten doubles, 80 bytes"
+
+
+class _Kind(NamedTuple):
+    """A kind of file: what messages call it, doubles of a record, those that are looked at, and how many of them are
+    not all zero.
+    """
+
+    words: str
+    width: int
+    fields: _Fields
+    least: int
+
+    @property
+    def size(self) -> int:
+        """Bytes of a record."""
+        return 8 * self.width
+
+
+_SBET = _Kind("an SBET", 17, _FIELDS, 3)
+_SMRMSG = _Kind("an accuracy file of an SBET (smrmsg)", 10, _SIGMAS, 4)
 
 
 @dataclass(frozen=True)
@@ -69,13 +98,26 @@ def of_gps(week: int, seconds: float) -> Instant:
 
 
 def is_sbet(data: bytes) -> bool:
-    """Whether bytes are whole records, of which the first and the last are those of a flight."""
-    width = 17
-    if not data or len(data) % (8 * width):
+    """Whether bytes are records of 17 doubles, of which those at both ends are of a flight."""
+    return _looks_like(data, _SBET)
+
+
+def is_accuracy(data: bytes) -> bool:
+    """Whether bytes are records of 10 doubles, of which those at both ends state errors at times that rise."""
+    return _looks_like(data, _SMRMSG)
+
+
+def _looks_like(data: bytes, kind: _Kind) -> bool:
+    """Whether most of the first and last three records are of a kind, and rise from the first to the last."""
+    whole = len(data) // kind.size
+    if not whole or (b"\n" in data[: kind.size] and data[: kind.size].isascii()):
         return False
-    ends = np.frombuffer(data, "<f8").reshape(-1, width)[[0, -1]]
+    records = np.frombuffer(data[: whole * kind.size], "<f8").reshape(-1, kind.width)
+    ends = records[sorted({*range(min(3, whole)), *range(max(whole - 3, 0), whole)})]
     # Digits of a text are doubles next to zero.
-    return _first_wrong(ends, _FIELDS) is None and bool((np.abs(ends[:, :3]).max(axis=1) > 1e-9).all())
+    is_sound = ~_wrong(ends, kind.fields).any(axis=0) & (np.abs(ends[:, : kind.least]).max(axis=1) > 1e-9)
+    sound = ends[is_sound]
+    return bool(2 * len(sound) > len(ends) and (len(sound) < 2 or sound[0, 0] != sound[-1, 0]))
 
 
 def read_sbet(data: bytes, name: str, keys: LogKeys) -> Log:
@@ -87,14 +129,17 @@ def read_sbet(data: bytes, name: str, keys: LogKeys) -> Log:
     """
     hold_to_scale("gps", keys, name)
     hold_to_ellipsoid(keys, name)
-    records = _records(data, name, 17, _FIELDS)
-    times, start = _risen(records[:, 0], name), None
-    _hold_to_velocities(times, records, name)
-    if keys.week is not None:
-        start = of_gps(keys.week, float(times[0]))
+    table, records = _records(data, name, _SBET)
+    times = _over_weeks(table[:, 0], records)
+    usable = records.is_usable
+    records.keep_what_rises(times, None)
+    _hold_to_velocities(times[usable], table[usable], name)
+    start = None if keys.week is None else of_gps(keys.week, float(times[0]))
+    if start is not None:
         times = times - times[0]
-    _, latitude, longitude, height = records[:, :4].T
-    return geodetic_log(LogRows(name), "SBET", times, start, "gps", (latitude, longitude, height))
+    _, latitude, longitude, height = table[:, :4].T
+    log = geodetic_log(records, "SBET", times, start, "gps", (latitude, longitude, height))
+    return log if start is not None else replace(log, clock="week")
 
 
 def read_accuracy(
@@ -112,12 +157,17 @@ def read_accuracy(
     the record or byte of the fault; or the records do not cover the aperture, have a gap in it, or state an error of
     zero all over it.
     """
-    records = _records(data, name, 10, _SIGMAS)
-    times, start = _risen(records[:, 0], name), None
+    if is_sbet(data) and not is_accuracy(data):
+        raise PathFileError(f"{name}: is an SBET, a trajectory", _RECORDS_OF_ACCURACY, "trajectory.file reads it")
+    table, named = _records(data, name, _SMRMSG)
+    times, start = _over_weeks(table[:, 0], named), None
     if week is not None:
-        start = utc_of(of_gps(week, float(times[0])), "gps")
+        start = of_gps(week, float(times[0]))
         times = times - times[0]
-    slow = slow_times(Log(times, records[:, 1:4], True, "", start), center, center_seconds, aperture_time_s, name)
+    log = usable_log(named, "", times, start, "gps", lambda kept: table[kept, 1:4])
+    slow = slow_times(log, center, center_seconds, aperture_time_s, name)
+    hold_to_usable_records(log, slow, aperture_time_s)
+    records = table[named.is_usable]
     inside = records[around_aperture(slow, aperture_time_s)]
     largest = inside[:, 1:7].max(axis=0)
     if not largest.all():
@@ -127,59 +177,74 @@ def read_accuracy(
     return Accuracy((east, north, down), (east_rate, north_rate, down_rate), len(inside))
 
 
-def _records(data: bytes, name: str, width: int, fields: _Fields) -> Floats:
-    """Records (n, width) whose fields are where they can be."""
-    size = 8 * width
+def _records(data: bytes, name: str, kind: _Kind) -> tuple[Floats, LogRecords]:
+    """Records (n, width), and which of them can be used: whose fields are where they can be.
+
+    What is left of a record at the end, where writing broke off, counts as one that cannot be used.
+    """
     hold_to_bytes(data, LARGEST, name)
     if not data:
         raise PathFileError(f"{name}: is empty")
-    whole, rest = divmod(len(data), size)
-    if rest:
-        raise PathFileError(
-            f"{name}: ends at byte {len(data)}, {rest} into record {whole + 1}; each has {size} bytes"
-        )
-    records = np.frombuffer(data, "<f8").reshape(-1, width)
-    wrong = _first_wrong(records, fields)
-    if wrong is None:
-        return records.astype(np.float64)
-    index, field, value, unit = wrong
-    says = f"{name}: record {index + 1}: {field} is {value:.6g} {unit}"
-    if _first_wrong(np.frombuffer(data, ">f8").reshape(-1, width), fields) is None:
-        raise PathFileError(f"{says}; the doubles are big-endian, they should be little-endian")
+    whole, rest = divmod(len(data), kind.size)
+    cut = f"{name}: ends at byte {len(data)}, {rest} into record {whole + 1}; each has {kind.size} bytes"
+    table = np.frombuffer(data[: whole * kind.size], "<f8").reshape(-1, kind.width)
+    wrong = _wrong(table, kind.fields)
+    is_wrong = wrong.any(axis=0)
+    broken = {whole + 1: cut} if rest else {}
+    try:
+        records = LogRecords(name, whole, broken=broken)
+        records.leave_out(is_wrong, lambda i: f"{_field_words(table, wrong, kind, i)}, which it cannot be")
+    except PathFileError as error:
+        if not is_wrong.any():
+            raise
+        raise _misread(data, name, kind, table, wrong) or error from None
+    return table.astype(np.float64), records
+
+
+def _field_words(table: Floats, wrong: NDArray[np.bool_], kind: _Kind, index: int) -> str:
+    """The first field of a record that is wrong, and its value."""
+    field, place, _, _, unit = kind.fields[int(wrong[:, index].argmax())]
+    return f"{field} is {table[index, place]:.6g} {unit}"
+
+
+def _misread(data: bytes, name: str, kind: _Kind, table: Floats, wrong: NDArray[np.bool_]) -> PathFileError:
+    """Why so many records are wrong: the file is another one, or has other units."""
+    index = int(wrong.any(axis=0).argmax())
+    field, place, *_ = kind.fields[int(wrong[:, index].argmax())]
+    value = float(table[index, place])
+    says = f"{name}: record {index + 1}: {_field_words(table, wrong, kind, index)}"
+    swapped = np.frombuffer(data[: len(table) * kind.size], ">f8").reshape(-1, kind.width)
+    if not _wrong(swapped, kind.fields).any():
+        return PathFileError(f"{says}; the doubles are big-endian, they should be little-endian")
     if field == "time" and value > _LATEST:
-        raise PathFileError(f"{says}; it should count from the start of the GPS week")
+        return PathFileError(f"{says}; it should count from the start of the GPS week")
     if field in ("latitude", "longitude") and math.isfinite(value) and abs(value) <= 360:
-        raise PathFileError(f"{says}; is it in degrees?")
-    raise PathFileError(f"{says}, which it cannot be; are these records of {width} doubles?")
+        return PathFileError(f"{says}; is it in degrees?")
+    return PathFileError(f"{says}, which it cannot be; are these records of {kind.width} doubles?")
 
 
-def _first_wrong(records: Floats, fields: _Fields) -> tuple[int, str, float, str] | None:
-    """Index, field, value and unit of what is out of its range first."""
-    found = []
+def _wrong(records: Floats, fields: _Fields) -> NDArray[np.bool_]:
+    """Which fields of records are out of their ranges, (fields, n)."""
+    wrong = np.empty((len(fields), len(records)), dtype=bool)
     with np.errstate(invalid="ignore"):
-        for field, at, lowest, highest, unit in fields:
-            values = records[:, at]
+        for index, (_, place, lowest, highest, _) in enumerate(fields):
+            values = records[:, place]
             # Doubles of the other byte order are often next to zero.
             is_tiny = (np.abs(values) < _SMALLEST) & (values != 0)
-            wrong = ~((values >= lowest) & (values <= highest)) | is_tiny
-            if wrong.any():
-                index = int(wrong.argmax())
-                found.append((index, field, float(records[index, at]), unit))
-    return min(found, key=lambda one: one[0], default=None)
+            wrong[index] = ~((values >= lowest) & (values <= highest)) | is_tiny
+    return wrong
 
 
-def _risen(times: Floats, name: str) -> Floats:
-    """Times that go on over the end of a week."""
-    steps = np.diff(times)
-    times = times + np.concatenate([[0.0], np.cumsum(np.where(steps <= -_ROLLED, WEEK, 0.0))])
-    late = np.diff(times) <= 0
-    if late.any():
-        index = int(late.argmax())
-        raise PathFileError(
-            f"{name}: record {index + 2}: time {times[index + 1]:.12g} s is not after {times[index]:.12g} s; "
-            "times must rise"
-        )
-    return times
+def _over_weeks(times: Floats, records: LogRecords) -> Floats:
+    """Times that go on over the end of a week; those of records that cannot be used do not count."""
+    usable = np.flatnonzero(records.is_usable)
+    at = times[usable]
+    steps = np.diff(at)
+    weeks = np.cumsum((steps <= -_ROLLED).astype(np.int64) - (steps >= _ROLLED))  # one back is that of a wrong time
+    rolled = np.concatenate([[0.0], weeks * WEEK])
+    found = times.copy()
+    found[usable] = at + rolled
+    return found
 
 
 def _hold_to_velocities(times: Floats, records: Floats, name: str) -> None:

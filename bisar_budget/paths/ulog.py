@@ -23,11 +23,12 @@ from bisar_budget.paths.flight import Log, PathFileError
 from bisar_budget.paths.instant import Instant
 from bisar_budget.paths.log_places import (
     LogKeys,
-    LogRows,
+    LogRecords,
     from_sea_level,
     geodetic_log,
     hold_to_ellipsoid,
     hold_to_scale,
+    one_instance,
     unix_instant,
 )
 
@@ -78,11 +79,12 @@ Records = NDArray[np.void]
 
 
 class _Topic(NamedTuple):
-    """Records of a topic, one for each message, and the names of its fields."""
+    """Records of a topic, one for each message, the names of its fields, and the instance of the receiver."""
 
     name: str
     records: Records
     units: _Units
+    instance: int = 0
 
     def column(self, field: str) -> Floats:
         values: Floats = self.records[field].astype(np.float64)
@@ -100,17 +102,24 @@ def is_ulog(data: bytes) -> bool:
 def read_ulog(data: bytes, name: str, keys: LogKeys) -> Log:
     """Read the places of a flight, as every reader of `LOG_FORMATS` does.
 
-    Of the GPS topic and the global position those count of which there are more. A receiver is taken that has most
-    fixes.
+    Of the GPS topic and the global position those count of which there are more. Of several receivers the mission
+    file chooses one; then places are those of its GPS topic.
     """
     hold_to_scale("utc", keys, name)
     if not is_ulog(data):
         raise PathFileError(f"{name}: is no ULog: it does not begin with 'ULog'")
     topics = [one for one in map(_with_places, _topics(data, name)) if _count(one)]
-    gps = max((one for one in topics if one.name in _GPS), key=_count, default=None)
+    of_gps = [one for one in topics if one.name in _GPS]
+    gps = max(of_gps, key=_count, default=None)
     places = max((one for one in topics if one.name == _GLOBAL), key=_count, default=None)
-    if places is not None and (gps is None or _count(places) > _count(gps)):
+    if places is not None and (gps is None or _count(places) > _count(gps)) and keys.instance is None:
         return _of_global(places, gps, keys, name)
+    if of_gps:
+        most: dict[float, int] = {}
+        for topic in of_gps:
+            most[topic.instance] = max(most.get(topic.instance, 0), _count(topic))
+        chosen = one_instance(most, keys, name)
+        gps = max((topic for topic in of_gps if topic.instance == chosen), key=_count)
     if gps is None:
         raise PathFileError(
             f"{name}: has no place", f"accepted: a ULog with the topic {', '.join(_GPS)} (with a fix) or {_GLOBAL}"
@@ -178,7 +187,7 @@ def _log(
     name: str,
 ) -> Log:
     """The log of a topic."""
-    rows, units = LogRows(name), topic.units
+    units = topic.units
     latitude, longitude = (
         np.radians(topic.column(field) * units.degrees) for field in (units.latitude, units.longitude)
     )
@@ -187,7 +196,9 @@ def _log(
         height = topic.column(units.height) * units.metres
     else:
         height = from_sea_level(topic.column(units.altitude) * units.metres, separations, keys, name)
-    return geodetic_log(rows, f"ULog {topic.name}{said}", times, start, "utc", (latitude, longitude, height))
+    records = LogRecords(name, len(times))
+    said = said if keys.instance is None else f", instance {keys.instance}"
+    return geodetic_log(records, f"ULog {topic.name}{said}", times, start, "utc", (latitude, longitude, height))
 
 
 # ---------------------------------------------------------------------- messages
@@ -195,7 +206,7 @@ def _topics(data: bytes, name: str) -> list[_Topic]:
     """Topics of places, each of one instance, with their records."""
     formats: dict[str, str] = {}
     layouts: dict[str, tuple[np.dtype[np.void], _Units]] = {}
-    wanted: dict[int, tuple[str, np.dtype[np.void], _Units]] = {}
+    wanted: dict[int, tuple[str, np.dtype[np.void], _Units, int]] = {}
     payloads: dict[int, list[bytes]] = {}
     for kind, at, payload in _messages(data, name):
         if kind == ord("D"):
@@ -213,12 +224,12 @@ def _topics(data: bytes, name: str) -> list[_Topic]:
             if topic in (*_GPS, _GLOBAL) and number not in wanted:
                 if topic not in layouts:
                     layouts[topic] = _layout(topic, formats.get(topic, ""), f"{name}: byte {at}")
-                wanted[number], payloads[number] = (topic, *layouts[topic]), []
+                wanted[number], payloads[number] = (topic, *layouts[topic], payload[0]), []
         elif kind == ord("B"):
             _hold_to_flags(payload, f"{name}: byte {at}")
     return [
-        _Topic(topic, np.frombuffer(b"".join(payloads[number]), dtype), units)
-        for number, (topic, dtype, units) in wanted.items()
+        _Topic(topic, np.frombuffer(b"".join(payloads[number]), dtype), units, instance)
+        for number, (topic, dtype, units, instance) in wanted.items()
         if payloads[number]
     ]
 

@@ -18,7 +18,7 @@ from bisar_budget.design.varied import scaled
 from bisar_budget.faults import SetValue
 from bisar_budget.mission.changes import read_changes
 from bisar_budget.mission.load import load_mission, parse_mission
-from bisar_budget.mission.quantities import QuestionError
+from bisar_budget.mission.quantities import QuestionError, number_of, range_of
 from tests.conftest import ROOT, mission_text
 from tests.standing import standing
 
@@ -382,3 +382,13 @@ def test_a_scale_factor_of_accelerometers_is_an_error_that_scales() -> None:
     mission = parse_mission(mission_text(platforms__receiver__motion_error=error))
     imu = scaled(mission, "platforms.receiver.motion_error.imu", 2.0).platforms.receiver.motion_error.imu
     assert imu.accelerometer_scale_factor == pytest.approx((6e-4,) * 3)
+
+
+@pytest.mark.parametrize("between", ["1e-12..2e-9/g", "1e-12..2e-9 /g", "1e-12/g..2e-9/g", "1e-12 1/g..2e-9 1/g"])
+def test_a_range_of_a_unit_per_g(between: str) -> None:
+    """The exponent of a number is no part of its unit."""
+    number = number_of({}, "platforms.receiver.oscillator.acceleration_sensitivity")
+    asked = range_of(number, between)
+    assert asked.low == pytest.approx(1e-12 / 9.80665, rel=1e-12)
+    assert asked.high == pytest.approx(2e-9 / 9.80665, rel=1e-12)
+    assert number.said_like(between).unit in ("/g", "1/g")

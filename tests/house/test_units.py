@@ -4,13 +4,14 @@ import math
 import re
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bisar_budget import units
 from bisar_budget.budget.check import check_mission
 from bisar_budget.faults import InvalidValueError
 from bisar_budget.mission.load import parse_mission
+from bisar_budget.other_units import value_of_unit
 from bisar_budget.units import format_limit, format_quantity, parse_quantity
 from tests.conftest import ROOT, TODAY
 
@@ -64,7 +65,15 @@ def test_reads(text: object, dimension: units.Dimension, value: float) -> None:
 # One of each, in SI, from the definitions: a degree is π/180, an hour 3600 s, a gal 0.01 m/s², g 9.80665 m/s².
 DATA_SHEETS = (
     (units.ANGULAR_RATE, 4.848136811e-6, "°/hr", "°/h", "deg/hr", "deg/h", "deg / hr", "º/h", "˚/hr"),
-    (units.ANGULAR_RATE, 1.745329252e-2, "°/s", "deg/s"),
+    (units.ANGULAR_RATE, 1.745329252e-2, "°/s", "deg/s", "dps"),
+    (units.ANGULAR_RATE, 1.745329252e-5, "mdps", "m°/s"),
+    (units.ANGULAR_RATE, 4.848136811e-6, "dph"),
+    (units.ANGLE_RANDOM_WALK, 1.745329252e-2, "dps/√Hz", "dps/sqrt(Hz)", "(dps)/√Hz", "dps/rtHz"),
+    (units.ANGLE_RANDOM_WALK, 1.745329252e-5, "mdps/√Hz", "mdps/sqrt(Hz)", "m°/s/√Hz"),
+    (units.ANGLE_RANDOM_WALK, 4.848136811e-6, "dph/√Hz", "dph/rt-Hz"),
+    (units.VELOCITY_RANDOM_WALK, 9.80665e-6, "micro-g/√Hz", "micro-g/rtHz", "µ-g/√Hz"),
+    (units.ACCELERATION, 9.80665e-6, "micro-g", "microg", "µ-g"),
+    (units.ACCELERATION, 9.80665e-3, "milli-g"),
     (units.ANGLE_RANDOM_WALK, 2.908882087e-4, "°/√h", "°/√hr", "deg/√hr", "deg/sqrt(hr)", "deg/sqrt(h)", "deg/rt-hr"),
     (units.ANGLE_RANDOM_WALK, 2.908882087e-4, "°/root-hr", "deg/rt(hr)", "deg/rthr", "deg/hr^0.5"),
     (units.ANGLE_RANDOM_WALK, 2.908882087e-4, "°/h^(1/2)", "°/h^½"),
@@ -114,22 +123,108 @@ def test_every_unit_is_read_back_as_a_report_writes_it(dimension: units.Dimensio
         ("3 arcseconds", units.ANGLE, "Did you mean 'arcsec'?"),
         ("3 Degrees", units.ANGLE, "Did you mean 'deg'?"),
         ("3 mgal", units.ACCELERATION, "Did you mean 'mGal'?"),
-        ("3 dph", units.ANGULAR_RATE, "Did you mean 'deg/h'?"),
         ("3 deg/hour", units.ANGULAR_RATE, "Did you mean 'deg/h'?"),
         ("3 DEG/HR", units.ANGULAR_RATE, "Did you mean 'deg/h'?"),
         ("3 deg/√HR", units.ANGLE_RANDOM_WALK, "Did you mean 'deg/sqrt(h)'?"),
         ("3 µg/√hz", units.VELOCITY_RANDOM_WALK, "Did you mean 'ug/sqrt(Hz)'?"),
-        ("3 micro-g", units.ACCELERATION, "Did you mean 'ug'?"),
         ("3 sec", units.TIME, "Did you mean 's'?"),
         ("3 meters", units.LENGTH, "Did you mean 'm'?"),
         ("3 °/√h", units.ANGULAR_RATE, ""),
         ("6 parsec", units.TIME, ""),  # nothing near: not 'ps'
+        ("5 kilometers", units.LENGTH, "Did you mean 'km'?"),
+        ("3 degrees/second", units.ANGULAR_RATE, "Did you mean 'deg/s'?"),
+        ("5 Nm", units.LENGTH, ""),  # nautical miles or nanometres
+        ("5 mhz", units.FREQUENCY, ""),  # megahertz or millihertz
+        ("5 MHZ", units.FREQUENCY, "Did you mean 'MHz'?"),
+        ("3 mdge", units.ANGLE, ""),  # not 'deg', which is a thousand times as much
+        ("5 in", units.LENGTH, "5 in is 127 mm"),
+        ("5 mils", units.LENGTH, "5 mils is 127 \N{MICRO SIGN}m"),
+        ("5 in/s", units.SPEED, "5 in/s is 127 mm/s"),
+        ("5 in/s", units.LENGTH, "5 in/s is 127 mm/s, a speed"),
+        ("5 mil", units.ANGLE, "A mil is 1/6400 of a turn, a milliradian, or a thousandth of an inch: write mrad"),
+        ("1 fs", units.TIME, "1 fs is 1e-15 s"),
+        ("3 deg/sqrt(Hz)", units.ANGLE_RANDOM_WALK, ""),  # not 'deg/sqrt(h)': another quantity
+        ("-95 dBm/Hz", units.PHASE_NOISE, "Subtract the carrier's power in dBm"),
+        ("-95 dBV/Hz", units.PHASE_NOISE, ""),
     ],
 )
 def test_a_unit_of_data_sheets_that_is_not_read_gets_a_hint(text: str, dimension: units.Dimension, hint: str) -> None:
     with pytest.raises(InvalidValueError) as error:
         parse_quantity(text, dimension)
     assert error.value.problem.hint == hint
+
+
+@pytest.mark.parametrize(
+    "unit", ["dBrad^2/Hz", "dBrad²/Hz", "dB rad²/Hz", "dB(rad²/Hz)", "dB re 1 rad^2/Hz", "dBrad2/Hz"]
+)
+def test_a_density_of_phase_is_read_as_twice_the_phase_noise(unit: str) -> None:
+    """IEEE Std 1139: L(f) is half of the one-sided density of phase."""
+    density = 10 ** (parse_quantity(f"-95 {unit}", units.PHASE_NOISE) / 10)
+    assert density == pytest.approx(10**-9.5 / 2, rel=1e-12)
+
+
+def test_a_power_is_no_phase_noise() -> None:
+    with pytest.raises(InvalidValueError) as error:
+        parse_quantity("-95 dBm/Hz", units.PHASE_NOISE)
+    problem = error.value.problem
+    assert problem.problem == "must be a phase noise L(f), but 'dBm/Hz' makes it a power in each hertz"
+    assert "Did you mean" not in problem.hint
+
+
+OF_LETTERS = st.sampled_from("abcdefghijklmnopqrstuvwxyzDGHKMNTµ²/^()√°")
+
+
+@st.composite
+def misspelt_units(draw: st.DrawFn) -> tuple[units.Dimension, str, str]:
+    """A dimension, one of its units, and the same with one slip of letters or of case."""
+    dimension = draw(st.sampled_from(units.DIMENSIONS))
+    unit = draw(st.sampled_from([unit for unit in dimension.units if unit]))
+    at = draw(st.integers(0, len(unit) - 1))
+    letter = draw(OF_LETTERS)
+    slips = [
+        unit[:at] + unit[at + 1 :],
+        unit[:at] + letter + unit[at:],
+        unit[:at] + letter + unit[at + 1 :],
+        unit[:at] + unit[at : at + 2][::-1] + unit[at + 2 :],
+        unit[:at] + unit[at].swapcase() + unit[at + 1 :],
+        unit.upper(),
+        unit.lower(),
+        unit + "s",
+    ]
+    return dimension, unit, draw(st.sampled_from([slip for slip in slips if slip]))
+
+
+@settings(max_examples=2000)
+@given(misspelt_units())
+def test_following_a_hint_never_changes_a_figure_by_a_factor(found: tuple[units.Dimension, str, str]) -> None:
+    """A slip may give another unit, which is read or understood as what it is; a hint never gives another size."""
+    dimension, unit, misspelt = found
+    try:
+        parse_quantity(f"3 {misspelt}", dimension)
+    except InvalidValueError as error:
+        meant = re.fullmatch(r"Did you mean '(.*)'\?", error.problem.hint)
+    else:
+        return
+    if meant:
+        understood = value_of_unit(units.normal_unit(misspelt))
+        typed = parse_quantity(f"3 {unit}", dimension)
+        if understood is not None:  # a word or a prefix: what is typed has a size of its own
+            typed = 3 * understood.factor / value_of_si(dimension)
+        assert parse_quantity(f"3 {meant[1]}", dimension) == pytest.approx(typed, rel=1e-9), misspelt
+
+
+def test_what_is_understood_beside_the_tables_agrees_with_them() -> None:
+    for dimension in units.DIMENSIONS:
+        for unit, factor in dimension.units.items():
+            understood = value_of_unit(unit)
+            if understood is not None and unit:
+                assert understood.factor == pytest.approx(factor * value_of_si(dimension), rel=1e-12), unit
+
+
+def value_of_si(dimension: units.Dimension) -> float:
+    understood = value_of_unit(dimension.si or "1")
+    assert understood is not None, dimension.si
+    return understood.factor
 
 
 def test_an_unknown_unit_is_named_as_it_was_written() -> None:
@@ -288,6 +383,7 @@ _ATOMS = {
     "urad": 1e-6,
     "nrad": 1e-9,
     "deg": math.pi / 180,
+    "mdeg": math.pi / 180e3,
     "\N{DEGREE SIGN}": math.pi / 180,
     "arcmin": math.pi / 10800,
     "arcsec": math.pi / 648000,

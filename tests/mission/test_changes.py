@@ -7,6 +7,7 @@ import pytest
 from bisar_budget.budget.check import check_mission
 from bisar_budget.faults import InvalidValueError, MissionError, SetValue, changes_words
 from bisar_budget.mission.changes import all_keys, nearest_keys, read_changes
+from bisar_budget.mission.edited import with_values
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.mission.model import Mission
 from tests.conftest import ROOT
@@ -75,8 +76,10 @@ def test_an_entry_is_added_behind_the_last() -> None:
         ),
         ("aperture_time=3 s", "Did you mean 'collection.aperture_time'?"),
         ("reciever.azimuth=3deg", "'platforms.receiver.azimuth' or 'platforms.transmitter.azimuth'?"),
-        ("radar.bandwidth=", "--set radar.bandwidth: has no value. Give it one"),
-        ("radar.bandwidth=~", "--set radar.bandwidth: has no value. Give it one"),
+        ("radar.bandwidth=", "--set radar.bandwidth: has no value. Give it one; null takes the key out"),
+        ("radar.bandwidth=~", "--set radar.bandwidth: must not be taken out: it is required"),
+        ("radar.bandwidth=null", "--set radar.bandwidth: must not be taken out: it is required"),
+        ("radar.bandwith=null", "--set radar.bandwith: is not in the file, and null takes nothing out. Did you mean"),
         ("radar.bandwidth=[1", "--set radar.bandwidth: is not valid YAML: "),
         ("radar.bandwidth=*x", "--set radar.bandwidth: is an alias (*); write the value out"),
         ("radar.bandwidth=!!float 3", "--set radar.bandwidth: carries a YAML tag"),
@@ -141,3 +144,50 @@ def test_every_key_is_found() -> None:
     )
     assert nearest_keys("colection.aperture") == "Did you mean 'collection.aperture_time'?"
     assert nearest_keys("qqqqqqqq") == ""
+
+
+class TestTakingOut:
+    """`KEY=null` takes a key out: the mission is that of a file without it."""
+
+    LISTED = TEXT + "other_errors:\n  - {name: a, quadratic_phase_error: 1 deg}\n"
+
+    def test_a_key_is_taken_out(self) -> None:
+        assert changed("other_errors=null", data=self.LISTED).other_errors == ()
+
+    def test_a_key_that_the_file_leaves_out_stays_out(self) -> None:
+        assert changed("requirements.islr=null").requirements == parse_mission(TEXT).requirements
+
+    def test_a_value_can_follow(self) -> None:
+        assert changed("other_errors=null", "radar.bandwidth=100MHz", data=self.LISTED).radar.bandwidth == 100e6
+
+    @pytest.mark.parametrize("key", ["other_errors.0", "platforms.transmitter.position.1"])
+    def test_an_entry_of_a_list_is_not_taken_out(self, key: str) -> None:
+        line = fault(f"{key}=null", data=self.LISTED)
+        assert "is an entry of a list, which null does not take out" in line
+        assert "accepted: null for a key, or the list without the entry" in line
+
+    def test_quotes_make_it_a_text(self) -> None:
+        assert changed("name='null'").name == "null"
+
+    def test_python_takes_a_key_out_with_none(self) -> None:
+        mission = parse_mission(self.LISTED, "m.yaml").replace({"other_errors": None})
+        assert mission.other_errors == ()
+        assert [change.text for change in mission.changes] == ["null"]
+
+    @pytest.mark.parametrize(
+        ("text", "key", "left"),
+        [
+            ("a: 1\nb: 2 # two\nc: 3\n", "b", "a: 1\nc: 3\n"),
+            ("a: 1\n# of b\nb:\n  x: 1\n  y: 2\n# of c\nc: 3\n", "b", "a: 1\n# of b\n# of c\nc: 3\n"),
+            ("a:\n  x: 1\n  y: 2\nb: 3\n", "a.y", "a:\n  x: 1\nb: 3\n"),
+            ("a: {x: 1, y: 2}\n", "a.x", "a: {y: 2}\n"),
+            ("a: {x: 1, y: 2}\n", "a.y", "a: {x: 1}\n"),
+            ("a: {x: 1}\n", "a.x", "a: {}\n"),
+            ("a:\n  - x: 1\n    y: 2\n", "a.0.x", "a:\n  - y: 2\n"),
+            ("a:\n  - x: 1\n    y: 2\n", "a.0.y", "a:\n  - x: 1\n"),
+            ("a: 1\nb: 2\n", "b", "a: 1\n"),
+            ("a: 1\nb: 2\n", "c", "a: 1\nb: 2\n"),
+        ],
+    )
+    def test_the_text_of_a_file_without_a_key(self, text: str, key: str, left: str) -> None:
+        assert with_values(text, [SetValue(key, "null")]) == left

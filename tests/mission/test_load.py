@@ -303,7 +303,7 @@ def test_a_decimal_comma_in_a_list_is_refused(value: str, is_refused: bool) -> N
         ("requirements__cubic_phase_error", "6.28 rad", None),
         ("requirements__cubic_phase_error", "6.29 rad", ""),
         ("allocation__warn_above", "1", None),
-        ("allocation__warn_above", "80", "Did you mean '80 %'?"),
+        ("allocation__warn_above", "80", "A bare number is a ratio: 80 is 8000 %"),
         ("radar__center_frequency", "9.6", "A bare number is in Hz"),
         ("radar__center_frequency", "9.6 GHz", None),
     ],

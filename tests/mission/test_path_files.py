@@ -417,7 +417,7 @@ BROKEN: dict[str, tuple[Callable[[], str], dict[str, bytes | str], str]] = {
     "a log in seconds of which nobody knows the middle": (
         lambda: aircraft(platforms__receiver={"trajectory": {"file": "sbet.out"}}),
         {},
-        "sbet.out: covers",
+        "sbet.out: counts seconds of a GPS week, ",
     ),
     "a trajectory cut off": (
         lambda: aircraft(platforms__receiver={"trajectory": {"file": "sbet.out", "week": 2421}}),

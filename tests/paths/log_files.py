@@ -249,13 +249,17 @@ def message(kind: str, payload: bytes) -> bytes:
 
 
 def topic(
-    name: str, fields: tuple[tuple[str, str], ...], number: int, records: Iterable[dict[str, Any]]
+    name: str,
+    fields: tuple[tuple[str, str], ...],
+    number: int,
+    records: Iterable[dict[str, Any]],
+    instance: int = 0,
 ) -> tuple[bytes, bytes]:
     """Format of a topic; its number and its records. Fields that a record does not name are 0, no padding follows."""
     text = f"{name}:" + "".join(f"{kind} {field};" for kind, field in fields)
     fields = tuple(one for one in fields if not one[1].startswith("_padding"))
     form = "<" + "".join(_STRUCT[kind] for kind, _ in fields)
-    found = message("A", struct.pack("<BH", 0, number) + name.encode())
+    found = message("A", struct.pack("<BH", instance, number) + name.encode())
     for record in records:
         values = [record.get(field, b"" if kind.startswith("char") else 0) for kind, field in fields]
         found += message("D", struct.pack("<H", number) + struct.pack(form, *values))
@@ -394,7 +398,7 @@ def every_format(flown: Flight) -> dict[str, tuple[str, bytes, dict[str, Any]]]:
         ),
         "px4.csv": ("csv", px4_csv(flown, GPS_OF_OLD, gps_records(flown)), {}),
         "px4_now.csv": ("csv", px4_csv(flown, GPS_OF_NOW, gps_records(flown)), {}),
-        "dataflash.log": ("csv", dataflash(flown), above_sea),
+        "dataflash.log": ("csv", dataflash(flown), above_sea | {"instance": 0}),
         "mavlogdump.csv": ("csv", mavlogdump(flown), above_sea),
         "airdata.csv": ("csv", airdata(flown), above_sea),
     }

@@ -164,7 +164,7 @@ PLACES = "places are latitude, longitude, height, or x, y, z, or east, north, up
         ),
         (
             GOOD.replace("time [s]", "time [fs]"),
-            "1: time has the unknown unit 'fs'; write 'time [s]', 'time [UTC]' or 'time [GPST]'. Did you mean 's'?",
+            "1: time has the unknown unit 'fs'; write 'time [s]', 'time [UTC]' or 'time [GPST]'. 1 fs is 1e-15 s",
         ),
         (
             GOOD.replace("latitude [deg]", "latitude [degrees]"),

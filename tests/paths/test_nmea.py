@@ -2,13 +2,13 @@
 
 import math
 import sys
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 
 import numpy as np
 import pytest
 
 from bisar_budget.paths.earth import Geodetic, earth_fixed
-from bisar_budget.paths.flight import Log, PathFileError
+from bisar_budget.paths.flight import Log, PathFileError, dated, slow_times
 from bisar_budget.paths.instant import parse_instant
 from bisar_budget.paths.log_places import LogKeys
 from bisar_budget.paths.nmea import read_nmea
@@ -90,21 +90,59 @@ def test_midnight_is_a_moment_like_others(date) -> None:
     assert log.times == pytest.approx(FLOWN.times[1:] - FLOWN.times[1], abs=1e-9)
 
 
-def test_talkers_of_one_receiver_are_one_log_and_those_of_two_are_not() -> None:
-    """A receiver may call itself GP while it sees no other system."""
-    lines = nmea(FLOWN).decode().splitlines()
-    changing = [gga(*one, talker="GP" if n % 100 < 30 else "GN") for n, one in enumerate(_places())]
-    assert len(read("\n".join([lines[2], *changing])).times) == 501
-    far = FLOWN.longitude + 0.1
-    other = [gga(t, a, b, h, talker="GP") for t, a, b, h in list(_places(far))[:400]]
-    mixed = [line for pair in zip(lines[::3], other + [""] * 101, strict=True) for line in pair]
-    log = read("\n".join([lines[2], *mixed]))
-    assert np.abs(log.places - FLOWN.places).max() < DIGITS
-
-
 def _places(longitude=None):
     degrees = np.degrees(FLOWN.longitude if longitude is None else longitude)
     return zip(FLOWN.times, np.degrees(FLOWN.latitude), degrees, FLOWN.height, strict=True)
+
+
+class TestTwoReceivers:
+    """Of two talkers the one with more fixes may be the worse one: the mission file chooses."""
+
+    MIXED = "\n".join(
+        [rmc(0)]
+        + [
+            line
+            for n, (time, north, east, up) in enumerate(_places())
+            for line in ([gga(time, north, east, up)] if n % 2 else [])
+            + [gga(time, north + 0.1, east, up, talker="GP", quality=1)]
+        ]
+    )
+
+    def test_they_are_refused(self) -> None:
+        with pytest.raises(PathFileError) as error:
+            read(self.MIXED)
+        assert str(error.value) == (
+            "a.nmea: has fixes of 2 talkers: GN (250 of GGA quality 4, RTK fixed) and GP (501 of GGA quality 1, "
+            "autonomous); they may be those of several receivers"
+        )
+        assert (error.value.accepted, error.value.hint) == (
+            "accepted: one talker",
+            "trajectory.talker: GN or GP chooses one",
+        )
+
+    def test_a_key_chooses(self) -> None:
+        log = read(self.MIXED, talker="GN")
+        assert np.abs(log.places - FLOWN.places[1::2]).max() < DIGITS
+        assert log.words == "NMEA 0183 GGA of the talker GN, 250 places over 9.96 s"
+        assert log.typical_sigmas == pytest.approx(np.full(250, 0.01))
+        assert len(read(self.MIXED, talker="GP").times) == 501
+        with pytest.raises(
+            PathFileError, match=r"has no fix of the talker GL; it has fixes of GN .* and GP "
+        ) as error:
+            read(self.MIXED, talker="GL")
+        assert error.value.key == "talker"
+
+    def test_a_receiver_that_changes_its_name_is_not_known_to_be_one(self) -> None:
+        changing = [gga(*one, talker="GP" if n % 100 < 30 else "GN") for n, one in enumerate(_places())]
+        with pytest.raises(PathFileError, match=r"has fixes of 2 talkers"):
+            read("\n".join([rmc(0), *changing]))
+
+    def test_a_talker_without_places_is_no_second_receiver(self) -> None:
+        """Satellites in view, a date, and a fix in two dimensions without a height that counts for none."""
+        others = [rmc(0, talker="GP"), sentence("GPGSV,1,1,00"), sentence("GLGSA,A,3,,,,,,,,,,,,,1,1,1")]
+        empty = sentence("GPGGA,,,,,,0,,,,,,,,")
+        log = read("\n".join([*others, empty, *(gga(*fix) for fix in _places())]))
+        assert log.words == "NMEA 0183 GGA, 501 places over 10 s"
 
 
 def test_wrong_checksums_are_left_out_and_counted() -> None:
@@ -144,14 +182,13 @@ GOOD = nmea(SHORT).decode().splitlines()
     [
         ([], "a.nmea: has no sentence GGA or GNS with a fix"),
         (GOOD[2::3], "a.nmea: has no sentence GGA or GNS with a fix"),
-        (GOOD[0::3], "a.nmea: has no date"),
         (
             [*GOOD, GOOD[0]],
             "a.nmea:19: time 2026-06-01T05:20:01.250Z is not after 2026-06-01T05:20:01.350Z of line 16",
         ),
         (
-            [sentence("GPGGA,052060.00,4805.0,N,01116.0,E,1,12,0.7,1.0,M,1.0,M,,")],
-            "a.nmea:1: GGA must have a time like 052001.25 (got '052060.00')",
+            [sentence("GPGGA,052060.25,4805.0,N,01116.0,E,1,12,0.7,1.0,M,1.0,M,,")],
+            "a.nmea:1: GGA must have a time like 052001.25 (got '052060.25')",
         ),
         (
             [sentence("GPGGA,052000.00,4865.0,N,01116.0,E,1,12,0.7,1.0,M,1.0,M,,")],
@@ -206,6 +243,92 @@ def test_a_void_sentence_dates_nothing() -> None:
     lines[2] = sentence(",".join(fields))
     log = read("\n".join(lines))
     assert log.times[1] - log.times[0] == pytest.approx(1, abs=1e-6)
+
+
+class TestWithoutADate:
+    def test_the_middle_of_the_aperture_dates_the_log(self) -> None:
+        undated = read("\n".join(gga(*fix) for fix in _places()))
+        center = parse_instant("2026-06-01T05:20:05Z")
+        assert undated.start is None
+        assert undated.clock == "day"
+        log = dated(undated, center)
+        assert log.start is not None
+        assert log.start.as_text() == "2026-06-01T00:00:00.000Z"
+        assert log.words == "NMEA 0183 GGA, 501 places over 10 s, date by collection.center_time: 2026-06-01"
+        begins = parse_instant(stamp(0))
+        assert slow_times(log, begins, None, 0.01, "a.nmea") == pytest.approx(FLOWN.times, abs=1e-6)
+        assert np.abs(log.places - FLOWN.places).max() < DIGITS
+
+    @pytest.mark.parametrize("begins", ["2026-06-01T23:59:55", "2026-06-02T00:00:00", "2026-06-01T23:59:49.5"])
+    def test_it_takes_the_nearest_midnight(self, begins: str) -> None:
+        """A flight over midnight, or beside it, whose middle is on either side of it."""
+        start = datetime.fromisoformat(begins).replace(tzinfo=UTC)
+        undated = read("\n".join(gga(*fix, start=start) for fix in _places()))
+        for second in (1, 5, 9):
+            center = parse_instant(f"{start + timedelta(seconds=second):%Y-%m-%dT%H:%M:%S.%f}Z")
+            slow = slow_times(dated(undated, center), center, None, 1.0, "a.nmea")
+            assert slow == pytest.approx(FLOWN.times - second, abs=1e-6)
+
+    def test_without_one_it_is_refused(self) -> None:
+        undated = read("\n".join(gga(*fix) for fix in _places()))
+        with pytest.raises(PathFileError) as error:
+            slow_times(dated(undated, None), None, None, 1.0, "a.nmea")
+        assert str(error.value) == "a.nmea: has times of day and no date"
+        assert error.value.accepted == (
+            "accepted: collection.center_time, of which the nearest midnight dates the log"
+        )
+
+    def test_a_date_that_is_none_is_left_out_and_counted(self) -> None:
+        none = [rmc(0).partition("*")[0].strip("$").replace("010626", date) for date in ("000000", "310226", "1626")]
+        log = read("\n".join([*map(sentence, none), nmea(FLOWN).decode()]))
+        assert log.start is not None
+        assert log.start.as_text() == "2026-06-01T05:20:01.250Z"
+        assert log.words == "NMEA 0183 GGA, 3 sentences without a date that there is left out, 501 places over 10 s"
+
+
+@pytest.mark.parametrize(("clock", "seconds"), [("051960.00", 1200), ("235960", 0), ("051959.996", 1199.996)])
+@pytest.mark.parametrize("kind", ["GGA", "RMC", "ZDA"])
+def test_a_second_60_is_a_rounded_one(clock: str, seconds: float, kind: str) -> None:
+    """59.996 s with two digits; the date is that before it is rounded."""
+    by_kind = {
+        "GGA": sentence(f"GNGGA,{clock},4805.0,N,01116.0,E,4,12,0.7,1.0,M,1.0,M,,"),
+        "RMC": sentence(f"GNRMC,{clock},A,4805.0,N,01116.0,E,0,0,010626,,,A"),
+        "ZDA": sentence(f"GNZDA,{clock},01,06,2026,00,00"),
+    }
+    fix = by_kind["GGA"] if kind == "GGA" else sentence("GNGGA,052001.00,4805.0,N,01116.0,E,4,12,0.7,1.0,M,1.0,M,,")
+    log = read("\n".join([by_kind["RMC" if kind == "GGA" else kind], fix]))
+    assert log.start is not None
+    if kind == "GGA":
+        assert log.start.seconds == pytest.approx((5 * 3600 + seconds) % 86400 if seconds else 86400)
+    elif clock != "235960":
+        assert log.start.as_text() == "2026-06-01T05:20:01.000Z"
+
+
+class TestADatum:
+    USER = sentence("GPDTM,999,,0.08,N,0.07,E,-47.7,W84")
+
+    @pytest.mark.parametrize("datum", ["W84,,0.0,N,0.0,E,0.0,W84", "W84,,,,,,,W84", ",,,,,,,"])
+    def test_wgs84_is_read(self, datum: str) -> None:
+        assert len(read(sentence(f"GPDTM,{datum}") + "\n" + nmea(SHORT).decode()).times) == 6
+
+    @pytest.mark.parametrize(
+        ("datum", "words"),
+        [
+            ("999,,0.08,N,0.07,E,-47.7,W84", "a user datum (999), 0.08' N, 0.07' E and -47.7 m off W84"),
+            ("W84,,0.08,N,0.0,E,0.0,W84", "WGS-84 with offsets, 0.08' N, 0.0' E and 0.0 m off W84"),
+            ("P90,,0.001,S,0,W,1,W84", "the datum P90, 0.001' S, 0' W and 1 m off W84"),
+        ],
+    )
+    def test_another_one_is_refused_by_its_name(self, datum: str, words: str) -> None:
+        with pytest.raises(PathFileError) as error:
+            read(nmea(SHORT).decode() + sentence(f"GPDTM,{datum}"))
+        assert str(error.value) == f"a.nmea:19: DTM says that the places are of {words}"
+
+    def test_that_of_a_receiver_that_is_not_chosen_does_not_count(self) -> None:
+        lines = "\n".join([self.USER, *TestTwoReceivers.MIXED.splitlines()])
+        assert len(read(lines, talker="GN").times) == 250
+        with pytest.raises(PathFileError, match=r"a\.nmea:1: DTM says"):
+            read(lines, talker="GP")
 
 
 class TestALogSaysItsAccuracy:

@@ -57,7 +57,8 @@ def test_what_is_no_log_is_none(data: bytes) -> None:
     [
         (b"PK\x03\x04\0\0", "a.zip", "a.zip: is no log that is known by its content"),
         (b"\xff" * 136, "a.out", "a.out: record 1: "),  # by the ending of its name
-        (sbet(SHORT)[:-1], "b.out", "b.out: ends at byte 4623, 135 into record 34"),
+        (sbet(SHORT)[: 10 * 136 - 1], "b.out", "b.out: ends at byte 1359, 135 into record 10"),
+        (smrmsg(SHORT.times), "b.out", "b.out: is the accuracy file of an SBET (smrmsg), records of ten doubles, 80"),
         (b"ULog", "a.ulg", "a.ulg: is no ULog"),
         (b"<kml/>", "a.gpx", "a.gpx:1: is no GPX"),
         (b"hello\n", "a.csv", "a.csv:1: names no place"),

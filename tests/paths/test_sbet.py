@@ -176,11 +176,11 @@ NOT_SO = "which it cannot be; are these records of 17 doubles?"
         (sbet(SHORT, **changed(6, "wander", 17.0)), f"record 6: wander angle is 17 rad, {NOT_SO}"),
         (
             sbet(SHORT, **changed(3, "time", SECOND + 0.02)),
-            "record 3: time 105619.27 s is not after 105619.27 s; times must rise",
+            "record 3: time 105619.27 s is not after 105619.27 s of record 2; times must rise",
         ),
         (
             sbet(SHORT, **changed(3, "time", SECOND - 1)),
-            "record 3: time 105618.25 s is not after 105619.27 s; times must rise",
+            "record 3: time 105618.25 s is not after 105619.27 s of record 2; times must rise",
         ),
         (
             sbet(FLOWN, x=30.0, y=0.0),
@@ -297,7 +297,7 @@ def test_an_error_of_zero_all_over_the_aperture_is_no_accuracy() -> None:
     ("data", "center", "says"),
     [
         (b"", 10.0, "is empty"),
-        (smrmsg(TIMES)[:-8], 10.0, "ends at byte 1672, 72 into record 21; each has 80 bytes"),
+        (smrmsg(TIMES[:19])[:-8], 10.0, "ends at byte 1512, 72 into record 19; each has 80 bytes"),
         (
             smrmsg(TIMES, north=-0.02),
             10.0,
@@ -305,8 +305,9 @@ def test_an_error_of_zero_all_over_the_aperture_is_no_accuracy() -> None:
         ),
         (
             smrmsg(TIMES, rates=(0.1, 0.1, np.where(TIMES == 4, np.nan, 0.1))),
-            10.0,
-            "record 5: down velocity RMS is nan m/s, which it cannot be; are these records of 10 doubles?",
+            4.5,
+            "record 5: down velocity RMS is nan m/s, which it cannot be; the record lies within the 5 s around "
+            "mid-aperture that are used",
         ),
         (
             smrmsg(TIMES),
@@ -321,7 +322,7 @@ def test_an_error_of_zero_all_over_the_aperture_is_no_accuracy() -> None:
         (
             sbet(flight(10)),
             10.0,
-            "record 1: east velocity RMS is -49.8663 m/s, which it cannot be; are these records of 10 doubles?",
+            "is an SBET, a trajectory",
         ),
     ],
 )
@@ -329,6 +330,15 @@ def test_faults_of_accuracy_have_records(data: bytes, center: float, says: str) 
     with pytest.raises(PathFileError) as error:
         read_accuracy(data, "smrmsg.out", None, None, SECOND + center, 5.0)
     assert str(error.value) == f"smrmsg.out: {says}"
+
+
+def test_a_record_of_accuracy_far_away_is_left_out() -> None:
+    far = smrmsg(TIMES, rates=(0.1, 0.1, np.where(TIMES == 4, np.nan, 0.1)))
+    known = (None, None, SECOND + 12.0, 5.0)
+    assert read_accuracy(far, "smrmsg.out", *known) == read_accuracy(
+        smrmsg(TIMES, rates=0.1 * np.ones(3)), "", *known
+    )
+    assert read_accuracy(smrmsg(TIMES)[:-8], "smrmsg.out", *known).records == 7
 
 
 def held_to_its_word(data: bytes) -> None:

@@ -92,6 +92,28 @@ def test_the_topic_with_more_places_counts() -> None:
     assert read(ulog(own, without_fix, gps)).words.startswith("ULog sensor_gps")
 
 
+def test_one_of_several_receivers_is_chosen() -> None:
+    """Raw fixes of two; the autopilot's own estimate needs no choice."""
+    far = FLOWN._replace(latitude=FLOWN.latitude + 1e-3)
+    first = topic("sensor_gps", GPS_OF_NOW, 3, gps_records(FLOWN))
+    second = topic("sensor_gps", GPS_OF_NOW, 4, gps_records(far), instance=1)
+    both = ulog(first, second)
+    with pytest.raises(PathFileError) as error:
+        read(both)
+    assert str(error.value) == "a.ulg: has fixes of 2 receivers: of the instances 0 with 501, 1 with 501"
+    logs = [read(both, instance=instance) for instance in (0, 1)]
+    assert np.abs(logs[0].places - FLOWN.places).max() < NOW
+    assert np.linalg.norm(logs[1].places - FLOWN.places, axis=1) == pytest.approx(np.full(501, 6.37e3), rel=0.01)
+    assert logs[1].words == "ULog sensor_gps, instance 1, 501 places over 10 s"
+    with pytest.raises(PathFileError, match=r"has no fix of the instance 2") as error:
+        read(both, instance=2)
+    assert error.value.key == "instance"
+    without_fix = topic("sensor_gps", GPS_OF_NOW, 4, gps_records(far, fix=2), instance=1)
+    assert len(read(ulog(first, without_fix)).times) == 501
+    own = topic("vehicle_global_position", GLOBAL, 5, global_records(flight(900)))
+    assert read(ulog(own, first, second)).words.startswith("ULog vehicle_global_position")
+
+
 def test_another_reader_finds_the_same() -> None:
     pyulog = pytest.importorskip("pyulog")
     data = ulog(topic("sensor_gps", GPS_OF_NOW, 3, gps_records(SHORT)))

@@ -62,9 +62,10 @@ def since_start(log: Log) -> float:
         ),
         (
             dataflash(FLOWN),
-            OF_SEA,
+            OF_SEA | {"instance": 0},
             BY_ARDUPILOT,
-            "GPS rows of ArduPilot, 501 places over 10 s, UTC is GPS less 18 s, 1 row without a fix left out",
+            "GPS rows of ArduPilot, instance 0, 501 places over 10 s, UTC is GPS less 18 s, "
+            "1 row without a fix left out",
         ),
         (
             mavlogdump(FLOWN),
@@ -80,6 +81,20 @@ def test_the_flight_is_where_it_was(data: bytes, keys: dict[str, object], digits
     assert log.times == pytest.approx(FLOWN.times, abs=1e-9)
     assert since_start(log) == pytest.approx(0, abs=1e-9)
     assert log.words == words
+
+
+def test_one_of_several_receivers_is_chosen() -> None:
+    with pytest.raises(PathFileError) as error:
+        read(dataflash(FLOWN), **OF_SEA)
+    assert str(error.value) == "a.csv: has fixes of 2 receivers: of the instances 0 with 501, 1 with 101"
+    assert error.value.hint == "trajectory.instance: 0 chooses one"
+    assert len(read(dataflash(FLOWN), **OF_SEA, instance=1).times) == 101
+    with pytest.raises(PathFileError, match=r"has no fix of the instance 2; it has 0 with 501, 1 with 101") as error:
+        read(dataflash(FLOWN), **OF_SEA, instance=2)
+    assert error.value.key == "instance"
+    with pytest.raises(PathFileError, match=r"has no column that numbers receivers") as error:
+        read(geodetic_csv(FLOWN), instance=0)
+    assert error.value.key == "instance"
 
 
 @pytest.mark.parametrize("unit", ["meters", "feet"])
@@ -128,7 +143,7 @@ def test_what_ulog2csv_writes_is_read(tmp_path: Path, monkeypatch: pytest.Monkey
 
 
 def test_a_week_that_ends_goes_on_in_the_next() -> None:
-    log = read(dataflash(FLOWN, week_second=604795.0), **OF_SEA)
+    log = read(dataflash(FLOWN, week_second=604795.0), **OF_SEA, instance=0)
     assert log.times == pytest.approx(FLOWN.times, abs=1e-9)
     assert log.start is not None
     assert log.start.as_text() == "2026-06-06T23:59:37.000Z"

@@ -1,0 +1,295 @@
+"""Units that are understood without being read: inches, mils, words, prefixes that no table has.
+
+A message may then say what a quantity is in a unit that is read, or which spelling was meant, and never offers one
+that changes the size. Imported where a unit has been refused.
+"""
+
+import math
+import re
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
+from bisar_budget.constants import STANDARD_GRAVITY
+from bisar_budget.units import DIMENSIONS, Dimension, format_quantity, normal_unit
+
+_SAME_FACTOR = 1e-9  # relative difference of two spellings of one unit
+_SHORTEST_TYPO = 3  # characters; a shorter unit is one slip away from everything
+_SHORTEST_PLURAL = 4  # characters: mils, days
+
+
+class UnitValue(NamedTuple):
+    """Factor of a unit to SI, and the powers of metre, second and radian in it."""
+
+    factor: float
+    powers: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def times(self, other: "UnitValue", exponent: float = 1.0) -> "UnitValue":
+        """Product with a power of another unit."""
+        a, b = self.powers, other.powers
+        powers = (a[0] + exponent * b[0], a[1] + exponent * b[1], a[2] + exponent * b[2])
+        return UnitValue(self.factor * other.factor**exponent, powers)
+
+
+_LENGTH, _TIME, _ANGLE, _PLAIN = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
+_SPEED, _ACCELERATION, _FREQUENCY, _TURN_RATE = (1.0, -1.0, 0.0), (1.0, -2.0, 0.0), (0.0, -1.0, 0.0), (0.0, -1.0, 1.0)
+_DEGREE = math.pi / 180
+_SI_PREFIXES = {"T": 1e12, "G": 1e9, "M": 1e6, "k": 1e3, "h": 1e2, "d": 1e-1, "c": 1e-2, "m": 1e-3, "u": 1e-6}
+_SI_PREFIXES |= {"n": 1e-9, "p": 1e-12, "f": 1e-15}
+# Each with the prefixes that somebody writes before it. International inch, foot, yard and mile of 1959; the rest are
+# of the SI brochure, 9th edition, tables 8 and 3, and of ISO 80000-3.
+_ATOMS: Mapping[str, tuple[float, tuple[float, float, float], str]] = {
+    "1": (1.0, _PLAIN, ""),
+    "%": (1e-2, _PLAIN, ""),
+    "ppm": (1e-6, _PLAIN, ""),
+    "ppb": (1e-9, _PLAIN, ""),
+    "m": (1.0, _LENGTH, "khdcmunpf"),
+    "in": (0.0254, _LENGTH, ""),
+    "mil": (2.54e-5, _LENGTH, ""),
+    "ft": (0.3048, _LENGTH, "k"),
+    "yd": (0.9144, _LENGTH, ""),
+    "mi": (1609.344, _LENGTH, ""),
+    "nmi": (1852.0, _LENGTH, ""),
+    "NM": (1852.0, _LENGTH, ""),
+    "micron": (1e-6, _LENGTH, ""),
+    "s": (1.0, _TIME, "cdmunpf"),
+    "min": (60.0, _TIME, ""),
+    "h": (3600.0, _TIME, ""),
+    "hr": (3600.0, _TIME, ""),
+    "day": (86400.0, _TIME, ""),
+    "week": (604800.0, _TIME, ""),
+    "month": (30 * 86400.0, _TIME, ""),
+    "year": (365.25 * 86400.0, _TIME, ""),
+    "Hz": (1.0, _FREQUENCY, "TGMkhdcmun"),
+    "rad": (1.0, _ANGLE, "cmunpf"),
+    "deg": (_DEGREE, _ANGLE, "mun"),
+    "\N{DEGREE SIGN}": (_DEGREE, _ANGLE, "mun"),
+    "arcmin": (_DEGREE / 60, _ANGLE, ""),
+    "arcsec": (_DEGREE / 3600, _ANGLE, "mu"),
+    "mas": (_DEGREE / 3600e3, _ANGLE, ""),
+    "gon": (math.pi / 200, _ANGLE, "m"),
+    "rev": (2 * math.pi, _ANGLE, ""),
+    "turn": (2 * math.pi, _ANGLE, ""),
+    "rpm": (2 * math.pi / 60, _TURN_RATE, ""),
+    "dps": (_DEGREE, _TURN_RATE, "mu"),
+    "dph": (_DEGREE / 3600, _TURN_RATE, "m"),
+    "mph": (0.44704, _SPEED, ""),
+    "kph": (1 / 3.6, _SPEED, ""),
+    "kmh": (1 / 3.6, _SPEED, ""),
+    "mps": (1.0, _SPEED, "kcm"),
+    "fps": (0.3048, _SPEED, ""),
+    "kn": (1852 / 3600, _SPEED, ""),
+    "kt": (1852 / 3600, _SPEED, ""),
+    "g": (STANDARD_GRAVITY, _ACCELERATION, "mun"),
+    "Gal": (1e-2, _ACCELERATION, "mu"),
+    "TECU": (1e16, (-2.0, 0.0, 0.0), ""),
+}
+# Words in small letters and in the singular; a prefix may stand before them.
+_WORDS = {
+    "arcminute": "arcmin",
+    "arcsecond": "arcsec",
+    "asec": "arcsec",
+    "degree": "deg",
+    "feet": "ft",
+    "foot": "ft",
+    "gal": "Gal",
+    "gee": "g",
+    "hertz": "Hz",
+    "hour": "h",
+    "inch": "in",
+    "inches": "in",
+    "hr": "h",
+    "knot": "kn",
+    "kt": "kn",
+    "meter": "m",
+    "metre": "m",
+    "mile": "mi",
+    "minute": "min",
+    "percent": "%",
+    "radian": "rad",
+    "revolution": "rev",
+    "sec": "s",
+    "second": "s",
+    "yard": "yd",
+}
+_WORD_PREFIXES = {"tera": 1e12, "giga": 1e9, "mega": 1e6, "kilo": 1e3, "centi": 1e-2, "milli": 1e-3, "micro": 1e-6}
+_WORD_PREFIXES |= {"nano": 1e-9, "pico": 1e-12}
+_TOKEN = re.compile(r"\s*(sqrt\(|[()/*\u00b7]|\^-?\d(?:\.\d)?|[A-Za-z\u00b0%-]+|1)", re.ASCII)
+# Levels against something else than a carrier, by their units in small letters.
+_OTHER_LEVELS = {
+    "dbm": "a power",
+    "dbw": "a power",
+    "dbm/hz": "a power in each hertz",
+    "dbw/hz": "a power in each hertz",
+    "dbv": "a voltage",
+    "dbsm": "a radar cross section",
+}
+
+
+def about_unit(digits: str, written: str, dimension: Dimension) -> tuple[str, str]:
+    """Problem and hint for a number with a unit that no dimension reads."""
+    unit = normal_unit(written)
+    problem = f"has the unknown unit {written!r}"
+    if other_level := _OTHER_LEVELS.get(unit.lower()):
+        is_noise = unit.lower().endswith("/hz") and dimension.si == "dBc/Hz"
+        hint = f"Subtract the carrier's power in {unit[:-3]}" if is_noise else ""
+        return f"must be {dimension.name}, but {written!r} makes it {other_level}", hint
+    if dimension.si == "rad" and unit.lower().removesuffix("s") == "mil":
+        return problem, "A mil is 1/6400 of a turn, a milliradian, or a thousandth of an inch: write mrad"
+    if dimension.si == "rad" and unit.lower() == "as":
+        return problem, "Did you mean 'arcsec'?"
+    value = value_of_unit(unit)
+    if value is None:
+        meant = _respelt(unit, dimension)
+        return problem, f"Did you mean {meant!r}?" if meant else ""
+    if value.powers == _powers_of(dimension):
+        if meant := _of_same_size(value, dimension):
+            return problem, f"Did you mean {meant!r}?"
+        return problem, _converted(digits, written, value.factor, dimension)
+    other = next((one for one in DIMENSIONS if _powers_of(one) == value.powers), None)
+    if other is None or "Hz" in unit:  # a density that is none of the field
+        return problem, ""
+    conversion = _converted(digits, written, value.factor, other)
+    return problem, f"{conversion}, {other.name}" if conversion else ""
+
+
+def is_of(written: str, dimension: Dimension) -> bool:
+    """Whether a unit, read or only understood, is one of a dimension."""
+    value = value_of_unit(normal_unit(written))
+    return value is not None and value.powers == _powers_of(dimension)
+
+
+def value_of_unit(unit: str) -> UnitValue | None:
+    """Value of a unit made of known ones by products, quotients, powers and square roots; None where it is none."""
+    tokens: list[str] = []
+    end = 0
+    while end < len(unit):
+        match = _TOKEN.match(unit, end)
+        if match is None:
+            return None
+        tokens.append(match[1])
+        end = match.end()
+    try:
+        value = _product(tokens)
+    except (IndexError, OverflowError, ZeroDivisionError):
+        return None
+    return None if tokens or value is None or not math.isfinite(value.factor) or not value.factor else value
+
+
+def _product(tokens: list[str]) -> UnitValue | None:
+    """Value of factors up to the end or a closing bracket; takes them from the list."""
+    value = UnitValue(1.0)
+    sign = 1.0
+    if tokens[0] == "/":
+        sign = -1.0
+        tokens.pop(0)
+    while True:
+        factor = _power(tokens)
+        if factor is None:
+            return None
+        value = value.times(factor, sign)
+        if not tokens or tokens[0] == ")":
+            return value
+        sign = -1.0 if tokens[0] == "/" else 1.0
+        if tokens[0] in ("/", "*", "\u00b7"):
+            tokens.pop(0)
+
+
+def _power(tokens: list[str]) -> UnitValue | None:
+    token = tokens.pop(0)
+    if token in ("(", "sqrt("):
+        value = _product(tokens)
+        if tokens.pop(0) != ")":
+            return None
+        exponent = 0.5 if token == "sqrt(" else 1.0
+    else:
+        value, exponent = _atom(token), 1.0
+    if tokens and tokens[0].startswith("^"):
+        exponent *= float(tokens.pop(0)[1:])
+    return None if value is None else UnitValue(1.0).times(value, exponent)
+
+
+def _atom(name: str) -> UnitValue | None:
+    """Value of a unit's name, with or without a prefix, or of a word for it."""
+    for prefix, factor in {"": 1.0, **_SI_PREFIXES}.items():
+        of_name = _ATOMS.get(name.removeprefix(prefix)) if name.startswith(prefix) else None
+        if of_name is not None and (not prefix or prefix in of_name[2]):
+            return UnitValue(factor * of_name[0], of_name[1])
+    word = name.lower()
+    for prefix, factor in {"": 1.0, **_WORD_PREFIXES}.items():
+        rest = word.removeprefix(prefix).lstrip("-") if word.startswith(prefix) else ""
+        known = _WORDS.get(rest) or _WORDS.get(rest.removesuffix("s"))
+        if known is not None:
+            return UnitValue(factor * _ATOMS[known][0], _ATOMS[known][1])
+    is_plural = len(name) >= _SHORTEST_PLURAL and name.endswith("s") and name[:-1] in _ATOMS
+    return UnitValue(*_ATOMS[name[:-1]][:2]) if is_plural else None
+
+
+def _powers_of(dimension: Dimension) -> tuple[float, float, float] | None:
+    """Powers of a dimension's SI unit; None of decibels and bytes."""
+    value = value_of_unit(dimension.si or "1")
+    return None if value is None else value.powers
+
+
+def _of_same_size(value: UnitValue, dimension: Dimension) -> str:
+    """Unit of a dimension that is as large; empty if none is."""
+    return next((unit for unit, factor in dimension.units.items() if unit and _is_same(factor, value.factor)), "")
+
+
+def _is_same(a: float, b: float) -> bool:
+    return math.isclose(a, b, rel_tol=_SAME_FACTOR)
+
+
+def _converted(digits: str, written: str, factor: float, dimension: Dimension) -> str:
+    """Words on what a number with a unit is in a unit that is read."""
+    value = float(digits) * factor
+    return f"{digits} {written} is {format_quantity(value, dimension.si, 9)}" if math.isfinite(value) else ""
+
+
+def _respelt(unit: str, dimension: Dimension) -> str:
+    """Unit of a dimension that is written like this one but for letters of the other case, or one slip.
+
+    Empty where another unit that somebody may have meant is as near, and differs in size.
+    """
+    candidates = dict(_conceivable(dimension))
+    spellings = {unit.lower(), normal_unit(unit.lower().replace("hz", "Hz")).lower()}
+    folded = [one for one in candidates if one.lower() in spellings and len(one) > 1]
+    if not _is_one_size([candidates[one] for one in folded]):
+        folded = [one for one in folded if one in dimension.units]
+        is_unsure = len(folded) > 1 or folded[0][0] != unit[0]  # Mhz is no millihertz, and nobody knows what Nm is
+        folded = [] if is_unsure else folded
+    is_level = _powers_of(dimension) is None  # one letter of dBc makes it a power
+    slips = [one for one in candidates if _is_one_slip(unit, one)]
+    if not _is_one_size([candidates[one] for one in (*folded, *slips)]):
+        return ""
+    offered = [*folded, *(slips if len(unit) >= _SHORTEST_TYPO and not is_level else ())]
+    return next((one for one in offered if one in dimension.units), "")
+
+
+def _is_one_size(factors: list[float]) -> bool:
+    return all(_is_same(factor, factors[0]) for factor in factors)
+
+
+def _conceivable(dimension: Dimension) -> Iterator[tuple[str, float]]:
+    """Units of a dimension, and those with other prefixes that somebody could mean, with their factors."""
+    powers = _powers_of(dimension)
+    for unit, factor in dimension.units.items():
+        if not unit:
+            continue
+        yield unit, factor
+        if powers is None:
+            continue
+        for bare in {unit, unit[1:]}:
+            for prefixed in (bare, *(prefix + bare for prefix in _SI_PREFIXES)):
+                value = value_of_unit(prefixed) if prefixed not in dimension.units else None
+                if value is not None and value.powers == powers:
+                    yield prefixed, value.factor
+
+
+def _is_one_slip(a: str, b: str) -> bool:
+    """Whether a letter too many, too few, wrong, or two exchanged make one text of the other."""
+    if a == b or abs(len(a) - len(b)) > 1:
+        return a == b
+    start = next((n for n, (x, y) in enumerate(zip(a, b, strict=False)) if x != y), min(len(a), len(b)))
+    rest_a, rest_b = a[start:], b[start:]
+    is_exchanged = rest_a[:2] == rest_b[1::-1] and rest_a[2:] == rest_b[2:] and len(rest_a) > 1
+    return rest_a[1:] == rest_b or rest_a == rest_b[1:] or rest_a[1:] == rest_b[1:] or is_exchanged
