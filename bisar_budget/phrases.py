@@ -632,6 +632,16 @@ def mask_begins(frequency: float, slope: float) -> str:
 
 
 @phrase
+def rests_on_the_continuation(platforms: Sequence[str], percent: float, least: float) -> str:
+    """Said of a row that rests on noise below the first points of masks. [Hz]"""
+    keys = " and ".join(f"platforms.{name}.oscillator" for name in platforms)
+    return (
+        f"{percent:.0f} % of its power lies below the first point of the mask of {keys}, where the noise is taken to "
+        f"continue as f^-3: a mask down to {format_quantity(least, 'Hz', 2, 'down')} would say it"
+    )
+
+
+@phrase
 def power_law_fits(misfit: float) -> str:
     """Said of an oscillator."""
     return f"the power law fits the Allan deviation to {100 * misfit:.2g} %"

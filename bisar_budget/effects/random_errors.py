@@ -68,4 +68,5 @@ def in_one_case(mission: Mission, error: RandomError, case: int = 0) -> RandomEr
         oscillator: Oscillator = getattr(mission.platforms, error.owner).oscillator
         noise = noise_of(oscillator, mission.radar.center_frequency, mission.collection.aperture_time)
     declared = None if error.declared is None else plain(error.declared, case)
-    return error._replace(declared=declared, published=published, full=full, noise=noise)
+    continued = None if error.continued is None else error.continued.of(case)
+    return error._replace(declared=declared, published=published, full=full, noise=noise, continued=continued)
