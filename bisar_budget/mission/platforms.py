@@ -48,7 +48,6 @@ from bisar_budget.mission.readers import (
     VELOCITY,
     Choice,
     Key,
-    Label,
     Quantity,
     Reader,
     Reference,
@@ -59,9 +58,11 @@ from bisar_budget.mission.readers import (
     TextList,
     Triple,
     Whole,
+    date_schema,
     either,
 )
 from bisar_budget.mission.vibrations import Vibration
+from bisar_budget.paths.accuracy import StatedAccuracy
 from bisar_budget.paths.instant import SCALES, parse_instant
 
 LEAST_BASELINE = 1.0  # m, between platforms of which one hears the other
@@ -226,7 +227,7 @@ class _Lines(Reader):
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
         """Array of two lines."""
-        return {"type": "array", "items": {"type": "string"}, "minItems": 2, "maxItems": 2}
+        return {"type": "array", "items": Reference().schema(definitions), "minItems": 2, "maxItems": 2}
 
 
 class OrbitSource(NamedTuple):
@@ -270,7 +271,7 @@ class _Instant(Reader):
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
         """Date and time."""
-        return {"type": "string", "format": "date-time"}
+        return date_schema(r"^\s*\d{4}-\d\d-\d\d[T ]")
 
 
 class _Talker(Text):
@@ -323,7 +324,7 @@ class TrajectorySource(NamedTuple):
     track: Annotated[
         str | None,
         Key(
-            Label(),
+            Reference(),
             "Track of a GPX file with several, by its name or number; omitted: the one that covers the aperture.",
         ),
     ] = None
@@ -396,7 +397,12 @@ class FlownPath(NamedTuple):
     is_doubted: bool = False
     accuracy: tuple[str, str] | None = None  # file that states its errors, and its SHA-256
     orientation: tuple[str, str] | None = None  # table by which it is turned to the Earth, and its SHA-256
-    sigmas: Vector | None = None  # east, north, up, that its log states in the aperture, at most [m]
+    stated: tuple[StatedAccuracy, ...] = ()  # by its own source, along the scene's axes
+
+    @property
+    def largest_doubt_m(self) -> float:
+        """How far the truth may be from it, by what its source says of itself or by anything else. [m]"""
+        return max([self.doubt_m, *(one.position_m for one in self.stated)])
 
     @property
     def beside(self) -> Mapping[str, tuple[str, str] | None]:

@@ -9,8 +9,9 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 from bisar_budget.faults import shown
+from bisar_budget.paths.accuracy import StatedAccuracy
 from bisar_budget.paths.ephemeris import APART, OWN_VELOCITY, Interpolation, Segment, orbit_through, velocity_off
-from bisar_budget.paths.flight import Orbit, PathDoubt, PathFileError, Sample
+from bisar_budget.paths.flight import Orbit, PathFileError, Sample
 from bisar_budget.paths.instant import FIRST_DAY, Instant, tai
 from bisar_budget.paths.messages import (
     LATEST,
@@ -74,7 +75,7 @@ def read_eof(
         where=f"{name}:{lines[0]}",
         words=f"{shown(kind)} of {satellite}, {_HERMITE.words}",
         interpolation=_HERMITE,
-        accuracy=PathDoubt(stated, f"{100 * stated:.2g} cm that {kind} may be off"),
+        accuracy=StatedAccuracy(f"accuracy of {kind}", total=stated) if stated else None,
         remarks=(flaws,) if flawed else (),
     )
     return orbit_through([segment], name, wanted, center, orientation)
