@@ -261,6 +261,27 @@ class Choice(Reader):
         return {"enum": list(self.names)}
 
 
+_YES_NO = {word: word.lower() == "true" for word in ("true", "True", "TRUE", "false", "False", "FALSE")}
+
+
+class YesNo(Reader):
+    """True or false."""
+
+    is_word = True
+    what = "true or false"
+
+    def leaf(self, value: Any) -> bool:
+        """Read true or false, in the spellings of YAML 1.2; of an option also as a word."""
+        found = value if isinstance(value, bool) else _YES_NO.get(value) if isinstance(value, str) else None
+        if found is None:
+            raise InvalidValueError("must be true or false", "accepted: true, false")
+        return found
+
+    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
+        """Boolean, or its word."""
+        return {"enum": [True, False, *_YES_NO]}
+
+
 class Words(Reader):
     """A list of some of a few words, each once."""
 
