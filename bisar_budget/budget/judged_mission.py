@@ -18,6 +18,7 @@ from bisar_budget.analysis.scene import SceneEdges, scene_edges
 from bisar_budget.analysis.spread import noise
 from bisar_budget.budget.aggregates import Aggregates, JudgedScene, unplaced, untaken_effects
 from bisar_budget.budget.declarations import DECLARATIONS, is_asked_for, missing_declarations
+from bisar_budget.budget.dispersion_row import dispersion_rows
 from bisar_budget.budget.doubts import doubted_platforms, is_in_doubt, strays
 from bisar_budget.budget.error_rows import ErrorRows, specification_rows
 from bisar_budget.budget.file_warnings import FASTEST_FLIGHT, calm_oscillators
@@ -175,6 +176,7 @@ class _Judgement:
         yield from self._random.stated_rows(model)
         yield from spur_rows(self.judging, self.analysis, model)
         yield from accelerated_rows(self.judging, self.analysis, model)
+        yield from dispersion_rows(self.judging, self.analysis)
         if needs.pslr is not None:
             yield pslr_row(self.judging, self.analysis.tones, needs.pslr)
         if needs.islr is not None:

@@ -196,10 +196,10 @@ def _total(key: str, judged: JudgedMission, case: Case, rows: Sequence[Row | Non
 
 def _share(row: Row, key: str, case: Case, utilization: float | None) -> DecidingShare | None:
     """The share of a requirement that a row is held to; None where it is held to the whole."""
-    kind = row.subject.kind
-    if key == QUADRATIC and kind in (PULL_IN, "spatial_variance"):
+    of_kinds = {PULL_IN: "autofocus", "spatial_variance": "scene", "dispersion": "band"}
+    if key == QUADRATIC and row.subject.kind in of_kinds:
         return DecidingShare(
-            owner="autofocus" if kind == PULL_IN else "scene",
+            owner=of_kinds[row.subject.kind],
             allowed=row.allowable,
             reached=row.declared,
             utilization=utilization,

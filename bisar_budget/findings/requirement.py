@@ -21,7 +21,8 @@ class DecidingShare:
     """A share of a requirement that decides in place of the whole, in the unit of the requirement; without gain.
 
     `owner` is the platform or the clock that has the share; `autofocus`, where the sum of all phases is held to what
-    autofocus pulls in; `scene`, where the difference at the scene's edge is held to the requirement.
+    autofocus pulls in; `scene`, where the difference at the scene's edge is held to the requirement; `band`, where
+    the phase is that of dispersion over the band.
     """
 
     owner: str

@@ -76,7 +76,8 @@ def use_remarks(one: JudgedRequirement) -> Iterator[str]:
 
 
 _OF_OWNER = "'s share"
-_SHARES = {"autofocus": "pull-in of autofocus", "scene": "at the scene's edge"}  # that no platform and no clock has
+# Shares that no platform and no clock has.
+_SHARES = {"autofocus": "pull-in of autofocus", "scene": "at the scene's edge", "band": "over the band"}
 
 
 def share_words(one: JudgedRequirement, share: DecidingShare) -> str:

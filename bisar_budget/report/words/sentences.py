@@ -131,7 +131,8 @@ def dashed(text: str) -> str:
 
 _PHASE_UNIT = "deg"  # of the phase requirement that a file does not state
 LEVELS = ("pslr", "islr")  # requirements in dB of the image, and the kinds of the rows that add them up
-_OF_PHASES = ("quadratic_phase_error", "cubic_phase_error", "spatial_variance")  # rows that add phases up
+# Kinds of rows that add phases up.
+_OF_PHASES = ("quadratic_phase_error", "cubic_phase_error", "spatial_variance", "dispersion")
 
 
 def row_size(value: float | None, row: Row, mission: MissionFindings, rounding: str = "nearest") -> str:
