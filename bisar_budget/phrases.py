@@ -39,6 +39,7 @@ class Note(str):
 
 NOTHING = Note("")
 CODES: dict[str, str] = {}  # of every sentence, with what it is said of
+_SCENE_AXES = {"x": "east", "y": "north", "z": "up"}
 _NO_GAIN = "autofocus gain does not apply"
 
 
@@ -72,6 +73,19 @@ def _by(text: str, equation: str) -> str:
 
 def _level(db: float, rounding: str = "nearest") -> str:
     return format_quantity(db, "dB", 3, rounding)
+
+
+# ---------------------------------------------------------------------- how a mission stands
+@phrase
+def confidence(coverage_factor: float, *, has_sigma: bool, has_bounds: bool) -> str:
+    """Said of a mission whose requirements are met, behind `met`."""
+    covered = f"with coverage factor {coverage_factor:g}"
+    if not has_sigma:
+        if not has_bounds:
+            return "for the stated values"
+        return "for the stated bounds" if coverage_factor == 1 else f"for the stated bounds {covered}"
+    sigma = "at 1 sigma" if coverage_factor == 1 else covered
+    return f"{sigma} and for the stated bounds" if has_bounds else sigma
 
 
 # ---------------------------------------------------------------------- how a row stands
@@ -214,6 +228,55 @@ def input_in_doubt(doubt: float, words: str, declared: float | None, key: str) -
     """Said of a position error that is less than the doubt of the platform's path. [m]"""
     stated = "no position error is declared" if declared is None else f"{_size(declared, 'm')} is declared"
     return f"the path may be {_size(doubt, 'm')} off ({words}), {stated}: state it in {key}"
+
+
+@phrase
+def input_states_more(
+    words: str,
+    kind: str,
+    stated: Sequence[float],
+    declared: Sequence[float],
+    unit: str,
+    key: str,
+    is_declared: bool,
+    axes: Sequence[str] = (),
+) -> str:
+    """Said of a declared error that is less than the one which the source of the path states. [m], [m/s]"""
+    within = f" ({_axes(axes)})" if axes else ""
+    own = _declared(kind, declared, unit, is_declared)
+    return f"{words}: a {kind} error of {_sizes(stated, unit)}{within} is stated, {own}: state at least that in {key}"
+
+
+@phrase
+def input_usually_has_more(
+    words: str,
+    kind: str,
+    stated: Sequence[float],
+    declared: Sequence[float],
+    unit: str,
+    key: str,
+    is_declared: bool,
+    axes: Sequence[str] = (),
+) -> str:
+    """Said of a declared error that is less than a third of the usual one of a log's quality. [m]"""
+    return (
+        f"{words} usually have an error of {_size(max(stated), unit)} on each axis,"
+        f" {_declared(kind, declared, unit, is_declared)}: state at least a third of the usual error in {key}"
+    )
+
+
+def _declared(kind: str, declared: Sequence[float], unit: str, is_declared: bool) -> str:
+    return f"{_sizes(declared, unit)} is declared" if is_declared else f"no {kind} error is declared"
+
+
+def _sizes(sizes: Sequence[float], unit: str) -> str:
+    """One size where all are alike, else each."""
+    words = [_size(size, unit) for size in sizes]
+    return words[0] if len(set(words)) == 1 else ", ".join(words)
+
+
+def _axes(names: Sequence[str]) -> str:
+    return ", ".join(_SCENE_AXES.get(name, name).replace("_", "-") for name in names)
 
 
 # ---------------------------------------------------------------------- over the limit

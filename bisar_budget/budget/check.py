@@ -17,6 +17,7 @@ import numpy as np
 
 from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Analysis, Case, by_nodes
+from bisar_budget.budget.confidence import confidence_of
 from bisar_budget.budget.declarations import declared_kinds
 from bisar_budget.budget.doubts import collection_notes, model_doubt
 from bisar_budget.budget.file_warnings import file_warnings
@@ -127,6 +128,7 @@ def _findings(judged: JudgedMission, case: Case, today: date, outside: Outside) 
         document=mission.document,
         changes=mission.changes,
         model_doubt=model_doubt(case, rows),
+        confidence=confidence_of(case),
     )
 
 

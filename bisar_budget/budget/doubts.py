@@ -1,36 +1,51 @@
 """Doubts about what is checked: paths that stray from the truth, a model or a collection at its edge.
 
 A path by an orbit or a log says how far the truth may be from it: by the age of its elements, the interpolation of
-its ephemeris, the residual of its smoothed log. A position error that is smaller cannot be that of this path.
+its ephemeris, the residual of its smoothed log. A position error that is smaller cannot be that of this path. Nor can
+a declared error that is smaller than the one that the source of the path states of itself.
 """
 
 from collections.abc import Iterator, Sequence
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
 
 from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Case
 from bisar_budget.constants import SPEED_OF_LIGHT
-from bisar_budget.effects.effect import PLATFORMS, Subject
+from bisar_budget.effects.effect import MOTION_UNITS, PLATFORMS, Subject
 from bisar_budget.findings.row import Row
-from bisar_budget.geometry import norm
+from bisar_budget.geometry import FRAME_AXES, BistaticGeometry, norm, unit
+from bisar_budget.mission.covariance import KINDS
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import FlownPath, MotionError, Platform
+from bisar_budget.paths.accuracy import StatedAccuracy
 from bisar_budget.phrases import NOTHING, Note
+from bisar_budget.ranges.exact_ranges import Floats, Truths
 
 LEAST_M = 1e-3  # of a doubt; what is less is no story beside any declared error, zero included
+NEGLIGIBLE_USE = 0.1  # of a requirement, by the doubt of a path or by a velocity that its source states
+NEGLIGIBLE_RAD = 0.08  # of quadratic phase, in any image
+_TYPICAL_SHARE = 1 / 3  # of a usual error; a fix may be as much better than those of its quality usually are
+_EQUAL = 1e-6  # relative, of variances: equal is enough, and turned axes round
 
 
-class InputDoubt(NamedTuple):
+@dataclass(frozen=True)
+class InputDoubt:
     """A platform whose path is in doubt by more than the file declares.
 
-    `doubt` is how far the truth may be from the path [m], `declared` the root-sum-square of the position errors that
-    the file declares, without the coverage factor, 0 where it declares none [m]. `note` says both.
+    `doubt` is how far the truth may be from the path, or the error that its source states, along the axis where it
+    exceeds the declared one most. `declared` is that one, without the coverage factor, 0 where the file declares
+    none. Both are root-sum-squares where the doubt has no direction. [m] or [m/s], by the `kind`. `note` says both.
     """
 
     owner: str
     doubt: float
     declared: float
     note: Note
+    kind: str = "position"
+    is_stated: bool = False
 
 
 def input_doubts(mission: Mission) -> list[InputDoubt]:
@@ -39,11 +54,52 @@ def input_doubts(mission: Mission) -> list[InputDoubt]:
     for name in PLATFORMS:
         platform: Platform = getattr(mission.platforms, name)
         path, declared = platform.path, declared_position_error(platform.motion_error)
-        if path is not None and path.doubt_m > least_doubt(path, declared):
+        if path is None:
+            continue
+        if np.any(strays(mission, name)):
             key = f"platforms.{name}.motion_error.position"
             note = phrases.input_in_doubt(path.doubt_m, path.doubt_of, declared, key)
             found.append(InputDoubt(name, path.doubt_m, declared or 0.0, note))
+        for kind in KINDS:
+            found += [
+                _stated_doubt(platform, name, kind, stated)
+                for stated in path.stated
+                if np.any(states_more(mission, name, kind, stated))
+            ]
     return found
+
+
+def doubted_platforms(mission: Mission, cases: int) -> dict[tuple[str, str], Truths]:
+    """Cases in which a platform's path is in doubt by more than the file declares, by owner and kind of error."""
+    found = {}
+    for name in PLATFORMS:
+        path: FlownPath | None = getattr(mission.platforms, name).path
+        if path is not None:
+            for kind in KINDS:
+                doubts = [strays(mission, name)] if kind == "position" else []
+                doubts += [states_more(mission, name, kind, stated) for stated in path.stated]
+                found[name, kind] = np.any([np.broadcast_to(doubt, (cases,)) for doubt in (False, *doubts)], axis=0)
+    return found
+
+
+# ---------------------------------------------------------------------- how far the truth may be from a path
+def strays(mission: Mission, name: str) -> Any:
+    """Whether the truth may be farther from a platform's path than the file declares, in each case.
+
+    Age, interpolation and residual count against an error that is not declared where they are unusual, or where so
+    much would be more than a negligible part of a requirement.
+    """
+    platform: Platform = getattr(mission.platforms, name)
+    path, declared = platform.path, declared_position_error(platform.motion_error)
+    if path is None:
+        return False
+    if declared is not None:
+        return np.asarray(path.doubt_m) > np.maximum(declared, LEAST_M)
+    is_large = np.asarray(path.doubt_m) > LEAST_M
+    if not is_large.any() or path.is_doubted:
+        return is_large
+    in_any_direction = np.multiply.outer(np.asarray(path.doubt_m, dtype=float) ** 2, np.eye(3))
+    return is_large & _matters(mission, name, "position", in_any_direction)
 
 
 def declared_position_error(error: MotionError) -> Any:
@@ -56,18 +112,138 @@ def declared_position_error(error: MotionError) -> Any:
     return sum(size**2 for size in sizes) ** 0.5 if sizes else None
 
 
-def least_doubt(path: FlownPath, declared: Any) -> Any:
-    """Doubt of a path that a declared position error allows, or None; shaped as that error. [m]"""
-    if declared is None:
-        return LEAST_M if path.is_doubted else path.doubt_m
-    return declared + (LEAST_M - declared) * (declared < LEAST_M)
-
-
-def is_in_doubt(what: Subject, owner: str, mission: Mission) -> bool:
-    """Whether a row is of a position error of a platform, along the axes that the file states it in."""
+def is_in_doubt(what: Subject, owner: str, mission: Mission, kind: str = "position") -> bool:
+    """Whether a row is of a kind of error of a platform, along the axes that the file states it in."""
     error: MotionError = getattr(mission.platforms, owner).motion_error
-    frame = "scene" if error.stated("position") is None else error.frame
-    return what.owner == owner and what.kind == "position" and what.frame == frame
+    frame = "scene" if error.stated(kind) is None else error.frame
+    return what.owner == owner and what.kind == kind and what.frame == frame
+
+
+# ---------------------------------------------------------------------- what the source of a path states
+def states_more(mission: Mission, name: str, kind: str, stated: StatedAccuracy) -> Any:
+    """Whether the source of a path states a larger error than the file declares, in each case.
+
+    An error is larger if it has more variance in any direction. A source that states no direction is held to the
+    root-sum-square. A velocity counts where so much would be more than a negligible part of a requirement: an
+    ephemeris may know its places well and its velocities badly, and it is the places that are flown. So does a usual
+    position error where the file declares none.
+    """
+    platform: Platform = getattr(mission.platforms, name)
+    own = _stated_covariance(stated, kind)
+    declared = _declared_covariance(platform, kind)
+    if stated.covariance is None:
+        is_more = kind == "position" and stated.total**2 > np.trace(declared, axis1=-2, axis2=-1) * (1 + _EQUAL)
+        return np.asarray(is_more) & (stated.total > LEAST_M)
+    if own is None:
+        return False
+    share = _TYPICAL_SHARE**2 if stated.is_typical else 1.0
+    seen = LEAST_M**2 if kind == "position" else 0.0
+    left = declared * (1 + _EQUAL) + seen * np.eye(3) - share * own
+    scale = np.trace(own, axis1=-2, axis2=-1)
+    is_more = np.linalg.eigvalsh(left)[..., 0] < -1e-9 * scale
+    is_open = stated.is_typical and platform.motion_error.stated(kind) is None and not platform.motion_error.random
+    if is_more.any() and (kind == "velocity" or is_open):
+        is_more = is_more & _matters(mission, name, kind, own)
+    return is_more
+
+
+def _stated_covariance(stated: StatedAccuracy, kind: str) -> Floats | None:
+    """Covariance (..., 3, 3) of a kind of error along the scene's axes; None where the source states none."""
+    if stated.covariance is None:
+        return None
+    first = 3 * KINDS.index(kind)
+    if len(stated.covariance) <= first:
+        return None
+    rows = [row[first : first + 3] for row in stated.covariance[first : first + 3]]
+    return _stack(rows)
+
+
+def _declared_covariance(platform: Platform, kind: str) -> Floats:
+    """Covariance (..., 3, 3) of the errors of a kind that the file declares, along the scene's axes."""
+    error = platform.motion_error
+    sizes = error.stated(kind) or (0.0, 0.0, 0.0)
+    correlation = np.eye(3).tolist() if error.covariance is None else error.covariance.block(kind)
+    along = [[sizes[i] * sizes[j] * correlation[i][j] for j in range(3)] for i in range(3)]
+    if kind == "position":
+        for one in error.random:
+            for axis in range(3):
+                along[axis][axis] = along[axis][axis] + one.sigma[axis] ** 2
+    axes = _stack(platform.state.frame(error.frame))
+    return np.asarray(np.swapaxes(axes, -1, -2) @ _stack(along) @ axes)
+
+
+def _stack(rows: Sequence[Sequence[Any]]) -> Floats:
+    """A matrix (..., 3, 3) from its elements, numbers or arrays (cases,)."""
+    elements = np.broadcast_arrays(*(np.asarray(element, dtype=float) for row in rows for element in row))
+    return np.moveaxis(np.array(elements).reshape(3, 3, *elements[0].shape), (0, 1), (-2, -1))
+
+
+def _stated_doubt(platform: Platform, name: str, kind: str, stated: StatedAccuracy) -> InputDoubt:
+    """The errors that a source states and that the file declares, along the axis where they differ most."""
+    error = platform.motion_error
+    key = f"platforms.{name}.motion_error.{kind if error.covariance is None else 'covariance'}"
+    own, declared = _stated_covariance(stated, kind), _declared_covariance(platform, kind)
+    unit_name = MOTION_UNITS[kind]
+    is_declared = error.stated(kind) is not None or (kind == "position" and bool(error.random))
+    if own is None:
+        total = float(np.trace(declared)) ** 0.5
+        note = phrases.input_states_more(stated.words, kind, (stated.total,), (total,), unit_name, key, is_declared)
+        return InputDoubt(name, stated.total, total, note, kind, is_stated=True)
+    axes = _stack(platform.state.frame(error.frame))
+    names: Sequence[str] = FRAME_AXES[error.frame]
+    sizes = [np.sqrt(np.diag(axes @ one @ axes.T)).tolist() for one in (own, declared)]
+    share = _TYPICAL_SHARE if stated.is_typical else 1.0
+    if all(share * size <= known * (1 + _EQUAL) + LEAST_M for size, known in zip(*sizes, strict=True)):
+        # Along each axis enough is declared, but not between them.
+        values, directions = np.linalg.eigh(declared - share**2 * own)
+        worst = directions[:, int(values.argmin())]
+        sizes, names = [[float(worst @ one @ worst) ** 0.5] for one in (own, declared)], ("between the axes",)
+    place = max(range(len(sizes[0])), key=lambda axis: share * sizes[0][axis] - sizes[1][axis])
+    phrase = phrases.input_usually_has_more if stated.is_typical else phrases.input_states_more
+    note = phrase(stated.words, kind, sizes[0], sizes[1], unit_name, key, is_declared, names)
+    return InputDoubt(name, sizes[0][place], sizes[1][place], note, kind, is_stated=True)
+
+
+# ---------------------------------------------------------------------- what so much would do
+def _matters(mission: Mission, name: str, kind: str, covariance: Floats) -> Any:
+    """Whether an error of a platform, by its covariance, uses more than a negligible part of a requirement."""
+    needs, half = mission.requirements, np.asarray(mission.collection.aperture_time) / 2
+    with np.errstate(all="ignore"):
+        ways = [_sight(mission, name, time) for time in (-half, 0.0 * half, half)]
+        before, middle, after = (np.stack(np.broadcast_arrays(*way), axis=-1) for way in ways)
+        at_ends = np.asarray(half)[..., None]
+        if kind == "position":
+            constant, linear, edge = middle, (after - before) / (2 * at_ends), (after + before) / 2 - middle
+        else:
+            constant, linear, edge = 0 * middle, (after + before) / 2, (after - before) * at_ends / 2
+        at_edge = np.sqrt(np.einsum("...i,...ij,...j->...", edge, covariance, edge))
+        phase = 2 * np.pi / np.asarray(mission.radar.wavelength) * at_edge
+        matters = np.logical_not(phase < np.minimum(NEGLIGIBLE_USE * needs.quadratic_phase_error, NEGLIGIBLE_RAD))
+        if needs.location_error is not None:
+            moved = _moved(mission.geometry, constant, linear)
+            spread = np.sqrt(np.einsum("...ai,...ij,...aj->...", moved, covariance, moved))
+            matters = matters | np.logical_not(spread < NEGLIGIBLE_USE * np.asarray(needs.location_error))
+    return matters
+
+
+def _sight(mission: Mission, name: str, time: Any) -> Any:
+    """Range that a metre of a platform's motion adds at a slow time, along each axis; less that of a direct path."""
+    platforms = mission.platforms
+    sight = unit(getattr(platforms, name).state.place(time))
+    if not mission.has_direct_path:
+        return sight
+    sign = 1.0 if name == "transmitter" else -1.0
+    baseline = unit(platforms.geometry.apart.place(time))
+    return [towards - sign * along for towards, along in zip(sight, baseline, strict=True)]
+
+
+def _moved(geometry: BistaticGeometry, constant: Floats, linear: Floats) -> Floats:
+    """Displacement on the ground (..., 2, 3) per metre of an error, by range and its rate per metre, as in (25)."""
+    (a, b), (c, d) = geometry.range_gradient, geometry.doppler_gradient
+    determinant = np.asarray(a * d - b * c)[..., None]
+    east = (np.asarray(d)[..., None] * constant - np.asarray(b)[..., None] * linear) / determinant
+    north = (np.asarray(a)[..., None] * linear - np.asarray(c)[..., None] * constant) / determinant
+    return np.stack((east, north), axis=-2)
 
 
 # ---------------------------------------------------------------------- the published model

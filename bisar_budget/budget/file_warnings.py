@@ -120,7 +120,7 @@ def nothing_declared() -> str:
 # ---------------------------------------------------------------------- how platforms fly
 def _doubtful_paths(mission: Mission) -> Iterator[_Warned]:
     """Paths in doubt where rows do not say it; a place that strays is no part of a log's residual."""
-    owners = {one.owner for one in input_doubts(mission)}
+    owners = {one.owner for one in input_doubts(mission) if not one.is_stated}
     for name in PLATFORMS:
         platform: Platform = getattr(mission.platforms, name)
         path = platform.path

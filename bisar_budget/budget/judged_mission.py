@@ -18,7 +18,7 @@ from bisar_budget.analysis.scene import SceneEdges, scene_edges
 from bisar_budget.analysis.spread import noise
 from bisar_budget.budget.aggregates import Aggregates, JudgedScene, unplaced, untaken_effects
 from bisar_budget.budget.declarations import DECLARATIONS, is_asked_for, missing_declarations
-from bisar_budget.budget.doubts import declared_position_error, is_in_doubt, least_doubt
+from bisar_budget.budget.doubts import doubted_platforms, is_in_doubt, strays
 from bisar_budget.budget.error_rows import ErrorRows, specification_rows
 from bisar_budget.budget.file_warnings import FASTEST_FLIGHT, calm_oscillators
 from bisar_budget.budget.judged_requirements import (
@@ -235,22 +235,16 @@ class _Judgement:
 
     # ---------------------------------------------------------------- what no row says by itself
     @cached_property
-    def _in_doubt(self) -> dict[str, Truths]:
-        """Platforms with a path, and in which cases that is in doubt by more than the file declares."""
-        found = {}
-        for name in PLATFORMS:
-            platform = getattr(self.mission.platforms, name)
-            if platform.path is not None:
-                least = least_doubt(platform.path, declared_position_error(platform.motion_error))
-                found[name] = platform.path.doubt_m > self.judging.array(least)
-        return found
+    def _in_doubt(self) -> dict[tuple[str, str], Truths]:
+        """Platforms with a path, by a kind of error, and in which cases that is in doubt by more than is declared."""
+        return doubted_platforms(self.mission, self.cases)
 
     def _undeclared(self, known: Mapping[str, Judged]) -> Iterator[Judged]:
         """Rows that are shown, and of position errors of paths in doubt, that no case declares."""
         wanted = dict(self.shown or {})
-        for name, is_doubtful in self._in_doubt.items():
-            own = (subject(name, "position", axis) for axis in "xyz") if is_doubtful.any() else ()
-            wanted |= {one.id: one for one in own if is_in_doubt(one, name, self.mission)}
+        for (name, kind), is_doubtful in self._in_doubt.items():
+            own = (subject(name, kind, axis) for axis in "xyz") if is_doubtful.any() else ()
+            wanted |= {one.id: one for one in own if is_in_doubt(one, name, self.mission, kind)}
         there = {*known, DECLARATIONS.id}
         return (Judged.of_none(one, self.cases) for row_id, one in wanted.items() if row_id not in there)
 
@@ -268,7 +262,8 @@ class _Judgement:
         for name, path in zip(PLATFORMS, analysis.geometry.both, strict=True):
             platform = getattr(self.mission.platforms, name)
             if platform.path is not None and platform.path.doubts:
-                floor[~self._in_doubt[name] | bool(platform.path.samples)] = CODE["warn"]
+                is_said = strays(self.mission, name) & (not platform.path.samples)
+                floor[~np.broadcast_to(is_said, floor.shape)] = CODE["warn"]
             if platform.acceleration is None and not platform.is_of_the_earth:
                 floor[np.broadcast_to(np.asarray(norm(path.velocity)) > FASTEST_FLIGHT, floor.shape)] = CODE["warn"]
         if calm_oscillators(self.mission):
@@ -309,11 +304,11 @@ class RowStatuses:
             owed = [any(is_asked_for(what, one) for one in missing) for what in self.subjects]
             self._settle(owed, these & (self.status == CODE["not_declared"]), Why.NOT_DECLARED_AS_REQUIRED)
 
-    def doubt_inputs(self, in_doubt: Mapping[str, Truths]) -> None:
-        """Position errors of a path that is in doubt by more than the file declares are not evaluated."""
-        for name, is_doubtful in in_doubt.items():
+    def doubt_inputs(self, in_doubt: Mapping[tuple[str, str], Truths]) -> None:
+        """Errors of a path that is in doubt by more than the file declares are not evaluated."""
+        for (name, kind), is_doubtful in in_doubt.items():
             if is_doubtful.any():
-                owed = [is_in_doubt(what, name, self.mission) for what in self.subjects]
+                owed = [is_in_doubt(what, name, self.mission, kind) for what in self.subjects]
                 self._settle(owed, is_doubtful & (self.status != CODE["fail"]), Why.INPUT_IN_DOUBT)
 
     def judge_effects(self, untaken: Sequence[UntakenEffect]) -> None:

@@ -32,6 +32,8 @@ TAKEN_BY = {"cubic": (CUBIC, "islr"), "spread": ("islr",), "tone": ("pslr", "isl
 
 _NONE = np.int8(len(STATUS))  # of a row that judges nothing
 IS_JUDGED = np.array([one.is_judged for one in STATUS.values()])
+# Whether a status leaves a requirement met, with or without a warning; the last is that of `_NONE`.
+IS_MET = np.array([*(one.is_held and not one.fails for one in STATUS.values()), False])
 
 
 class UntakenEffect(NamedTuple):
@@ -51,12 +53,14 @@ class UntakenEffect(NamedTuple):
 class RequirementState(NamedTuple):
     """How a requirement stands: its status, the place of the row that decides or -1, and the places that judge it.
 
-    `utilization` is that of the requirement by the deciding row.
+    `utilization` is that of the requirement by the row at `user`. Where the requirement is met, with or without a
+    warning, that is the row with the largest utilization: a warning of the other model alone may use less.
     """
 
     key: str
     status: Codes
     decider: NDArray[np.intp]
+    user: NDArray[np.intp]
     utilization: Floats
     judges: Truths  # (rows, n)
 
@@ -130,9 +134,11 @@ def requirement_states(
         # What passes by itself may come nearer to breaking the requirement than what autofocus brings to pass.
         is_met = (worst == RANK["pass_with_autofocus"]) & (levels == RANK["pass"])
         decider = first_highest(np.where((levels == worst) | is_met, used, -1.0))
-        utilization = np.take_along_axis(used, decider[None], axis=0)[0]
+        largest = first_highest(np.where(mine & IS_MET[levels], used, -1.0))
+        user = np.where(IS_MET[worst], largest, decider)
+        utilization = np.take_along_axis(used, user[None], axis=0)[0]
         is_unjudged = ~mine.any(axis=0)
-        decider = np.where(is_unjudged, -1, decider)
+        decider, user = np.where(is_unjudged, -1, decider), np.where(is_unjudged, -1, user)
         if key == "islr":
             is_unjudged = is_unjudged | ~np.asarray(has_noise)
         if key == LOCATION:
@@ -140,5 +146,5 @@ def requirement_states(
         status = np.where(is_unjudged & (worst != RANK["fail"]), RANK["not_evaluated"], worst)
         if waived.get(key):
             status = np.where(np.isin(status, [RANK[name] for name in BROKEN]), RANK["waived"], status)
-        found.append(RequirementState(key, status.astype(np.int8), decider, utilization, mine))
+        found.append(RequirementState(key, status.astype(np.int8), decider, user, utilization, mine))
     return found

@@ -4,10 +4,14 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+import numpy as np
+
 from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Case
 from bisar_budget.analysis.spread import islr_db, mainlobe_energy, spread_limit
+from bisar_budget.analysis.together import quadratics
 from bisar_budget.analysis.vibration_limits import level_of, tone_limits
+from bisar_budget.budget.aggregates import PULL_IN
 from bisar_budget.budget.declarations import DECLARATIONS, Missing, is_asked_for, missing_declarations
 from bisar_budget.budget.doubts import input_doubts, is_in_doubt
 from bisar_budget.budget.judged_mission import JudgedMission
@@ -20,7 +24,7 @@ from bisar_budget.budget.judged_rows import FamilyRow, Judged, Why, statuses
 from bisar_budget.budget.waivers import Waived
 from bisar_budget.effects.declared import CUBIC, LOCATION, MODELS, QUADRATIC
 from bisar_budget.effects.oscillators import clocks_without_oscillator
-from bisar_budget.findings.requirement import JudgedRequirement
+from bisar_budget.findings.requirement import DecidingShare, JudgedRequirement
 from bisar_budget.findings.row import DECLARE, AppliedWaiver, Row, holding, in_order
 from bisar_budget.phrases import NOTHING, Note
 
@@ -86,8 +90,9 @@ def _why(judged: JudgedMission, case: Case, one: Judged, row: Row) -> Note:
         first = next(missing)
         return phrases.not_declared_as_required(first.key, first.lacks)
     if why is Why.INPUT_IN_DOUBT:
-        doubts = (each for each in input_doubts(mission) if is_in_doubt(one.subject, each.owner, mission))
-        return next(doubts).note
+        doubts = input_doubts(mission)
+        said = [each.note for each in doubts if is_in_doubt(one.subject, each.owner, mission, each.kind)]
+        return said[0].then(*said[1:])
     if why is Why.NO_PLACE:
         return unknown_place(judged, case)
     if why is Why.NOTHING_SPREADS:
@@ -132,12 +137,15 @@ def _entry(
     state: RequirementState, judged: JudgedMission, case: Case, rows: Sequence[Row | None], waived: Waived
 ) -> JudgedRequirement:
     mission, key = case.mission, state.key
-    value = getattr(mission.requirements, key)
+    value = None if key == DECLARE else getattr(mission.requirements, key)
+    status, place = statuses(state.status[case.place]), state.decider[case.place]
+    decider, user = (rows[one] if one >= 0 else None for one in (place, state.user[case.place]))
+    is_open = status == "not_evaluated" or (
+        status == "waived" and (place < 0 or statuses(judged.before[place].status[case.place]) == "not_evaluated")
+    )
     utilization = case.number(state.utilization)  # an error without an image has no phase to compare
-    status = statuses(state.status[case.place])
-    place = state.decider[case.place]
-    decider = rows[place] if place >= 0 else None
-    allowed, reached = _sizes(decider, key, case) if decider is not None else (None, None)
+    has_use = user is not None and user.utilization is not None and math.isfinite(utilization)
+    use = utilization if has_use and not is_open else None
     reason: Note | None = None
     if status == "not_evaluated" and (decider is None or decider.status != status):
         reason = (unknown_place(judged, case) if key == LOCATION else NOTHING) or phrases.nothing_judges(key)
@@ -147,20 +155,21 @@ def _entry(
     path = ("requirements", key)
     return JudgedRequirement(
         key=key,
-        value=None if key == "declare" else value,
+        value=value,
         unit=UNITS[key],
         is_default=path not in mission.places and not mission.is_changed(path),
         status=status,
-        allowed=allowed,
-        reached=reached,
-        utilization=utilization
-        if decider and decider.utilization is not None and math.isfinite(utilization)
-        else None,
+        allowed=value,
+        reached=None if is_open else _total(key, judged, case, rows),
+        utilization=use,
         row=None if decider is None else decider.id,
         rows=tuple(row.id for row in judges),
         reason=reason,
         line=mission.line(path),
         waivers=_waivers(status, waived.requirements.get(f"mission.{key}", ()), judges),
+        share=None if user is None or is_open else _share(user, key, case, use),
+        autofocus_gain=case.allocation.autofocus_gain if key == QUADRATIC else None,
+        use_row=None if user is None or use is None else user.id,
     )
 
 
@@ -171,28 +180,46 @@ def _waivers(
     return holding(status, in_order([*of_requirement, *(waiver for row in judges for waiver in row.waived_by)]))
 
 
-def _sizes(row: Row, key: str, case: Case) -> tuple[float | None, float | None]:
-    """Size that a row is allowed, and size that it reaches, in the unit of a requirement that it judges."""
-    mission, allocation = case.mission, case.allocation
-    if row.declared is None and row.metric != key:
-        return None, None
-    if (
-        row.unit == UNITS[key]
-        and row.binding_requirement in (key, None)
-        and (
-            row.subject.kind in (key, QUADRATIC, "spatial_variance", "autofocus_pull_in", "other")
-            or (key == "pslr" and row.unit == "dB")
+def _total(key: str, judged: JudgedMission, case: Case, rows: Sequence[Row | None]) -> float | None:
+    """Total of the mission: that of its own row, or the largest quadratic phase of a single error."""
+    own = next((row for row in rows if row is not None and row.id == f"mission.{key}"), None)
+    if own is not None and key != DECLARE:
+        return own.declared
+    if key != QUADRATIC:
+        return None
+    totals = [
+        together.combined(quadratics(together.phases)) for together in map(judged.analysis.together, judged.families)
+    ]
+    largest = case.number(np.max(totals, axis=0))
+    return largest if math.isfinite(largest) else None
+
+
+def _share(row: Row, key: str, case: Case, utilization: float | None) -> DecidingShare | None:
+    """The share of a requirement that a row is held to; None where it is held to the whole."""
+    kind = row.subject.kind
+    if key == QUADRATIC and kind in (PULL_IN, "spatial_variance"):
+        return DecidingShare(
+            owner="autofocus" if kind == PULL_IN else "scene",
+            allowed=row.allowable,
+            reached=row.declared,
+            utilization=utilization,
         )
-    ):
-        return row.allowable, row.declared
+    if row.owner == "mission" or key not in (QUADRATIC, "pslr", "islr"):
+        return None
+    allowed, reached = _sizes(row, key, case)
+    if allowed is None and reached is None:
+        return None
+    return DecidingShare(owner=row.owner, allowed=allowed, reached=reached, utilization=utilization)
+
+
+def _sizes(row: Row, key: str, case: Case) -> tuple[float | None, float | None]:
+    """Share of a requirement that the owner of a row has, without gain, and what the row reaches of it."""
+    mission, allocation = case.mission, case.allocation
     if key == QUADRATIC:
         qpe = row.qpe_full_rad if row.model == "full" else row.qpe_published_rad
-        return allocation.qpe_allowed(row.owner), None if qpe is None else abs(qpe)
-    if key == CUBIC:
-        return mission.requirements.cubic_phase_error, row.cubic_rad
-    if key == LOCATION:
-        moved = None if row.displacement_m is None else math.hypot(*row.displacement_m)
-        return mission.requirements.location_error, moved
+        return allocation.qpe_limit(row.owner), None if qpe is None else abs(qpe)
+    if row.unit == "dB" and (row.subject.kind == key or key == "pslr"):
+        return row.allowable, row.declared
     if key == "islr":
         model = row.model or "full"
         limit, use = spread_limit(mission, allocation, row.owner, model) or 0.0, row.utilization or 0.0

@@ -129,12 +129,8 @@ def _with_refuted(
     found = requirement._replace(status=status, row=row.id, reason=row.reason, waivers=holding(status, covering))
     if row.id == requirement.row:
         return found
-    is_alike = row.unit == requirement.unit
-    return found._replace(
-        allowed=row.allowable if is_alike else None,
-        reached=row.declared if is_alike else None,
-        utilization=row.utilization,
-    )
+    # The row's own numbers are in its unit, and no part of the requirement: an image says that its limit is wrong.
+    return found._replace(utilization=row.utilization, use_row=row.id, share=None)
 
 
 def _shown(verdict: Verdict) -> str:

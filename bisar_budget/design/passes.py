@@ -271,7 +271,7 @@ def _at_mid_time(number: int, stretch: Stretch, satellite: Watched, axes: SceneA
         state=state,
         side=_side(state, axes),
         is_ascending=axes.turned_back(state.velocity)[2] > 0,
-        doubt=satellite.orbit(time).doubt(center).size,
+        doubt=satellite.orbit(time).largest_doubt_m(center),
     )
 
 
@@ -315,7 +315,7 @@ def _judged(one: SatellitePass, findings: MissionFindings, mission: Mission, pla
     row, requirement, utilization, reason = _deciding(findings)
     return one._replace(
         state=path.state,
-        doubt=path.doubt_m,
+        doubt=path.largest_doubt_m,
         status=findings.status,
         reason=reason,
         bistatic_angle=findings.geometry.bistatic_angle,

@@ -46,6 +46,18 @@ def exact_ranges(
     return ExactRanges.of(geometry.both, mission.radar.wavelength, T, count, cases, has_direct_path=is_heard)
 
 
+def distribution_of(mission: Mission, source: ErrorSource) -> str:
+    """Distribution of a declared error; what the file states as a size alone is a `bound`."""
+    if source.clock is not None:
+        # A clock's values are one sigma, as the coverage factor on them says.
+        return "normal"
+    if source.owner in PLATFORMS:
+        return str(getattr(mission.platforms, source.owner).motion_error.distribution)
+    if source.is_common and mission.common_motion_error is not None:
+        return mission.common_motion_error.distribution
+    return "bound"
+
+
 class ErrorListing:
     """The errors of cases of one mission, as their file states them. Parameters are those of `DeclaredErrors`."""
 

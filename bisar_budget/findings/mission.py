@@ -78,6 +78,7 @@ class MissionFindings(NamedTuple):
     kinds: DeclaredKinds = DeclaredKinds()
     overrides: tuple[Override, ...] = ()  # what from outside the file bears on the verdict
     model_doubt: Note = NOTHING  # where the published model judges and does not hold
+    confidence: Note = NOTHING  # with which its requirements are met, should they be
 
     def __repr__(self) -> str:
         """File, name and status, on one line."""

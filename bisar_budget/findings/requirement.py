@@ -1,5 +1,6 @@
 """The table of requirements: what each asks for, what is reached, and which row decides."""
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from bisar_budget.findings.row import AppliedWaiver, holding
@@ -15,13 +16,30 @@ NAMES = {
 }
 
 
+@dataclass(frozen=True, kw_only=True)
+class DecidingShare:
+    """A share of a requirement that decides in place of the whole, in the unit of the requirement; without gain.
+
+    `owner` is the platform or the clock that has the share; `autofocus`, where the sum of all phases is held to what
+    autofocus pulls in; `scene`, where the difference at the scene's edge is held to the requirement.
+    """
+
+    owner: str
+    allowed: float | None
+    reached: float | None
+    utilization: float | None
+
+
 class JudgedRequirement(NamedTuple):
     """A requirement of the mission and how it stands. Numbers in SI, radians and decibel; None where there is none.
 
-    `value` is what the file, or the default, requires in all; `allowed` what the deciding row is held to (the share
-    of a platform, autofocus included) and `reached` what is declared there, in the unit of the requirement. `row` is
-    the deciding one, `rows` are all that judge it. `reason` says why it cannot be judged, or why it is not met.
-    `waivers` cover it or rows that judge it; empty unless it is waived.
+    `value` and `allowed` are the requirement as the file, or the default, states it; `reached` is the total of the
+    mission, with `combine: each` the largest row's. `utilization` is that of what decides: the ratio of the two, or
+    that of `share`, where a share decides. `autofocus_gain` is the factor by which autofocus lets quadratic phases
+    exceed what is allowed, in all and of a platform's share; None of other requirements. `row` is the row that
+    decides the status, `use_row` the one with the utilization, `rows` are all that judge the requirement. `reason`
+    says why it cannot be judged, or why it is not met. `waivers` cover it or rows that judge it; empty unless it is
+    waived.
     """
 
     key: str
@@ -37,6 +55,9 @@ class JudgedRequirement(NamedTuple):
     reason: Note | None = None
     line: int | None = None
     waivers: tuple[AppliedWaiver, ...] = ()
+    share: DecidingShare | None = None
+    autofocus_gain: float | None = None
+    use_row: str | None = None
 
     def __repr__(self) -> str:
         """Key, what is reached of what is allowed, and status, on one line."""

@@ -3,7 +3,7 @@
 import hashlib
 import math
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any, NamedTuple, TypeVar
@@ -11,7 +11,8 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from bisar_budget.faults import KeyPath, Problem, printable
-from bisar_budget.geometry import STRAIGHT, PlatformState, Vector
+from bisar_budget.geometry import STRAIGHT, PlatformState, UndefinedFrameError
+from bisar_budget.mission.covariance import KINDS, Covariance
 from bisar_budget.mission.instruments import Overridden
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import (
@@ -28,6 +29,14 @@ from bisar_budget.mission.platforms import (
 from bisar_budget.mission.propagation import too_low
 from bisar_budget.mission.readers import INVALID, Report
 from bisar_budget.paths import earth
+from bisar_budget.paths.accuracy import (
+    StatedAccuracy,
+    as_matrix,
+    block_turned,
+    correlations,
+    covering_sigmas,
+    diagonal,
+)
 from bisar_budget.paths.flight import (
     Fitted,
     Log,
@@ -52,6 +61,7 @@ from bisar_budget.resources import DISK, Files, UnreadableError
 from bisar_budget.units import format_quantity
 
 _T = TypeVar("_T")
+Floats = earth.Floats
 Beside = Callable[[str], bytes]  # content of a file that a mission names
 
 _FILES = (*ORBIT_FORMATS, "file", "accuracy")  # keys of a path that name one
@@ -61,6 +71,7 @@ _logs: dict[tuple[object, ...], Log] = {}  # by what they were read from; the by
 _PATHS_KEPT = 256  # of cases that a sweep reads: where nothing that a path follows from changes
 _paths: dict[tuple[object, ...], FlownPath] = {}  # by what they follow from
 _FARTHEST_M = 4.1e8  # of a satellite from the Earth's centre
+_UNCORRELATED = 1e-6  # of a correlation: what turning axes leaves by rounding
 _LOST = 0.1  # of the slant range: a satellite that may be farther off leaves nothing of the geometry
 _NOISE_M = 1.0  # residual of a log that is doubted where the file declares no position error; as of an ephemeris
 _PLACE = "accepted: scene.latitude, scene.longitude and scene.height"
@@ -181,16 +192,13 @@ def _with_path(mission: Mission, platform: Platform, axes: earth.SceneAxes | Non
         raise _UnusablePathError((platform.way,), Problem(words))
     if axes is not None:
         path = path._replace(state=_with_radial(path.state, axes))
-    found = platform._replace(path=path)
     trajectory, error = platform.trajectory, platform.motion_error
     if trajectory is not None and trajectory.accuracy is not None:
-        stated, digest = _by_accuracy(mission, trajectory, error, read)
-        path = path._replace(accuracy=(trajectory.accuracy, digest))
-        found = found._replace(motion_error=stated, path=path)
-    elif trajectory is not None and path.sigmas is not None and _takes_sigmas(error):
-        stated = _filled(error, {"position": path.sigmas}, f"solution {trajectory.file}")
-        found = found._replace(motion_error=stated)
-    return found
+        accuracy, digest = _by_accuracy(mission, trajectory, error, read)
+        path = path._replace(accuracy=(trajectory.accuracy, digest), stated=(accuracy,))
+    for one in path.stated:
+        error = _filled(error, one, path.state)
+    return platform._replace(path=path, motion_error=error)
 
 
 def _of_file(file: str | None, error: PathFileError) -> Problem:
@@ -333,8 +341,22 @@ def _orbit_path(
     age = None if orbit.epoch is None else center.since(orbit.epoch)
     doubts = (*of_orbit, *fitted.doubts)
     return _flown(fitted, orbit.words, file)._replace(
-        age=age, doubts=doubts, doubt_m=doubt.size + fitted.farthest, doubt_of=doubt.words, is_doubted=bool(doubts)
+        age=age,
+        doubts=doubts,
+        doubt_m=doubt.size + fitted.farthest,
+        doubt_of=doubt.words,
+        is_doubted=bool(doubts),
+        stated=tuple(_stated_of_orbit(orbit, center, axes, name)),
     )
+
+
+def _stated_of_orbit(orbit: Orbit, center: Instant, axes: earth.SceneAxes, name: str) -> Iterator[StatedAccuracy]:
+    """Accuracy that the file of an orbit states in the middle of the aperture, along the scene's axes."""
+    stated = orbit.stated(center)
+    if stated is not None:
+        own = stated.covariance
+        turned = None if own is None else as_matrix(block_turned(np.array(own), np.array(axes.axes)))
+        yield stated._replace(covariance=turned, words=f"{name}, {stated.words}")
 
 
 def _hold_to_range(doubt: PathDoubt, slant_range: float, said: Sequence[str], remedy: str, name: str) -> None:
@@ -377,10 +399,7 @@ def _log_path(
     if log.start is None:
         words += f", {route.center or 0.0:.12g} s of it at mid-aperture"
     path = _flown(fitted, words, route.file, digest)
-    if log.sigmas is not None:
-        east, north, up = np.fmax.reduce(log.sigmas[around_aperture(times, aperture_time)], axis=0).tolist()
-        is_known = east > 0 and north > 0 and up > 0  # NaN and 0 are not
-        path = path._replace(sigmas=(east, north, up) if is_known else None)
+    path = path._replace(stated=tuple(_stated_of_log(log, around_aperture(times, aperture_time), route.file)))
     # The root mean square is what a sigma is compared with: the largest of thousands of places is four of them.
     words = "residual of the smoothed log at places left out, root mean square"
     return path._replace(doubt_m=fitted.missed, doubt_of=words, is_doubted=fitted.missed > _NOISE_M)
@@ -400,8 +419,8 @@ def _log(route: TrajectorySource, data: bytes, digest: str) -> Log:
 
 def _by_accuracy(
     mission: Mission, route: TrajectorySource, error: MotionError, read: Beside
-) -> tuple[MotionError, str]:
-    """Errors that the accuracy file of a log states, where the mission file states none; and its SHA-256."""
+) -> tuple[StatedAccuracy, str]:
+    """Errors that the accuracy file of a log states, and its SHA-256."""
     file = route.accuracy or ""
     key = ("trajectory", "accuracy")
     if error.frame != "scene":
@@ -414,29 +433,73 @@ def _by_accuracy(
         raise _UnusablePathError(key, _of_file(file, unusable)) from None
     if error.distribution != "normal" and error.covariance is None and None in (error.position, error.velocity):
         raise _UnusablePathError(key, Problem("states one sigma", "accepted: motion_error.distribution: normal"))
-    figures = {"position": stated.position, "velocity": stated.velocity}
-    return _filled(error, figures, f"accuracy file {file}"), hashlib.sha256(data).hexdigest()
+    variances = [sigma**2 for sigma in (*stated.position, *stated.velocity)]
+    return StatedAccuracy(f"accuracy file {file}", diagonal(variances)), hashlib.sha256(data).hexdigest()
 
 
-def _takes_sigmas(error: MotionError) -> bool:
-    """Whether one-sigma errors east, north, up of a log can stand in, or have to be noted beside what is stated."""
-    is_stated = error.position is not None or error.covariance is not None
-    return is_stated or (error.frame == "scene" and error.distribution == "normal")
+def _stated_of_log(log: Log, near: slice, file: str) -> Iterator[StatedAccuracy]:
+    """Accuracy that a log states of its fixes around the aperture: the largest sigmas, or what is usual of them.
+
+    The usual one counts for fixes of which the log states no sigmas.
+    """
+    unstated: Any = np.ones(log.times[near].shape, dtype=bool)
+    if log.sigmas is not None:
+        sigmas = np.nan_to_num(log.sigmas[near])
+        largest = sigmas.max(axis=0)
+        unstated = np.logical_not((sigmas > 0).all(axis=1))
+        if largest.all():  # 0 is not known
+            yield StatedAccuracy(f"solution {file}", diagonal(largest**2))
+    if log.typical_sigmas is not None:
+        usual = np.where(unstated, np.nan_to_num(log.typical_sigmas[near]), 0.0)
+        worst = int(usual.argmax())
+        if usual[worst]:
+            quality = log.quality_words(worst + (near.start or 0))
+            words = f"fixes of {file} ({quality})" if quality else f"fixes of {file}"
+            yield StatedAccuracy(words, diagonal([usual[worst] ** 2] * 3), is_typical=True)
 
 
-def _filled(error: MotionError, figures: Mapping[str, Vector], source: str) -> MotionError:
-    """Errors with those of a file where the mission file states none; what it states is noted beside them."""
-    for kind, figure in figures.items():
+def _filled(error: MotionError, stated: StatedAccuracy, state: PlatformState) -> MotionError:
+    """Errors with those that the source of a path states, where the mission file states none.
+
+    Along the axes of the motion error. The figure of a source that states no direction is taken on each axis: the
+    error may have any. Figures that the mission file has itself are noted beside those of the source.
+    """
+    if stated.is_typical:
+        return error
+    try:
+        axes = np.array(state.frame(error.frame), dtype=float)
+    except UndefinedFrameError:  # which is said of the mission
+        return error
+    own = diagonal([stated.total**2] * 3) if stated.covariance is None else stated.covariance
+    along = block_turned(np.array(own), axes)
+    kinds = KINDS[: len(along) // 3]
+    sigmas = np.sqrt(np.diag(along))
+    is_whole = error.covariance is None and error.position is None and error.velocity is None
+    if is_whole and len(kinds) == 2 and error.distribution == "normal" and _is_correlated(along):
+        covariance = Covariance(tuple(sigmas.tolist()), correlations(along), is_matrix=False)
+        parts = tuple((figure, stated.words) for figure in ("covariance", *kinds))
+        return error._replace(covariance=covariance, of_parts=(*error.of_parts, *parts))
+    for place, kind in enumerate(kinds):
+        block = along[3 * place : 3 * place + 3, 3 * place : 3 * place + 3]
+        if not np.trace(block) > 0:
+            continue
         unit = {"position": "m", "velocity": "m/s"}[kind]
-        if error.covariance is None and getattr(error, kind) is None:
-            stated: Any = {kind: figure}
-            error = error._replace(**stated, of_parts=(*error.of_parts, (kind, source)))
-        else:
-            own = "covariance" if error.covariance is not None else kind
-            text = f"[{', '.join(format_quantity(sigma, unit) for sigma in figure)}]"
-            replaced = Overridden(kind, f"motion_error.{own}", source, text)
-            error = error._replace(overridden=(*error.overridden, replaced))
+        if error.covariance is not None or getattr(error, kind) is not None:
+            figure = [format_quantity(sigma, unit) for sigma in np.sqrt(np.diag(block)).tolist()]
+            key = f"motion_error.{'covariance' if error.covariance is not None else kind}"
+            if stated.covariance is not None:
+                replaced = Overridden(kind, key, stated.words, f"[{', '.join(figure)}]")
+                error = error._replace(overridden=(*error.overridden, replaced))
+        elif error.distribution == "normal":
+            figures: Any = {kind: covering_sigmas(block)}
+            error = error._replace(**figures, of_parts=(*error.of_parts, (kind, stated.words)))
     return error
+
+
+def _is_correlated(covariance: Floats) -> bool:
+    """Whether errors of a covariance are correlated, beyond rounding."""
+    apart = np.array(correlations(covariance)) - np.eye(len(covariance))
+    return bool(np.abs(apart).max() > _UNCORRELATED)
 
 
 def _of_place(platform: Platform, axes: earth.SceneAxes, aperture_time_s: float) -> FlownPath:

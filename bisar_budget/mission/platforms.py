@@ -62,6 +62,7 @@ from bisar_budget.mission.readers import (
     either,
 )
 from bisar_budget.mission.vibrations import Vibration
+from bisar_budget.paths.accuracy import StatedAccuracy
 from bisar_budget.paths.instant import SCALES, parse_instant
 
 LEAST_BASELINE = 1.0  # m, between platforms of which one hears the other
@@ -399,7 +400,12 @@ class FlownPath(NamedTuple):
     is_doubted: bool = False
     accuracy: tuple[str, str] | None = None  # file that states its errors, and its SHA-256
     orientation: tuple[str, str] | None = None  # table by which it is turned to the Earth, and its SHA-256
-    sigmas: Vector | None = None  # east, north, up, that its log states in the aperture, at most [m]
+    stated: tuple[StatedAccuracy, ...] = ()  # by its own source, along the scene's axes
+
+    @property
+    def largest_doubt_m(self) -> float:
+        """How far the truth may be from it, by what its source says of itself or by anything else. [m]"""
+        return max([self.doubt_m, *(one.position_m for one in self.stated)])
 
     @property
     def beside(self) -> Mapping[str, tuple[str, str] | None]:

@@ -54,6 +54,7 @@ def _bare(mission: Mission) -> Mission:
                 doubts=path.doubts and ("",),
                 doubt_m=path.doubt_m,
                 is_doubted=path.is_doubted,
+                stated=tuple(one._replace(words="") for one in path.stated),
             )
             platforms = mission.platforms._replace(**{name: platform._replace(path=path)})
             mission = mission._replace(platforms=platforms)

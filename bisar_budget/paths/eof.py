@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 from bisar_budget.faults import shown
+from bisar_budget.paths.accuracy import StatedAccuracy
 from bisar_budget.paths.ephemeris import (
     APART,
     OWN_VELOCITY,
@@ -20,7 +21,7 @@ from bisar_budget.paths.ephemeris import (
     usual_step,
     velocity_off,
 )
-from bisar_budget.paths.flight import Orbit, PathDoubt, PathFileError, Sample
+from bisar_budget.paths.flight import Orbit, PathFileError, Sample
 from bisar_budget.paths.instant import FIRST_DAY, Instant, tai
 from bisar_budget.paths.messages import (
     LATEST,
@@ -89,7 +90,7 @@ def read_eof(
         where=f"{name}:{lines[0]}",
         words=f"{shown(kind)} of {satellite}, {_HERMITE.words}{_dropped(repeated)}",
         interpolation=_HERMITE,
-        accuracy=PathDoubt(stated, f"{100 * stated:.2g} cm that {kind} may be off"),
+        accuracy=StatedAccuracy(f"accuracy of {kind}", total=stated) if stated else None,
         remarks=(flaws,) if flawed else (),
     )
     return orbit_through([segment], name, wanted, center, orientation)

@@ -12,7 +12,8 @@ from functools import lru_cache
 from itertools import pairwise
 
 from bisar_budget.geometry import Vector
-from bisar_budget.paths.flight import NO_DOUBT, Orbit, PathDoubt, PathFileError, Sample, interpolate
+from bisar_budget.paths.accuracy import EpochCovariance, StatedAccuracy, stated_of_orbit
+from bisar_budget.paths.flight import Orbit, PathDoubt, PathFileError, Sample, interpolate
 from bisar_budget.paths.instant import Instant, tai, utc
 from bisar_budget.paths.messages import cut, one_object
 from bisar_budget.paths.orientation import Orientation, Turn
@@ -56,8 +57,9 @@ class Segment:
     """Samples of one object that a polynomial may go through: between two segments there may be a manoeuvre.
 
     `names` are those that a mission may choose the object by. `first` and `last` are the useable times, of TAI.
-    `turn` takes places to the Earth, from axes that are not fixed to it. `accuracy` is what the file says of itself
-    [m], `remarks` are warnings. Without an `interpolation` the one that fits best is taken.
+    `turn` takes places to the Earth, from axes that are not fixed to it. `accuracy` is the figure that the file
+    states of itself, `covariances` are those that it states at epochs, `remarks` are warnings. Without an
+    `interpolation` the one that fits best is taken.
     """
 
     object: str
@@ -70,7 +72,8 @@ class Segment:
     interpolation: Interpolation | None = None
     axes: str = "ITRF"
     turn: Turn | None = None
-    accuracy: PathDoubt = NO_DOUBT
+    accuracy: StatedAccuracy | None = None
+    covariances: Sequence[EpochCovariance] = ()
     remarks: tuple[str, ...] = ()
 
     def holds(self, time: Instant) -> bool:
@@ -128,6 +131,7 @@ class _Between:
             doubt=self.doubt,
             remedy=_MORE_OFTEN,
             is_turned=segment.turn is not None,
+            stated=self.stated,
         )
 
     def place(self, instant: Instant) -> Vector:
@@ -146,10 +150,12 @@ class _Between:
             raise PathFileError(f"{self.segment.where}: the interpolation gives no number at {instant.as_text()}")
         return found
 
+    def stated(self, instant: Instant) -> StatedAccuracy | None:
+        segment = self.segment
+        return stated_of_orbit(segment.covariances, self.place, instant, self.span) or segment.accuracy
+
     def doubt(self, instant: Instant) -> PathDoubt:
-        stated = self.segment.accuracy
-        size = self._off(instant) + stated.size
-        words = "interpolation of the ephemeris" + (f" and {stated.words}" if stated.size else "")
+        size, words = self._off(instant), "interpolation of the ephemeris"
         if self.segment.turn is None:
             return PathDoubt(size, words)
         # They are of other causes; at their worst they add.

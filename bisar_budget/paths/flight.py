@@ -16,6 +16,7 @@ from numpy.polynomial import chebyshev, legendre
 from numpy.typing import NDArray
 
 from bisar_budget.geometry import STRAIGHT, PlatformState, Vector
+from bisar_budget.paths.accuracy import StatedAccuracy
 from bisar_budget.paths.earth import Floats
 from bisar_budget.paths.instant import DAY, Instant, gps_week
 
@@ -77,6 +78,7 @@ class Orbit:
     `place` takes an instant and gives Earth-fixed coordinates [m]. `words` says what it is, for reports; `epoch` is
     that of the elements. `doubt` says at an instant how far the truth may be; `doubts` are warnings of it, where it
     is more than usual, and `remedy` is what makes it less. An orbit that `is_turned` comes from axes of the stars.
+    `stated` is the accuracy that its file states at an instant, along the axes of the Earth.
     """
 
     place: Callable[[Instant], Vector]
@@ -87,6 +89,12 @@ class Orbit:
     doubt: Callable[[Instant], PathDoubt] = lambda _: NO_DOUBT
     remedy: str = ""
     is_turned: bool = False
+    stated: Callable[[Instant], StatedAccuracy | None] = lambda _: None
+
+    def largest_doubt_m(self, instant: Instant) -> float:
+        """How far the truth may be at an instant, by what its file states of itself or by anything else. [m]"""
+        stated = self.stated(instant)
+        return max(self.doubt(instant).size, 0.0 if stated is None else stated.position_m)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,8 +114,8 @@ class Log:
     records that are not among the places. A file of several tracks, of which no key chooses one, has the log of each
     in `tracks`; the log itself is then that of the first.
     `sigmas` (n, 3) are one-sigma errors east, north, up, where the log states them; NaN at fixes without [m].
-    `typical_sigmas` (n,) are those that a fix of the stated quality usually has, on each axis; NaN where the log says
-    no quality [m]. `quality_words` names the quality of the fix of an index: "GGA quality 1, autonomous".
+    `typical_sigmas` (n,) are those that a fix of the stated quality usually has, on each axis; NaN where the log
+    says no quality [m]. `quality_words` names the quality of the fix of an index: "GGA quality 1, autonomous".
     """
 
     times: Floats

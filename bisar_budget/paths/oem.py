@@ -3,10 +3,13 @@
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 
+import numpy as np
+
 from bisar_budget.faults import shown
+from bisar_budget.paths.accuracy import CovarianceError, EpochCovariance, held_to_covariance, local_axes
 from bisar_budget.paths.ephemeris import (
     APART,
     OWN_VELOCITY,
@@ -26,6 +29,7 @@ from bisar_budget.paths.messages import (
     epoch_in,
     hold_to_size,
     is_markup,
+    number_in,
     object_key,
     parse_markup,
 )
@@ -38,15 +42,30 @@ _SECONDS = re.compile(r"\d\d(\.\d{1,12})?Z?", re.ASCII)
 _SYSTEMS = ("UTC", *TAI_LESS)
 _HIGHEST_DEGREE = 31
 _VECTOR = ("X", "Y", "Z", "X_DOT", "Y_DOT", "Z_DOT")
+_CELESTIAL_AXES = (*_EQUINOX_OF_DATE, *_CELESTIAL)
+
+
+@dataclass
+class _CovarianceBlock:
+    """Covariance of a message: its line, epoch, reference frame (empty: the ephemeris') and rows of its triangle."""
+
+    line: int
+    epoch: str
+    frame: str = ""
+    rows: list[tuple[int, Sequence[str]]] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
 class _EphemerisBlock:
-    """Metadata of a segment: keyword to line and value; and its ephemeris: line, epoch and numbers of each sample."""
+    """Metadata of a segment: keyword to line and value; its ephemeris: line, epoch and numbers of each sample.
+
+    `covariances` are those of the segment, as they are written.
+    """
 
     line: int
     metadata: Mapping[str, tuple[int, str]]
     rows: Sequence[tuple[int, str, Sequence[str]]]
+    covariances: Sequence[_CovarianceBlock] = ()
 
 
 def read_oem(
@@ -148,7 +167,40 @@ def _segment(block: _EphemerisBlock, name: str, orientation: Orientation) -> Seg
         interpolation=interpolation,
         axes=frame,
         turn=_turn(frame, orientation, at_line),
+        covariances=[_covariance(one, frame, system, orientation, name) for one in block.covariances],
     )
+
+
+def _covariance(
+    block: _CovarianceBlock, frame: str, system: str, orientation: Orientation, name: str
+) -> EpochCovariance:
+    """A covariance of the message, in metres and seconds."""
+    where = f"{name}:{block.line}"
+    if [len(cells) for _, cells in block.rows] != list(range(1, 7)):
+        said = ", ".join(str(len(cells)) for _, cells in block.rows) or "no"
+        raise PathFileError(
+            f"{where}: a covariance must be a lower triangle of 6 rows with 1 to 6 numbers (has {said} numbers)"
+        )
+    values = np.zeros((6, 6))
+    for index, (line, cells) in enumerate(block.rows):
+        for column, cell in enumerate(cells):
+            number = number_in(cell)
+            if number is None or not math.isfinite(number):
+                raise PathFileError(
+                    f"{name}:{line}: must be a number of km**2, km**2/s or km**2/s**2 (got {shown(cell)})"
+                )
+            values[index, column] = values[column, index] = 1e6 * number
+    try:
+        values = held_to_covariance(values)
+    except CovarianceError as error:
+        raise PathFileError(f"{where}: the covariance {error}") from None
+    own = block.frame.upper() or frame
+    turn, axes = None, local_axes(own)
+    if axes is None and _EARTH_FIXED.fullmatch(own):
+        axes = "earth"
+    elif axes is None and own in _CELESTIAL_AXES:
+        axes, turn = "stars", _turn(own, orientation, where)
+    return EpochCovariance(_time(block.line, block.epoch, system, name), values, axes, turn)
 
 
 def _not_stated(metadata: Mapping[str, tuple[int, str]]) -> str:
@@ -229,6 +281,7 @@ def _from_keywords(text: str, name: str) -> Iterator[_EphemerisBlock]:
     lines = ((at, line.strip()) for at, line in enumerate(text.split("\n"), 1))
     rows: list[tuple[int, str, Sequence[str]]] = []
     metadata: dict[str, tuple[int, str]] | None = None
+    covariances: list[_CovarianceBlock] = []
     began = 0
     state = "nothing"
     for at, line in lines:
@@ -242,14 +295,16 @@ def _from_keywords(text: str, name: str) -> Iterator[_EphemerisBlock]:
             state = "header"
         elif line == "META_START" and state in ("header", "ephemeris"):
             if metadata is not None:
-                yield _EphemerisBlock(began, metadata, rows)
-            metadata, rows, began, state = {}, [], at, "metadata"
+                yield _EphemerisBlock(began, metadata, rows, covariances)
+            metadata, rows, covariances, began, state = {}, [], [], at, "metadata"
         elif line == "META_STOP" and state == "metadata":
             state = "ephemeris"
         elif line == "COVARIANCE_START" and state == "ephemeris":
             state = "covariance"
         elif line == "COVARIANCE_STOP" and state == "covariance":
             state = "ephemeris"
+        elif state == "covariance":
+            _add_to_covariances(covariances, at, line, name)
         elif state == "metadata" and equals and metadata is not None:
             if key in metadata:
                 raise PathFileError(f"{where}: {shown(key)} is there twice; before in line {metadata[key][0]}")
@@ -268,7 +323,21 @@ def _from_keywords(text: str, name: str) -> Iterator[_EphemerisBlock]:
         last = text.count("\n") + 1
         raise PathFileError(f"{name}:{last}: ends within {'metadata' if state == 'metadata' else 'a covariance'}")
     if metadata is not None:
-        yield _EphemerisBlock(began, metadata, rows)
+        yield _EphemerisBlock(began, metadata, rows, covariances)
+
+
+def _add_to_covariances(found: list[_CovarianceBlock], at: int, line: str, name: str) -> None:
+    """Take a line between COVARIANCE_START and COVARIANCE_STOP: an epoch, a frame or a row of a triangle."""
+    key, equals, value = (part.strip() for part in line.partition("="))
+    if key == "EPOCH" and equals:
+        found.append(_CovarianceBlock(at, value))
+    elif not found:
+        raise PathFileError(f"{name}:{at}: a covariance must begin with EPOCH (got {shown(line)})")
+    elif equals:
+        if key == "COV_REF_FRAME":
+            found[-1].frame = value
+    else:
+        found[-1].rows.append((at, line.split()))
 
 
 def _from_markup(data: bytes, name: str) -> Iterator[_EphemerisBlock]:
@@ -282,7 +351,17 @@ def _from_markup(data: bytes, name: str) -> Iterator[_EphemerisBlock]:
                 if one.name != "COMMENT"
             }
             rows = [_state(state, name) for block in segment.all("data") for state in block.all("stateVector")]
-            yield _EphemerisBlock(segment.line, metadata, rows)
+            covariances = [_matrix(one) for block in segment.all("data") for one in block.all("covarianceMatrix")]
+            yield _EphemerisBlock(segment.line, metadata, rows, covariances)
+
+
+def _matrix(matrix: MessageElement) -> _CovarianceBlock:
+    """A covariance of XML, which names each element of the lower triangle: CX_X, CY_X, CY_Y, …"""
+    parts = {one.name: one for one in matrix.children}
+    names = [[f"C{row}_{column}" for column in _VECTOR[: index + 1]] for index, row in enumerate(_VECTOR)]
+    rows = [[parts[key].text.strip() for key in of_row if key in parts] for of_row in names]
+    epoch, frame = (parts[key].text.strip() if key in parts else "" for key in ("EPOCH", "COV_REF_FRAME"))
+    return _CovarianceBlock(matrix.line, epoch, frame, [(matrix.line, row) for row in rows])
 
 
 def _state(state: MessageElement, name: str) -> tuple[int, str, Sequence[str]]:

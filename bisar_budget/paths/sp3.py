@@ -10,9 +10,10 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 from bisar_budget.faults import shown
+from bisar_budget.paths.accuracy import StatedAccuracy
 from bisar_budget.paths.ephemeris import APART, OWN_VELOCITY, USUAL_DEGREE, Interpolation, Segment, orbit_through
 from bisar_budget.paths.ephemeris import velocity_off as off_places
-from bisar_budget.paths.flight import Orbit, PathDoubt, PathFileError, Sample
+from bisar_budget.paths.flight import Orbit, PathFileError, Sample
 from bisar_budget.paths.instant import FIRST_DAY, TAI_LESS, Instant, parse_instant, tai, tai_less_utc
 from bisar_budget.paths.messages import LATEST, coordinate_in, decoded, hold_to_size, number_in, object_key
 from bisar_budget.paths.orientation import UNKNOWN, Orientation
@@ -226,6 +227,6 @@ def _segments(satellite: _Satellite, header: _Heading, name: str, center: Instan
             where=f"{name}:{satellite.lines[first]}",
             words=f"SP3 of {satellite.id}, {header.frame}{nameless}" + (f", {used.words}" if used else ""),
             interpolation=used,
-            accuracy=PathDoubt(stated, f"{stated:.2g} m that the file states"),
+            accuracy=StatedAccuracy(f"accuracy of {satellite.id}", total=stated) if stated else None,
             remarks=(f"{name}: places of {satellite.id} around the aperture are predicted",) if is_predicted else (),
         )

@@ -22,6 +22,7 @@ from bisar_budget.constants import MAX_DRAWS
 from bisar_budget.effects.effect import PLATFORMS, ErrorSource
 from bisar_budget.effects.oscillators import clocks_without_oscillator
 from bisar_budget.effects.random_effect import RandomError
+from bisar_budget.effects.sources import distribution_of
 from bisar_budget.findings.monte_carlo import MonteCarlo, Requirement
 from bisar_budget.mission.model import Mission, Simulation, has_instruments
 from bisar_budget.phrases import Note
@@ -91,17 +92,6 @@ def monte_carlo(
     )
 
 
-def _distribution(mission: Mission, source: ErrorSource) -> str:
-    if source.clock is not None:
-        # A clock's values are one sigma, as the coverage factor on them says.
-        return "normal"
-    if source.owner in PLATFORMS:
-        return str(getattr(mission.platforms, source.owner).motion_error.distribution)
-    if source.is_common and mission.common_motion_error is not None:
-        return mission.common_motion_error.distribution
-    return "bound"
-
-
 def _variables(analysis: Analysis) -> Iterator[Variable]:
     mission, full = analysis.mission, analysis.full
     factor = mission.allocation.coverage_factor
@@ -115,7 +105,7 @@ def _variables(analysis: Analysis) -> Iterator[Variable]:
             parts = [(s, (s.declared or 0.0) * vectors[i][index] * scale) for i, s in enumerate(members)]
             yield _variable(f"{group.id}.{index}", group.id, group.platform, "normal", parts, full)
     for source in left.values():
-        distribution = _distribution(mission, source)
+        distribution = distribution_of(mission, source)
         size = abs(source.declared or 0.0) / (factor if source.is_covered else 1.0)
         if distribution == "uniform":
             size /= math.sqrt(3)  # the standard uncertainty of ±a, GUM 4.3.7

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import astuple
 from datetime import date
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from bisar_budget.design.varied import scaled
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.faults import SetValue
 from bisar_budget.findings.mission import MissionFindings
+from bisar_budget.findings.requirement import DecidingShare
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.quantities import QuestionError, with_number
@@ -50,6 +52,8 @@ def assert_alike(one: Any, other: Any, where: str) -> None:
     if isinstance(one, float) and isinstance(other, float):
         # A phase of 1e-10 rad is what terms cancel to.
         assert other == pytest.approx(one, rel=2 * CLOSE, abs=1e-9, nan_ok=True), where
+    elif isinstance(one, DecidingShare) and isinstance(other, DecidingShare):
+        assert_alike(astuple(one), astuple(other), where)
     elif isinstance(one, tuple) and isinstance(other, tuple):
         assert len(one) == len(other), where
         for place, parts in enumerate(zip(one, other, strict=True)):

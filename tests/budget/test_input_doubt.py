@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from bisar_budget.budget.check import check_mission
-from bisar_budget.budget.doubts import LEAST_M, InputDoubt, input_doubts
+from bisar_budget.budget.doubts import LEAST_M, input_doubts
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.mission.model import Mission
@@ -188,8 +188,11 @@ class TestAnOrbit:
 
     @pytest.mark.parametrize(("days", "status"), [(6.9, "not_declared"), (7.1, "not_evaluated")])
     def test_without_a_declared_error_a_week_is_doubted(self, tmp_path: Path, days: float, status: str) -> None:
-        found = check_mission(orbiting(tmp_path, EPOCH.after(86400 * days)), TODAY)
-        assert statuses(found, "transmitter") == {status}
+        """With a quadratic requirement that 15 km do not touch."""
+        mission = orbiting(tmp_path, EPOCH.after(86400 * days))
+        needs = mission.requirements._replace(quadratic_phase_error=1e6)
+        mission = mission._replace(requirements=needs, radar=mission.radar._replace(center_frequency=1e6))
+        assert statuses(check_mission(mission, TODAY), "transmitter") == {status}
 
     def test_a_doubt_is_said_once(self, tmp_path: Path) -> None:
         """As the reason of its rows, or as a warning where the declared error covers it."""
@@ -244,7 +247,6 @@ class TestSweeps:
 def test_a_path_that_the_file_states_has_no_doubt() -> None:
     mission = parse_mission(mission_text(platforms__receiver__motion_error={"position": "1 mm"}))
     assert input_doubts(mission) == []
-    assert InputDoubt._fields == ("owner", "doubt", "declared", "note")
 
 
 def test_json_has_the_doubt_of_each_path(run: Callable[..., Any], tmp_path: Path) -> None:

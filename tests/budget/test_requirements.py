@@ -1,6 +1,7 @@
 """Exit 0 means: every requirement of the file was judged, on what the file declares, and is met or waived."""
 
 import math
+import re
 from typing import Any
 
 import numpy as np
@@ -141,7 +142,10 @@ def test_what_passes_by_itself_may_decide_beside_what_autofocus_corrects(n_pull:
     assert (said.row, said.status) == (decider, "pass_with_autofocus")
     assert (largest.id, largest.utilization) == (decider, said.utilization)
     (line,) = (one for one in requirement_lines(found) if one.requirement is said)
-    assert line.remark == ("" if decider == "mission.spatial_variance" else "share of 45 deg with autofocus")
+    if decider == "mission.spatial_variance":
+        assert re.fullmatch(r"autofocus gain 80, at the scene's edge: [\d.]+ of 45 deg", line.remark)
+    else:
+        assert re.fullmatch(r"receiver's share: [\d.]+ of 22\.5 deg, autofocus gain 12", line.remark)
 
 
 @pytest.mark.parametrize(

@@ -1,15 +1,18 @@
 """Missions whose platform is a log of some format: the same verdict as by the CSV of the flight."""
 
 import json
+import math
 import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from bisar_budget.budget.check import check_mission
 from bisar_budget.mission.load import load_mission
+from tests import conftest
 from tests.conftest import TODAY
 from tests.mission.test_path_files import aircraft
 from tests.paths.flown import flight, geodetic_csv
@@ -88,11 +91,23 @@ class TestSolutionsSayTheirErrors:
         assert said in found.notes
         assert {row.id for row in found.rows if said in row.remarks} == {f"receiver.position.{one}" for one in "xyz"}
 
-    @pytest.mark.parametrize("error", [{"frame": "track"}, {"distribution": "bound"}])
-    def test_other_axes_and_bounds_leave_the_position_open(self, error: dict[str, str], tmp_path: Path) -> None:
+    def test_bounds_leave_the_position_open_and_in_doubt(self, tmp_path: Path) -> None:
+        """A sigma is no bound; and what the log states is more than nothing."""
         (tmp_path / "a.pos").write_bytes(solution(FLOWN))
-        checked(tmp_path, {"file": "a.pos"}, motion_error={"velocity": "2 mm/s", **error})
+        found = checked(tmp_path, {"file": "a.pos"}, motion_error={"velocity": "2 mm/s", "distribution": "bound"})
         assert load_mission(str(tmp_path / "m.yaml")).platforms.receiver.motion_error.position is None
+        assert conftest.row(found, "receiver.position.x").status == "not_evaluated"
+        assert "no position error is declared" in str(conftest.row(found, "receiver.position.x").reason)
+
+    def test_other_axes_have_at_least_as_much_in_every_direction(self, tmp_path: Path) -> None:
+        """Independent errors along the track that cover sigmas along east, north, up."""
+        (tmp_path / "a.pos").write_bytes(solution(FLOWN))
+        checked(tmp_path, {"file": "a.pos"}, motion_error={"velocity": "2 mm/s", "frame": "track"})
+        receiver = load_mission(str(tmp_path / "m.yaml")).platforms.receiver
+        axes = np.array(receiver.state.frame("track"))
+        covered = axes.T @ np.diag(np.square(receiver.motion_error.position)) @ axes
+        assert np.linalg.eigvalsh(covered - np.diag(np.square(SIGMAS)))[0] > -1e-12
+        assert max(receiver.motion_error.position) < math.sqrt(3) * max(SIGMAS)
 
     def test_zeros_say_nothing(self, tmp_path: Path) -> None:
         (tmp_path / "a.pos").write_bytes(solution(FLOWN, sigmas=(0.0, 0.0, 0.0)))

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from bisar_budget.geometry import Vector
+from bisar_budget.paths.accuracy import StatedAccuracy
 from bisar_budget.paths.eof import read_eof
 from bisar_budget.paths.flight import PathFileError
 from bisar_budget.paths.instant import Instant
@@ -68,9 +69,11 @@ def test_what_is_said_of_it() -> None:
     assert orbit.span is not None
     assert [one.as_text() for one in orbit.span] == [f"{one[:23]}Z" for one in (FIRST, LAST)]
     assert not orbit.is_turned
-    doubt = orbit.doubt(MIDDLE)
-    assert doubt.size == pytest.approx(0.1, abs=1e-4)  # what is required of restituted orbits
-    assert doubt.words == "interpolation of the ephemeris and 10 cm that AUX_RESORB may be off"
+    doubt, stated = orbit.doubt(MIDDLE), orbit.stated(MIDDLE)
+    assert doubt.size < 1e-4
+    assert doubt.words == "interpolation of the ephemeris"
+    assert stated == StatedAccuracy("accuracy of AUX_RESORB", total=0.1)  # what is required of restituted orbits
+    assert orbit.largest_doubt_m(MIDDLE) == 0.1
     assert orbit.doubts(MIDDLE) == ()
 
 

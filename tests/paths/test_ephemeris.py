@@ -213,8 +213,8 @@ def test_a_gap_is_not_interpolated() -> None:
     with pytest.raises(PathFileError) as error:
         read(text, START.after(6000))
     assert str(error.value) == (
-        "c.oem:4: the ephemeris is too sparse around 2026-06-01T06:40:00.000Z to interpolate: its states there are 181 min"
-        " apart"
+        "c.oem:4: the ephemeris is too sparse around 2026-06-01T06:40:00.000Z to interpolate: its"
+        " states there are 181 min apart"
     )
     assert math.dist(read(text, START.after(300)).place(START.after(300)), on_circle(300)[0]) < 1e-6
 
@@ -294,7 +294,8 @@ def test_an_object_is_chosen(wanted: str) -> None:
 def test_covariances_accelerations_and_days_of_the_year_are_read_over() -> None:
     lines = oem(count=41, step=30.0).splitlines()
     rows = [f"{line.replace('2026-06-01T', '2026-152T')} 0 0 0" if line[:5] == "2026-" else line for line in lines]
-    text = "\r\n".join([*rows, "COVARIANCE_START", "EPOCH = 2026-06-01T05:00:00", "1.0", "COVARIANCE_STOP", ""])
+    triangle = [" ".join(["0"] * line + ["1.0"]) for line in range(6)]
+    text = "\r\n".join([*rows, "COVARIANCE_START", "EPOCH = 2026-06-01T05:00:00", *triangle, "COVARIANCE_STOP", ""])
     assert math.dist(read(text).place(START.after(615)), on_circle(615)[0]) < 1e-5
 
 

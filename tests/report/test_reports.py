@@ -133,8 +133,15 @@ class TestCsv:
         assert [row["id"] for row in rows] == [f"requirement.{one['key']}" for one in contract]
         for row, want in zip(rows, contract, strict=True):
             assert (row["status"], row["decided_by"]) == (want["status"], want["row"] or "")
-            allowed = want["value"] if want["allowed"] is None else want["allowed"]
-            for column, value in (("declared", want["reached"]), ("allowable", allowed)):
+            share = want["share"] or {"owner": "", "allowed": None, "reached": None}
+            assert row["share_owner"] == share["owner"]
+            for column, value in (
+                ("declared", want["reached"]),
+                ("allowable", want["value"]),
+                ("share_allowed", share["allowed"]),
+                ("share_reached", share["reached"]),
+                ("autofocus_gain", want["autofocus_gain"]),
+            ):
                 assert row[column] == ("" if value is None else repr(float(value)))
 
     def test_text_that_looks_like_a_formula_is_text(self) -> None:

@@ -35,6 +35,7 @@ from bisar_budget.report.words.heading import (
 )
 from bisar_budget.report.words.identity import source_path
 from bisar_budget.report.words.requirements import (
+    confidence_words,
     kind_names,
     requirement_id,
     requirement_lines,
@@ -253,6 +254,7 @@ def _summary(page: Page) -> list[doc.Block]:
 def _verdict(page: Page) -> Iterator[doc.Block]:
     found, waived = page.found, _waived(page.found)
     said = _NOTHING if found.is_empty else _judged(found.status, waived)
+    said += f";{confidence}" if (confidence := confidence_words(found)) else ""
     said += (_CHANGED if found.changes else "") + (_ALONE if _is_alone(found) else "")
     yield doc.Paragraph(said, f"verdict {found.status}")
     if doubt := doubtful_model(found):

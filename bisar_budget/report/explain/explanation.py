@@ -13,7 +13,7 @@ from bisar_budget.analysis.together import Together, cubics, quadratics
 from bisar_budget.analysis.vibration_limits import amplitude_share, echo_phase, slow_limits
 from bisar_budget.budget.aggregates import effect_parts, untaken_effects
 from bisar_budget.budget.declarations import missing_declarations
-from bisar_budget.budget.doubts import declared_position_error, input_doubts, is_in_doubt
+from bisar_budget.budget.doubts import InputDoubt, declared_position_error, input_doubts, is_in_doubt
 from bisar_budget.budget.judged_requirements import (
     MAKES_UP,
     SMALL_RAD,
@@ -22,7 +22,7 @@ from bisar_budget.budget.judged_requirements import (
 )
 from bisar_budget.effects.combined import phase_parts
 from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
-from bisar_budget.effects.effect import ErrorSource
+from bisar_budget.effects.effect import MOTION_UNITS, ErrorSource
 from bisar_budget.effects.vibration import cubic_part, lines_of, near_lines, quadratic_part, sight_of, worst_phases
 from bisar_budget.faults import KeyPath, changes_words, printable
 from bisar_budget.findings.mission import MissionFindings
@@ -80,7 +80,7 @@ def explain(mission: Mission, found: MissionFindings, row_id: str) -> str:
 def explain_requirement(mission: Mission, found: MissionFindings, one: JudgedRequirement) -> str:
     """Write how a requirement of a mission stands, and the rows that judge it."""
     title = f"{STATUS[one.status].text} {requirement_id(one)}"
-    return _text(mission, title, [*_lines(finding_of(mission, found, one)), "", requirement_finding(one)])
+    return _text(mission, title, [*_lines(finding_of(mission, found, one)), "", requirement_finding(one, found)])
 
 
 def _lines(steps: Iterable[Step]) -> list[str]:
@@ -524,7 +524,7 @@ def not_judged(found: MissionFindings, row: Row) -> Iterator[Step]:
     code = reason.code
     if code == "not-declared-as-required":
         yield from _asked_for(mission)
-    elif code == "input-in-doubt":
+    elif code in ("input-in-doubt", "input-states-more", "input-usually-has-more"):
         yield from _path_in_doubt(mission, row)
     elif code == "clocks-are-not-set":
         yield from _displacing(analysis, row)
@@ -577,7 +577,10 @@ def _untaken(analysis: Analysis, row: Row, one: UntakenEffect) -> Iterator[Step]
 def _path_in_doubt(mission: Mission, row: Row) -> Iterator[Step]:
     """How far a path may be from the truth, and the position errors that the file declares of it."""
     for one in input_doubts(mission):
-        if row.owner != "mission" and not is_in_doubt(row.subject, one.owner, mission):
+        if row.owner != "mission" and not is_in_doubt(row.subject, one.owner, mission, one.kind):
+            continue
+        if one.is_stated:
+            yield _stated_by_source(one)
             continue
         platform: Platform = getattr(mission.platforms, one.owner)
         error, path = platform.motion_error, platform.path
@@ -591,6 +594,13 @@ def _path_in_doubt(mission: Mission, row: Row) -> Iterator[Step]:
         terms = " + ".join(f"{number(size)}^2" for size in sizes)
         line = Sum(f"stated = sqrt({terms}) = {with_unit(declared, 'm')}")
         yield step("Position errors that it declares, without coverage factor: less than the doubt", line)
+
+
+def _stated_by_source(one: InputDoubt) -> Step:
+    """The error that the source of a path states, and the declared one along the same axis."""
+    unit = MOTION_UNITS[one.kind]
+    title = f"The {one.kind} error that the source of the {one.owner}’s path states exceeds the declared one"
+    return step(title, f"stated = {with_unit(one.doubt, unit)}", f"declared = {with_unit(one.declared, unit)}")
 
 
 def _displacing(analysis: Analysis, row: Row) -> Iterator[Step]:

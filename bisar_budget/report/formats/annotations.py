@@ -16,7 +16,13 @@ from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
 from bisar_budget.report.words.heading import overrides_words
 from bisar_budget.report.words.identity import Identity, digest, identities, source_path
-from bisar_budget.report.words.requirements import requirement_finding, requirement_id, unseen
+from bisar_budget.report.words.requirements import (
+    confidence_words,
+    requirement_finding,
+    requirement_id,
+    share_columns,
+    unseen,
+)
 from bisar_budget.report.words.sentences import (
     command_property,
     command_text,
@@ -59,7 +65,8 @@ def _annotations(report: Report, style: Style) -> Iterator[_Annotation]:
             continue
         for one in unseen(mission):
             title = f"{STATUS[one.status].text} {requirement_id(one)}"
-            yield _Annotation(STATUS[one.status].github, file, _region_of(one.line), title, requirement_finding(one))
+            how = requirement_finding(one, mission)
+            yield _Annotation(STATUS[one.status].github, file, _region_of(one.line), title, how)
         if outside := overrides_words(mission):
             yield _Annotation("notice", file, None, "From outside the file", outside)
         for row in worst_first(mission.rows):
@@ -113,10 +120,16 @@ def step_summary(report: Report, style: Style) -> str:
             file += " " + markdown_text(changes_words(mission.changes))
         if outside := overrides_words(mission, with_changes=False):
             file += "; from outside the file: " + markdown_text(outside)
-        status = STATUS[mission.status].text + ("; each error alone" if mission.combine == "each" else "")
+        status = (
+            STATUS[mission.status].text
+            + confidence_words(mission)
+            + ("; each error alone" if mission.combine == "each" else "")
+        )
         lines.append(markdown_row((status, file, markdown_text(row.id), use)))
     usable = [mission for mission in report.missions if isinstance(mission, MissionFindings)]
-    broken = [requirement_finding(one) for found in usable for one in found.requirements if STATUS[one.status].fails]
+    broken = [
+        requirement_finding(one, found) for found in usable for one in found.requirements if STATUS[one.status].fails
+    ]
     broken += [finding(row, found) for found in usable for row in found.rows if STATUS[row.status].fails]
     lines += ["", *(f"- {markdown_text(said)}" for said in broken[:_SHOWN_IN_SUMMARY])] if broken else []
     if len(broken) > _SHOWN_IN_SUMMARY:
@@ -285,23 +298,29 @@ def _requirement(
     one: JudgedRequirement, mission: MissionFindings, artifact: dict[str, Any], identity: Identity
 ) -> dict[str, Any]:
     level, name = STATUS[one.status].sarif, identity.of(requirement_id(one))
-    result = _located(one.key, level, requirement_finding(one), one.line, artifact, name)
+    result = _located(one.key, level, requirement_finding(one, mission), one.line, artifact, name)
     result["properties"] = _properties(
         mission,
         status=one.status,
         metric=one.key,
         unit=one.unit or None,
         declared=one.reached,
-        allowable=one.value if one.allowed is None else one.allowed,
+        allowable=one.allowed,
         utilization=one.utilization,
         decided_by=one.row,
+        **share_columns(one),
     )
     return result | _suppressed(one.status, one.waivers, artifact)
 
 
 def _properties(mission: MissionFindings, **values: str | float | None) -> dict[str, str | float]:
     """Properties that have a value, made harmless, with those of the mission."""
-    values = {"mission": mission.name, **values, "overrides": overrides_words(mission) or None}
+    values = {
+        "mission": mission.name,
+        "confidence": mission.confidence,
+        **values,
+        "overrides": overrides_words(mission) or None,
+    }
     return {
         key: printable(value) if isinstance(value, str) else value
         for key, value in values.items()

@@ -1,7 +1,8 @@
 """The table of requirements and the rows as CSV for a spreadsheet: SI values, a line for each, a header.
 
-`kind` tells them apart. A requirement has the id `requirement.islr`, what is reached under `declared`, what is
-allowed under `allowable`, and the row that decides under `decided_by`.
+`kind` tells them apart. A requirement has the id `requirement.islr`, what the mission reaches under `declared`, what
+the file requires under `allowable`, and the row that decides under `decided_by`. Where a share of it decides, the
+utilization is that of the share, which has its own two numbers.
 """
 
 import csv
@@ -15,7 +16,7 @@ from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.findings.row import Row
 from bisar_budget.report import Piece, Style
 from bisar_budget.report.words.heading import overrides_words
-from bisar_budget.report.words.requirements import requirement_id
+from bisar_budget.report.words.requirements import requirement_id, share_columns, use_remarks
 from bisar_budget.report.words.sentences import spreadsheet_text
 
 COLUMNS = (
@@ -52,6 +53,11 @@ COLUMNS = (
     "decided_by",
     "overrides",
     "waived_by",
+    "share_owner",
+    "share_allowed",
+    "share_reached",
+    "autofocus_gain",
+    "confidence",
 )
 
 
@@ -96,8 +102,15 @@ def _rows(mission: MissionFindings) -> Iterator[list[object]]:
     file, name = spreadsheet_text(mission.file), spreadsheet_text(mission.name)
     changed = spreadsheet_text(changes_words(mission.changes)) or None
     outside = spreadsheet_text(overrides_words(mission)) or None
+    of_mission = {
+        "file": file,
+        "mission": name,
+        "set": changed,
+        "overrides": outside,
+        "confidence": None if mission.is_empty else mission.confidence,
+    }
     for one in mission.requirements:
-        cells = {"file": file, "mission": name, "set": changed, "overrides": outside, **_requirement(one)}
+        cells = of_mission | _requirement(one)
         yield [cells.get(column) for column in COLUMNS]
     verdicts = {verdict.id: verdict.verdict for verdict in mission.verdicts or ()}
     for row in mission.rows:
@@ -127,13 +140,14 @@ def _requirement(one: JudgedRequirement) -> dict[str, object]:
         "metric": one.key,
         "unit": one.unit,
         "declared": one.reached,
-        "allowable": one.value if one.allowed is None else one.allowed,
+        "allowable": one.allowed,
         "utilization": one.utilization,
         "line": one.line,
         "reason": one.reason,
-        "notes": "; ".join(waiver.words for waiver in one.waivers),
+        "notes": "; ".join([*use_remarks(one), *(waiver.words for waiver in one.waivers)]),
         "kind": "requirement",
         "decided_by": spreadsheet_text(one.row),
+        **share_columns(one),
         "waived_by": _waived_by(one),
     }
 

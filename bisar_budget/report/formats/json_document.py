@@ -1,7 +1,9 @@
 """The report as JSON, `bisar-budget/check/1`. Keys may be added, never changed or removed."""
 
 import json
+import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +18,7 @@ from bisar_budget.findings.status import worst
 from bisar_budget.findings.trade import TradeStudy
 from bisar_budget.geometry import PlatformState
 from bisar_budget.mission.model import Shares
+from bisar_budget.paths.accuracy import StatedAccuracy
 from bisar_budget.report import Piece, Style
 
 if TYPE_CHECKING:
@@ -120,6 +123,7 @@ def _mission(mission: MissionFindings) -> dict[str, Any]:
         "model": mission.model,
         "model_doubt": mission.model_doubt or None,
         "model_doubt_code": mission.model_doubt.code or None,
+        "confidence": None if mission.is_empty else mission.confidence,
         "combine": mission.combine,
         "coverage_factor": mission.coverage_factor,
         "geometry": {
@@ -192,6 +196,7 @@ def verdict_item(verdict: Verdict) -> dict[str, Any]:
 def _requirement(one: JudgedRequirement) -> dict[str, Any]:
     found: dict[str, Any] = one._asdict()
     found["waivers"] = [waiver.words for waiver in one.waivers]
+    found["share"] = None if one.share is None else asdict(one.share)
     found["waived_by"] = [waiver.id for waiver in one.waived_by]
     return found | {"reason_code": None if one.reason is None else one.reason.code}
 
@@ -234,13 +239,27 @@ def _platform(mission: MissionFindings, name: str) -> dict[str, Any]:
             "residual_rms_m": path.rms,
             "samples": path.samples,
             "stretch_s": path.stretch,
-            "doubt_m": path.doubt_m,
+            "doubt_m": path.largest_doubt_m,
+            "stated": [_stated_accuracy(one) for one in path.stated],
             **{
                 said: None if file is None else dict(zip(("file", "sha256"), file, strict=True))
                 for said, file in path.beside.items()
             },
         }
     return found
+
+
+def _stated_accuracy(stated: StatedAccuracy) -> dict[str, Any]:
+    """Sigmas that the source of a path states, along the scene's axes, or the one that it names no direction of."""
+    variances = [row[index] for index, row in enumerate(stated.covariance or ())]
+    sigmas = [math.sqrt(max(variance, 0.0)) for variance in variances]
+    return {
+        "source": stated.words,
+        "position_m": sigmas[:3] or None,
+        "velocity_mps": sigmas[3:] or None,
+        "total_m": stated.total or None,
+        "is_typical": stated.is_typical,
+    }
 
 
 def _shares(split: Shares) -> dict[str, float]:

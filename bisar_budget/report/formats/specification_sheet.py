@@ -23,7 +23,7 @@ from bisar_budget.report.formats.text_table import requirement_table
 from bisar_budget.report.formats.traceability import identifier, needs_document
 from bisar_budget.report.words.heading import overrides_words, title_lines
 from bisar_budget.report.words.identity import Identity, distinct, identities
-from bisar_budget.report.words.requirements import requirement_lines
+from bisar_budget.report.words.requirements import RequirementLine, requirement_lines
 from bisar_budget.report.words.sentences import counted, need_text, percent, rst_text, table, wrapped
 
 _LISTED = 3  # parts of the catalogue that a table names
@@ -267,10 +267,14 @@ def _required(sheet: SpecificationSheet) -> Iterator[doc.Block]:
     heads = doc.heads("Requirement", *doc.numbers("Allowed", "Reached", "Use"), "Status", "Decided by")
     if sheet.findings is not None and not sheet.broken:
         rows: list[doc.Line] = [
-            [one.name, one.allowed, one.reached, one.use, doc.Badge(one.status), doc.Name(one.decided_by)]
+            [one.name, one.allowed, one.reached, one.use, doc.Badge(one.status), _decided_by(one)]
             for one in requirement_lines(sheet.findings)
         ]
         yield doc.TextTable("Requirements", "Requirements, with what is ordered in place", heads, rows)
+
+
+def _decided_by(one: RequirementLine) -> doc.Text:
+    return (doc.Name(one.decided_by), f", {one.remark}") if one.remark else doc.Name(one.decided_by)
 
 
 def specified(sheet: SpecificationSheet, anchor: str) -> Iterator[doc.Block]:

@@ -15,7 +15,7 @@ from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
 from bisar_budget.report.words.heading import overrides_words
 from bisar_budget.report.words.identity import Identity, distinct, identities, stem
-from bisar_budget.report.words.requirements import declared_words, requirement_finding, requirement_id
+from bisar_budget.report.words.requirements import declared_words, requirement_finding, requirement_id, share_columns
 from bisar_budget.report.words.sentences import cause, counted, measure, need_text, rst_text, xml_text
 
 
@@ -64,6 +64,7 @@ def _suite_of(mission: MissionFindings, class_name: str, file: str, counts: Coun
             ("file", file),
             ("model", mission.model),
             ("combine", mission.combine),
+            ("confidence", mission.confidence),
             ("set", changes_words(mission.changes) or None),
             ("overrides", overrides_words(mission) or None),
             ("declared_kinds", declared_words(mission.kinds)),
@@ -72,7 +73,7 @@ def _suite_of(mission: MissionFindings, class_name: str, file: str, counts: Coun
     )
     file = xml_text(file)
     for one in mission.requirements:
-        yield from _requirement_case(one, class_name, file)
+        yield from _requirement_case(one, mission, class_name, file)
     for row in mission.rows:
         yield from _row_case(row, mission, class_name, file)
     if mission.warnings:
@@ -88,7 +89,7 @@ def _suite(name: str, *, tests: int, failures: int, errors: int, skipped: int) -
     )
 
 
-def _requirement_case(one: JudgedRequirement, class_name: str, file: str) -> Iterator[str]:
+def _requirement_case(one: JudgedRequirement, mission: MissionFindings, class_name: str, file: str) -> Iterator[str]:
     yield f'<testcase classname="{class_name}" name="{requirement_id(one)}" time="0">'
     values: tuple[tuple[str, object], ...] = (
         ("budget_status", one.status),
@@ -98,10 +99,11 @@ def _requirement_case(one: JudgedRequirement, class_name: str, file: str) -> Ite
         ("reached", one.reached),
         ("utilization", one.utilization),
         ("decided_by", one.row),
+        *share_columns(one).items(),
         ("line", one.line),
     )
     yield from _properties(values)
-    said = requirement_finding(one)
+    said = requirement_finding(one, mission)
     yield from _outcome(one.status, said, said, one.line, file)
     yield "</testcase>"
 
@@ -228,7 +230,7 @@ def _row_need(row: Row, mission: MissionFindings, file: str) -> dict[str, Any]:
 
 
 def _requirement_need(one: JudgedRequirement, mission: MissionFindings, file: str) -> dict[str, Any]:
-    texts = [requirement_finding(one), *_origin(one.line, mission, file)]
+    texts = [requirement_finding(one, mission), *_origin(one.line, mission, file)]
     return _need(f"{one.name} of {mission.name}", one.status, texts, "requirement", one.key)
 
 

@@ -7,10 +7,17 @@ from typing import NamedTuple
 from bisar_budget import phrases
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.monte_carlo import MonteCarlo, Requirement
-from bisar_budget.findings.requirement import DeclaredKinds, JudgedRequirement
+from bisar_budget.findings.requirement import DecidingShare, DeclaredKinds, JudgedRequirement
 from bisar_budget.findings.row import SPECIFICATION, Row
 from bisar_budget.findings.status import BROKEN, STATUS
-from bisar_budget.report.words.sentences import counted, requirement_size, use_words, waiver_names, wrapped
+from bisar_budget.report.words.sentences import (
+    counted,
+    requirement_limit,
+    requirement_size,
+    use_words,
+    waiver_names,
+    wrapped,
+)
 from bisar_budget.units import format_quantity
 
 COLUMNS = ("requirement", "allowed", "reached", "use", "status", "decided by")
@@ -19,8 +26,8 @@ COLUMNS = ("requirement", "allowed", "reached", "use", "status", "decided by")
 class RequirementLine(NamedTuple):
     """One line of the table of requirements, in words.
 
-    `decided_by` is the row that decides; where nothing could be judged, why. `remark` says what `allowed` is a share
-    of, and which waiver stands.
+    `decided_by` is the row that decides; where nothing could be judged, why. `remark` says which share `use` is of,
+    with its own two numbers, what autofocus gains, and which waiver stands.
     """
 
     requirement: JudgedRequirement
@@ -42,48 +49,78 @@ def requirement_lines(mission: MissionFindings) -> Iterator[RequirementLine]:
     """Write the table of requirements, in the order of the contract."""
     for one in mission.requirements:
         is_open = one.status == "not_evaluated"
-        allowed, reached = one.value if one.allowed is None else one.allowed, one.reached
-        if is_open and one.row != one.id:  # what a share has reached is not what all of it would
-            allowed, reached = one.value, None
-        remark = ", ".join(_remarks(one, mission))
+        remark = ", ".join([*use_remarks(one), *(waiver.words for waiver in one.waivers)])
         yield RequirementLine(
             requirement=one,
             name=one.name,
-            allowed=requirement_size(allowed, one, "down"),
-            reached=requirement_size(reached, one),
-            use=use_words(None if one.allowed is None or is_open else one.utilization),
+            allowed=requirement_limit(one.value, one),
+            reached=requirement_size(one.reached, one),
+            use=use_words(None if one.value is None or is_open else one.utilization),
             status=one.status,
             decided_by=(one.reason if is_open and one.reason else one.row) or ("" if remark else "-"),
             remark=remark,
         )
 
 
-def _remarks(one: JudgedRequirement, mission: MissionFindings) -> Iterator[str]:
-    """Say what is allowed, where that is not the requirement as it stands, and which waivers hold."""
-    if one.allowed is not None and one.value is not None and one.status != "not_evaluated":
-        gain = mission.allocation.autofocus_gain if one.key == "quadratic_phase_error" else 1.0
-        is_share = abs(one.allowed - gain * one.value) > 1e-9 * abs(one.value)
-        is_gained = gain > 1 and abs(one.allowed - one.value) > 1e-9 * one.value
-        if one.row == "mission.autofocus_pull_in":
-            yield "all that autofocus pulls in"
-        elif (is_share or is_gained) and one.row != "mission.spatial_variance":
-            value = requirement_size(one.value, one)
-            yield f"{'share of ' if is_share else ''}{value}{' with autofocus' if is_gained else ''}"
-    yield from (waiver.words for waiver in one.waivers)
+def use_remarks(one: JudgedRequirement) -> Iterator[str]:
+    """Say what the use is of, where that is not reached over allowed: another row, a share, more by autofocus."""
+    if one.status == "not_evaluated" or one.value is None:
+        return
+    if one.use_row not in (None, one.row):
+        yield f"most used by {one.use_row}"
+    said = [] if one.share is None else [share_words(one, one.share)]
+    if one.autofocus_gain is not None and one.autofocus_gain > 1:
+        has_no_gain = one.share is not None and one.share.owner in _SHARES
+        said.insert(0 if has_no_gain else len(said), f"autofocus gain {one.autofocus_gain:.3g}")
+    yield from said
 
 
-def requirement_finding(one: JudgedRequirement) -> str:
-    """Say in a sentence how a requirement stands."""
+_OF_OWNER = "'s share"
+_SHARES = {"autofocus": "pull-in of autofocus", "scene": "at the scene's edge"}  # that no platform and no clock has
+
+
+def share_words(one: JudgedRequirement, share: DecidingShare) -> str:
+    """Say whose share decides, with its own two numbers: `receiver's share: 24.4 of 31.5 deg`."""
+    reached, allowed = requirement_size(share.reached, one), requirement_limit(share.allowed, one)
+    number, _, unit = reached.rpartition(" ")
+    if number and allowed.endswith(f" {unit}"):  # the unit stands once
+        reached = number
+    return f"{_SHARES.get(share.owner, share.owner + _OF_OWNER)}: {reached} of {allowed}"
+
+
+def share_columns(one: JudgedRequirement) -> dict[str, str | float | None]:
+    """Whose share decides, its own two numbers, and the gain of autofocus, by the names of columns and properties."""
+    share = one.share
+    return {
+        "share_owner": None if share is None else share.owner,
+        "share_allowed": None if share is None else share.allowed,
+        "share_reached": None if share is None else share.reached,
+        "autofocus_gain": one.autofocus_gain,
+    }
+
+
+def confidence_words(mission: MissionFindings) -> str:
+    """Say behind the status of a mission with which confidence its requirements are met; nothing where one is not."""
+    status = STATUS[mission.status]
+    return f" {mission.confidence}" if status.is_held and not status.fails else ""
+
+
+_HAS_CONFIDENCE = ("quadratic_phase_error", "cubic_phase_error", "location_error")  # levels are of mean powers
+
+
+def requirement_finding(one: JudgedRequirement, mission: MissionFindings) -> str:
+    """Say in a sentence how a requirement stands; where it is met, with which confidence."""
     text = one.name
     if one.value is not None:
-        text += f" of {requirement_size(one.value, one)}{' (default)' if one.is_default else ''}"
+        text += f" of {requirement_limit(one.value, one)}{' (default)' if one.is_default else ''}"
     text += f": {STATUS[one.status].words}"
-    if one.reached is not None and one.allowed is not None and one.status != "not_evaluated":
-        text += (
-            f", {requirement_size(one.reached, one)} reached, {requirement_size(one.allowed, one, 'down')} allowed"
-        )
+    if STATUS[one.status].is_held and not STATUS[one.status].fails and one.key in _HAS_CONFIDENCE:
+        text += f" {mission.confidence}"
+    if one.reached is not None:
+        text += f", {requirement_size(one.reached, one)} reached"
     if one.row is not None and one.status != "not_evaluated":
         text += f", decided by {one.row}"
+    text += "".join(f", {remark}" for remark in use_remarks(one))
     return "; ".join([text, *filter(None, [one.reason]), *(waiver.words for waiver in one.waivers)])
 
 
@@ -131,7 +168,7 @@ def _waived(mission: MissionFindings, *, is_brief: bool) -> list[str]:
 
 def _met(mission: MissionFindings, waived: Sequence[str]) -> str:
     """Say that nothing is broken that is not waived, and what bears on that."""
-    text = ", ".join(waived) or "every requirement is judged and met"
+    text = ", ".join(waived) or f"every requirement is judged and met {mission.confidence}"
     if "warn" in mission.statuses:
         return f"{text}, with warnings"
     return f"{text}, with autofocus" if mission.status == "pass_with_autofocus" else text

@@ -122,6 +122,7 @@ def dashed(text: str) -> str:
 
 
 _PHASE_UNIT = "deg"  # of the phase requirement that a file does not state
+LEVELS = ("pslr", "islr")  # requirements in dB of the image, and the kinds of the rows that add them up
 _OF_PHASES = ("quadratic_phase_error", "cubic_phase_error", "spatial_variance")  # rows that add phases up
 
 
@@ -139,8 +140,11 @@ def row_size(value: float | None, row: Row, mission: MissionFindings, rounding: 
 
 
 def row_limit(row: Row, mission: MissionFindings) -> str:
-    """Write the allowable of a row, rounded down, so that copied from the page into a file it passes."""
-    return row_size(row.allowable, row, mission, "down")
+    """Write the allowable of a row, rounded down, so that copied from the page into a file it passes.
+
+    Rows of PSLR and ISLR are levels of the image, which no file states as an error: to the nearest.
+    """
+    return row_size(row.allowable, row, mission, "nearest" if row.subject.kind in LEVELS else "down")
 
 
 def allowable_words(row: Row, mission: MissionFindings) -> str:
@@ -165,6 +169,11 @@ def phase_unit(mission: MissionFindings) -> str:
 def phase_limit(value: float, mission: MissionFindings) -> str:
     """Write a phase that is allowed, rounded down, in the unit of the quadratic phase requirement. [rad]"""
     return format_in(value, "rad", phase_unit(mission), 3, "down")
+
+
+def requirement_limit(value: float | None, one: JudgedRequirement) -> str:
+    """Write what a requirement or a share of it allows: a level to the nearest, any other limit rounded down."""
+    return requirement_size(value, one, "nearest" if one.key in LEVELS else "down")
 
 
 def requirement_size(value: float | None, one: JudgedRequirement, rounding: str = "nearest") -> str:
@@ -200,7 +209,8 @@ def wrapped(text: str, indent: str) -> list[str]:
 def wrapped_counts(text: str) -> list[str]:
     """Break `file: 1 FAIL, 2 pass` before 80 columns, after a colon or comma."""
     joined = text.replace(" ", "\u00a0").replace(",\u00a0", ", ").replace(":\u00a0", ": ").replace(";\u00a0", "; ")
-    return [line.replace("\u00a0", " ") for line in wrapped(joined, "  ")]
+    first, *rest = (line.replace("\u00a0", " ") for line in wrapped(joined, "  "))
+    return [first, *(part for line in rest for part in wrapped(line, "    "))]  # the first has the file, to be copied
 
 
 def spaced(cells: Sequence[str], widths: Sequence[int], sides: str) -> str:
