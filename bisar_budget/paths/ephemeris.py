@@ -200,14 +200,20 @@ def minutes(duration_s: float) -> str:
 
 def _step_around(samples: Sequence[Sample], time: Instant) -> float:
     """Time between the two samples around an instant. [s]"""
-    behind = min(max(bisect_right(samples, time, key=lambda one: one.time), 1), len(samples) - 1)
-    return samples[behind].time.since(samples[behind - 1].time)
+    before, after = _times_around(samples, time)
+    return after.since(before)
 
 
 def usual_step(samples: Sequence[Sample]) -> float:
     """Median time between two samples; 0 of a single one. [s]"""
     steps = sorted(after.time.since(before.time) for before, after in pairwise(samples))
     return steps[len(steps) // 2] if steps else 0.0
+
+
+def _times_around(samples: Sequence[Sample], time: Instant) -> tuple[Instant, Instant]:
+    """Times of the two samples around an instant; of the nearest two where it is outside."""
+    behind = min(max(bisect_right(samples, time, key=lambda one: one.time), 1), len(samples) - 1)
+    return samples[behind - 1].time, samples[behind].time
 
 
 def _misses_around(samples: Sequence[Sample], time: Instant, used: Interpolation) -> float:
@@ -225,8 +231,7 @@ def _misses_around(samples: Sequence[Sample], time: Instant, used: Interpolation
         error = math.dist(*both)
         return error if math.isfinite(error) else math.inf
 
-    behind = min(max(bisect_right(samples, time, key=lambda one: one.time), 1), len(samples) - 1)
-    before, after = samples[behind - 1].time, samples[behind].time
+    before, after = _times_around(samples, time)
     return max(misses(time), misses(before.after(after.since(before) / 2)))
 
 
