@@ -251,10 +251,15 @@ def _of_finals(lines: Sequence[tuple[int, str]]) -> Iterator[_TableRow]:
         cells = [line[first:last].strip() for first, last in _FIXED]
         final = {index: line[first:last].strip() for index, (first, last) in _FINAL.items()}
         cells = [final.get(index) or cell for index, cell in enumerate(cells)]
-        if cells[0] and not any(cells[1:]):  # a day of the future without values
+        if _is_empty(cells):
             continue
         is_final = all(final.values())
         yield _TableRow(at, cells, not is_final and any(line[at : at + 1] == "P" for at in _PREDICTION_FLAGS))
+
+
+def _is_empty(cells: Sequence[str]) -> bool:
+    """Whether a row is a day of the future that has no values yet."""
+    return bool(cells[0]) and not any(cells[1:])
 
 
 def _of_iers_csv(lines: Sequence[tuple[int, str]], name: str) -> Iterator[_TableRow]:
@@ -266,7 +271,7 @@ def _of_iers_csv(lines: Sequence[tuple[int, str]], name: str) -> Iterator[_Table
         row = _row_of(line, ";", header, f"{name}:{at}")
         final = {n: row[place] for n, place in finals.items() if place >= 0}
         cells = [final.get(n) or row[place] for n, place in enumerate(places)]
-        if cells[0] and not any(cells[1:]):
+        if _is_empty(cells):
             continue
         is_final = len(final) == len(finals) and all(final.values())
         yield _TableRow(
