@@ -18,7 +18,7 @@ from bisar_budget.report.formats.csv_table import csv_text
 from bisar_budget.report.formats.json_document import document_text, outside_item
 from bisar_budget.report.words.heading import title_lines
 from bisar_budget.report.words.identity import digest
-from bisar_budget.report.words.sentences import percent, sentence, spaced, spreadsheet_text, use_words, wrapped
+from bisar_budget.report.words.sentences import percent, sentence, spaced, use_words, wrapped
 from bisar_budget.units import format_quantity
 
 
@@ -89,11 +89,9 @@ def direction(one: SatellitePass) -> str:
 
 def as_csv(passes: Passes, style: Style) -> str:
     """Write a line for each pass, values in SI and radians, empty where there is none."""
-    whose = [spreadsheet_text(text) for text in (passes.file, passes.name, passes.platform)]
+    whose = [passes.file, passes.name, passes.platform]
     lines: list[list[object]] = [["file", "name", "platform", *_item(_NO_PASS)]]
-    for one in passes.found:
-        cells = (spreadsheet_text(value) if isinstance(value, str) else value for value in _item(one).values())
-        lines.append([*whose, *cells])
+    lines += [[*whose, *_item(one).values()] for one in passes.found]
     return csv_text(lines)
 
 
