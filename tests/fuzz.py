@@ -310,6 +310,9 @@ def places(node: Any) -> Iterator[tuple[Any, Any]]:
         yield from places(value)
 
 
+_schema = cache(mission_schema)
+
+
 @cache
 def _keys_of_missions() -> frozenset[str]:
     """Every key that a mission file may have: `islr` is one letter from `pslr`."""
@@ -320,7 +323,7 @@ def _keys_of_missions() -> frozenset[str]:
         for inner in schema.values() if isinstance(schema, dict) else schema if isinstance(schema, list) else ():
             yield from below(inner)
 
-    return frozenset(below(mission_schema()))
+    return frozenset(below(_schema()))
 
 
 def _misspelt(text: str, random: Random) -> Case:
@@ -556,7 +559,7 @@ _PLACES = ("", "collection", "scene", "requirements", "allocation", "Platform", 
 
 def from_schema(tree: Any, node: Any, key: Any, random: Random) -> None:
     """A key that the schema has, with a value of its kind."""
-    schema = mission_schema()
+    schema = _schema()
     if not isinstance(tree, dict):
         return
     platforms = tree.get("platforms")
@@ -579,16 +582,21 @@ def _filled(kind: Any, key: str, definitions: Any, random: Random) -> Any:
     """A value of a part of the schema."""
     if "$ref" in kind:
         return _filled(definitions[kind["$ref"].rpartition("/")[2]], key, definitions, random)
+    if "anyOf" in kind and any("pattern" in form for form in kind["anyOf"]):  # a quantity, or a whole number
+        return _filled(kind["anyOf"][0], key, definitions, random)
     for choices in ("allOf", "anyOf"):
         if choices in kind:
             return _filled(random.choice(kind[choices]), key, definitions, random)
+    if "not" in kind:  # any single value
+        return _value(random) if random.random() < 0.3 else f"{key} {random.randint(0, 9)}"
     if "enum" in kind:
         return random.choice(kind["enum"])
     if "const" in kind:
         return kind["const"]
     if kind["type"] == "array":
         count = kind.get("maxItems") if kind.get("minItems") else random.randint(1, 3)
-        items = [_filled(kind["items"], key, definitions, random) for _ in range(count or 1)]
+        of_each = kind["items"] if isinstance(kind["items"], list) else [kind["items"]] * (count or 1)
+        items = [_filled(item, key, definitions, random) for item in of_each]
         return list(dict.fromkeys(items)) if kind.get("uniqueItems") else items
     if kind["type"] == "object":
         if key in _POINTS:

@@ -155,7 +155,7 @@ class _MatrixReader(Reader):
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
         """Array of six arrays of six."""
-        return _matrix_schema(_ELEMENTS[0][0].schema(definitions))
+        return _matrix_schema([[element.schema(definitions) for element in row] for row in _ELEMENTS])
 
 
 def _excesses(rows: Sequence[Sequence[float]], sigmas: Sequence[float]) -> Iterator[Problem]:
@@ -172,11 +172,11 @@ def _excesses(rows: Sequence[Sequence[float]], sigmas: Sequence[float]) -> Itera
                 yield Problem(problem, accepted, at=(i, j))
 
 
-def _matrix_schema(element: dict[str, Any]) -> dict[str, Any]:
-    def six(items: dict[str, Any]) -> dict[str, Any]:
+def _matrix_schema(elements: Sequence[Sequence[dict[str, Any]]]) -> dict[str, Any]:
+    def six(items: Sequence[dict[str, Any]]) -> dict[str, Any]:
         return {"type": "array", "items": items, "minItems": SIZE, "maxItems": SIZE}
 
-    return six(six(element))
+    return six([six(row) for row in elements])
 
 
 class _Correlations(NamedTuple):
@@ -244,7 +244,7 @@ class _CorrelationReader(Reader):
             "patternProperties": {rf"^\s*{name}\s*-\s*{name}\s*$": number},
             "additionalProperties": False,
         }
-        return {"anyOf": [pairs, _matrix_schema(number)]}
+        return {"anyOf": [pairs, _matrix_schema([[number] * SIZE] * SIZE)]}
 
 
 def error_index(name: str) -> int | None:

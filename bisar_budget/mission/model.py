@@ -29,7 +29,6 @@ from bisar_budget.mission.readers import (
     Day,
     Glob,
     Key,
-    Label,
     ListOf,
     OneOf,
     Quantity,
@@ -57,8 +56,8 @@ if TYPE_CHECKING:
 class Document(NamedTuple):
     """The document that a report of this mission becomes; every report shows it."""
 
-    number: Annotated[str | None, Key(Label())] = None
-    issue: Annotated[str | None, Key(Label())] = None
+    number: Annotated[str | None, Key(Text())] = None
+    issue: Annotated[str | None, Key(Text())] = None
     author: Annotated[str | None, Key(Text())] = None
 
 

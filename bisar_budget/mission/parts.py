@@ -53,11 +53,11 @@ from bisar_budget.mission.readers import (
     VELOCITY,
     Choice,
     Key,
-    Label,
     ListOf,
     Reference,
     Report,
     Section,
+    Text,
     TextMap,
     Triple,
     did_you_mean,
@@ -70,7 +70,7 @@ from bisar_budget.settings import SettingsError, project_settings
 Find = Callable[[str], tuple[str, bytes]]  # file and content of a part by its name
 
 MOTION_ERROR = Section(MotionError)
-_TEXT = Label()
+_TEXT = Text()
 _NAME = Key(_TEXT, "Maker, type, and revision or mode; reports show it.")
 _SAYS = Key(_TEXT, "What its figures are in their source: which statistic, typical or largest, in which conditions.")
 _SOURCE = either(dict, TextMap("figure"), _TEXT)

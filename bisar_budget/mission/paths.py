@@ -224,13 +224,14 @@ def _with_radial(state: PlatformState, axes: earth.SceneAxes) -> PlatformState:
 class _OrbitFile(NamedTuple):
     """The file of an orbit: the form it has, its name, its content, and which object of it is wanted.
 
-    The name is None where an element set stands in the mission file itself.
+    One that `is_planned` is flown as it stands. The name is None where an element set stands in the mission file.
     """
 
     form: str
     name: str | None
     data: bytes
     object: str | None
+    is_planned: bool = False
 
     @classmethod
     def of(cls, route: OrbitSource, read: Beside) -> "_OrbitFile":
@@ -238,14 +239,15 @@ class _OrbitFile(NamedTuple):
         form = _form_of(route)
         named = getattr(route, form)
         if isinstance(named, str):
-            return cls(form, named, read(named), route.object)
-        return cls(form, None, "\n".join(named).encode(), route.object)
+            return cls(form, named, read(named), route.object, bool(route.planned))
+        return cls(form, None, "\n".join(named).encode(), route.object, bool(route.planned))
 
     def orbit(self, center: Instant, orientation: Orientation) -> Orbit:
         """The orbit that is flown at an instant; raises `PathFileError` where there is none."""
         name = self.name or "the element set"
         hold_to_format(self.data, name, self.form)
-        return ORBIT_FORMATS[self.form].read(self.data, name, self.object, center, orientation)
+        orbit = ORBIT_FORMATS[self.form].read(self.data, name, self.object, center, orientation)
+        return orbit.as_planned() if self.is_planned else orbit
 
 
 def _form_of(route: OrbitSource) -> str:
@@ -288,7 +290,7 @@ def _of_orbit(mission: Mission, route: OrbitSource, axes: earth.SceneAxes, read:
         named = getattr(route, _form_of(route))
         file = named if isinstance(named, str) else None
         raise _UnusablePathError(("orbit", _form_of(route)), _of_file(file, error)) from None
-    return path._replace(sha256=digest)
+    return path._replace(sha256=digest, is_planned=given.is_planned)
 
 
 def _orientation(mission: Mission, center: Instant, read: Beside) -> tuple[Orientation, tuple[str, str] | None]:

@@ -48,7 +48,6 @@ from bisar_budget.mission.readers import (
     VELOCITY,
     Choice,
     Key,
-    Label,
     Quantity,
     Reader,
     Reference,
@@ -59,6 +58,8 @@ from bisar_budget.mission.readers import (
     TextList,
     Triple,
     Whole,
+    YesNo,
+    date_schema,
     either,
 )
 from bisar_budget.mission.vibrations import Vibration
@@ -227,7 +228,7 @@ class _Lines(Reader):
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
         """Array of two lines."""
-        return {"type": "array", "items": {"type": "string"}, "minItems": 2, "maxItems": 2}
+        return {"type": "array", "items": Reference().schema(definitions), "minItems": 2, "maxItems": 2}
 
 
 class OrbitSource(NamedTuple):
@@ -245,11 +246,15 @@ class OrbitSource(NamedTuple):
     eof: Annotated[str | None, Key(_FILE, "Orbit file of a Sentinel, POEORB or RESORB; Hermite.")] = None
     sp3: Annotated[str | None, Key(_FILE, "Orbits of GNSS or low satellites, SP3-c or SP3-d; object: G05.")] = None
     object: Annotated[str | None, Key(Reference(), "Name or catalogue number, where a file has several.")] = None
+    planned: Annotated[
+        bool | None,
+        Key(YesNo(), "The orbit is the plan, flown as it stands: neither its age nor its interpolation counts."),
+    ] = None
 
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
         """Hold it to one source."""
-        ways = [key for key in OrbitSource._fields if key != "object"]
+        ways = [key for key in OrbitSource._fields if key not in ("object", "planned")]
         given = [way for way in ways if values.get(way) is not None]
         if len(given) != 1 and values.keys() >= set(ways):
             said = f"mixes {' with '.join(given)}" if given else "is empty"
@@ -271,7 +276,7 @@ class _Instant(Reader):
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
         """Date and time."""
-        return {"type": "string", "format": "date-time"}
+        return date_schema(r"^\s*\d{4}-\d\d-\d\d[T ]")
 
 
 class _Talker(Text):
@@ -324,7 +329,7 @@ class TrajectorySource(NamedTuple):
     track: Annotated[
         str | None,
         Key(
-            Label(),
+            Reference(),
             "Track of a GPX file with several, by its name or number; omitted: the one that covers the aperture.",
         ),
     ] = None
@@ -378,7 +383,7 @@ class FlownPath(NamedTuple):
 
     `doubt_m` is how far the truth may be from it by what its own source says: the age of elements, the interpolation
     of an ephemeris, the residual of a smoothed log; `doubt_of` says which. Where the file declares no position error,
-    it counts if it `is_doubted`.
+    it counts if it `is_doubted`. An orbit that `is_planned` is the plan: what its source cannot know does not count.
     """
 
     state: PlatformState
@@ -395,6 +400,7 @@ class FlownPath(NamedTuple):
     doubt_m: float = 0.0
     doubt_of: str = ""
     is_doubted: bool = False
+    is_planned: bool = False
     accuracy: tuple[str, str] | None = None  # file that states its errors, and its SHA-256
     orientation: tuple[str, str] | None = None  # table by which it is turned to the Earth, and its SHA-256
     stated: tuple[StatedAccuracy, ...] = ()  # by its own source, along the scene's axes

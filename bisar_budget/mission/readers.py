@@ -31,6 +31,14 @@ _MAX_WILDCARDS = 20  # an id has four parts; patterns of hundreds take a second 
 _UNPRINTABLE = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff\ufeff\u202a-\u202e\u2066-\u2069]")
 
 
+_MANY = {"type": ["array", "object", "null"]}  # JSON Schema: what is no single value
+
+
+def date_schema(pattern: str) -> dict[str, Any]:
+    """JSON Schema of a date or an instant: as text, or as what a reader of YAML makes of it, which JSON has not."""
+    return {"not": {"type": ["array", "object", "null", "boolean", "number"]}, "pattern": pattern}
+
+
 class Reader:
     """Reads one kind of value; `is_word` where that is a word or a whole number, of which several can be compared."""
 
@@ -122,10 +130,25 @@ class Quantity(Reader):
         return f"A bare number is in {self.dimension.si}" if self.dimension.si not in ("", "dB") else ""
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
-        """Text with a unit, or a bare number; of an angle only zero is bare."""
-        if self.dimension.usual:
-            return {"anyOf": [{"type": "string"}, {"const": 0}]}
-        return {"type": ["string", "number"]}
+        """Text with a unit, or a bare number within the bounds; of an angle only zero is bare."""
+        name = re.sub(r"\W", "", self.dimension.name.partition(" ")[2].title()) + "Quantity"
+        if name not in definitions:
+            definitions[name] = _quantity_schema(self.dimension)
+        accepted: dict[str, Any] = {"$ref": f"#/definitions/{name}"}
+        words = ("exclusiveMinimum", "minimum", "exclusiveMaximum", "maximum")
+        bounds = {word: bound for word, bound in zip(words, self.bounds, strict=True) if math.isfinite(bound)}
+        return {"allOf": [accepted], **bounds} if bounds and not self.dimension.usual else accepted
+
+
+def _quantity_schema(dimension: Dimension) -> dict[str, Any]:
+    """JSON Schema of a kind of quantity: text that begins with a number and has no unit of another kind behind it."""
+    number = r"[+-]?(?!0\d)(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
+    known = {unit for other in units.DIMENSIONS for unit in other.units if unit}
+    foreign = sorted(unit for unit in known if dimension.scales.keys().isdisjoint((unit, units.normal_unit(unit))))
+    of_others = "|".join(re.sub(r"([\^$.*+?()|/])", r"\\\1", unit) for unit in foreign)
+    text: dict[str, Any] = {"type": "string", "pattern": rf"^\s*(?!{number}\s*(?:{of_others})\s*$){number}"}
+    words = dimension.accepted.removeprefix("accepted: ")
+    return {"description": words, "anyOf": [text, {"const": 0} if dimension.usual else {"type": "number"}]}
 
 
 class Triple(Reader):
@@ -194,22 +217,17 @@ class Text(Reader):
         return value
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
-        """Text that is not empty."""
-        return {"type": "string", "minLength": 1, "maxLength": _MAX_TEXT}
+        """Any single value: readers of YAML make a number of 007, true of `yes` and a date of 2026-06-01."""
+        pattern = r"^(?=.*\S)[^\u0000-\u001f\u007f-\u009f\u2028\u2029\ufeff\u202a-\u202e\u2066-\u2069]*$"
+        words = {"description": "One line of text."}
+        definitions.setdefault("Text", {**words, "not": _MANY, "maxLength": _MAX_TEXT, "pattern": pattern})
+        return {"$ref": "#/definitions/Text"}
 
 
 class Reference(Text):
     """Name of a part or of a file, from which values come."""
 
     is_word = True
-
-
-class Label(Text):
-    """Text that may look like a number to an editor, such as the issue of a document."""
-
-    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
-        """Text or a number, of which the digits are kept as they stand."""
-        return {"type": ["string", "number"], "minLength": 1, "maxLength": _MAX_TEXT}
 
 
 class Glob(Text):
@@ -241,6 +259,27 @@ class Choice(Reader):
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
         """Enumeration."""
         return {"enum": list(self.names)}
+
+
+_YES_NO = {word: word.lower() == "true" for word in ("true", "True", "TRUE", "false", "False", "FALSE")}
+
+
+class YesNo(Reader):
+    """True or false."""
+
+    is_word = True
+    what = "true or false"
+
+    def leaf(self, value: Any) -> bool:
+        """Read true or false, in the spellings of YAML 1.2; of an option also as a word."""
+        found = value if isinstance(value, bool) else _YES_NO.get(value) if isinstance(value, str) else None
+        if found is None:
+            raise InvalidValueError("must be true or false", "accepted: true, false")
+        return found
+
+    def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
+        """Boolean, or its word."""
+        return {"enum": [True, False, *_YES_NO]}
 
 
 class Words(Reader):
@@ -304,8 +343,9 @@ class Whole(Reader):
         raise InvalidValueError(f"must be a whole number from {self.low} to {self.high}")
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
-        """Integer."""
-        return {"type": "integer", "minimum": self.low, "maximum": self.high}
+        """Integer, or its digits in quotes."""
+        number = {"type": "integer", "minimum": self.low, "maximum": self.high}
+        return {"anyOf": [number, {"type": "string", "pattern": r"^\s*(?:0|-?[1-9]\d{0,17})\s*$"}]}
 
 
 class Version(Reader):
@@ -318,8 +358,8 @@ class Version(Reader):
         return 1
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
-        """Constant."""
-        return {"const": 1}
+        """Constant, in quotes or not."""
+        return {"enum": [1, "1"]}
 
 
 class Day(Reader):
@@ -337,8 +377,8 @@ class Day(Reader):
             raise InvalidValueError("must be a calendar date", "accepted: 2027-03-31 and the like") from None
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
-        """Date."""
-        return {"type": "string", "format": "date"}
+        """Date, which readers of YAML may have made of its text."""
+        return date_schema(r"^\d{4}-\d\d-\d\d$")
 
 
 def _is_few(
@@ -369,7 +409,7 @@ class TextMap(Reader):
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
         """Object."""
-        return {"type": "object", "additionalProperties": Label().schema(definitions), "maxProperties": _MAX_IDS}
+        return {"type": "object", "additionalProperties": Text().schema(definitions), "maxProperties": _MAX_IDS}
 
 
 class SizeMap(Reader):
@@ -411,7 +451,7 @@ class Weights(Reader):
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
         """Object of numbers, or array of text."""
-        label, weight = Label().schema(definitions), _WEIGHT.schema(definitions)
+        label, weight = Text().schema(definitions), _WEIGHT.schema(definitions)
         return {
             "anyOf": [
                 {"type": "object", "additionalProperties": weight, "maxProperties": _MAX_IDS},

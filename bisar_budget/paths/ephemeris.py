@@ -12,7 +12,7 @@ from functools import lru_cache
 
 from bisar_budget.geometry import Vector
 from bisar_budget.paths.accuracy import EpochCovariance, StatedAccuracy, stated_of_orbit
-from bisar_budget.paths.flight import Orbit, PathDoubt, PathFileError, Sample, interpolate
+from bisar_budget.paths.flight import NO_DOUBT, Orbit, PathDoubt, PathFileError, Sample, interpolate
 from bisar_budget.paths.instant import Instant, tai, utc
 from bisar_budget.paths.messages import cut, one_object
 from bisar_budget.paths.orientation import Orientation, Turn
@@ -128,6 +128,8 @@ class _Between:
             doubt=self.doubt,
             remedy=_MORE_OFTEN,
             is_turned=segment.turn is not None,
+            turning_doubt=self.turning_doubt,
+            turning_doubts=self.turning_doubts,
             stated=self.stated,
         )
 
@@ -152,13 +154,15 @@ class _Between:
         return stated_of_orbit(segment.covariances, self.place, instant, self.span) or segment.accuracy
 
     def doubt(self, instant: Instant) -> PathDoubt:
-        size, words = self._off(instant), "interpolation of the ephemeris"
-        if self.segment.turn is None:
-            return PathDoubt(size, words)
+        own, turning = PathDoubt(self._off(instant), "interpolation of the ephemeris"), self.turning_doubt(instant)
         # They are of other causes; at their worst they add.
-        size += sum(self.orientation.misplaced(self._inside(instant)))
+        return PathDoubt(own.size + turning.size, ", ".join(filter(None, (own.words, turning.words))))
+
+    def turning_doubt(self, instant: Instant) -> PathDoubt:
+        if self.segment.turn is None:
+            return NO_DOUBT
         unsure = "0.1 s of UT1 - UTC and polar motion" if not self.orientation.words else "the Earth's orientation"
-        return PathDoubt(size, f"{words}, {unsure}")
+        return PathDoubt(sum(self.orientation.misplaced(self._inside(instant))), unsure)
 
     def doubts(self, instant: Instant) -> Sequence[str]:
         said = list(self.segment.remarks)
@@ -168,11 +172,11 @@ class _Between:
                 f"{self.segment.where}: the interpolation of the ephemeris is about {error:.2g} m off; write it more"
                 " often"
             )
-        if self.segment.turn is not None:
-            said += self._of_orientation(instant)
-        return tuple(said)
+        return (*said, *self.turning_doubts(instant))
 
-    def _of_orientation(self, instant: Instant) -> Sequence[str]:
+    def turning_doubts(self, instant: Instant) -> Sequence[str]:
+        if self.segment.turn is None:
+            return ()
         turned, moved = self.orientation.misplaced(self._inside(instant))
         begins = f"{self.segment.where}: {self.segment.axes} is turned to the Earth"
         if not self.orientation.words:

@@ -78,6 +78,7 @@ class Orbit:
     `place` takes an instant and gives Earth-fixed coordinates [m]. `words` says what it is, for reports; `epoch` is
     that of the elements. `doubt` says at an instant how far the truth may be; `doubts` are warnings of it, where it
     is more than usual, and `remedy` is what makes it less. An orbit that `is_turned` comes from axes of the stars.
+    `turning_doubt` and `turning_doubts` are the part of both that the Earth's orientation has, not the orbit.
     `stated` is the accuracy that its file states at an instant, along the axes of the Earth.
     """
 
@@ -89,7 +90,14 @@ class Orbit:
     doubt: Callable[[Instant], PathDoubt] = lambda _: NO_DOUBT
     remedy: str = ""
     is_turned: bool = False
+    turning_doubt: Callable[[Instant], PathDoubt] = lambda _: NO_DOUBT
+    turning_doubts: Callable[[Instant], Sequence[str]] = lambda _: ()
     stated: Callable[[Instant], StatedAccuracy | None] = lambda _: None
+
+    def as_planned(self) -> "Orbit":
+        """The orbit as the plan, which is flown as it stands: neither its age nor its interpolation is in doubt."""
+        words = f"{self.words}, flown as planned: its age and its interpolation do not count"
+        return replace(self, words=words, doubt=self.turning_doubt, doubts=self.turning_doubts)
 
     def largest_doubt_m(self, instant: Instant) -> float:
         """How far the truth may be at an instant, by what its file states of itself or by anything else. [m]"""

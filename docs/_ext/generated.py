@@ -281,7 +281,6 @@ def _form(reader: readers.Reader) -> str:
         readers.Section: "section",
         readers.Version: "`1`",
         readers.Day: "date, such as `2027-03-31`",
-        readers.Label: "text or number",
         readers.Text: "text",
     }
     if isinstance(reader, readers.TextMap):

@@ -1,6 +1,7 @@
 """What an input states of its own accuracy: it fills an absent error, and a declared one below it is not judged."""
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -9,15 +10,17 @@ import pytest
 
 from bisar_budget.budget.check import check_mission
 from bisar_budget.budget.doubts import input_doubts
+from bisar_budget.faults import MissionError
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.mission.load import load_mission
+from bisar_budget.mission.model import Mission
 from tests.budget.test_input_doubt import statuses
 from tests.conftest import TODAY, row
 from tests.design.test_sweep import assert_as_checked, grid, swept
-from tests.mission.test_path_files import aircraft, ephemeris
+from tests.mission.test_path_files import aircraft, ephemeris, satellite
 from tests.paths.flown import flight
 from tests.paths.log_files import SIGMAS, gga, nmea, sentence, solution
-from tests.paths.orbit_files import oem
+from tests.paths.orbit_files import EPOCH, TLE, oem
 from tests.paths.test_accuracy import START, triangle, with_covariance
 
 CENTER = "2026-06-01T05:19:30Z"
@@ -217,6 +220,67 @@ class TestALog:
         changes: dict[str, Any] = {} if requirements is None else {"requirements": requirements}
         (folder / "m.yaml").write_text(aircraft(platforms__receiver=receiver, **changes))
         return check_mission(load_mission(str(folder / "m.yaml")), TODAY)
+
+
+class TestAPlannedOrbit:
+    @pytest.mark.parametrize("days", [3.0, 30.0, 3650.0])
+    def test_its_age_does_not_count_and_every_report_says_so(
+        self, days: float, tmp_path: Path, run: Callable[..., Any]
+    ) -> None:
+        """Elements of ten years before too, which are refused without the key."""
+        mission = self.mission(tmp_path, days, planned=True)
+        path = mission.platforms.transmitter.path
+        assert path.doubts == ()
+        assert path.doubt_m < 1e-3
+        assert input_doubts(mission) == []
+        found = check_mission(mission, TODAY)
+        assert statuses(found, "transmitter") == {"not_declared"}
+        for form in ("text", "json", "markdown", "html"):
+            assert "its age and its interpolation do not count" in " ".join(
+                run("check", tmp_path / "m.yaml", "--format", form, "-v").stdout.split()
+            )
+        said = [one.message for one in found.warnings if "orbit.planned" in one.message]
+        assert said == [
+            "platforms.transmitter.orbit.planned: the orbit is the plan: neither its age nor its interpolation counts"
+        ]
+
+    def test_without_the_key_it_counts(self, tmp_path: Path) -> None:
+        """3 days of age, 7 km, against 5 m of location: with the line `planned: false` as without it."""
+        for planned in (None, False):
+            mission = self.mission(tmp_path, 3.0, planned=planned)
+            assert statuses(check_mission(mission, TODAY), "transmitter") == {"not_evaluated"}
+        with pytest.raises(MissionError, match="more than a tenth of the slant range"):
+            self.mission(tmp_path, 3650.0, planned=None)
+
+    def test_what_it_states_of_itself_counts_all_the_same(self, tmp_path: Path) -> None:
+        orbiting(tmp_path, (10.0, 10.0, 10.0), position="1 m")
+        text = (tmp_path / "m.yaml").read_text()
+        text = re.sub(r"^( +)oem: a.oem$", r"\1oem: a.oem\n\1planned: true", text, flags=re.MULTILINE)
+        assert "planned: true" in text
+        (tmp_path / "m.yaml").write_text(text)
+        (doubt,) = input_doubts(load_mission(str(tmp_path / "m.yaml")))
+        assert doubt.is_stated
+
+    def test_how_the_earth_is_turned_is_no_part_of_the_plan(self, tmp_path: Path) -> None:
+        text = oem(frame="GCRF", times=START.after)
+        (tmp_path / "a.oem").write_text(text)
+        transmitter = {"orbit": {"oem": "a.oem", "planned": True}}
+        (tmp_path / "m.yaml").write_text(ephemeris(CENTER, text, platforms__transmitter=transmitter))
+        path = load_mission(str(tmp_path / "m.yaml")).platforms.transmitter.path
+        assert 10 < path.doubt_m < 80
+        assert "UT1 = UTC" in path.doubts[0]
+
+    @staticmethod
+    def mission(folder: Path, days: float, *, planned: bool | None) -> Mission:
+        (folder / "a.tle").write_text(TLE)
+        orbit = {"tle": "a.tle"} | ({} if planned is None else {"planned": planned})
+        text = satellite(
+            EPOCH.after(86400 * days),
+            platforms__transmitter={"orbit": orbit, "motion_error": {"velocity": "1 mm/s"}},
+            requirements={"location_error": "5 m"},
+        )
+        (folder / "m.yaml").write_text(text)
+        return load_mission(str(folder / "m.yaml"))
 
 
 def test_a_sweep_says_the_same(tmp_path: Path) -> None:
