@@ -18,7 +18,7 @@ _STYLE = """<style>
 _COLOURS = {
     "pass": "#1a7f37",
     "pass_with_autofocus": "#1a7f37",
-    "waived": "#57606a",
+    "waived": "#8a5a00",
     "info": "#57606a",
     "not_declared": "#57606a",
     "warn": "#8a5a00",

@@ -507,19 +507,32 @@ def across_the_line_of_sight() -> str:
 @phrase
 def below_the_ionosphere(platform: str) -> str:
     """Said of the electron content on a leg that lies within the air."""
+    if platform == "mission":
+        return "both platforms fly below the ionosphere: no electrons on their legs"
     return f"the {platform} flies below the ionosphere: no electrons on its leg"
 
 
 @phrase
 def runs_along_the_ground(platform: str) -> str:
     """Said of the delay on a leg that is seen too low, and of which nothing may be stated."""
+    if platform == "mission":
+        return "both legs run along the ground: no delay follows from that of the zenith"
     return f"the leg of the {platform} runs along the ground: no delay follows from that of the zenith"
 
 
 @phrase
-def disperses_over_the_band(phase: float) -> str:
-    """Said of an electron content."""
-    return f"bends the phase by {phase:.3g} rad at the ends of the band, which no requirement takes"
+def dispersion_over(phase: float, limit: float) -> str:
+    """Said of the electrons of the air. [rad]"""
+    return (
+        f"at the edges of the band the phase is bent by {_against(phase, limit, 'rad')}; autofocus corrects a phase "
+        "over slow time, and does not take it out"
+    )
+
+
+@phrase
+def content_allowed(content: float) -> str:
+    """Said of the same, of one air. [1/m²]"""
+    return f"allowed with a zenith_electron_content of {format_limit(content, '1/m^2')}"
 
 
 @phrase
@@ -679,6 +692,16 @@ def mask_is_cut(bandwidth: float, last: float, beyond: float) -> str:
 def mask_begins(frequency: float, slope: float) -> str:
     """Said of an oscillator. [Hz]"""
     return f"the mask begins at {frequency:g} Hz; below, it continues as f^(\u2212{slope:.3g})"
+
+
+@phrase
+def rests_on_the_continuation(platforms: Sequence[str], percent: float, least: float) -> str:
+    """Said of a row that rests on noise below the first points of masks. [Hz]"""
+    keys = " and ".join(f"platforms.{name}.oscillator" for name in platforms)
+    return (
+        f"{percent:.0f} % of its power lies below the first point of the mask of {keys}, where the noise is taken to "
+        f"continue as f^-3: a mask down to {format_quantity(least, 'Hz', 2, 'down')} would say it"
+    )
 
 
 @phrase

@@ -15,20 +15,25 @@ def standing(found: MissionFindings, row_id: str | None, breaks: Container[str])
     status = found.status if row_id is None else rows[0].status if rows else "not_evaluated"
     complies = status not in breaks
     deciding = [row for row in rows if _decides(row, breaks) and (complies or row.status in breaks)]
+    deciding = [row for row in deciding if row.status != "waived" or status == "waived"]
+    waivers = (found if row_id is None else rows[0]).waived_by if rows and status == "waived" else ()
+    waived_by = tuple(waiver.id for waiver in waivers)
     if not deciding:
         broken = [one.key for one in found.requirements if one.status == status and row_id is None and not complies]
-        return Standing(complies, status, requirement=broken[0] if broken else None)
+        return Standing(complies, status, requirement=broken[0] if broken else None, waived_by=waived_by)
     highest = max(map(_use, deciding))
     worst = next(row for row in deciding if _use(row) >= highest - ALIKE * abs(highest) or _use(row) == highest)
-    return Standing(complies, status, worst.id, worst.binding_requirement or worst.metric, worst.utilization)
+    is_unknown = (status == "not_evaluated" and not complies) or _use(worst) < 0
+    use = None if is_unknown else worst.utilization  # it need not be that of what decides
+    return Standing(complies, status, worst.id, worst.binding_requirement or worst.metric, use, waived_by)
 
 
 def _decides(row: Row, breaks: Container[str]) -> bool:
     """Whether a row is judged by a number; what only ever warns decides nothing, unless a warning does."""
-    is_judged = STATUS[row.status].is_judged and row.status != "waived"
     has_say = row.utilization is not None or row.status != "not_evaluated"
-    return is_judged and has_say and ("warn" in breaks or row.subject.kind != "autofocus_pull_in")
+    return STATUS[row.status].is_judged and has_say and ("warn" in breaks or row.subject.kind != "autofocus_pull_in")
 
 
 def _use(row: Row) -> float:
-    return -1.0 if row.utilization is None else row.utilization
+    is_unknown = row.utilization is None or (row.status == "waived" and row.is_unjudged)
+    return -1.0 if is_unknown else row.utilization

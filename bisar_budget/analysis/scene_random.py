@@ -25,7 +25,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bisar_budget.constants import ROUNDING
-from bisar_budget.effects.air_delays import delay_course, metres_per_unit
+from bisar_budget.effects.air_delays import delay_course, legs_of, metres_per_unit
 from bisar_budget.effects.declared import DeclaredErrors
 from bisar_budget.effects.effect import PLATFORMS, Subject
 from bisar_budget.effects.random_effect import NODES, Moves, RandomError, SensorCases, factor
@@ -118,18 +118,23 @@ class _Clock(NamedTuple):
 
 
 class _Delay(NamedTuple):
-    """A delay of the air on the leg of a platform that the centre sees at `middle`, so many metres of the zenith."""
+    """A delay of the air, so many metres of the zenith, on the legs of platforms, by their places.
 
-    place: int
+    The centre sees each of these at the place in `middles` at mid-aperture.
+    """
+
+    places: tuple[int, ...]
     delay: str
-    middle: Vectors
+    middles: Sequence[Vectors]
     metres: Floats
     groups: int = 1
 
     def there(self, there: ExactRanges, of: Places) -> Floats:
         """Quadratic phase, (1, places). [rad]"""
-        x, y, z = (part[of] for part in self.middle)
-        course = delay_course(self.delay, there.tracks[self.place], (x, y, z), self.metres[of], there.fit)
+        course: Any = 0.0
+        for place, middle in zip(self.places, self.middles, strict=True):
+            x, y, z = (part[of] for part in middle)
+            course = course + delay_course(self.delay, there.tracks[place], (x, y, z), self.metres[of], there.fit)
         return np.asarray(np.einsum("np,np->p", there.phase_weights[0], course)[None])
 
 
@@ -147,8 +152,9 @@ def _at_random(
         elif kind in _CLOCKS:
             yield what, _Clock.of(errors.exact, error.full.covariance, size)
         elif kind == "propagation":
-            place, metres = PLATFORMS.index(what.owner), metres_per_unit(errors.mission, what.axis)
-            yield what, _Delay(place, what.axis, errors.exact.positions[place], size * metres)
+            places = tuple(map(PLATFORMS.index, legs_of(what.owner)))
+            middles = [errors.exact.positions[place] for place in places]
+            yield what, _Delay(places, what.axis, middles, size * metres_per_unit(errors.mission, what.axis))
 
 
 def _vibrating(errors: DeclaredErrors) -> Iterator[tuple[Subject, _Moving]]:

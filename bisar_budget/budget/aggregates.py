@@ -1,7 +1,7 @@
 """Declared errors together: phases of platforms and mission, cubic phase, location, autofocus pull-in, scene edge."""
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -13,6 +13,7 @@ from bisar_budget.analysis.analysis import Analysis, Case
 from bisar_budget.analysis.scene import Corrections, SceneEdge, SceneEdges
 from bisar_budget.analysis.spread import noise
 from bisar_budget.analysis.together import Together, cubics, quadratics
+from bisar_budget.budget.continued_masks import continuation_note, rests_on_masks
 from bisar_budget.budget.judged_requirements import (
     MAKES_UP,
     SMALL_RAD,
@@ -26,9 +27,11 @@ from bisar_budget.effects.combined import Phases, correlation_notes
 from bisar_budget.effects.declared import CUBIC, LOCATION, OTHER_MODEL, QUADRATIC
 from bisar_budget.effects.effect import Subject, subject
 from bisar_budget.effects.oscillator_tones import spurs_of
+from bisar_budget.effects.random_effect import RandomError
 from bisar_budget.effects.vibration import DeclaredPhase
 from bisar_budget.faults import KeyPath
 from bisar_budget.findings.row import Row
+from bisar_budget.mission.model import Shares
 from bisar_budget.phrases import NOTHING, Note
 from bisar_budget.ranges.exact_ranges import Floats, Truths
 
@@ -71,6 +74,7 @@ class Aggregates:
             theirs,
             by_other,
             without_autofocus=size / limit,
+            continued=("quadratic", self._of_owners(split, owner)),
             qpe_published_rad=published,
             qpe_full_rad=np.where(np.isfinite(full), full, math.nan),
         )
@@ -97,6 +101,7 @@ class Aggregates:
             theirs,
             theirs.combined(cubics(theirs.phases)),
             mine.combined(phases, "rss") if self.combine == "each" else math.nan,
+            continued=("cubic", mine.random),
             metric=CUBIC,
             cubic_rad=size,
         )
@@ -113,6 +118,7 @@ class Aggregates:
             theirs.moved(self.combine),
             mine.moved("rss") if self.combine == "each" else math.nan,
             without_value="info" if limit is None else "not_evaluated",
+            continued=("displacement", mine.random),
             metric=LOCATION,
         )
 
@@ -128,6 +134,10 @@ class Aggregates:
             theirs.combined(quadratics(theirs.phases), "sum"),
             never_fails=True,
         )
+
+    def _of_owners(self, split: Shares, owner: str) -> Sequence[RandomError]:
+        """Errors of sensors, clocks and the air that count against the share of an owner."""
+        return [error for error in self.together("full").random if split.includes(error.owner, owner)]
 
     def _is_declared(self, members: Iterable[DeclaredPhase]) -> Truths:
         """Cases in which any of these is declared."""
@@ -150,12 +160,15 @@ class Aggregates:
         without_value: str = "",
         without_autofocus: Any = 0.0,
         never_fails: bool = False,
+        continued: tuple[str, Sequence[RandomError]] = ("quadratic", ()),
         **fields: Any,
     ) -> "Aggregate":
         """Judge what errors add up to; a sum without a finite value fails: one of them has no image at all.
 
-        `without_value` is its status there, where it is another one.
+        `without_value` is its status there, where it is another one. `continued` names the part of random errors that
+        the row adds up, and those errors: a pass that rests on noise below the first points of masks is a warning.
         """
+        rests_on: Any = False
         is_over_by_other: Any = False
         is_over_of_all: Any = False
         by_model: dict[str, Any] = {}
@@ -165,11 +178,12 @@ class Aggregates:
             by_model = {f"allowable_{model}": limit for model in models}
             is_over_by_other = self.errors.doubts(theirs.model, by_other > limit * BOUND)
             is_over_of_all = of_all > limit * BOUND
+            rests_on = rests_on_masks(continued[1], continued[0], size, limit)
         judged = self.judging.row(
             what,
             size,
             limit,
-            doubt=is_over_by_other | is_over_of_all,
+            doubt=is_over_by_other | is_over_of_all | rests_on,
             without_autofocus=without_autofocus,
             is_info=limit is None,
             never_fails=never_fails,
@@ -181,7 +195,8 @@ class Aggregates:
             nothing = nothing._replace(status=np.where(is_declared, status, nothing.status))
             judged = judged.where(~has_value, nothing)
         rule = "sum" if never_fails else self.combine
-        return Aggregate(judged, rule, phases, by_other, of_all, is_over_by_other, is_over_of_all, without_autofocus)
+        by_others = (by_other, of_all, is_over_by_other, is_over_of_all)
+        return Aggregate(judged, rule, phases, *by_others, without_autofocus, rests_on, continued)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -200,6 +215,8 @@ class Aggregate(FamilyRow):
     is_over_by_other: Any = False
     is_over_of_all: Any = False
     without_autofocus: Any = 0.0
+    rests_on: Any = False  # noise below the first points of masks, which `continued` names as `Aggregates._row`
+    continued: tuple[str, Sequence[RandomError]] = ("quadratic", ())
 
     def in_words(self, case: Case, model: str) -> Row:
         """The row of one case, by the model that judges it."""
@@ -343,7 +360,11 @@ def _doubt(case: Case, other: str, one: Aggregate, said: _Words, limit: float | 
         what = "displacement" if one.judged.subject.kind == LOCATION else said.what
         return phrases.all_together_over(what, case.number(one.of_all), limit, said.unit)
     if not case.number(one.is_over_by_other):
-        return NOTHING
+        if not case.number(one.rests_on):
+            return NOTHING
+        part, errors = one.continued
+        of_case = [error for error in case.random if error.id in {each.id for each in errors}]
+        return continuation_note(case, of_case, part, case.number(one.judged.declared))
     phrase = phrases.other_model_is_beyond if one.judged.subject.kind == PULL_IN else phrases.other_model_fails
     return phrase(other, case.number(one.by_other), limit, said.unit)
 

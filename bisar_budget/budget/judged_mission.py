@@ -18,6 +18,7 @@ from bisar_budget.analysis.scene import SceneEdges, scene_edges
 from bisar_budget.analysis.spread import noise
 from bisar_budget.budget.aggregates import Aggregates, JudgedScene, unplaced, untaken_effects
 from bisar_budget.budget.declarations import DECLARATIONS, is_asked_for, missing_declarations
+from bisar_budget.budget.dispersion_row import dispersion_rows
 from bisar_budget.budget.doubts import doubted_platforms, is_in_doubt, strays
 from bisar_budget.budget.error_rows import ErrorRows, specification_rows
 from bisar_budget.budget.file_warnings import FASTEST_FLIGHT, calm_oscillators
@@ -64,7 +65,8 @@ class JudgedMission:
     unplaced: Mapping[str, Truths]
     scene: JudgedScene | None
     floor: Codes  # the best status that each case can have
-    waived_by: Sequence[tuple[str, Truths]] = ()  # ids of waivers in the file's order, and the cases that each covers
+    waivers: NDArray[np.intp]  # of each row, by its place in the file, (rows, n); -1: none
+    waived_requirements: Sequence[tuple[Truths, int]]  # where each is waived, and its own waiver by place; -1: none
 
     @property
     def is_empty(self) -> bool:
@@ -75,6 +77,14 @@ class JudgedMission:
             for row in self.rows
         )
         return all(nothing)
+
+    def covering(self, row_id: str | None = None) -> Iterator[tuple[str, Truths]]:
+        """Waivers by their ids, in the order of the file, and the cases in which each covers anything, or a row."""
+        rows = [row_id is None or row.subject.id == row_id for row in self.rows]
+        requirements = self.waived_requirements if row_id is None else ()
+        for place, waiver in enumerate(self.analysis.mission.waivers):
+            own = (is_waived for is_waived, own in requirements if own == place)
+            yield waiver.id, np.any([(self.waivers[rows] == place).any(axis=0), *own], axis=0)
 
     @cached_property
     def status(self) -> Codes:
@@ -137,6 +147,7 @@ class _Judgement:
             of_all.judges(),
             np.array([row.quadratic_use for row in rows]),
             {key: place >= 0 for key, place in of_requirements.items()},
+            before=own,
             has_noise=has_noise,
             is_misplaced=is_misplaced,
         )
@@ -150,13 +161,8 @@ class _Judgement:
             unplaced=drifting,
             scene=self._scene,
             floor=np.min([self._floor(), *(one.status for one in states)], axis=0),
-            waived_by=[
-                (
-                    waiver.id,
-                    np.any([(waivers == place).any(axis=0), *_waived(states, of_requirements, place)], axis=0),
-                )
-                for place, waiver in enumerate(mission.waivers)
-            ],
+            waivers=waivers,
+            waived_requirements=[(one.status == CODE["waived"], of_requirements[one.key]) for one in states],
         )
 
     # ---------------------------------------------------------------- rows of the families
@@ -170,6 +176,7 @@ class _Judgement:
         yield from self._random.stated_rows(model)
         yield from spur_rows(self.judging, self.analysis, model)
         yield from accelerated_rows(self.judging, self.analysis, model)
+        yield from dispersion_rows(self.judging, self.analysis)
         if needs.pslr is not None:
             yield pslr_row(self.judging, self.analysis.tones, needs.pslr)
         if needs.islr is not None:
@@ -375,13 +382,6 @@ class RowStatuses:
             use = np.where(is_info, np.nan, row.utilization) if is_info.any() else row.utilization
             found.append(row._replace(status=code, why=why, utilization=use))
         return tuple(found)
-
-
-def _waived(states: Sequence[RequirementState], of_requirements: Mapping[str, int], waiver: int) -> Iterator[Truths]:
-    """Cases in which a waiver, by its place in the file, covers each of the requirements that it names."""
-    for one in states:
-        if of_requirements[one.key] == waiver:
-            yield np.asarray(one.status == CODE["waived"])
 
 
 def _stricter(full: Mapping[str, Judged], published: Mapping[str, Judged] | None = None) -> list[Judged]:

@@ -33,7 +33,7 @@ TAKEN_BY = {"cubic": (CUBIC, "islr"), "spread": ("islr",), "tone": ("pslr", "isl
 _NONE = np.int8(len(STATUS))  # of a row that judges nothing
 IS_JUDGED = np.array([one.is_judged for one in STATUS.values()])
 # Whether a status leaves a requirement met, with or without a warning; the last is that of `_NONE`.
-IS_MET = np.array([*(one.is_held and not one.fails for one in STATUS.values()), False])
+IS_MET = np.array([*(one.complies for one in STATUS.values()), False])
 
 
 class UntakenEffect(NamedTuple):
@@ -55,6 +55,7 @@ class RequirementState(NamedTuple):
 
     `utilization` is that of the requirement by the row at `user`. Where the requirement is met, with or without a
     warning, that is the row with the largest utilization: a warning of the other model alone may use less.
+    `is_unjudged` is where it cannot be judged, be that waived or not.
     """
 
     key: str
@@ -63,6 +64,7 @@ class RequirementState(NamedTuple):
     user: NDArray[np.intp]
     utilization: Floats
     judges: Truths  # (rows, n)
+    is_unjudged: Truths
 
 
 def first_highest(uses: Floats) -> NDArray[np.intp]:
@@ -90,6 +92,7 @@ def requirement_states(
     quadratic_use: Floats,
     waived: Mapping[str, Any],
     *,
+    before: Codes,
     has_noise: Any,
     is_misplaced: Any,
 ) -> list[RequirementState]:
@@ -109,12 +112,15 @@ def requirement_states(
         Quadratic phase of each over what that may be, whatever sets its allowable; not a number where it has none.
     waived : mapping of str to bool
         Keys of the requirements that a valid waiver names.
+    before : (rows, n)
+        Statuses of the rows before waivers.
     has_noise : (n,) bool
         Whether something that spreads, or a tone that ISLR holds, is declared: without it ISLR is not judged.
     is_misplaced : (n,) bool
         Whether a declared error displaces the image by an amount that no row holds.
     """
     uses, found = np.nan_to_num(utilization, nan=0.0, posinf=np.inf), []
+    is_open = before == RANK["not_evaluated"]
     for key in required_keys(mission):
         mine = IS_JUDGED[codes] & (judges == KEYS.index(key))
         levels, used = np.where(mine, codes, _NONE), uses
@@ -133,10 +139,13 @@ def requirement_states(
         worst = levels.min(axis=0)
         # What passes by itself may come nearer to breaking the requirement than what autofocus brings to pass.
         is_met = (worst == RANK["pass_with_autofocus"]) & (levels == RANK["pass"])
-        decider = first_highest(np.where((levels == worst) | is_met, used, -1.0))
+        # Of what is waived the first is what has a number that breaks the requirement.
+        shown = np.where((codes == RANK["waived"]) & is_open, -0.5, used)
+        decider = first_highest(np.where((levels == worst) | is_met, shown, -1.0))
         largest = first_highest(np.where(mine & IS_MET[levels], used, -1.0))
         user = np.where(IS_MET[worst], largest, decider)
         utilization = np.take_along_axis(used, user[None], axis=0)[0]
+        is_unknown = np.take_along_axis(is_open, decider[None], axis=0)[0]
         is_unjudged = ~mine.any(axis=0)
         decider, user = np.where(is_unjudged, -1, decider), np.where(is_unjudged, -1, user)
         if key == "islr":
@@ -144,7 +153,8 @@ def requirement_states(
         if key == LOCATION:
             is_unjudged = is_unjudged | np.asarray(is_misplaced)
         status = np.where(is_unjudged & (worst != RANK["fail"]), RANK["not_evaluated"], worst)
+        is_unknown = (is_unknown & (worst == RANK["waived"])) | (status == RANK["not_evaluated"])
         if waived.get(key):
             status = np.where(np.isin(status, [RANK[name] for name in BROKEN]), RANK["waived"], status)
-        found.append(RequirementState(key, status.astype(np.int8), decider, user, utilization, mine))
+        found.append(RequirementState(key, status.astype(np.int8), decider, user, utilization, mine, is_unknown))
     return found

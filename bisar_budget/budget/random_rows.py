@@ -25,10 +25,10 @@ from bisar_budget.analysis.spread import (
     spread_limit,
     stated_powers,
 )
-from bisar_budget.budget.judged_requirements import SMALL_RAD
+from bisar_budget.budget.continued_masks import continuation_note, continued_power, part_of, rests_on_masks
 from bisar_budget.budget.judged_rows import BOUND, CODE, EFFECTS, REQUIREMENTS, FamilyRow, Judging, worded
 from bisar_budget.budget.tone_rows import evidence, notes_of_acceleration
-from bisar_budget.effects.air_delays import CONTENT, dispersion
+from bisar_budget.effects.air_delays import CONTENT, legs_of
 from bisar_budget.effects.declared import CUBIC, LOCATION, OTHER_MODEL, QUADRATIC
 from bisar_budget.effects.effect import PLATFORMS, override_notes, subject
 from bisar_budget.effects.navigation_errors import process_of
@@ -139,11 +139,12 @@ class RandomRows:
         without_autofocus = np.where((gain > 1) & (qpe > 0) & is_limited, within, 0.0)
         is_over_other = declared > sizes_of_other.min(axis=0) * BOUND
         published, full = (mine, theirs) if model == "published" else (theirs, mine)
+        is_continued = self._rests_on_masks(mine, sizes)
         judged = self.judging.row(
             self.errors[0].subject,
             declared,
             allowable,
-            doubt=is_over_other,
+            doubt=is_over_other | is_continued,
             without_autofocus=without_autofocus,
             is_info=(self._table([combine != "each" or bool(one.counted_in) for one in self.errors]) > 0) & ~is_open,
             is_unknown=is_open,
@@ -170,6 +171,17 @@ class RandomRows:
             row = judged.at(place, error.subject)
             yield RandomRow(row.in_decibel() if error.unit == "dB" else row, place, *others)
 
+    def _rests_on_masks(self, effects: RandomEffect, sizes: Floats) -> Truths:
+        """Whether what an error uses of a requirement rests on noise below the first point of its mask."""
+        found = np.zeros(sizes.shape[1:], dtype=bool)
+        for row, error in enumerate(self.errors):
+            for part, limit in zip(("quadratic", "cubic", "spread", "displacement"), sizes, strict=True):
+                if error.continued is not None and error.declared is not None:
+                    size = part_of(effects, part)[row] * error.declared
+                    reached = limit[row] * part_of(effects, part)[row]  # of the requirement, by the size that has it
+                    found[row] |= np.isfinite(limit[row]) & rests_on_masks([error], part, size, reached)
+        return found
+
     # ---------------------------------------------------------------- powers together
     def islr_rows(self, model: str) -> Iterator["IslrRow"]:
         """Rows of what spreads in sum: for the mission, and for each owner unless only wideband vibration spreads."""
@@ -190,11 +202,16 @@ class RandomRows:
             shares * spread_limit(mission, self.allocation, "mission", one) for one in (model, OTHER_MODEL[model])
         )
         rms = np.sqrt(variance)
+        masked = [[one for one in self.errors if split.includes(one.owner, owner)] for owner in owners]
+        rests_on = np.array([
+            np.broadcast_to(rests_on_masks(some, "spread", size, most), size.shape)
+            for some, size, most in zip(masked, rms, limit, strict=True)
+        ])  # fmt: skip
         judged = self.judging.row(
             subject("mission", ISLR),
             np.where(is_declared, rms, math.nan),
             np.where(is_there, limit, math.nan),
-            doubt=rms > limit_of_other * BOUND,
+            doubt=(rms > limit_of_other * BOUND) | rests_on,
         )
         published, full = (limit, limit_of_other) if model == "published" else (limit_of_other, limit)
         columns = (judged.declared, judged.allowable, published, full)  # by one rule: the whole reads as required
@@ -259,6 +276,8 @@ class RandomRow(FamilyRow):
         if self.is_over_other[case.place]:
             limit = allocation.qpe_allowed(error.owner)
             doubt = _doubt(mission, error, gating, HELD[self.bound_by_other[case.place]], limit)
+        elif error.continued is not None:
+            doubt = _continuation(case, error, gating)
         equation, evidence, notes = _said(mission, error)
         return worded(
             case,
@@ -304,6 +323,10 @@ class IslrRow(FamilyRow):
         variance, limit, by_other = map(case.number, (self.variance, self.limit, self.limit_of_other))
         if math.sqrt(variance) > by_other * BOUND:
             doubt = phrases.other_model_allows(other, level(by_other), "dB")
+        elif self.judged.status[case.place] == CODE["warn"]:
+            makers = [one for one in case.random if one.id in {each.row_id for each in self.members}]
+            if case.number(rests_on_masks(makers, "spread", math.sqrt(variance), limit)):
+                doubt = continuation_note(case, makers, "spread", math.sqrt(variance))
         if self.judged.status[case.place] == CODE["fail"]:
             known = [one for one in self.members if not math.isnan(case.number(one.variance))]
             largest = max(known, key=lambda one: case.number(one.variance))
@@ -446,13 +469,11 @@ def _kept_by(mission: Mission, sync: Synchronization | None) -> Iterator[Note]:
 
 
 def _said_of_air(mission: Mission, error: RandomError) -> tuple[str, str | None, tuple[Note, ...]]:
-    """The same of a delay on a leg. Free electrons bend the phase over the band, which no requirement takes."""
-    leg = None if mission.propagation is None else mission.propagation.leg(error.owner)
-    source, notes = None if leg is None else leg.source, tuple[Note, ...]()
-    if error.subject.axis == CONTENT and error.declared is not None:
-        phase = error.declared * dispersion(mission, getattr(mission.geometry, error.owner))
-        if phase >= SMALL_RAD:
-            notes = (phrases.disperses_over_the_band(phase),)
+    """The same of a delay on a leg."""
+    source = None if mission.propagation is None else mission.propagation.source_of(legs_of(error.owner)[0])
+    if error.counted_in and error.declared is None:  # else it is the reason of the row
+        return "delay of the air", source, (phrases.counted_in_another_row(error.counted_in),)
+    notes = () if error.owner in PLATFORMS else (phrases.held_to_the_total("both legs, by one air"),)
     return "delay of the air", source, notes
 
 
@@ -491,6 +512,21 @@ def _over(mission: Mission, error: RandomError, model: str, binding: str | None,
     qpe = effect.quadratic * size
     over = phrases.quadratic_phase_over(qpe, limits.quadratic)
     return over.then(allocation.passes_with(qpe, error.owner, mission))
+
+
+def _continuation(case: Case, error: RandomError, model: str) -> Note:
+    """Say by how much a declared oscillator rests on noise below its mask, of the part of which it is most."""
+    effect, size, worst = error.effect(model), error.declared, NOTHING
+    limits = limits_for(case.mission, case.allocation, error.owner, model, case.allocation.autofocus_gain)
+    most = 0.0
+    for part, limit in zip(("quadratic", "cubic", "spread", "displacement"), limits, strict=True):
+        does = float(part_of(effect, part)) * size
+        if limit is None or not rests_on_masks([error], part, does, limit):
+            continue
+        share = float(continued_power([error], part)) / does**2
+        if share > most:
+            most, worst = share, continuation_note(case, [error], part, does)
+    return worst
 
 
 def _doubt(mission: Mission, error: RandomError, gating: str, binding: str, limit: float) -> Note:

@@ -49,7 +49,7 @@ def rows_in_words(judged: JudgedMission, case: Case) -> Iterator[Row]:
         if found is None:  # only other cases have it
             continue
         row, status = found.in_words(case, model), statuses(one.status[case.place])
-        changes: dict[str, Any] = {"model": model, "status": status}
+        changes: dict[str, Any] = {"model": model, "status": status, "is_unjudged": status == "not_evaluated"}
         if status != row.status and status == "info":
             changes |= {"utilization": None, "margin": None}
         row = row._replace(**changes)
@@ -70,6 +70,7 @@ def _declarations(case: Case, one: Judged) -> Row:
         equation="requirements.declare",
         requirement_id=mission.requirement_ids.get(DECLARATIONS.id),
         model=mission.gating_model,
+        is_unjudged=bool(missing),
     )
 
 
@@ -140,14 +141,12 @@ def _entry(
     value = None if key == DECLARE else getattr(mission.requirements, key)
     status, place = statuses(state.status[case.place]), state.decider[case.place]
     decider, user = (rows[one] if one >= 0 else None for one in (place, state.user[case.place]))
-    is_open = status == "not_evaluated" or (
-        status == "waived" and (place < 0 or statuses(judged.before[place].status[case.place]) == "not_evaluated")
-    )
+    is_open = bool(state.is_unjudged[case.place])
     utilization = case.number(state.utilization)  # an error without an image has no phase to compare
     has_use = user is not None and user.utilization is not None and math.isfinite(utilization)
     use = utilization if has_use and not is_open else None
     reason: Note | None = None
-    if status == "not_evaluated" and (decider is None or decider.status != status):
+    if is_open and (decider is None or not decider.is_unjudged):
         reason = (unknown_place(judged, case) if key == LOCATION else NOTHING) or phrases.nothing_judges(key)
     elif decider is not None and status not in ("pass", "info"):
         reason = decider.reason
@@ -167,6 +166,7 @@ def _entry(
         reason=reason,
         line=mission.line(path),
         waivers=_waivers(status, waived.requirements.get(f"mission.{key}", ()), judges),
+        is_unjudged=is_open,
         share=None if user is None or is_open else _share(user, key, case, use),
         autofocus_gain=case.allocation.autofocus_gain if key == QUADRATIC else None,
         use_row=None if user is None or use is None else user.id,
@@ -196,10 +196,10 @@ def _total(key: str, judged: JudgedMission, case: Case, rows: Sequence[Row | Non
 
 def _share(row: Row, key: str, case: Case, utilization: float | None) -> DecidingShare | None:
     """The share of a requirement that a row is held to; None where it is held to the whole."""
-    kind = row.subject.kind
-    if key == QUADRATIC and kind in (PULL_IN, "spatial_variance"):
+    of_kinds = {PULL_IN: "autofocus", "spatial_variance": "scene", "dispersion": "band"}
+    if key == QUADRATIC and row.subject.kind in of_kinds:
         return DecidingShare(
-            owner="autofocus" if kind == PULL_IN else "scene",
+            owner=of_kinds[row.subject.kind],
             allowed=row.allowable,
             reached=row.declared,
             utilization=utilization,

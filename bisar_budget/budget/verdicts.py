@@ -93,7 +93,9 @@ def _with_verdict(row: Row, verdict: Verdict) -> Row:
         else:
             said.insert(0, phrases.optimistic_limit(_shown(verdict)))
     refuted = (*row.refuted, *said)
-    return row._replace(status="fail", reason=reason, refuted=refuted) if reason else row._replace(refuted=refuted)
+    if not reason:
+        return row._replace(refuted=refuted)
+    return row._replace(status="fail", reason=reason, refuted=refuted)._replace(is_unjudged=False)
 
 
 def _is_gate(row: Row) -> bool:
@@ -126,7 +128,9 @@ def _with_refuted(
     if RANK[status] > RANK[requirement.status]:
         return requirement
     covering = in_order([*requirement.waivers, *waivers, *row.waived_by])
-    found = requirement._replace(status=status, row=row.id, reason=row.reason, waivers=holding(status, covering))
+    found = requirement._replace(
+        status=status, row=row.id, reason=row.reason, waivers=holding(status, covering), is_unjudged=False
+    )
     if row.id == requirement.row:
         return found
     # The row's own numbers are in its unit, and no part of the requirement: an image says that its limit is wrong.

@@ -93,6 +93,17 @@ class _Gate(click.Command):
         return defaults
 
 
+def _touched(changed: Sequence[str]) -> list[str]:
+    """List the missions that a change touches; without any the command ends well, and says so."""
+    from bisar_budget.cli.touched import touched_missions
+
+    files = touched_missions(changed)
+    if not files:
+        complain(f"No mission is among the changed files, and none reads one of them ({len(changed)} given).")
+        sys.exit(0)
+    return files
+
+
 def _hold_below(folder: str, report: str) -> None:
     """Hold a report that settings ask for to their folder: a check of somebody's missions writes nowhere else."""
     inside = os.path.join(os.path.realpath(folder), "")
@@ -184,6 +195,13 @@ class _Draws(ParamType[int]):
     help="For html and markdown: also check other values, written as for sweep --vary, and draw what complies: one "
     "key as curves, two as a map.",
 )
+@click.option(
+    "--changed",
+    "is_of_change",
+    is_flag=True,
+    help="MISSION... are the files of a change, of any kind: check the missions among them, and those below the "
+    "current folder that read one of them (a part, an orbit, a log, a table, settings).",
+)
 @click.option("-q", "--quiet", is_flag=True, help="One line per mission.")
 @click.option("--all", "all_rows", is_flag=True, help="Show every row, also those that are not declared.")
 @click.option(
@@ -223,6 +241,7 @@ def check(
     scheduler: str | None,
     patience: int,
     swept: Sequence[str],
+    is_of_change: bool,
     quiet: bool,
     all_rows: bool,
     verbose: bool,
@@ -243,7 +262,7 @@ def check(
 
     written = [(name, _format_of(name)) for name in reports]
     formats = [format_name, *(its_format for _, its_format in written)]
-    files = expand(missions)
+    files = _touched(missions) if is_of_change else expand(missions)
     folders = [_folder_of_pictures(name, its_format) for name, its_format in [*written, (output or "-", format_name)]]
     spare(files, [output, *reports, _step_summary(format_name)], [*filter(None, folders)])
     given = click.get_current_context().get_parameter_source

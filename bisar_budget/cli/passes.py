@@ -38,6 +38,7 @@ from bisar_budget.cli.streams import (
     write_file,
 )
 from bisar_budget.constants import MAX_DAYS
+from bisar_budget.report.words.sentences import waived_count
 
 if TYPE_CHECKING:
     from bisar_budget.design.passes import SatellitePass
@@ -94,7 +95,7 @@ _FORMATS = {".txt": "text", ".json": "json", ".csv": "csv", ".ics": "ics"}  # by
 )
 @output_option(
     "Write to FILE: .txt, .json, .csv or .ics. Into a folder DIR, or a name that ends in /, go mission files, "
-    "one for each pass that complies.",
+    "one for each pass that complies or is waived.",
     metavar="FILE|DIR",
 )
 @plot_option("Draw tracks in the sky and resolutions: .svg, .png or .pdf.")
@@ -116,8 +117,8 @@ def passes(
 
     The mission names an orbit of a platform and the scene's place on the Earth; its collection.center_time is
     that of each pass in turn. A pass that cannot be checked is listed with the reason. Exit code: 0 if the mission
-    complies in some pass, 1 if in none, 2 for wrong usage, an unusable mission file or an orbit that is not known at
-    any time that was asked for.
+    complies or is waived in some pass, 1 if in none, 2 for wrong usage, an unusable mission file or an orbit that is
+    not known at any time that was asked for.
     """
     if math.isnan(days):
         raise click.UsageError(f"--days: nan is no number of days; accepted: more than 0, up to {MAX_DAYS:g}.")
@@ -164,24 +165,24 @@ def passes(
         deliver(pass_list.as_ics(found.found, judged_on), output, format_name)
     else:
         deliver_found(pass_list, found.found, format_name, output)
-    sys.exit(0 if found.complying else EXIT_BROKEN)
+    sys.exit(0 if found.accepted else EXIT_BROKEN)
 
 
 # ---------------------------------------------------------------- a mission file for each pass
 def _write_missions(found: "PassesResult", folder: str, today: date) -> None:
-    """Write the mission of each pass that complies, none of them where one would not be checked to the same status.
+    """Write the mission of each pass that complies or is waived, none where one would get another status.
 
     They are read first as they will lie there: files that they name are looked for from the folder.
     """
-    texts = {os.path.join(folder, _name(one, found.file)): found.mission_text(one, folder) for one in found.complying}
+    texts = {os.path.join(folder, _name(one, found.file)): found.mission_text(one, folder) for one in found.accepted}
     spare([found.file], texts)
     if not texts:
-        complain(f"no mission file is written to {folder}: no pass complies")
+        complain(f"no mission file is written to {folder}: no pass complies or is waived")
         return
     is_new = not os.path.isdir(folder)
     try:
         os.makedirs(folder, exist_ok=True)
-        _hold_to_statuses(found.complying, texts, today)
+        _hold_to_statuses(found.accepted, texts, today)
     except OSError as error:
         fail(f"cannot write {folder}: {error.strerror}")
     except SystemExit:
@@ -191,7 +192,9 @@ def _write_missions(found: "PassesResult", folder: str, today: date) -> None:
         raise
     for path, text in texts.items():
         write_file(path, text)
-    complain(f"{len(texts)} mission file{'s' if len(texts) != 1 else ''} in {folder}")
+    waived = len(texts) - len(found.complying)
+    apart = f": {len(found.complying)} comply, {waived_count(waived, found.waived_by)}" if waived else ""
+    complain(f"{len(texts)} mission file{'s' if len(texts) != 1 else ''} in {folder}{apart}")
 
 
 def _name(one: "SatellitePass", file: str) -> str:

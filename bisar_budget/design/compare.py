@@ -83,9 +83,11 @@ class Comparison(NamedTuple):
 
     @property
     def status(self) -> str:
-        """Whether `all`, `some` or `none` of the parts comply."""
+        """Whether `all`, `some` or `none` of the parts comply; `waived` where none does and some are waived."""
         count = len(self.complying)
-        return "none" if count == 0 else "all" if count == len(self.parts) else "some"
+        if count:
+            return "all" if count == len(self.parts) else "some"
+        return "waived" if any(part.standing.status == "waived" for part in self.parts) else "none"
 
 
 def is_of_parts(key: str) -> bool:
@@ -173,12 +175,13 @@ def _with_silence(states: Sequence[PartState]) -> Iterator[PartState]:
         yield state._replace(silent_on=tuple(figure for figure in known if figure not in state.figures))
 
 
-def _order(state: PartState) -> tuple[bool, float, float, str]:
-    """Sort key: what complies first, the smallest margin first; then the nearest miss, at last what is no mission."""
+def _order(state: PartState) -> tuple[int, float, float, str]:
+    """Sort key: what complies first, the smallest margin first; what is waived; the nearest miss; no mission last."""
     sign = -1 if state.complies else 1
     uses = (state.standing.utilization, state.own_utilization)
     worst, own = (math.inf if use is None else sign * use for use in uses)
-    return not state.complies, worst, own, state.id
+    rank = 0 if state.complies else 1 if state.standing.status == "waived" else 2
+    return rank, worst, own, state.id
 
 
 class _Candidate(NamedTuple):

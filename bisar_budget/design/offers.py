@@ -51,12 +51,12 @@ def offer(sheet: SpecificationSheet, mission: Mission, today: date) -> Offer:
     """Hold the mission of an offer to a sheet.
 
     A figure is inside where it is no larger than what is ordered, of three axes the largest one, those of parts that
-    the offer names too. A level shifts a spectrum: of another spectrum it says nothing. Specifications in the offer's
-    own file do not count.
+    the offer names too. A level shifts a spectrum: of another spectrum it says nothing. Specifications and
+    waivers in the offer's own file do not count.
     """
     asked = None if sheet.findings is None else sheet.findings.mission
     figures = tuple(_figure(one, sheet, mission, asked) for one in sheet.specifications)
-    found = check_mission(mission._replace(specifications={}), today)
+    found = check_mission(mission._replace(specifications={}, waivers=()), today)
     notes = () if asked is None else tuple(_differences(asked, mission))
     return Offer(mission.file, found.status, figures, found.requirements, notes)
 

@@ -6,6 +6,7 @@ and the mission is checked as a file with that `collection.center_time` is.
 """
 
 import math
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from datetime import date
 from typing import NamedTuple
@@ -47,7 +48,8 @@ class SatellitePass(NamedTuple):
     never has the squint. `state` is the path at the mid-time in the axes of the scene, `side` that of the track on
     which the scene lies. `status` is that of `check`; `error` where there is no mission then, `not_evaluated` where
     there is no mid-time; `reason` says why. `row`, `requirement` and `utilization` are of the requirement that
-    decides. `doubt` is how far the satellite may be from its path [m].
+    decides. `waived_by` are the ids of waivers, where it is waived. `doubt` is how far the satellite may be from its
+    path [m].
     """
 
     number: int
@@ -72,11 +74,17 @@ class SatellitePass(NamedTuple):
     row: str | None = None
     requirement: str | None = None
     utilization: float | None = None
+    waived_by: tuple[str, ...] = ()
 
     @property
     def complies(self) -> bool:
-        """Whether the mission breaks nothing at the mid-time."""
-        return self.status != "error" and not STATUS[self.status].fails
+        """Whether the mission meets everything at the mid-time; what is waived does not."""
+        return STATUS[self.status].complies
+
+    @property
+    def is_accepted(self) -> bool:
+        """Whether the mission complies, or is waived: `check` exits with 0 then."""
+        return self.complies or self.status == "waived"
 
     @property
     def bearing(self) -> float | None:
@@ -116,8 +124,23 @@ class Passes(NamedTuple):
 
     @property
     def complying(self) -> list[SatellitePass]:
-        """Passes in which the mission breaks nothing."""
+        """Passes in which the mission complies."""
         return [one for one in self.found if one.complies]
+
+    @property
+    def accepted(self) -> list[SatellitePass]:
+        """Passes in which the mission complies or is waived."""
+        return [one for one in self.found if one.is_accepted]
+
+    @property
+    def counts(self) -> Counter[str]:
+        """Number of passes of each status."""
+        return Counter(one.status for one in self.found)
+
+    @property
+    def waived_by(self) -> tuple[str, ...]:
+        """Ids of the waivers of all passes."""
+        return tuple(dict.fromkeys(waiver for one in self.found for waiver in one.waived_by))
 
 
 def start_of(text: str) -> Instant:
@@ -325,6 +348,7 @@ def _judged(one: SatellitePass, findings: MissionFindings, mission: Mission, pla
         row=row,
         requirement=requirement,
         utilization=utilization,
+        waived_by=tuple(waiver.id for waiver in findings.waived_by) if findings.status == "waived" else (),
     )
 
 
@@ -332,14 +356,16 @@ def _deciding(found: MissionFindings) -> tuple[str | None, str | None, float | N
     """Row, requirement and utilization of the requirement that decides, and why the status is what it is.
 
     Of requirements of one status the one decides that is used most. Where none has the status of the mission, a row
-    has it, or a warning that doubts the whole.
+    has it, or a warning that doubts the whole. What cannot be judged has no utilization.
     """
     worst = min(found.requirements, key=lambda one: (RANK[one.status], -(one.utilization or 0.0)))
     if worst.status == found.status:
         return worst.row, worst.key, worst.utilization, str(worst.reason or "")
     for row in worst_first(found.rows):
         if row.status == found.status:
-            return row.id, row.binding_requirement or row.metric, row.utilization, str(row.reason or "")
+            use = None if row.is_unjudged else row.utilization
+            return row.id, row.binding_requirement or row.metric, use, str(row.reason or "")
     doubts = [str(warning.message) for warning in found.warnings if warning.is_doubt]
     reason = doubts[0] if doubts else "nothing is declared" if found.is_empty else ""
-    return worst.row, worst.key, worst.utilization, printable(reason)
+    use = None if found.status == "not_evaluated" else worst.utilization
+    return worst.row, worst.key, use, printable(reason)

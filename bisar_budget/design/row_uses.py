@@ -35,7 +35,13 @@ _NOTHING = 1e-13  # of a row: what rounding leaves of it
 # What the ids of rows begin with that have no requirement: effects that none takes, and what a file may state.
 NEGLIGIBLE, ACCEPTED = "negligible", "accepted"
 _WARN_ONLY = ("autofocus_pull_in",)  # kinds of rows that warn and never fail
-_AS_COMBINED = (QUADRATIC, CUBIC, LOCATION, "spatial_variance")  # kinds of rows that combine errors by the rule
+_AS_COMBINED = (
+    QUADRATIC,
+    CUBIC,
+    LOCATION,
+    "spatial_variance",
+    "dispersion",
+)  # kinds of rows that combine errors by the rule
 
 
 class RowUses(NamedTuple):

@@ -22,11 +22,13 @@ from bisar_budget.design.table import (
     GEOMETRY,
     REASON,
     VERDICT,
+    WAIVED_BY,
     Question,
     Table,
     Variation,
     breaking,
     hold_to_decisions,
+    listed,
 )
 from bisar_budget.design.varied import scaled
 from bisar_budget.faults import MissionError, SetValue
@@ -53,8 +55,8 @@ class State(NamedTuple):
     """How the mission stands at one value.
 
     `row` has the highest utilization of the rows that decide, `requirement` is what sets its allowable; None where
-    nothing is judged. `reason` says why there is no mission at this value; empty where there is one. Resolutions are
-    peak to first null on the ground. [m]
+    nothing is judged. `reason` says why there is no mission at this value; empty where there is one. `waived_by` are
+    ids of waivers where it is waived, which does not comply. Resolutions are peak to first null on the ground. [m]
     """
 
     value: float
@@ -66,6 +68,7 @@ class State(NamedTuple):
     range_resolution_m: float | None = None
     cross_range_resolution_m: float | None = None
     reason: str = ""
+    waived_by: tuple[str, ...] = ()
 
 
 class Crossing(NamedTuple):
@@ -106,7 +109,8 @@ class Solution(NamedTuple):
     below the key. `low` and `high` are the ends of the range, `is_circle` whether they are one direction. `nearest`
     is the nearest miss where nothing complies, or where everything does the value with the least left. `given` is
     the value of the file. `texts` has every value as the file would have it. `is_constant` is whether the number
-    changes no utilization that decides. `skipped` counts the places of the range at which there is no mission.
+    changes no utilization that decides. `skipped` counts the places of the range at which there is no mission,
+    `waived` those that are waived, by the waivers `waived_by`.
     `imaged` is what images say at the best crossing, if any were formed. `overrides` is what from outside the file
     bears on it.
     """
@@ -131,6 +135,8 @@ class Solution(NamedTuple):
     changes: tuple[SetValue, ...] = ()
     imaged: Imaged | None = None
     overrides: tuple[Override, ...] = ()
+    waived: int = 0
+    waived_by: tuple[str, ...] = ()
 
     @property
     def value(self) -> float | None:
@@ -149,10 +155,10 @@ class Solution(NamedTuple):
 
     @property
     def status(self) -> str:
-        """`crossing`, or `all` or `none` of the range complies."""
+        """`crossing`, or `all` or `none` of the range complies; `waived` where none does and some of it is waived."""
         if self.crossings:
             return "crossing"
-        return "all" if self.nearest.complies else "none"
+        return "all" if self.nearest.complies else "waived" if self.waived else "none"
 
 
 def solve(
@@ -201,10 +207,13 @@ def solve(
         given=given,
         crossings=crossings,
         nearest=nearest,
-        is_constant=all(
+        is_constant=missions[0].status != "not_evaluated"
+        and all(
             one.row == missions[0].row and _is_alike(one.utilization, missions[0].utilization) for one in missions[1:]
         ),
         skipped=sum(bool(state.reason) for state in scanned),
+        waived=sum(state.status == "waived" for state in scanned),
+        waived_by=tuple(dict.fromkeys(waiver for state in scanned for waiver in state.waived_by)),
         changes=mission.changes,
         texts=search.texts(crossings, nearest),
     )
@@ -213,12 +222,14 @@ def solve(
 def _nearest(states: Sequence[State]) -> State:
     """The first place with the least left where all comply, else the first that lacks the least.
 
-    Where something is not evaluated nothing is broken: no limit is nearer.
+    Of places that do not comply those that are waived come first. Where something is not evaluated nothing is broken:
+    no limit is nearer.
     """
     if all(state.complies for state in states):
         uses = [state.utilization or 0.0 for state in states]
         decides = max(uses)
     else:
+        states = [state for state in states if state.status == "waived"] or states
         uses = [
             -1.0 if state.status == "not_evaluated" else math.inf if state.utilization is None else state.utilization
             for state in states
@@ -286,15 +297,27 @@ class _Search:
         """Check the mission with each of many values."""
         (number,) = self.table.numbers
         found = self.table.watched({number.key: np.array(values)}, progress)
-        columns = (*VERDICT, *GEOMETRY[:2], REASON)
+        columns = (*VERDICT, *GEOMETRY[:2], WAIVED_BY, REASON)
         states = []
         for value, *line in zip(values, *(found[column.name].tolist() for column in columns), strict=True):
-            status, row, use, requirement, *resolutions, why = line
+            status, row, use, requirement, range_m, cross_range_m, waived_by, why = line
             if why:
                 states.append(State(value, complies=False, status=status, reason=why))
                 continue
             complies, utilization = status not in self.breaks, None if math.isnan(use) else use
-            states.append(State(value, complies, status, row or None, requirement or None, utilization, *resolutions))
+            states.append(
+                State(
+                    value,
+                    complies,
+                    status,
+                    row or None,
+                    requirement or None,
+                    utilization,
+                    range_m,
+                    cross_range_m,
+                    waived_by=listed(waived_by),
+                )
+            )
         return states
 
     def crossings(self, borders: Sequence[tuple[State, State]]) -> tuple[Crossing, ...]:

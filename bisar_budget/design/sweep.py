@@ -19,6 +19,7 @@ from bisar_budget.design.table import (
     GEOMETRY,
     REASON,
     VERDICT,
+    WAIVED_BY,
     Column,
     Part,
     Question,
@@ -158,7 +159,7 @@ class Asked:
             mission_sha256=sha256(self.mission.data).hexdigest(),
             varied=tuple(column.name for column in varied),
             count=self.cases.count,
-            columns=(*varied, *GEOMETRY, *VERDICT, *self.columns, REASON),
+            columns=(*varied, *GEOMETRY, *VERDICT, *self.columns, WAIVED_BY, REASON),
             parts=parts,
         )
 

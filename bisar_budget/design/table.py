@@ -32,7 +32,7 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.mission.quantities import FACTOR, Number, QuestionError, number_of, tree_of, with_number
 from bisar_budget.mission.stacked import picked, stacked
 from bisar_budget.mission.tree import Tree, read_tree
-from bisar_budget.ranges.exact_ranges import Places
+from bisar_budget.ranges.exact_ranges import Places, Truths
 from bisar_budget.workers import Progress, unseen
 
 _SOON, _SELDOM = (2, 12), 48  # cases after which it is told how far many are
@@ -88,15 +88,18 @@ VERDICT = (
     Column("utilization", "", "Its declared value over its allowable."),
     Column("binding_requirement", "", "The requirement that sets its allowable.", is_text=True),
 )
+WAIVED_BY = Column("waived_by", "", "Waivers that hold, as the file writes them.", is_text=True)
 REASON = Column("reason", "", "Why there is no mission in this case.", is_text=True)
 
-_IS_JUDGED = np.array([one.is_judged and name != "waived" for name, one in STATUS.items()])
+BETWEEN_WAIVERS = "; "
+_IS_JUDGED = np.array([one.is_judged for one in STATUS.values()])
 
 
 # ---------------------------------------------------------------- the worst row
 def breaking(target: str) -> frozenset[str]:
-    """Statuses that do not comply: what `check` breaks on (fail), or what `check --strict` does (warn)."""
-    return frozenset(name for name, one in STATUS.items() if (one.fails if target == "fail" else one.fails_strict))
+    """Statuses that do not comply: what `check` breaks on (fail), or `check --strict` (warn), and what is waived."""
+    fails = (name for name, one in STATUS.items() if (one.fails if target == "fail" else one.fails_strict))
+    return frozenset([*fails, "waived"])
 
 
 def _verdict(
@@ -106,12 +109,13 @@ def _verdict(
 
     Of the rows that are judged the one binds that uses most of its limit; of those that use as much of it, but for
     rounding, the first. One that is not evaluated and has no number binds nothing. Where the whole does not comply,
-    only rows that break are looked at.
+    only rows that break are looked at, and those that are waived where nothing else breaks. Of what is not evaluated
+    no utilization is said: it would not be that of the requirement that decides.
     """
     rows = list(judged.rows) if row_id is None else [by_id[row_id]] if row_id in by_id else []
     if not rows:
-        nothing = ("not_evaluated", "", math.nan, "")
-        return dict(zip((column.name for column in VERDICT), nothing, strict=True))
+        nothing = ("not_evaluated", "", math.nan, "", "")
+        return dict(zip((column.name for column in (*VERDICT, WAIVED_BY)), nothing, strict=True))
     does_break = np.array([name in breaks for name in STATUS])
     codes, uses = np.array([one.status for one in rows]), np.array([one.utilization for one in rows])  # (rows, cases)
     status = judged.status if row_id is None else codes[0]
@@ -119,8 +123,13 @@ def _verdict(
     may_decide = np.array([["warn" in breaks or one.subject.kind != "autofocus_pull_in"] for one in rows])
     may_decide = may_decide & (does_break[codes] | np.array([[one.metric != SPECIFICATION] for one in rows]))
     decides = may_decide & _IS_JUDGED[codes] & (does_break[codes] | ~does_break[status])
+    decides &= (codes != RANK["waived"]) | (status == RANK["waived"])
     decides &= ~np.isnan(uses) | (codes != RANK["not_evaluated"])
-    known = np.where(decides, np.where(np.isnan(uses), -1.0, uses), -2.0)
+    # Of what is waived the first is what has a number that breaks a limit.
+    before = {row.subject.id: row.status for row in judged.before}
+    is_open = np.array([before.get(row.subject.id, row.status) for row in rows]) == RANK["not_evaluated"]
+    is_numbered = ~np.isnan(uses) & ~(is_open & (codes == RANK["waived"]))
+    known = np.where(decides, np.where(is_numbered, uses, -1.0), -2.0)
     has_one = decides.any(axis=0)
     place = (
         np.where(has_one, first_highest(known), -1),
@@ -136,12 +145,24 @@ def _verdict(
     if row_id is None:
         for one in reversed(judged.requirements):
             unmet = np.where((one.status == status) & does_break[status], one.key, unmet)
+    is_unjudged = (status == RANK["not_evaluated"]) & does_break[status]
+    is_known = has_one & ~is_unjudged & is_numbered[place]
     return {
         "status": statuses(status),
         "worst_row": np.where(has_one, ids, ""),
-        "utilization": np.where(has_one, uses[place], math.nan),
+        "utilization": np.where(is_known, uses[place], math.nan),
         "binding_requirement": np.where(has_one, requirement, unmet),
+        "waived_by": _waived_by(judged, row_id, status == RANK["waived"]),
     }
+
+
+def _waived_by(judged: JudgedMission, row_id: str | None, is_waived: Truths) -> Values:
+    """Ids of the waivers of the cases that are waived, (cases,), as the file writes them; empty for others."""
+    found = np.full(is_waived.shape, "", dtype=object)
+    for waiver_id, covers in judged.covering(row_id) if is_waived.any() else ():
+        more = np.where(found == "", "", BETWEEN_WAIVERS).astype(object) + waiver_id
+        found = np.where(is_waived & covers, found + more, found)
+    return found
 
 
 class Standing(NamedTuple):
@@ -152,16 +173,23 @@ class Standing(NamedTuple):
     row: str | None = None
     requirement: str | None = None
     utilization: float | None = None
+    waived_by: tuple[str, ...] = ()
+
+
+def listed(waived_by: str) -> tuple[str, ...]:
+    """Ids of waivers of a cell of the table."""
+    return tuple(filter(None, waived_by.split(BETWEEN_WAIVERS)))
 
 
 def standing(judged: JudgedMission, row_id: str | None, breaks: Container[str]) -> Standing:
     """Say how a mission by itself stands, or the row that was asked for."""
     rows = {row.subject.id: row for row in judged.rows}
-    (status,), (row,), (use,), (requirement,) = (
+    (status,), (row,), (use,), (requirement,), (waived_by,) = (
         np.ravel(column) for column in _verdict(judged, rows, row_id, breaks).values()
     )
     utilization = None if math.isnan(use) else float(use)
-    return Standing(status not in breaks, str(status), row or None, requirement or None, utilization)
+    complies = status not in breaks
+    return Standing(complies, str(status), row or None, requirement or None, utilization, listed(waived_by))
 
 
 def hold_to_decisions(judged: Sequence[JudgedMission], row_id: str | None) -> None:
@@ -310,7 +338,7 @@ class Table:
         """The values of some cases, and room for what is found of them."""
         found: dict[str, Values] = {key: np.asarray(values[key], dtype=object) for key in self.question.choices}
         found |= {number.key: np.asarray(values[number.key], dtype=float) for number in self.numbers}
-        is_text = {column.name: column.is_text for column in (*GEOMETRY, *VERDICT, REASON)}
+        is_text = {column.name: column.is_text for column in (*GEOMETRY, *VERDICT, WAIVED_BY, REASON)}
         for name, is_one in (is_text | {name: is_status(name) for name in self.fields}).items():
             found[name] = np.full(cases, "", dtype=object) if is_one else np.full(cases, math.nan)
         return found

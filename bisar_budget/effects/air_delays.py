@@ -10,15 +10,16 @@ displacement Q⁻¹[ḡ, −g₁] and the phases of −g, with what the displace
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
 from bisar_budget.constants import EARTH_RADIUS
+from bisar_budget.effects.combined import combined
 from bisar_budget.effects.effect import PLATFORMS, subject
 from bisar_budget.effects.random_effect import RandomError, SensorCases
-from bisar_budget.geometry import PlatformState, Vectors, norm
+from bisar_budget.geometry import BistaticGeometry, PlatformState, Vectors, norm
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.propagation import (
     ABOVE_THE_AIR,
@@ -27,6 +28,7 @@ from bisar_budget.mission.propagation import (
     elevation_deg,
     height_of,
 )
+from bisar_budget.ranges.exact_ranges import Floats
 
 ELECTRONS = 40.308  # m³/s²: e²/(8π²ε₀mₑ), the group delay of 1/m² is so much over f² (CODATA 2018)
 TROPOSPHERE = 7e3  # m, height at which a spherical troposphere is crossed as a whole
@@ -100,35 +102,90 @@ def delay_course(delay: str, track: Vectors, middle: Vectors, scale: Any, fit: A
     return seen_course(group, fit[0] @ group, delay)
 
 
-def dispersion(mission: Mission, path: PlatformState) -> float:
-    """Phase at the ends of the band that a unit of electron content bends it by, of one case. [rad/unit]
+def dispersion_per_unit(mission: Mission, path: PlatformState) -> Any:
+    """Quadratic phase at the edges of the band by a unit of electron content at the zenith. [rad/unit]
 
     Of exp(2πi·K/(c·f)), K = g·f₀², the second order in f − f₀: (2π/λ)·g·(B/2f₀)².
     """
-    radar, g = mission.radar, float(group_delay(mission, path, CONTENT, 0.0))
-    return 2 * math.pi / radar.wavelength * g * (radar.bandwidth / radar.center_frequency / 2) ** 2
+    radar = mission.radar
+    g = metres_per_unit(mission, CONTENT) * leg_factor(CONTENT, path.position, path.position)
+    return 2 * math.pi / np.asarray(radar.wavelength) * g * (radar.bandwidth / radar.center_frequency / 2) ** 2
 
 
-def delay_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
-    """Delays on the leg of a platform, declared or not; none where nothing is stated of it."""
+def dispersed_legs(mission: Mission, geometry: BistaticGeometry) -> dict[str, Any]:
+    """Quadratic phase at the edges of the band by the declared electron content of each leg. [rad]
+
+    The coverage factor is in it. Legs of which no content is declared are left out.
+    """
+    propagation, factor = mission.propagation, mission.allocation.coverage_factor
+    found: dict[str, Any] = {}
+    for name, path in zip(PLATFORMS, geometry.both, strict=True):
+        content = None if propagation is None else propagation.content(name)
+        if content is not None:
+            found[name] = content * factor * dispersion_per_unit(mission, path)
+    return found
+
+
+def dispersed(mission: Mission, geometry: BistaticGeometry) -> Any:
+    """Quadratic phase at the edges of the band by both legs: of one air they add, those of two combine. [rad]"""
+    legs = list(dispersed_legs(mission, geometry).values())
+    is_one_air = mission.propagation is not None and mission.propagation.is_one_air
+    return combined(np.broadcast_arrays(*legs), "sum" if is_one_air else mission.allocation.combine)
+
+
+def legs_of(owner: str) -> tuple[str, ...]:
+    """Platforms on whose legs an error of the air is: one, or both where the air is one."""
+    return PLATFORMS if owner == "mission" else (owner,)
+
+
+def delay_errors(seen: SensorCases) -> Iterator[RandomError]:
+    """Delays of the air, declared or not; none where nothing is stated of it.
+
+    A figure that the file states once is one random number over the scene: both legs have it, each by its own
+    elevation, and what they do adds with its signs before it is squared. Then each leg has a row of its own, which
+    counts in that of the air.
+    """
     propagation = seen.mission.propagation
-    leg = None if propagation is None else propagation.leg(name)
-    if propagation is None or leg is None:
+    if propagation is None:
         return
-    exact, place = seen.exact, PLATFORMS.index(name)
-    track, middle = exact.tracks[place], getattr(seen.geometry, name).position
-    for delay, unit in UNITS.items():
-        scale = metres_per_unit(seen.mission, delay)
-        still = np.broadcast_to(scale * leg_factor(delay, middle, middle), exact.times.shape)
-        moving = delay_course(delay, track, middle, scale, exact.fit)
-        published, full = seen.of_courses(moving[None], still[None])
-        value = getattr(leg, delay)
-        yield RandomError(
-            subject=subject(name, "propagation", delay),
-            unit=unit,
-            declared=None if value is None else value * seen.factor,
-            path=propagation.path(name, delay),
-            published=published,
-            full=full,
-            spreads=False,
-        )
+    by_leg = {
+        (name, delay): _courses_of_leg(seen, name, delay)
+        for name in PLATFORMS
+        if propagation.leg(name) is not None
+        for delay in DELAYS
+    }
+    for name, delay in by_leg:
+        counted = subject("mission", "propagation", delay).id if propagation.is_one_air else ""
+        yield _delay_error(seen, name, delay, [by_leg[name, delay]], counted)
+    for delay in DELAYS if propagation.is_one_air else ():
+        yield _delay_error(seen, "mission", delay, [by_leg[name, delay] for name in PLATFORMS])
+
+
+def _courses_of_leg(seen: SensorCases, name: str, delay: str) -> tuple[Floats, Floats]:
+    """Range error at the nodes by a unit of a delay on one leg, as it turns and held at mid-aperture. [m/unit]"""
+    exact, middle = seen.exact, getattr(seen.geometry, name).position
+    scale = metres_per_unit(seen.mission, delay)
+    moving = delay_course(delay, exact.tracks[PLATFORMS.index(name)], middle, scale, exact.fit)
+    return moving, np.broadcast_to(scale * leg_factor(delay, middle, middle), exact.times.shape)
+
+
+def _delay_error(
+    seen: SensorCases, owner: str, delay: str, courses: Sequence[tuple[Floats, Floats]], counted_in: str = ""
+) -> RandomError:
+    """A delay of one leg, or of one air over both."""
+    propagation = seen.mission.propagation
+    name = legs_of(owner)[0]
+    leg = None if propagation is None else propagation.leg(name)
+    value = None if leg is None else getattr(leg, delay)
+    moving, held = (sum(parts) for parts in zip(*courses, strict=True))
+    published, full = seen.of_courses(np.asarray(moving)[None], np.asarray(held)[None])
+    return RandomError(
+        subject=subject(owner, "propagation", delay),
+        unit=UNITS[delay],
+        declared=None if value is None else value * seen.factor,
+        path=("propagation", delay) if propagation is None else propagation.path(name, delay),
+        published=published,
+        full=full,
+        spreads=False,
+        counted_in=counted_in,
+    )

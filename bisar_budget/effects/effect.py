@@ -27,7 +27,7 @@ class Subject(NamedTuple):
     """The thing that a row or an error is about. `subject` makes it, with its id; nobody reads an id to find out.
 
     `owner` is the one whose share it counts against: transmitter, receiver, clock, or mission for what is nobody's.
-    `kind` is position, velocity, acceleration, time_tag, vibration, timing, propagation, terrain, other,
+    `kind` is position, velocity, acceleration, time_tag, vibration, timing, propagation, dispersion, terrain, other,
     specification, or the name of a sum. `axis` is the axis of `frame`, the term of the clock, the figure of a sensor
     or the air, the name of another error, the key that is specified, the sort of a vibration, and `entry` the place
     of one in the file.
@@ -46,8 +46,10 @@ def subject(owner: str, kind: str, axis: str = "", frame: str = "scene", entry: 
     """Name an error or a sum as the contract does."""
     if kind in ("timing", "other", "specification"):  # of one owner each
         parts = [kind, axis]
-    elif kind == "propagation":
-        parts = [kind, owner, axis]
+    elif kind == "propagation":  # of one air over both legs, or of one leg
+        parts = [kind, "" if owner == "mission" else owner, axis]
+    elif kind == "dispersion":
+        parts = ["propagation", kind]
     elif owner == "clock":
         parts = ["timing", kind]
     elif owner == "mission" and kind in (*MOTION, "time_tag", "random"):

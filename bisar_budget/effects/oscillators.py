@@ -25,7 +25,8 @@ from bisar_budget.ranges.exact_ranges import Floats
 BANDWIDTH = 1e3  # Hz, to which noise counts that is stated without an end
 POOR_FIT = 0.2  # of an Allan deviation, from where a power law does not describe it
 _EXACT, _DESCRIBES = 1e-6, 0.01  # misfits of an Allan deviation: nothing, and so little that no term is added
-_STEEPEST, _LEAST_STEEP = 4.0, 3.0  # slopes of a mask below its first point
+_SLOPE_BELOW_MASK = 3.0  # flicker of frequency; by the first points' own, a higher point could lower a phase
+COVERED_CYCLES = 0.1  # per aperture, down to which a mask should reach: what is slower is hardly in any order
 
 
 class Noise(NamedTuple):
@@ -69,7 +70,7 @@ def _of_mask(oscillator: Oscillator, center_frequency: float, aperture_time: flo
         slope = math.log(density / next_density) / math.log(g / f)
         pieces.append(PowerLawPiece(f, g, density * f**slope, slope))
     first, density = densities[0]
-    slope = min(_STEEPEST, max(_LEAST_STEEP, pieces[0].slope))
+    slope = _SLOPE_BELOW_MASK
     pieces.insert(0, PowerLawPiece(0.0, first, density * first**slope, slope))
     # The quadratic phase is made of tones of about a cycle per aperture.
     below = NOTHING
@@ -201,7 +202,7 @@ def oscillator_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
     oscillator: Oscillator | None = getattr(mission.platforms, name).oscillator
     if oscillator is None:
         return
-    found = _left_at_1_hz(seen, name, oscillator)
+    found = _left_at_1_hz(seen, name, oscillator.noise_alone)
     scale = mission.radar.center_frequency**2 * 10 ** (np.asarray(oscillator.level) / 10)
     tones = np.zeros_like(found)
     for spur in spurs_of(mission, seen.geometry):
@@ -211,9 +212,20 @@ def oscillator_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
     published, full = _of_clock(seen, Parts(*found * scale), Parts(*tones))
     key = ("platforms", name, "oscillator")
     path = key if oscillator.sensor is None else (*key, "sensor")
-    yield RandomError(
+    error = RandomError(
         subject(name, "oscillator"), "dB", 1.0, path, published.times(seen.factor), full.times(seen.factor)
     )
+    yield error._replace(continued=_continued(seen, name, oscillator, scale))
+
+
+def _continued(seen: SensorCases, name: str, oscillator: Oscillator, scale: Any) -> RandomEffect | None:
+    """Effect of the noise below the first point of a mask, which no point states; None where it hardly counts."""
+    mask = oscillator.phase_noise
+    if mask is None or np.all(mask[0][0] * seen.aperture_time <= COVERED_CYCLES):
+        return None
+    left = _left_at_1_hz(seen, name, oscillator.noise_alone, is_below_mask=True)
+    _, full = _of_clock(seen, Parts(*left * scale), Parts(*np.zeros_like(left)))
+    return full.times(seen.factor)
 
 
 def _of_clock(seen: SensorCases, found: Parts, tones: Parts) -> tuple[RandomEffect, RandomEffect]:
@@ -242,8 +254,10 @@ def _of_clock(seen: SensorCases, found: Parts, tones: Parts) -> tuple[RandomEffe
     return published, RandomEffect(quadratic, cubic, spread, east, north, np.where(counts, whole, own))
 
 
-def _left_at_1_hz(seen: SensorCases, name: str, oscillator: Oscillator) -> Floats:
+def _left_at_1_hz(seen: SensorCases, name: str, oscillator: Oscillator, *, is_below_mask: bool = False) -> Floats:
     """Parts of the phase at 1 Hz that an oscillator leaves over the aperture, (parts, cases); they grow as f₀².
+
+    Of a mask all of it, or what lies below its first point.
 
     It depends on how the clocks are kept together: all of its noise, what exchanged pulses leave, what has come since
     the clocks were set, or what a receiver that hears the transmitter has between direct path and echo.
@@ -253,10 +267,11 @@ def _left_at_1_hz(seen: SensorCases, name: str, oscillator: Oscillator) -> Float
     if sync is not None and sync.is_direct_path and name == "transmitter":
         return found
     interval = None if sync is None else sync.interval
-    for (alike, exchanged), places in seen.alike((oscillator.noise_alone, interval)):
+    for (alike, exchanged), places in seen.alike((oscillator, interval)):
         spectra: dict[Any, list[int]] = {}
         for place in places.tolist():  # an Allan deviation may be fitted otherwise over another aperture
-            spectra.setdefault(noise_of(alike, 1.0, float(times[place])).pieces, []).append(place)
+            pieces = noise_of(alike, 1.0, float(times[place])).pieces
+            spectra.setdefault(pieces[:1] if is_below_mask else pieces, []).append(place)
         for pieces, some in spectra.items():
             found[:, some] = _left_of(pieces, exchanged, seen, some).rows
     return found

@@ -94,7 +94,8 @@ class RandomError(NamedTuple):
     silent. The unit of an oscillator is `dB`: its noise as a factor of amplitude, declared 1. `noise` is the spectrum
     of an oscillator; not of many cases. `spreads` tells noise from what changes within the aperture by a few orders.
     `counted_in` is the id of a row whose error does this too, so that this one counts nowhere. `moves` says how a
-    unit moves platforms, where the edge of a scene is looked at; of clocks and the air nothing.
+    unit moves platforms, where the edge of a scene is looked at; of clocks and the air nothing. `continued` is the
+    effect of what lies below the first point of an oscillator's mask, where the mask does not reach far enough down.
     """
 
     subject: Subject
@@ -107,6 +108,7 @@ class RandomError(NamedTuple):
     spreads: bool = True
     counted_in: str = ""
     moves: tuple[Moves, ...] = ()
+    continued: RandomEffect | None = None
 
     @property
     def id(self) -> str:

@@ -43,7 +43,7 @@ def random_errors(mission: Mission, geometry: BistaticGeometry | None = None, ca
     found += [error for name in PLATFORMS for error in oscillator_noise(seen, name)]
     found += [error for name in PLATFORMS for error in oscillator_acceleration(seen, name)]
     found += link_noise(seen)
-    found += [error for name in PLATFORMS for error in delay_errors(seen, name)]
+    found += delay_errors(seen)
     found += _stated_effects(mission)
     return [in_one_case(mission, error) for error in found] if geometry is None else found
 
@@ -68,4 +68,5 @@ def in_one_case(mission: Mission, error: RandomError, case: int = 0) -> RandomEr
         oscillator: Oscillator = getattr(mission.platforms, error.owner).oscillator
         noise = noise_of(oscillator, mission.radar.center_frequency, mission.collection.aperture_time)
     declared = None if error.declared is None else plain(error.declared, case)
-    return error._replace(declared=declared, published=published, full=full, noise=noise)
+    continued = None if error.continued is None else error.continued.of(case)
+    return error._replace(declared=declared, published=published, full=full, noise=noise, continued=continued)

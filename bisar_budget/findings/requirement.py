@@ -21,7 +21,8 @@ class DecidingShare:
     """A share of a requirement that decides in place of the whole, in the unit of the requirement; without gain.
 
     `owner` is the platform or the clock that has the share; `autofocus`, where the sum of all phases is held to what
-    autofocus pulls in; `scene`, where the difference at the scene's edge is held to the requirement.
+    autofocus pulls in; `scene`, where the difference at the scene's edge is held to the requirement; `band`, where
+    the phase is that of dispersion over the band.
     """
 
     owner: str
@@ -39,7 +40,7 @@ class JudgedRequirement(NamedTuple):
     exceed what is allowed, in all and of a platform's share; None of other requirements. `row` is the row that
     decides the status, `use_row` the one with the utilization, `rows` are all that judge the requirement. `reason`
     says why it cannot be judged, or why it is not met. `waivers` cover it or rows that judge it; empty unless it is
-    waived.
+    waived. `is_unjudged` is whether it cannot be judged, be that waived or not.
     """
 
     key: str
@@ -55,6 +56,7 @@ class JudgedRequirement(NamedTuple):
     reason: Note | None = None
     line: int | None = None
     waivers: tuple[AppliedWaiver, ...] = ()
+    is_unjudged: bool = False
     share: DecidingShare | None = None
     autofocus_gain: float | None = None
     use_row: str | None = None

@@ -85,6 +85,7 @@ class Row(NamedTuple):
     model: str | None = None
     waivers: tuple[AppliedWaiver, ...] = ()
     refuted: tuple[Note, ...] = ()
+    is_unjudged: bool = False  # it cannot be judged, be that waived or not
 
     def __repr__(self) -> str:
         """Id, what is declared of what is allowed, and status, on one line."""

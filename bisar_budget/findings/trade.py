@@ -64,8 +64,8 @@ class TradeStudy(NamedTuple):
     """A sweep that a report of the mission shows.
 
     `asked` is what stood behind each option; `rows` are the utilizations of the rows that are the worst anywhere,
-    over the one key that varies. Of `cases` `complying` break no requirement, `unevaluated` of them because
-    something could not be evaluated or nothing is declared, and `missing` are no mission. `model`
+    over the one key that varies. Of `cases` `complying` meet every requirement, `waived` are waived, by `waived_by`;
+    of `unevaluated` something could not be evaluated or nothing is declared, and `missing` are no mission. `model`
     is the one that an option put in place of the mission's own, `day` that on which waivers were judged.
     """
 
@@ -74,6 +74,8 @@ class TradeStudy(NamedTuple):
     rows: Mapping[str, NDArray[Any]]
     cases: int
     complying: int
+    waived: int
+    waived_by: tuple[str, ...]
     unevaluated: int
     missing: int
     day: date

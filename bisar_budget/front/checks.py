@@ -275,6 +275,7 @@ def with_studies(
     QuestionError
         One cannot be asked; the message begins with its file.
     """
+    from bisar_budget.design.table import listed
     from bisar_budget.findings.trade import TradeStudy
     from bisar_budget.report.drawing.trades import uses_of_rows
 
@@ -294,12 +295,15 @@ def with_studies(
             trade = _of(mission, again, (), advance).trade()
             rows = _of(mission, uses_of_rows, trade, again)
             counts = Counter(trade.values["status"].ravel().tolist())
+            waivers = trade.values["waived_by"].ravel().tolist()
             study = TradeStudy(
                 asked=tuple(asked),
                 trade=trade,
                 rows=rows,
                 cases=cases.count,
                 complying=complying(counts),
+                waived=counts["waived"],
+                waived_by=tuple(dict.fromkeys(waiver for cell in waivers for waiver in listed(cell))),
                 unevaluated=counts["not_evaluated"],
                 missing=counts["error"],
                 day=today,
@@ -352,7 +356,7 @@ def gathered(
     from bisar_budget.report.tables import Described
 
     swept = Asked(mission, cases, columns=columns, model=model, today=today).checked(jobs or cores())
-    found = Gathered(Described(swept, cases, mission, __version__), ("binding_requirement", *columns))
+    found = Gathered(Described(swept, cases, mission, __version__), ("binding_requirement", "waived_by", *columns))
     for part in swept.parts:
         found.add(part)
         advance(part.stop - part.start)

@@ -24,7 +24,7 @@ from bisar_budget.findings.status import exit_code
 from bisar_budget.mission.model import Mission
 from bisar_budget.report import FORMATS, Style, format_of, pictures, render
 from bisar_budget.report.words.requirements import declared_words, requirement_lines, verdict
-from bisar_budget.report.words.sentences import allowable_words, matters, row_size, shown_use, use_words
+from bisar_budget.report.words.sentences import allowable_words, matters, row_size, shown_use, use_words, waived_count
 
 if TYPE_CHECKING:
     from bisar_budget.design.compare import Comparison
@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from bisar_budget.simulator.point import PointImages
 
 _COMPLIES = ("fail", "pass")
+_HEADINGS = {"none": "fail", "waived": "waived"}  # of a solution, by its status
 _DECIDING = 12  # rows of a result that a notebook shows
 
 
@@ -141,12 +142,17 @@ class CheckResult(Mapping[str, Row]):
 
     @property
     def status(self) -> str:
-        """Verdict of the mission: fail, not_evaluated, warn, pass_with_autofocus or pass."""
+        """Verdict of the mission: fail, not_evaluated, waived, warn, pass_with_autofocus or pass."""
         return self.findings.status
 
     @property
+    def waived_by(self) -> tuple[str, ...]:
+        """Ids of the waivers that cover rows or requirements, as the file writes them."""
+        return tuple(waiver.id for waiver in self.findings.waived_by)
+
+    @property
     def exit_code(self) -> int:
-        """Exit code of `bisar-budget check`: 0 all judged and met, 1 not."""
+        """Exit code of `bisar-budget check`: 0 all judged and met or waived, 1 not."""
         return exit_code({self.status}, False)
 
     @property
@@ -273,6 +279,12 @@ class _Answer:
         return found
 
 
+def _waived(waivers: Sequence[Sequence[str]]) -> str:
+    """How many are waived, and by which waivers, behind how many comply; empty where none is."""
+    ids = tuple(dict.fromkeys(waiver for of_one in waivers for waiver in of_one))
+    return f", {waived_count(len(waivers), ids)}" if waivers else ""
+
+
 class SolveResult(_Answer):
     """Values at which compliance begins or ends: `value` in SI, `crossings`, `status`, `nearest`.
 
@@ -288,7 +300,8 @@ class SolveResult(_Answer):
     @property
     def _said(self) -> str:
         if (parts := getattr(self.found, "parts", None)) is not None:
-            return f"{len(self.complying)} of {len(parts)} parts comply"
+            waived = [one.standing.waived_by for one in parts if one.standing.status == "waived"]
+            return f"{len(self.complying)} of {len(parts)} parts comply{_waived(waived)}"
         return "none" if self.value is None else f"{self.value:.6g} {self.unit}"
 
     def _repr_html_(self) -> str:
@@ -305,7 +318,7 @@ class SolveResult(_Answer):
                 rows.append((inside.value, inside.row or "", use_words(inside.utilization), one.outside.row or ""))
         title = f"{found.key} of {found.name}"
         return notebook.page(
-            notebook.heading(_COMPLIES[found.status != "none"], title, f"{found.status}: {self._said}"),
+            notebook.heading(_HEADINGS.get(found.status, "pass"), title, f"{found.status}: {self._said}"),
             notebook.table(columns, rows),
         )
 
@@ -407,7 +420,8 @@ class PassesResult(_Answer):
     def __repr__(self) -> str:
         """How many passes comply, on one line."""
         found = self.found
-        return f"<passes of {found.name!r}: {len(found.complying)} of {len(found.found)} comply>"
+        waived = _waived([one.waived_by for one in found.found if one.status == "waived"])
+        return f"<passes of {found.name!r}: {len(found.complying)} of {len(found.found)} comply{waived}>"
 
     def __len__(self) -> int:
         """Number of passes."""

@@ -14,7 +14,7 @@ import numpy as np
 from bisar_budget import __version__, notebook
 from bisar_budget.design.cases import Cases, some_of
 from bisar_budget.design.sweep import Asked, Block, part_of
-from bisar_budget.design.table import Part, Question, Swept
+from bisar_budget.design.table import Part, Question, Swept, listed
 from bisar_budget.faults import ClusterError, printable
 from bisar_budget.findings.requirement import Override
 from bisar_budget.findings.status import complying
@@ -25,6 +25,7 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.mission.quantities import QuestionError
 from bisar_budget.report.drawing.trades import Gathered, check_plot, uses_of_rows
 from bisar_budget.report.tables import Described, dataset
+from bisar_budget.report.words.sentences import waived_count
 from bisar_budget.resources import cores
 
 if TYPE_CHECKING:
@@ -40,8 +41,9 @@ class SweepResult:
     """A mission checked for many values: its table, by `to_dataframe`, `to_xarray`, or as columns.
 
     Cases are those of `mission` with the values of `cases`; they are checked when they are first asked for.
-    `statuses` counts those that have been. `workers` of a scheduler check them, where there are any; parts are kept
-    beside the file `beside` where one is named, and gone on from if `is_resumed`.
+    `statuses` counts those that have been, `waived_by` has the ids of their waivers. `workers` of a scheduler check
+    them, where there are any; parts are kept beside the file `beside` where one is named, and gone on from if
+    `is_resumed`.
     """
 
     mission: Mission
@@ -55,6 +57,7 @@ class SweepResult:
     beside: str | None = None
     is_resumed: bool = False
     statuses: Counter[str] = field(default_factory=Counter)
+    waived_by: dict[str, None] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Ask: what cannot be asked is said here."""
@@ -138,8 +141,11 @@ class SweepResult:
 
     def _counted(self, parts: Iterator[Part], told: Callable[[int, int], None]) -> Iterator[Part]:
         self.statuses.clear()
+        self.waived_by.clear()
         for part in parts:
             self.statuses.update(part.values["status"].tolist())
+            of_part = (listed(waivers) for waivers in dict.fromkeys(part.values["waived_by"].tolist()))
+            self.waived_by |= dict.fromkeys(waiver for waivers in of_part for waiver in waivers)
             yield part
             told(self.statuses.total(), self.cases.count)
 
@@ -153,6 +159,8 @@ class SweepResult:
         if done < self.cases.count:
             said[0] += f" of {self.cases.count}"
         said.append(f"{comply} comply ({percentage(comply, done)})")
+        if self.statuses["waived"]:
+            said.append(waived_count(self.statuses["waived"], list(self.waived_by)))
         if self.statuses["not_evaluated"]:
             said.append(f"{self.statuses['not_evaluated']} not evaluated")
         if self.statuses["error"]:

@@ -41,11 +41,13 @@ _LEG = Section(LegDelay)
 
 
 class Propagation(NamedTuple):
-    """Delays in the air that correction leaves, 1 sigma: the same for each leg, or of each leg its own."""
+    """Delays in the air that correction leaves, 1 sigma: one air for both legs, or of each leg its own."""
 
-    zenith_delay: Annotated[float | None, Key(_ZENITH_DELAY, "Of the troposphere, on each leg.")] = None
+    zenith_delay: Annotated[
+        float | None, Key(_ZENITH_DELAY, "Of the troposphere: one air, which both legs have over them.")
+    ] = None
     zenith_electron_content: Annotated[
-        float | None, Key(_ELECTRON_CONTENT, "Of the ionosphere, on each leg; 1 TECU is 1e16/m².")
+        float | None, Key(_ELECTRON_CONTENT, "Of the ionosphere, likewise; 1 TECU is 1e16/m².")
     ] = None
     transmitter: Annotated[LegDelay | None, Key(_LEG, "From the transmitter to the scene, alone.")] = None
     receiver: Annotated[LegDelay | None, Key(_LEG, "From the scene to the receiver, alone.")] = None
@@ -64,17 +66,31 @@ class Propagation(NamedTuple):
         elif not (of_both or of_one):
             yield Problem("states no delay", accepted)
 
+    @property
+    def is_one_air(self) -> bool:
+        """Whether the delays are stated once: both legs have the same air over them."""
+        return self.transmitter is None and self.receiver is None
+
+    def content(self, platform: str) -> Any:
+        """Electron content at the zenith of the leg of a platform; None where the file states none. [1/m²]"""
+        leg = self.leg(platform)
+        return None if leg is None else leg.zenith_electron_content
+
+    def source_of(self, platform: str) -> str | None:
+        """Where the delays of the leg of a platform come from."""
+        leg = self.leg(platform)
+        return None if leg is None else leg.source
+
     def leg(self, platform: str) -> LegDelay | None:
         """The leg of a platform as stated; None where that of the other alone is."""
-        if self.transmitter is None and self.receiver is None:
+        if self.is_one_air:
             return LegDelay(self.zenith_delay, self.zenith_electron_content, self.source)
         own: LegDelay | None = getattr(self, platform)
         return own if own is None or own.source else own._replace(source=self.source)
 
     def path(self, platform: str, delay: str) -> KeyPath:
         """Where a figure of a leg stands in the file."""
-        is_of_both = self.transmitter is None and self.receiver is None
-        return ("propagation", *(() if is_of_both else (platform,)), delay)
+        return ("propagation", *(() if self.is_one_air else (platform,)), delay)
 
 
 PROPAGATION = Section(Propagation)

@@ -255,10 +255,17 @@ def _by_two_clocks(counted_s: Floats, instants: Floats, records: LogRecords) -> 
     An instant is cut to its second: the start is at or behind every instant less its time, and less than a second
     behind. Between the latest and the earliest such bound it is taken in the middle.
     """
-    is_said = np.isfinite(instants)
+    is_said = np.isfinite(instants) & records.is_usable
     if not is_said.any():
         raise PathFileError(f"{records.name}: has no instant of UTC")
-    behind = (instants - counted_s)[is_said]
+    apart = instants - counted_s
+    usual = float(np.median(apart[is_said]))
+    off = np.abs(apart - usual)
+    records.leave_out(
+        is_said & (off > 1.0 + _CLOCKS_APART_S),
+        lambda i: f"its clocks, time(millisecond) and datetime(utc), drift apart by {off[i]:.3g} s",
+    )
+    behind = apart[is_said & records.is_usable]
     earliest, latest = float(behind.max()), float(behind.min()) + 1.0
     if earliest - latest > _CLOCKS_APART_S:
         raise PathFileError(

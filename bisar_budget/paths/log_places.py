@@ -190,7 +190,8 @@ def _longest_rise(times: Floats) -> NDArray[np.bool_]:
     is_settled[:-1] &= times[:-1] < lowest[1:]
     # Between settled times, which are after all before them and before all behind, each disorder is one of its own.
     places = np.flatnonzero(~is_settled)
-    for disorder in np.split(places, np.flatnonzero(np.diff(places) > 1) + 1):
+    disorders = np.split(places, np.flatnonzero(np.diff(places) > 1) + 1) if places.size else []
+    for disorder in disorders:
         rises[disorder] = False
         ends: list[float] = []  # least last times of selections, by their lengths
         last: list[int] = []

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.constants import SPEED_OF_LIGHT
-from bisar_budget.effects.air_delays import CONTENT, DELAY, group_delay
+from bisar_budget.effects.air_delays import CONTENT, DELAY, group_delay, legs_of
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.navigation_errors import (
     TILTS,
@@ -134,13 +134,15 @@ def _motion(mission: Mission, name: str) -> MotionError:
 def delay_courses(
     mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator
 ) -> Floats:
-    """Group delays on one leg at the centre frequency, (draws, times), of one sigma of what is declared. [m]
+    """Group delays at the centre frequency, (draws, times), of one sigma of what is declared. [m]
 
-    What is above the scene stays as it is within an aperture.
+    On one leg, or of one air the sum of both legs. What is above the scene stays as it is within an aperture.
     """
     size = (error.declared or 0.0) / mission.allocation.coverage_factor
-    path: PlatformState = getattr(mission.geometry, error.owner)
-    of_unit = np.broadcast_to(group_delay(mission, path, error.subject.axis, times), times.shape)
+    of_unit = np.zeros(times.shape)
+    for name in legs_of(error.owner):
+        path: PlatformState = getattr(mission.geometry, name)
+        of_unit = of_unit + group_delay(mission, path, error.subject.axis, times)
     found: Floats = np.multiply.outer(size * rng.standard_normal(draws), of_unit)
     return found
 

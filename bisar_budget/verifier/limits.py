@@ -15,6 +15,7 @@ from bisar_budget.budget.aggregates import Aggregates
 from bisar_budget.budget.judged_rows import Judging
 from bisar_budget.budget.random_rows import RandomRows
 from bisar_budget.budget.verdicts import rows_worth_showing
+from bisar_budget.effects.air_delays import dispersed_legs
 from bisar_budget.effects.declared import QUADRATIC
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.vibration import SLOWEST, lines_of
@@ -161,6 +162,8 @@ def _cases(study: Study) -> Iterator[tuple[str, Case]]:
             yield one.id, swaying[one]
     yield from _of_instruments(study)
     requirements = mission.requirements
+    if any(map(np.any, dispersed_legs(mission, mission.geometry).values())):
+        yield "propagation.dispersion", partial(phase_cases.dispersion, study)
     if mission.allocation.combine == "each":
         if _warns_of_the_total(study):
             row_id = subject("mission", QUADRATIC).id

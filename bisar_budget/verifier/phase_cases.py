@@ -125,6 +125,13 @@ def stated(study: Study, row_id: str, limit: float, unit: str) -> Verdict:
     return study.blank(row_id, limit, unit, reason=reasons.stated_by_its_effect())
 
 
+def dispersion(study: Study) -> Verdict:
+    """Phase that free electrons bend over the band: images are read over slow time."""
+    budget = study.allocation.qpe_total
+    blank = study.blank("propagation.dispersion", budget, "rad", budget_rad=budget)
+    return blank._replace(reason=reasons.images_are_read_over_slow_time())
+
+
 def edge(study: Study) -> Verdict:
     """Difference between two places of the scene; what images and exact ranges say of it is in the tests."""
     budget = study.allocation.qpe_total

@@ -27,6 +27,12 @@ def no_image_at_the_limit() -> str:
 
 
 @phrase
+def images_are_read_over_slow_time() -> str:
+    """Said of dispersion in the air, whose phase is one over the band."""
+    return "images are read along slow time, and this phase is over the band: `simulate` shows its blur in range"
+
+
+@phrase
 def nothing_moves_the_image() -> str:
     """Said of the location requirement."""
     return "no error that moves the image is declared"

@@ -315,6 +315,10 @@ class TestAction:
         assert (design / "b.xml").exists()
         assert (design / "b.sarif").exists()
 
+    def test_a_folder_of_the_checkout_is_where_the_missions_are(self) -> None:
+        steps = [step for step in ACTION["runs"]["steps"] if "inputs.missions" in str(step.get("env"))]
+        assert {step["working-directory"] for step in steps} == {"${{ inputs.working-directory || '.' }}"}
+
     def test_inputs_are_data_to_the_shell(self, design: Path) -> None:
         done = self.run(design, "Check the budgets", missions='$(touch a) "; touch b; "', junit="$(touch c).xml")
         assert done.returncode == 2
@@ -448,10 +452,13 @@ class TestPreCommit:
         assert "pass missions/survey.yaml" in bad.stdout
         (installed,) = (tmp_path / "cache").glob("repo*/py_env-*/lib/python*/site-packages/bisar_budget")
         assert not (installed.parent / "yaml").exists()
-        good = hook("missions/survey.yaml", "pyproject.toml")
+        good = hook("missions/survey.yaml", "README.md")
         assert good.returncode == 0, good.stdout + good.stderr
         assert "Passed" in good.stdout
-        assert "Skipped" in hook("pyproject.toml").stdout
+        assert hook("README.md").returncode == 0
+        settings = hook("pyproject.toml")  # hold every mission below their folder
+        assert settings.returncode == 1
+        assert "FAIL missions/fine_survey.yaml" in settings.stdout
 
         variables["PYTHONPATH"] = set_traps(design)["PYTHONPATH"]
         trapped = hook("missions/fine_survey.yaml")

@@ -57,9 +57,14 @@ def findings(**changes: object) -> MissionFindings:
 
 
 # ---------------------------------------------------------------------- delays in the air
-def test_a_delay_is_held_to_its_platforms_share() -> None:
+def of_two(**figures: object) -> dict[str, object]:
+    """The same figures for each leg: two airs, which know nothing of each other."""
+    return dict.fromkeys(PLATFORMS, figures)
+
+
+def test_a_delay_of_a_leg_is_held_to_its_platforms_share() -> None:
     split = {"transmitter": 0.2, "receiver": 0.8}
-    found = findings(propagation=AIR, allocation={"split": split})
+    found = findings(propagation=of_two(**AIR), allocation={"split": split})
     rows = [row(found, f"propagation.{name}.zenith_delay") for name in ("transmitter", "receiver")]
     for one, share in zip(rows, split.values(), strict=True):
         assert one.subject.owner in one.id
@@ -77,12 +82,71 @@ def test_the_coverage_factor_multiplies_it() -> None:
     assert two.allowable == pytest.approx(one.allowable)
 
 
-def test_legs_are_independent() -> None:
-    found = findings(propagation=AIR, requirements__location_error="1 m")
+def test_legs_with_their_own_figures_are_independent() -> None:
+    found = findings(propagation=of_two(**AIR), requirements__location_error="1 m")
     legs = [math.hypot(*row(found, f"propagation.{name}.zenith_delay").displacement_m) for name in PLATFORMS]
     assert row(found, "mission.location_error").declared == pytest.approx(math.hypot(*legs))
-    summed = findings(propagation=AIR, requirements__location_error="1 m", allocation={"combine": "sum"})
+    summed = findings(propagation=of_two(**AIR), requirements__location_error="1 m", allocation={"combine": "sum"})
     assert row(summed, "mission.location_error").declared == pytest.approx(sum(legs))
+
+
+# Two satellites behind each other at 514.8 km, which see the scene at an incidence of 35 degrees.
+FORMATION = {
+    "radar": {"center_frequency": "9.65 GHz", "bandwidth": "150 MHz"},
+    "collection": {"aperture_time": "0.7 s"},
+    **{
+        f"platforms__{name}": {
+            "position": [f"{514.8 * math.tan(math.radians(35))} km", north, "514.8 km"],
+            "velocity": [0, "7500 m/s", 0],
+            "acceleration": ["-4.6 m/s^2", 0, "-6.6 m/s^2"],
+        }
+        for name, north in (("transmitter", "100 m"), ("receiver", "-100 m"))
+    },
+}
+
+
+@pytest.mark.parametrize("combine", ["each", "sum", "rss"])
+@pytest.mark.parametrize("model", ["published", "full"])
+def test_one_air_is_one_error_of_both_legs(model: str, combine: str) -> None:
+    """Its amplitudes add: with both legs alike √2 of what two airs make. 4 cm passed a limit of 70 mm."""
+    needs, rules = {"location_error": "70 mm"}, {"model": model, "combine": combine}
+    found = findings(**FORMATION, propagation={"zenith_delay": "4 cm"}, requirements=needs, allocation=rules)
+    # The delay along the leg, over the sine of the incidence: on the ground.
+    along = 0.04 / math.sqrt(1 - (math.sin(math.radians(35)) / (1 + 7e3 / 6371e3)) ** 2)
+    moved = along / math.sin(math.radians(35))
+    assert row(found, "mission.location_error").declared == pytest.approx(moved, rel=2e-3)
+    assert row(found, "mission.location_error").status == found.status == "fail"
+    air = row(found, "propagation.zenith_delay")
+    assert (air.owner, air.status) == ("mission", "fail" if combine == "each" else "info")
+    for name in PLATFORMS:
+        leg = row(found, f"propagation.{name}.zenith_delay")
+        assert (leg.status, leg.is_independent) == ("info", False)
+        assert "propagation.zenith_delay" in str(leg.reason)
+        assert math.hypot(*leg.displacement_m) == pytest.approx(moved / 2, rel=2e-3)
+    apart = findings(**FORMATION, propagation=of_two(zenith_delay="4 cm"), requirements=needs, allocation=rules)
+    of_rule = {"each": moved / 2, "sum": moved, "rss": moved / math.sqrt(2)}[combine]
+    assert row(apart, "mission.location_error").declared == pytest.approx(of_rule, rel=2e-3)
+    assert (apart.status == "fail") == (combine == "sum")
+
+
+def test_one_air_is_drawn_once() -> None:
+    text = mission_text(**FORMATION, propagation={"zenith_delay": "4 cm"}, requirements={"location_error": "1 m"})
+    analysis = Analysis(parse_mission(text))
+    (drawn,) = [one for one in monte_carlo(analysis, 100_000, 3).requirements if one.unit == "m"]
+    air = next(one for one in analysis.random if one.id == "propagation.zenith_delay")
+    assert drawn.sigma == pytest.approx(air.full.displacement * 0.04, rel=0.01)
+
+
+@pytest.mark.parametrize("combine", ["sum", "rss"])
+def test_at_the_edge_of_a_scene_one_air_is_one_error_too(combine: str) -> None:
+    """Two airs differ there by no more than one does: of both legs' differences one is a sum with signs."""
+    changes = {"scene": {"radius": "500 m"}, "allocation": {"combine": combine}}
+    one, two = (
+        row(findings(**changes, propagation=air), "mission.spatial_variance").declared
+        for air in ({"zenith_delay": "5 m"}, of_two(zenith_delay="5 m"))
+    )
+    assert one > 0
+    assert one <= two * (math.sqrt(2) if combine == "rss" else 1) * (1 + 1e-6)
 
 
 def test_below_the_ionosphere_electrons_do_nothing() -> None:
@@ -91,19 +155,100 @@ def test_below_the_ionosphere_electrons_do_nothing() -> None:
     assert found.reason == "the transmitter flies below the ionosphere: no electrons on its leg"
 
 
-@pytest.mark.parametrize(("content", "said"), [("5 TECU", False), ("30 TECU", True)])
-def test_what_disperses_over_the_band_is_said(content: str, said: bool) -> None:
-    """30 TECU at 1.25 GHz and 80 MHz: 0.26 rad at the ends of the band, by the second order of K/f."""
-    found = row(findings(**ORBITS, propagation={"zenith_electron_content": content}), CONTENT)
-    assert any("at the ends of the band" in note for note in found.remarks) == said
-    if said:
-        f, edge = 1.25e9, 1.29e9
-        group = 40.308 * 30e16 / f**2 * 1.26  # the shell's factor, to a percent
-        tau = group / 299_792_458
-        phase = [2 * math.pi * tau * f**2 / one for one in (f, edge, 2 * f - edge)]
-        bend = (phase[1] + phase[2]) / 2 - phase[0]
-        (note,) = (note for note in found.remarks if "at the ends of the band" in note)
-        assert note.values[0] == pytest.approx(bend, rel=0.01)
+# ---------------------------------------------------------------------- dispersion over the band
+DISPERSION = "propagation.dispersion"
+P_BAND = {
+    "radar": {"center_frequency": "435 MHz", "bandwidth": "150 MHz"},
+    "platforms__transmitter": {
+        "slant_range": "800 km",
+        "azimuth": 0,
+        "elevation": "55 deg",
+        "speed": "7.5 km/s",
+        "motion_azimuth": "90 deg",
+        "acceleration": ["-0.666 m/s^2", 0, "-7.851 m/s^2"],
+    },
+}
+SHELL = 1 / math.sqrt(1 - (math.cos(math.radians(55)) / (1 + 350e3 / 6371e3)) ** 2)  # at 350 km, over a sphere
+
+
+def bent_over_the_band(content: float, obliquity: float, center: float, bandwidth: float) -> float:
+    """Quadratic phase at the edges of the band, fitted to the exact phase 2πK/(c·f) of one leg. [rad]"""
+    f = np.linspace(center - bandwidth / 2, center + bandwidth / 2, 2001)
+    phase = 2 * math.pi * 40.308 * content * obliquity / (299_792_458 * f)
+    coefficients = np.polynomial.legendre.legfit(2 * (f - center) / bandwidth, phase, 6)
+    return float(1.5 * coefficients[2])
+
+
+@pytest.mark.parametrize("combine", ["each", "sum", "rss"])
+@pytest.mark.parametrize("model", ["published", "full", "strictest"])
+def test_dispersion_is_held_by_the_quadratic_requirement_alone(model: str, combine: str) -> None:
+    """10 TECU at 435 MHz bend the ends of 150 MHz by 6.88 rad, and the mission passed."""
+    found = findings(
+        **P_BAND,
+        propagation={"transmitter": {"zenith_electron_content": "10 TECU"}},
+        requirements=NEEDS | {"location_error": "1 km"},
+        other_errors=[ELSEWHERE],
+        allocation={"model": model, "combine": combine, "split": {"transmitter": 0.2, "receiver": 0.8}},
+        autofocus={"n_pull": 2},
+    )
+    one = row(found, DISPERSION)
+    assert (one.status, one.unit, one.metric) == ("fail", "rad", "quadratic_phase_error")
+    assert one.declared == pytest.approx(6.88, abs=0.005)
+    assert one.allowable == pytest.approx(math.pi / 4)  # all of it, without share and gain
+    # The exact phase has orders beyond: a seventh of the fourth, (B/2f₀)² of the second, is in the fit.
+    assert one.declared == pytest.approx(bent_over_the_band(1e17, SHELL, 435e6, 150e6), rel=0.04)
+    (quadratic,) = [each for each in found.requirements if each.key == "quadratic_phase_error"]
+    assert (quadratic.status, quadratic.row) == ("fail", DISPERSION)
+    assert row(found, "mission.quadratic_phase_error").declared < 1 if combine != "each" else True
+
+
+@pytest.mark.parametrize(("radar", "content"), [("1.25 GHz", 5e16), ("9.65 GHz", 1e16)])
+def test_dispersion_is_that_of_the_exact_phase_over_a_narrow_band(radar: str, content: float) -> None:
+    changes = P_BAND | {"radar": {"center_frequency": radar, "bandwidth": "50 MHz"}}
+    found = findings(**changes, propagation={"transmitter": {"zenith_electron_content": f"{content / 1e16} TECU"}})
+    exact = bent_over_the_band(content, SHELL, float(radar.split()[0]) * 1e9, 50e6)
+    assert row(found, DISPERSION).declared == pytest.approx(exact, rel=0.001)
+    assert row(found, DISPERSION).status == "pass"
+
+
+def test_a_tecu_at_x_band_is_negligible() -> None:
+    found = findings(
+        **ORBITS | {"radar": {"center_frequency": "10 GHz", "bandwidth": "300 MHz"}},
+        propagation={"zenith_electron_content": "1 TECU"},
+    )
+    assert row(found, DISPERSION).utilization < 0.01
+
+
+def test_of_one_air_both_legs_bend_the_band_together_of_two_by_the_rule() -> None:
+    content = {"zenith_electron_content": "5 TECU"}
+    legs = [row(findings(**ORBITS, propagation={name: content}), DISPERSION).declared for name in PLATFORMS]
+    assert row(findings(**ORBITS, propagation=content), DISPERSION).declared == pytest.approx(sum(legs))
+    of_two = dict.fromkeys(PLATFORMS, content)
+    for rule, combined in (("rss", math.hypot(*legs)), ("sum", sum(legs)), ("each", max(legs))):
+        found = findings(**ORBITS, propagation=of_two, allocation={"combine": rule})
+        assert row(found, DISPERSION).declared == pytest.approx(combined)
+
+
+def test_the_content_that_is_allowed_is_said_and_is_the_limit() -> None:
+    changes = P_BAND | {"allocation": {"coverage_factor": "2"}}
+    found = row(findings(**changes, propagation={"zenith_electron_content": "10 TECU"}), DISPERSION)
+    (note,) = [one for one in found.remarks if one.code == "content-allowed"]
+    (content,) = note.values
+    for factor, status in ((0.999, "warn"), (1.001, "fail")):
+        at_limit = {"zenith_electron_content": f"{float(content) * factor} 1/m^2"}
+        assert row(findings(**changes, propagation=at_limit), DISPERSION).status == status
+
+
+def test_without_a_content_there_is_no_row_of_dispersion() -> None:
+    assert DISPERSION not in {one.id for one in findings(**ORBITS, propagation=AIR).rows}
+
+
+def test_dispersion_is_explained_with_its_numbers() -> None:
+    mission = parse_mission(mission_text(**P_BAND, propagation={"zenith_electron_content": "10 TECU"}))
+    found = check_mission(mission, TODAY)
+    text = explain(mission, found, DISPERSION)
+    assert "6.87861 rad" in text
+    assert "without share and gain" in text
 
 
 def test_a_leg_of_which_nothing_is_stated_has_no_row() -> None:
@@ -268,7 +413,8 @@ def test_draws_are_the_root_sum_square_of_the_rows() -> None:
     )
     analysis = Analysis(parse_mission(text))
     drawn = {one.id: one for one in monte_carlo(analysis, 1_000_000, 7).requirements}
-    legs = [one for one in analysis.random if one.subject.kind == "propagation" and one.declared]
+    airs = [one for one in analysis.random if one.subject.kind == "propagation" and one.declared]
+    legs = [one for one in airs if not one.counted_in]
     moved = math.hypot(*(one.full.displacement * one.declared / 2 for one in legs), 0.1)
     phases = math.hypot(*(one.full.quadratic * one.declared / 2 for one in legs), math.radians(5))
     assert drawn["mission.location_error"].sigma == pytest.approx(moved, rel=2e-3)
@@ -317,7 +463,7 @@ def test_questions_of_design(run: Callable, tmp_path: Path) -> None:
     file.write_text(mission_text(propagation=AIR, requirements=needs))
     solved = json.loads(run("solve", str(file), "--for", "propagation.zenith_delay", "--format", "json").stdout)
     found = found_of(propagation=AIR, requirements=needs)
-    least = min(row(found, f"propagation.{name}.zenith_delay").allowable for name in PLATFORMS)
+    least = row(found, "propagation.zenith_delay").allowable
     assert solved["missions"][0]["value"] == pytest.approx(least, rel=1e-4)
     scaled = json.loads(run("solve", str(file), "--for", "propagation", "--scale", "--format", "json").stdout)
     assert scaled["missions"][0]["value"] == pytest.approx(least / 0.05, rel=1e-4)
@@ -335,7 +481,7 @@ def test_explanations_can_be_repeated(model: str, needs: dict[str, str], changes
     mission = parse_mission(text)
     found = check_mission(mission, TODAY)
     rows = [one for one in found.rows if one.subject.kind in ("propagation", "other") and one.declared is not None]
-    assert len(rows) == 8
+    assert len(rows) == 10
     for one in rows:
         lines = sums(explain(mission, found, one.id))
         for symbol, numbers, value in lines:
@@ -374,10 +520,7 @@ def test_what_is_left_out_is_looser(run: Callable, tmp_path: Path) -> None:
     assert found.exit_code == 1
     refused = found.stdout.partition("Refused")[2]
     gone = ["", ".cubic_phase_error", ".location_error", ".islr"]
-    for row_id in (
-        *(f"other.antenna{one}" for one in gone),
-        *(f"propagation.{one}.zenith_delay" for one in PLATFORMS),
-    ):
+    for row_id in (*(f"other.antenna{one}" for one in gone), "propagation.zenith_delay"):
         assert f"{row_id}: declared -> not declared" in refused
     assert "propagation.source" not in refused  # there is nothing left to have one
 

@@ -83,8 +83,11 @@ class TestAgainstCheck:
             assert one.doubt == at(one).platforms.transmitter.path.doubt_m  # type: ignore[union-attr]
             (judged,) = [each for each in result.requirements if each.key == one.requirement]
             # Checked together with others, digits beyond those that a search settles to may differ.
-            assert one.utilization == pytest.approx(judged.utilization, rel=1e-6)
             assert one.row == judged.row
+            if one.status == "not_evaluated":  # a small row's would read as a margin
+                assert one.utilization is judged.utilization is None
+                continue
+            assert one.utilization == pytest.approx(judged.utilization, rel=1e-6)
             assert one.utilization == pytest.approx(max(each.utilization or 0 for each in result.requirements))
 
     def test_statuses_differ_and_those_that_break_nothing_comply(self, three_days: Passes) -> None:

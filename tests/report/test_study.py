@@ -194,6 +194,8 @@ def test_markdown_and_json(run, tmp_path: Path) -> None:
         "vary": [f"{TIME}=1:2s:11"],
         "cases": 11,
         "comply": 8,
+        "waived": 0,
+        "waived_by": [],
         "not_evaluated": 0,
         "without_mission": 0,
     }

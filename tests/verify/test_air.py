@@ -28,13 +28,20 @@ def test_images_confirm_limits_within_the_air() -> None:
     assert limits(SECTION_V, "{location_error: 1 m}") == {
         "transmitter.zenith_delay": "confirmed",
         "receiver.zenith_delay": "confirmed",
+        "zenith_delay": "confirmed",  # of both legs
     }
 
 
 def test_images_confirm_limits_from_orbit_by_the_phase() -> None:
-    found = limits(ORBITS, "{quadratic_phase_error: 10 deg}", "propagation.*.zenith_*")
+    found = limits(ORBITS, "{quadratic_phase_error: 10 deg}", "propagation.*zenith_*")
     assert set(found.values()) == {"confirmed"}
-    assert len(found) == 4
+    assert len(found) == 6
+
+
+def test_dispersion_has_no_image_and_says_why() -> None:
+    (row,) = verify_mission(parse_mission(ORBITS), "propagation.dispersion").rows
+    assert row.verdict == "not_evaluated"
+    assert "over the band" in str(row.reason)
 
 
 def test_a_limit_that_is_wrong_is_seen() -> None:
@@ -86,7 +93,7 @@ def test_draws_of_a_leg_are_one_number_times_its_course() -> None:
 @pytest.mark.parametrize("seed", [1, 2])
 @pytest.mark.parametrize("text", [SECTION_V, ORBITS], ids=["flat", "orbits"])
 def test_the_air_is_flown_as_it_is_drawn(text: str, seed: int) -> None:
-    """An image of all declared errors has the displacement of the drawn delays of both legs, each row its own."""
+    """An image of all declared errors has the displacement of the drawn delays, one number of both legs each."""
     mission = parse_mission(f"{text.strip()}\nsimulation: {{seed: {seed}}}\n")
     errors = declared_errors(mission)
     collection = PointCollection(mission, mission.geometry)
@@ -94,7 +101,7 @@ def test_the_air_is_flown_as_it_is_drawn(text: str, seed: int) -> None:
     analysis = Analysis(mission)
     total = np.zeros(4)
     half = mission.collection.aperture_time / 2
-    for error in analysis.random:
+    for error in (one for one in analysis.random if not one.counted_in):
         rng = np.random.default_rng([seed, *error.id.encode()])
         times = np.linspace(-half, half, 4097)
         (drawn,) = delay_courses(mission, error, times, 1, rng)

@@ -112,7 +112,11 @@ def _numbers(found: MissionFindings) -> Iterator[tuple[str, str, float | None]]:
 
 
 # ---------------------------------------------------------------------- what is looser
-_COMPUTED = ("oscillator", "spatial_variance")  # the file states no such number: a zero is a result, as a level is
+_COMPUTED = (
+    "oscillator",
+    "spatial_variance",
+    "dispersion",
+)  # the file states no such number: a zero is a result, as a level is
 # Each asks for more than the one before it.
 _RULES = {"combine": ("each", "rss", "sum"), "model": GATING_MODELS}
 

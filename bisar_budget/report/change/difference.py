@@ -239,6 +239,7 @@ def _mission(mission: MissionChange, gate: Gate | None) -> dict[str, Any]:
             name: {
                 "file": found.file,
                 "status": found.status,
+                "waived_by": [waiver.id for waiver in found.waived_by],
                 **outside_item(found),
             }
             for name, found in (("before", mission.before), ("after", mission.after))

@@ -20,7 +20,7 @@ from bisar_budget.report.words.sentences import percent
 from bisar_budget.units import format_quantity
 
 SUMS = (*NAMES, "autofocus_pull_in")  # kinds of rows that are no error
-_RESULTS = (*SUMS, "spatial_variance")  # kinds of rows that only other rows make
+_RESULTS = (*SUMS, "spatial_variance", "dispersion")  # kinds of rows that only other rows make
 _ROUNDING = 1e-6  # part by which the same error may use less of the same limit, as searches for limits settle
 _ANY_DAY = date(2000, 1, 1)  # waivers decide no use of a limit
 

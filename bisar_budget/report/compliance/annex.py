@@ -1,6 +1,7 @@
 """The annex of a compliance report: a sweep, images, draws that somebody asked for; with `--detail full` all rows."""
 
 import math
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from shlex import quote
 from typing import Any
@@ -15,7 +16,7 @@ from bisar_budget.findings.images import ImageEvidence, PointImage
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.monte_carlo import MonteCarlo
 from bisar_budget.findings.specification import SpecificationSheet
-from bisar_budget.findings.status import STATUS
+from bisar_budget.findings.status import STATUS, complying
 from bisar_budget.findings.trade import Axis, Trade, TradeStudy
 from bisar_budget.report.compliance import document as doc
 from bisar_budget.report.compliance.rows import (
@@ -40,7 +41,7 @@ from bisar_budget.report.explain.explanation import chain, collection_chain
 from bisar_budget.report.formats import verification
 from bisar_budget.report.formats.specification_sheet import specified
 from bisar_budget.report.words.requirements import held
-from bisar_budget.report.words.sentences import BINDING_WORDS, counted, percent, sentence
+from bisar_budget.report.words.sentences import BINDING_WORDS, counted, percent, sentence, waived_count
 from bisar_budget.units import format_quantity
 
 _MOST = 20  # lines of the table of a sweep
@@ -106,7 +107,8 @@ def _studied(page: Page, study: TradeStudy) -> doc.Chapter:
     else:
         listed = list(_parts(trade, by_word[1] if by_word else {}))
         name: doc.Text = doc.Name(by_word[0].key) if by_word else "Worst row"
-        heads = doc.heads(doc.Head(name, "id"), *doc.numbers("Cases", "Comply", "Utilization"))
+        counts_of_waived = ["Waived"] if study.waived else []
+        heads = doc.heads(doc.Head(name, "id"), *doc.numbers("Cases", "Comply", *counts_of_waived, "Utilization"))
         caption = "What binds in how many cases, and how many of them comply"
         caption = "How many cases comply with each" if by_word else caption
     said = "; ".join(words for _, words in listed[:_MOST]) + (" ..." if len(listed) > _MOST else ".")
@@ -151,8 +153,10 @@ def _value(axis: Axis, place: int) -> str:
 
 
 def _counts(study: TradeStudy) -> str:
-    failing = study.cases - study.complying - study.missing - study.unevaluated
+    failing = study.cases - study.complying - study.waived - study.missing - study.unevaluated
     said = [f"{study.cases} cases", f"{study.complying} comply ({percent(study.complying / study.cases)})"]
+    if study.waived:
+        said.append(waived_count(study.waived, study.waived_by))
     if study.unevaluated:
         said.append(f"{study.unevaluated} not evaluated")
     if failing:
@@ -211,11 +215,14 @@ def _parts(trade: Trade, by_word: Mapping[str, Trade]) -> Iterator[tuple[doc.Lin
         names, counts = np.unique(rows[rows != ""].astype(str), return_counts=True)
         for place in np.argsort(-counts, kind="stable").tolist():
             cases[str(names[place])] = {name: column[rows == names[place]] for name, column in values.items()}
+    is_waived = "waived" in trade.statuses
     for name, of_case in cases.items():
         statuses = of_case["status"].tolist()
-        complying = sum(status != "error" and not STATUS[status].fails for status in statuses)
-        line = (doc.Name(name), str(len(statuses)), str(complying), _uses(of_case["utilization"]))
-        yield line, f"{name}: {complying} of {len(statuses)} comply"
+        comply, waived = complying(Counter(statuses)), statuses.count("waived")
+        apart = f", {waived} waived" if waived else ""
+        numbers = (str(len(statuses)), str(comply), *([str(waived)] if is_waived else []))
+        line: doc.Line = (doc.Name(name), *numbers, _uses(of_case["utilization"]))
+        yield line, f"{name}: {comply} of {len(statuses)} comply{apart}"
 
 
 # ---------------------------------------------------------------------- images

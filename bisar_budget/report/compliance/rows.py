@@ -215,6 +215,8 @@ def what_sets_it(page: Page, row: Row) -> str:
         return "all QPE together within what autofocus corrects, π·N_pull"
     if row.subject.kind == "spatial_variance":  # one correction for the whole scene: no gain
         return f"QPE differs over the scene by ≤ {phase_limit(allocation.qpe_total, found)}"
+    if row.subject.kind == "dispersion":
+        return f"quadratic phase at the edges of the band ≤ {phase_limit(allocation.qpe_total, found)}"
     limit = allocation.qpe_allowed(row.owner)
     share = "" if row.owner == "mission" else f", {allocation.qpe.of(row.owner):.3g} of the budget"
     return f"QPE ≤ {phase_limit(limit, found)}{share}"

@@ -53,6 +53,7 @@ from bisar_budget.report.words.sentences import (
     sentence,
     shown_use,
     use_words,
+    waiver_names,
 )
 from bisar_budget.units import format_quantity
 
@@ -189,6 +190,7 @@ def _index_line(page: Page) -> doc.Line:
         worst = decides[0]
     use = shown_use(judged[0]) if judged and worst == judged[0].id else None
     counts = ", ".join(f"{count} {STATUS[status].words}" for status, count in found.summary.items())
+    counts += f"; {waiver_names([one.id for one in found.waived_by])}" if found.waived_by else ""
     name, decided = doc.Name(page.name, page.anchor), doc.Name(worst) if worst else "–"
     return name, doc.Name(page.file), doc.Badge(found.status), decided, dashed(use_words(use)), counts
 

@@ -19,9 +19,11 @@ from bisar_budget.effects.air_delays import (
     TROPOSPHERE,
     group_delay,
     leg_factor,
+    legs_of,
     metres_per_unit,
 )
 from bisar_budget.effects.declared import CUBIC, LOCATION
+from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.navigation_errors import TILTS, arm_at, body_axes, process_of, specific_force
 from bisar_budget.effects.oscillator_acceleration import (
     accelerated_tones,
@@ -93,7 +95,10 @@ def explained_random(analysis: Analysis, allocation: Allocation, error: RandomEr
     elif kind == "oscillator":
         yield from _oscillator(mission, error)
     elif kind == "propagation":
-        yield from _delay_on_a_leg(analysis, error)
+        for name in legs_of(error.owner):
+            yield from _delay_on_a_leg(analysis, error, name)
+        if error.owner not in PLATFORMS:
+            yield step("One air over both legs: their range errors add, with their signs, before anything is squared")
     elif kind == "other":
         yield effect_from_elsewhere()
     else:
@@ -505,13 +510,13 @@ def _acceleration(mission: Mission, error: RandomError) -> Iterator[Step]:
     )
 
 
-def _delay_on_a_leg(analysis: Analysis, error: RandomError) -> Iterator[Step]:
+def _delay_on_a_leg(analysis: Analysis, error: RandomError, name: str) -> Iterator[Step]:
     """From the delay of the zenith to that of the leg over the aperture, of a unit."""
     mission, delay = analysis.mission, error.subject.axis
-    path: PlatformState = getattr(analysis.geometry, error.owner)
+    path: PlatformState = getattr(analysis.geometry, name)
     (x, y, z), height = path.position, float(height_of(path.position))
     if delay == CONTENT and height < ABOVE_THE_AIR:
-        yield step(f"The {error.owner} flies at {height:.6g} m, below the ionosphere: no electrons on its leg")
+        yield step(f"The {name} flies at {height:.6g} m, below the ionosphere: no electrons on its leg")
         return
     values = {"R": path.slant_range, "z": z}
     if height < ABOVE_THE_AIR:
@@ -531,7 +536,7 @@ def _delay_on_a_leg(analysis: Analysis, error: RandomError) -> Iterator[Step]:
     half = mission.collection.aperture_time / 2
     times = [half * moment for moment in _MOMENTS]
     yield step(
-        "Delay by a unit as the elevation changes over the aperture",
+        f"Delay on the leg of the {name} by a unit as the elevation changes over the aperture",
         *(
             f"{time:+.6g} s: {with_unit(float(group_delay(mission, path, delay, time)), _per_unit('m', error))}"
             for time in times

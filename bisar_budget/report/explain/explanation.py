@@ -20,6 +20,8 @@ from bisar_budget.budget.judged_requirements import (
     TENTH,
     UntakenEffect,
 )
+from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.effects.air_delays import CONTENT, ELECTRONS, dispersed_legs, leg_factor
 from bisar_budget.effects.combined import phase_parts
 from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.effect import MOTION_UNITS, ErrorSource
@@ -138,6 +140,8 @@ def _to_utilization(mission: Mission, found: MissionFindings, row: Row) -> Itera
         yield from _phase_aggregate(together, found, row)
     elif row.subject.kind == CUBIC:
         yield from _cubic_aggregate(together, found, row)
+    elif row.subject.kind == "dispersion":
+        yield from _dispersion(analysis, found, row)
     elif row.subject.kind == "spatial_variance":
         yield from _spatial_variance(analysis, found, row)
     elif row.subject.kind == LOCATION:
@@ -432,6 +436,33 @@ def _cubic_aggregate(together: Together, found: MissionFindings, row: Row) -> It
     yield from combined("Cubic phase of the declared errors", found.combine, parts, row.declared)
     if row.allowable is not None:
         yield step("Allowable", f"requirements.cubic_phase_error = {row.allowable:.6g} rad")
+
+
+def _dispersion(analysis: Analysis, found: MissionFindings, row: Row) -> Iterator[Step]:
+    """Quadratic phase over the band of each leg, and of both."""
+    mission = analysis.mission
+    legs = dispersed_legs(mission, mission.geometry)
+    for name, phase in legs.items():
+        path, propagation = getattr(mission.geometry, name), mission.propagation
+        if propagation is None:
+            continue
+        content = propagation.content(name) * found.coverage_factor
+        values = {
+            "K": ELECTRONS * content * float(leg_factor(CONTENT, path.position, path.position)),
+            "c": SPEED_OF_LIGHT,
+            "f_0": mission.radar.center_frequency,
+            "B": mission.radar.bandwidth,
+        }
+        declared_at = place(mission, propagation.path(name, CONTENT))
+        yield step(f"Declared in {declared_at}, on the leg of the {name}", f"content = {content:.6g}/m²")
+        yield step(
+            f"Quadratic phase at the edges of the band, K = 40.308 m³/s² · content along the leg of the {name}",
+            WorkedEquation(f"phase_{name[0]}", "2*π*K/(c*f_0)*(B/(2*f_0))^2", values, float(phase), "rad"),
+        )
+    is_one_air = mission.propagation is not None and mission.propagation.is_one_air
+    rule = "sum" if is_one_air else found.combine  # of one air the legs add
+    yield from combined("Both legs", rule, [(name, float(phase)) for name, phase in legs.items()], row.declared)
+    yield step("Allowable: all of the requirement, without share and gain", f"allowable = {row.allowable:.6g} rad")
 
 
 def _spatial_variance(analysis: Analysis, found: MissionFindings, row: Row) -> Iterator[Step]:

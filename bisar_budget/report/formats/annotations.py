@@ -32,6 +32,7 @@ from bisar_budget.report.words.sentences import (
     markdown_text,
     percent,
     uri,
+    waiver_names,
 )
 
 _ORDER = ("error", "warning", "notice")
@@ -125,6 +126,8 @@ def step_summary(report: Report, style: Style) -> str:
             + confidence_words(mission)
             + ("; each error alone" if mission.combine == "each" else "")
         )
+        if mission.waived_by:
+            file += "; " + markdown_text(waiver_names([one.id for one in mission.waived_by]))
         lines.append(markdown_row((status, file, markdown_text(row.id), use)))
     usable = [mission for mission in report.missions if isinstance(mission, MissionFindings)]
     broken = [
@@ -372,7 +375,7 @@ def _suppressed(status: str, waivers: Sequence[AppliedWaiver], artifact: dict[st
         "status": "accepted",
         "justification": printable(waiver.reason),
         "location": _location(artifact, {"startLine": int(waiver.line or 1)}),
-        "properties": {"until": waiver.until.isoformat()},
+        "properties": {"id": printable(waiver.id), "until": waiver.until.isoformat()},
     }
     return {"suppressions": [suppression]}
 

@@ -14,10 +14,19 @@ from bisar_budget.findings.status import STATUS
 from bisar_budget.report import Style
 from bisar_budget.report.formats.json_document import document_text, outside_item, verdict_item
 from bisar_budget.report.words.heading import title_lines
-from bisar_budget.report.words.sentences import BINDING_WORDS, counted, percent, table, use_words, wrapped
+from bisar_budget.report.words.sentences import (
+    BINDING_WORDS,
+    counted,
+    percent,
+    table,
+    use_words,
+    waived_count,
+    waiver_names,
+    wrapped,
+)
 from bisar_budget.units import format_quantity
 
-_SGR = {"crossing": "32", "all": "32", "some": "32", "none": "1;31"}
+_SGR = {"crossing": "32", "all": "32", "some": "32", "waived": STATUS["waived"].sgr, "none": "1;31"}
 
 Answer = Solution | Comparison | Sensitivity
 
@@ -67,6 +76,8 @@ def _solved(solution: Solution) -> dict[str, Any]:
         "crossings": [_crossing(crossing) for crossing in solution.crossings],
         "nearest": _state(solution.nearest),
         "places_without_mission": solution.skipped,
+        "places_waived": solution.waived,
+        "waived_by": list(solution.waived_by),
         "parts": None,
         "verified": _imaged(solution.imaged),
     }
@@ -108,6 +119,8 @@ def _compared(found: Comparison) -> dict[str, Any]:
         "crossings": [],
         "nearest": None,
         "places_without_mission": sum(part.standing.status == "error" for part in found.parts),
+        "places_waived": sum(part.standing.status == "waived" for part in found.parts),
+        "waived_by": list(dict.fromkeys(waiver for part in found.parts for waiver in part.standing.waived_by)),
         "parts": [_part(part) for part in found.parts],
         "verified": _imaged(found.imaged),
     }
@@ -121,6 +134,7 @@ def _part(part: PartState) -> dict[str, Any]:
         "file": part.file,
         "is_given": part.is_given,
         **part.standing._asdict(),
+        "waived_by": list(part.standing.waived_by),
         "figures": list(part.figures),
         "silent_on": list(part.silent_on),
         "own_row": part.own_row,
@@ -140,7 +154,7 @@ def _crossing(crossing: Crossing) -> dict[str, Any]:
 
 
 def _state(state: State) -> dict[str, Any]:
-    return {**state._asdict(), "reason": state.reason or None}
+    return {**state._asdict(), "reason": state.reason or None, "waived_by": list(state.waived_by)}
 
 
 def _lines_of_parts(found: Comparison, style: Style) -> Iterator[str]:
@@ -148,6 +162,9 @@ def _lines_of_parts(found: Comparison, style: Style) -> Iterator[str]:
     count, total = len(found.complying), len(found.parts)
     what = f"row {printable(found.row)} complies" if found.row else "the mission complies"
     said = f"{what} with {count} of {total} parts" if count else f"{what} with none of {total} parts"
+    if waived := [part.standing for part in found.parts if part.standing.status == "waived"]:
+        ids = tuple(dict.fromkeys(waiver for one in waived for waiver in one.waived_by))
+        said += f", {waived_count(len(waived), ids)}"
     remark = f"; {found.model} model{', neither fails nor warns' if found.target == 'warn' else ''}"
     yield from title_lines(found, f"{printable(found.key)}: {said}", _SGR[found.status], style, remark=remark)
     is_mixed = len({part.kind for part in found.parts}) > 1
@@ -155,6 +172,7 @@ def _lines_of_parts(found: Comparison, style: Style) -> Iterator[str]:
     for part in found.parts:
         stands = part.standing
         row = printable(part.reason) if part.reason else stands.row or _undecided(stands.requirement)
+        row += f" ({waiver_names(stands.waived_by)})" if stands.waived_by else ""
         marks = f"{' *' if part.is_given else ''}{' -' if part.silent_on else ''}"
         kind = [part.kind] if is_mixed else []
         rows.append([f"{part.id}{marks}", *kind, STATUS[stands.status].text, use_words(stands.utilization), row])
@@ -190,8 +208,9 @@ def _said(solution: Solution, value: float) -> str:
 def _answer(solution: Solution) -> str:
     if solution.status == "all":
         return "every value of the range complies"
-    if solution.status == "none":
-        return "no value of the range complies"
+    if solution.status in ("waived", "none"):
+        waived = f", {waived_count(solution.waived, solution.waived_by)}" if solution.waived else ""
+        return f"no value of the range complies{waived}"
     return f"complies {', '.join(_intervals(solution))}"
 
 
@@ -223,6 +242,9 @@ def _facts(solution: Solution) -> Iterator[tuple[str, str]]:
         yield "Bounded", "from below and from above"
     if solution.skipped:
         yield "No mission", f"at {solution.skipped} of the places looked at; they do not comply"
+    if solution.waived:
+        waivers = waiver_names(solution.waived_by)
+        yield "Waived", f"at {solution.waived} of the places looked at, where it does not comply ({waivers})"
     for crossing in solution.crossings:
         yield "Inside", f"{_said(solution, crossing.inside.value)}: {_stands(crossing.inside)}{_resolves(crossing)}"
         yield "Outside", f"{_said(solution, crossing.outside.value)}: {_stands(crossing.outside)}"
@@ -238,7 +260,7 @@ def _facts(solution: Solution) -> Iterator[tuple[str, str]]:
             f"{printable(solution.key)} changes nothing that decides: the use is the same at every value",
         )
     if not solution.crossings:
-        is_miss = solution.status == "none"
+        is_miss = not solution.nearest.complies
         nearest = solution.nearest
         if is_miss and nearest.status == "not_evaluated":
             yield "Not judged", f"where nothing fails, such as {_said(solution, nearest.value)}: {_stands(nearest)}"
@@ -272,6 +294,7 @@ def _undecided(requirement: str | None) -> str:
 def _stands(state: State) -> str:
     """Say how the mission stands at a value."""
     word = STATUS[state.status].text
+    word += f" ({waiver_names(state.waived_by)})" if state.waived_by else ""
     if state.reason:
         return f"{word}, {printable(state.reason)}"
     if state.row is None:

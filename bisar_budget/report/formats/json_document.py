@@ -178,6 +178,8 @@ def _study(study: TradeStudy) -> dict[str, Any]:
         "vary": list(study.asked),
         "cases": study.cases,
         "comply": study.complying,
+        "waived": study.waived,
+        "waived_by": list(study.waived_by),
         "not_evaluated": study.unevaluated,
         "without_mission": study.missing,
     }

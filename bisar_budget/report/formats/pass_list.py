@@ -18,7 +18,15 @@ from bisar_budget.report.formats.csv_table import csv_text
 from bisar_budget.report.formats.json_document import document_text, outside_item
 from bisar_budget.report.words.heading import title_lines
 from bisar_budget.report.words.identity import digest
-from bisar_budget.report.words.sentences import percent, sentence, spaced, use_words, wrapped
+from bisar_budget.report.words.sentences import (
+    percent,
+    sentence,
+    spaced,
+    use_words,
+    waived_count,
+    waiver_names,
+    wrapped,
+)
 from bisar_budget.units import format_quantity
 
 
@@ -44,9 +52,22 @@ def as_json(passes: Passes, style: Style) -> str:
             }
             for one in passes.unknown
         ],
+        "summary": _summarized(passes),
         "passes": [_item(one) for one in passes.found],
     }
     return document_text("bisar-budget/passes/1", content)
+
+
+def _summarized(passes: Passes) -> dict[str, int]:
+    """Number of passes that comply, that are waived, and that do neither."""
+    counts = passes.counts
+    return {
+        "comply": len(passes.complying),
+        "waived": counts["waived"],
+        "fail": counts["fail"],
+        "not_evaluated": counts["not_evaluated"],
+        "without_mission": counts["error"],
+    }
 
 
 def _item(one: SatellitePass) -> dict[str, Any]:
@@ -78,6 +99,7 @@ def _item(one: SatellitePass) -> dict[str, Any]:
         "row": one.row,
         "utilization": one.utilization,
         "reason": one.reason or None,
+        "waived_by": list(one.waived_by),
     }
     return {key: None if isinstance(one, float) and not math.isfinite(one) else one for key, one in found.items()}
 
@@ -91,7 +113,9 @@ def as_csv(passes: Passes, style: Style) -> str:
     """Write a line for each pass, values in SI and radians, empty where there is none."""
     whose = [passes.file, passes.name, passes.platform]
     lines: list[list[object]] = [["file", "name", "platform", *_item(_NO_PASS)]]
-    lines += [[*whose, *_item(one).values()] for one in passes.found]
+    for one in passes.found:
+        values = _item(one) | {"waived_by": "; ".join(one.waived_by) or None}
+        lines.append([*whose, *values.values()])
     return csv_text(lines)
 
 
@@ -115,19 +139,22 @@ _HEADS = (
     ("doubt", "", ">"),
     ("use", "", ">"),
 )
+_WAIVERS = ("waived by", "", "<")  # a column where any pass is waived
 
 
 def as_text(passes: Passes, style: Style) -> str:
-    """Write lines for a person: how many comply, a table of at most 100 columns, and what decides."""
+    """Write lines for a person: how many comply, a table of at most 100 columns and waivers, and what decides."""
     return "\n".join(_lines(passes, style)) + "\n"
 
 
 def verdict(passes: Passes) -> str:
-    """How many passes comply, of how many, when and above what."""
+    """How many passes comply, of how many, when and above what; those that are waived are counted apart."""
     count = len(passes.found)
     comply = len(passes.complying)
     if not count:
         said = "no pass"
+    elif passes.counts["waived"]:
+        said = ", ".join(_counted(passes))
     elif count == 1:
         said = f"one pass, which {'complies' if comply else 'does not comply'}"
     elif comply == count:
@@ -139,6 +166,18 @@ def verdict(passes: Passes) -> str:
         f"{said}: {passes.platform} above {math.degrees(passes.min_elevation):.4g} deg and at {squint}, "
         f"{short_time(passes.start)} to {short_time(passes.stop)}"
     )
+
+
+def _counted(passes: Passes) -> Iterator[str]:
+    """Numbers of passes by how they stand; what occurs nowhere is said of those that fail alone."""
+    counts = passes.counts
+    count = len(passes.found)
+    yield f"{count} pass{'es' if count > 1 else ''}: {len(passes.complying)} comply"
+    yield waived_count(counts["waived"], passes.waived_by)
+    yield f"{counts['fail']} fail"
+    for name, words in (("not_evaluated", "not evaluated"), ("error", "without a mission")):
+        if counts[name]:
+            yield f"{counts[name]} {words}"
 
 
 def short_time(instant: Instant) -> str:
@@ -153,7 +192,7 @@ def _seconds(instant: Instant) -> str:
 
 
 def _lines(passes: Passes, style: Style) -> Iterator[str]:
-    sgr = "32" if passes.complying else "1;31"
+    sgr = "32" if passes.complying else STATUS["waived"].sgr if passes.accepted else "1;31"
     yield from title_lines(passes, verdict(passes), sgr, style, remark=f"; {passes.model} model")
     if passes.found:
         yield from _table(passes.found, style)
@@ -163,11 +202,12 @@ def _lines(passes: Passes, style: Style) -> Iterator[str]:
 
 
 def _table(found: Sequence[SatellitePass], style: Style) -> Iterator[str]:
-    cells = [_cells(one) for one in found]
-    heads = [tuple(head[place] for head in _HEADS) for place in (0, 1)]
-    widths = [max(len(row[column]) for row in (*heads, *cells)) for column in range(len(_HEADS))]
+    columns = (*_HEADS, _WAIVERS) if any(one.waived_by for one in found) else _HEADS
+    cells = [_cells(one)[: len(columns)] for one in found]
+    heads = [tuple(head[place] for head in columns) for place in (0, 1)]
+    widths = [max(len(row[column]) for row in (*heads, *cells)) for column in range(len(columns))]
     widths[0] = 8  # as in every table
-    sides = "".join(head[2] for head in _HEADS)
+    sides = "".join(head[2] for head in columns)
     for head in heads:
         yield spaced(head, widths, sides).rstrip()
     for one, row in zip(found, cells, strict=True):
@@ -192,6 +232,7 @@ def _cells(one: SatellitePass) -> tuple[str, ...]:
         " x ".join(map(_metres, sizes)) if None not in sizes else "-",
         "-" if one.doubt is None else format_quantity(one.doubt, "m"),
         use_words(one.utilization),
+        ", ".join(map(printable, one.waived_by)),
     )
 
 
@@ -238,7 +279,8 @@ def _decided(one: SatellitePass) -> str:
     if one.requirement is None:
         return ""
     name = NAMES.get(one.requirement, one.requirement.replace("_", " "))
-    return f"{name} decides" + (f", by {printable(one.row)}" if one.row else "")
+    waived = f", not met but waived ({waiver_names(one.waived_by)})" if one.waived_by else ""
+    return f"{name} decides" + (f", by {printable(one.row)}" if one.row else "") + waived
 
 
 def _figureless(one: SatellitePass) -> str:

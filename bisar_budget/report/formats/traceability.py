@@ -62,6 +62,8 @@ def _suite_of(mission: MissionFindings, class_name: str, file: str, counts: Coun
     yield from _properties(
         (
             ("file", file),
+            ("budget_status", mission.status),
+            ("waived_by", _waived_by(mission)),
             ("model", mission.model),
             ("combine", mission.combine),
             ("confidence", mission.confidence),
@@ -80,6 +82,11 @@ def _suite_of(mission: MissionFindings, class_name: str, file: str, counts: Coun
         texts = "\n".join(f"{file}:{w.line or '-'}: {xml_text(w.message)}" for w in mission.warnings)
         yield f"<system-out>{texts}</system-out>"
     yield "</testsuite>"
+
+
+def _waived_by(found: MissionFindings | JudgedRequirement | Row) -> str | None:
+    """Ids of the waivers that hold, as the file writes them; None where nothing is waived."""
+    return "; ".join(waiver.id for waiver in found.waived_by) or None
 
 
 def _suite(name: str, *, tests: int, failures: int, errors: int, skipped: int) -> str:
@@ -101,6 +108,7 @@ def _requirement_case(one: JudgedRequirement, mission: MissionFindings, class_na
         ("decided_by", one.row),
         *share_columns(one).items(),
         ("line", one.line),
+        ("waived_by", _waived_by(one)),
     )
     yield from _properties(values)
     said = requirement_finding(one, mission)
@@ -126,6 +134,7 @@ def _row_case(row: Row, mission: MissionFindings, class_name: str, file: str) ->
             ("equation", row.equation),
             ("evidence", row.evidence),
             ("line", row.line),
+            ("waived_by", _waived_by(row)),
         )
     yield from _properties(values)
     why, size = cause(row), measure(row, mission)

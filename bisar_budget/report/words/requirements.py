@@ -48,7 +48,7 @@ def requirement_id(one: JudgedRequirement) -> str:
 def requirement_lines(mission: MissionFindings) -> Iterator[RequirementLine]:
     """Write the table of requirements, in the order of the contract."""
     for one in mission.requirements:
-        is_open = one.status == "not_evaluated"
+        is_open = one.is_unjudged
         remark = ", ".join([*use_remarks(one), *(waiver.words for waiver in one.waivers)])
         yield RequirementLine(
             requirement=one,
@@ -64,7 +64,7 @@ def requirement_lines(mission: MissionFindings) -> Iterator[RequirementLine]:
 
 def use_remarks(one: JudgedRequirement) -> Iterator[str]:
     """Say what the use is of, where that is not reached over allowed: another row, a share, more by autofocus."""
-    if one.status == "not_evaluated" or one.value is None:
+    if one.is_unjudged or one.value is None:
         return
     if one.use_row not in (None, one.row):
         yield f"most used by {one.use_row}"
@@ -76,7 +76,8 @@ def use_remarks(one: JudgedRequirement) -> Iterator[str]:
 
 
 _OF_OWNER = "'s share"
-_SHARES = {"autofocus": "pull-in of autofocus", "scene": "at the scene's edge"}  # that no platform and no clock has
+# Shares that no platform and no clock has.
+_SHARES = {"autofocus": "pull-in of autofocus", "scene": "at the scene's edge", "band": "over the band"}
 
 
 def share_words(one: JudgedRequirement, share: DecidingShare) -> str:
@@ -118,7 +119,7 @@ def requirement_finding(one: JudgedRequirement, mission: MissionFindings) -> str
         text += f" {mission.confidence}"
     if one.reached is not None:
         text += f", {requirement_size(one.reached, one)} reached"
-    if one.row is not None and one.status != "not_evaluated":
+    if one.row is not None and not one.is_unjudged:
         text += f", decided by {one.row}"
     text += "".join(f", {remark}" for remark in use_remarks(one))
     return "; ".join([text, *filter(None, [one.reason]), *(waiver.words for waiver in one.waivers)])

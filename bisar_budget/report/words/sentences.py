@@ -105,9 +105,17 @@ _WAIVERS = 3  # whose ids a sentence has room for
 
 def waiver_names(ids: Sequence[str]) -> str:
     """Ids of waivers as the file writes them: `waiver receiver.*`, of many the first and how many there are more."""
+    return f"waiver{'s' if len(ids) > 1 else ''} {_some(ids)}"
+
+
+def waived_count(count: int, ids: Sequence[str]) -> str:
+    """Number of missions that are waived, and by which waivers: `12 waived (mission.location_error)`."""
+    return f"{count} waived ({_some(ids)})" if ids else f"{count} waived"
+
+
+def _some(ids: Sequence[str]) -> str:
     shown = [printable(one) for one in ids[:_WAIVERS]]
-    shown += [f"{len(ids) - _WAIVERS} more"] if len(ids) > _WAIVERS else []
-    return f"waiver{'s' if len(ids) > 1 else ''} {', '.join(shown)}"
+    return ", ".join([*shown, f"{len(ids) - _WAIVERS} more"] if len(ids) > _WAIVERS else shown)
 
 
 def dotted(path: KeyPath) -> str:
@@ -128,7 +136,8 @@ def dashed(text: str) -> str:
 
 _PHASE_UNIT = "deg"  # of the phase requirement that a file does not state
 LEVELS = ("pslr", "islr")  # requirements in dB of the image, and the kinds of the rows that add them up
-_OF_PHASES = ("quadratic_phase_error", "cubic_phase_error", "spatial_variance")  # rows that add phases up
+# Kinds of rows that add phases up.
+_OF_PHASES = ("quadratic_phase_error", "cubic_phase_error", "spatial_variance", "dispersion")
 
 
 def row_size(value: float | None, row: Row, mission: MissionFindings, rounding: str = "nearest") -> str:
@@ -161,8 +170,8 @@ def allowable_words(row: Row, mission: MissionFindings) -> str:
 
 
 def shown_use(row: Row) -> float | None:
-    """Utilization of a row; None where it has no limit, or was not evaluated."""
-    return None if row.allowable is None or row.status == "not_evaluated" else row.utilization
+    """Utilization of a row; None where it has no limit, or cannot be judged, be that waived or not."""
+    return None if row.allowable is None or row.is_unjudged or row.status == "not_evaluated" else row.utilization
 
 
 def phase_unit(mission: MissionFindings) -> str:

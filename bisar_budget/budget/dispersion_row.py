@@ -1,0 +1,64 @@
+"""The row of dispersion in the air: free electrons bend the phase over the band, which blurs an image in range.
+
+The quadratic requirement holds it on its own: it is a phase over frequency, and adds to none over slow time. It may
+have all of the requirement, since nobody has a share for the air, and autofocus does not correct it.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from bisar_budget import phrases
+from bisar_budget.analysis.analysis import Analysis, Case
+from bisar_budget.budget.judged_rows import FamilyRow, Judging, worded
+from bisar_budget.effects.air_delays import CONTENT, dispersed
+from bisar_budget.effects.declared import QUADRATIC
+from bisar_budget.effects.effect import PLATFORMS, subject
+from bisar_budget.findings.row import Row
+from bisar_budget.phrases import NOTHING
+
+DISPERSION = subject("mission", "dispersion")
+
+
+def dispersion_rows(judging: Judging, analysis: Analysis) -> Iterator["DispersionRow"]:
+    """Judge the quadratic phase at the edges of the band; no row where no electron content is declared."""
+    propagation = analysis.mission.propagation
+    if propagation is None or all(propagation.content(name) is None for name in PLATFORMS):
+        return
+    phase = judging.array(dispersed(analysis.mission, analysis.geometry))
+    total = judging.array(analysis.allocation.qpe_total)
+    judged = judging.row(DISPERSION, phase, total)
+    judged = judged._replace(allowable_published=total, allowable_full=total)
+    yield DispersionRow(judged.held_to(QUADRATIC))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DispersionRow(FamilyRow):
+    """Dispersion in many cases. [rad]"""
+
+    def in_words(self, case: Case, model: str) -> Row:
+        """The row of one case; models do not differ in it."""
+        propagation = case.mission.propagation
+        assert propagation is not None  # else there is no row
+        contents: dict[str, Any] = {name: propagation.content(name) for name in PLATFORMS}
+        stated = next(name for name, content in contents.items() if content is not None)
+        phase, limit = case.number(self.judged.declared), case.number(self.judged.allowable)
+        over = remark = NOTHING
+        if phase:
+            over = phrases.dispersion_over(phase, limit)
+        if phase and propagation.is_one_air:
+            remark = phrases.content_allowed(float(np.asarray(contents[stated])) * limit / phase)
+        path = propagation.path(stated, CONTENT)
+        return worded(
+            case,
+            self.judged,
+            unit="rad",
+            path=path,
+            equation="(2π/λ)·g·(B/2f₀)²",
+            over=over,
+            remarks=tuple(filter(None, (remark,))),
+            evidence=case.mission.propagation and propagation.source_of(stated),
+            binding_requirement=QUADRATIC,
+        )
