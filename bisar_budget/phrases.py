@@ -691,7 +691,7 @@ def mask_is_cut(bandwidth: float, last: float, beyond: float) -> str:
 @phrase
 def mask_begins(frequency: float, slope: float) -> str:
     """Said of an oscillator. [Hz]"""
-    return f"the mask begins at {frequency:g} Hz; below, it continues as f^-{slope:.3g}"
+    return f"the mask begins at {frequency:g} Hz; below, it continues as f^(\u2212{slope:.3g})"
 
 
 @phrase
