@@ -186,10 +186,11 @@ def read_earth_rotation(data: bytes, name: str, instant: Instant) -> Orientation
     begins = ends = None
     measured: float | None = None  # the last day that is no prediction
     is_first_predicted = False
+    form = ""
     for row in _rows(data.decode("utf-8-sig", "replace"), name):
         numbers = _numbers(row, measured, f"{name}:{row.line}")
         day = int(numbers[0])
-        measured = measured if row.is_predicted else day
+        measured, form = measured if row.is_predicted else day, row.form
         if ends is not None and day <= ends:
             raise PathFileError(
                 f"{name}:{row.line}: the day {day} is not after {ends} of a row before; days must rise"
@@ -204,7 +205,7 @@ def read_earth_rotation(data: bytes, name: str, instant: Instant) -> Orientation
         raise PathFileError(f"{name}: has no row of values")
     spans = " to ".join(Instant(day, 0.0).as_text()[:10] for day in (begins, ends))
     raise PathFileError(
-        f"{name}: has no values for {instant.as_text()}; it covers {spans}",
+        f"{name}: has no values for {instant.as_text()}; it covers {spans} (read as {form})",
         "accepted: a table with the day of the aperture and the one after it",
     )
 

@@ -246,7 +246,7 @@ def _chapter(answer: Answer, anchor: str) -> doc.Chapter:
     sheet, offer = answer
     facts: list[tuple[doc.Text, doc.Text]] = [("File", doc.Name(printable(sheet.file))), ("Terms", _terms(sheet))]
     if outside := overrides_words(sheet):
-        facts.append(("From outside the file", outside))
+        facts.append(("Overrides", outside))
     blocks: list[doc.Block] = [
         doc.Paragraph(_verdict(sheet), f"verdict {'pass' if sheet.complies else 'fail'}"),
         doc.Facts(facts),

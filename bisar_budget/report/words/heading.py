@@ -62,7 +62,7 @@ def overrides_words(found: AboutMission, *, with_changes: bool = True) -> str:
 def overrides_lines(found: AboutMission) -> list[str]:
     """The same for a terminal, beside `--set`; no line if there is nothing."""
     said = overrides_words(found, with_changes=False)
-    return wrapped(f"From outside the file: {said}", "  ") if said else []
+    return wrapped(f"Overrides: {said}", "  ") if said else []
 
 
 def file_words(found: AboutMission) -> str:
