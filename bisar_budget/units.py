@@ -289,16 +289,11 @@ def _parse_closely(value: object, dimension: Dimension) -> float:
     return _finite(number * scale[0] / scale[1], dimension)
 
 
-LEAST_LEVEL_DB = 5e-4  # a level nearer to 0 dB is written as 0 dB
-
-
 def format_quantity(value: float, unit: str, digits: int = 3, rounding: str = "nearest") -> str:
     """Write an SI value with a prefix that keeps it readable: 0.005 m/s^2 is `5 mm/s²`.
 
     `rounding` is `nearest` or `down`; a limit is rounded down so that copying it from the page still passes.
     """
-    if unit == "dB" and rounding == "nearest" and abs(value) < LEAST_LEVEL_DB:
-        return "0 dB"
     size, suffix = abs(value), ""
     for scale, smallest, largest, its_suffix in _steps(unit):
         suffix = its_suffix

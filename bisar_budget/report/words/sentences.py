@@ -150,7 +150,7 @@ def row_size(value: float | None, row: Row, mission: MissionFindings, rounding: 
     given = _given(row.line, row.unit)
     if not given and row.unit == "rad" and row.subject.kind in _OF_PHASES:
         given = phase_unit(mission)
-    return format_in(value, row.unit, given, 3, rounding)
+    return format_in(_level(value, row.unit), row.unit, given, 3, rounding)
 
 
 def row_limit(row: Row, mission: MissionFindings) -> str:
@@ -195,7 +195,15 @@ def requirement_size(value: float | None, one: JudgedRequirement, rounding: str 
     if value is None:
         return "-"
     given = _given(one.line, one.unit) or (_PHASE_UNIT if one.unit == "rad" else "")
-    return format_in(value, one.unit, given, 3, rounding)
+    return format_in(_level(value, one.unit), one.unit, given, 3, rounding)
+
+
+LEAST_LEVEL_DB = 5e-4  # an echo as strong as its point is 0 dB, but for rounding
+
+
+def _level(value: float, unit: str) -> float:
+    """The number itself; 0 of a level that is 0 dB but for rounding."""
+    return 0.0 if unit == "dB" and abs(value) < LEAST_LEVEL_DB else value
 
 
 def _given(line: int | None, unit: str) -> str:
