@@ -1120,7 +1120,7 @@ def drawn_without_coverage() -> str:
 def waived(line: int | None, until: date, reason: str, is_expired: bool, waiver_id: str) -> str:
     """Said of a row, or a requirement, that fails."""
     place = "--set" if line is None else f"line {line}"
-    return f"{'expired ' if is_expired else ''}waiver {waiver_id} of {place}, until {until}: {reason}"
+    return f"{'expired ' if is_expired else ''}waiver of {place} ({waiver_id}), until {until}: {reason}"
 
 
 @phrase
