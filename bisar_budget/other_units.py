@@ -125,9 +125,24 @@ _OTHER_LEVELS = {
 }
 
 
+# 47°15'04.3", 47d15m, 47:15:04, N behind.
+_SEXAGESIMAL = re.compile(
+    r"([+-]?)(\d{1,3})\s*(?:\u00b0|\u00ba|d|deg|:)\s*(\d{1,2}(?:\.\d*)?)\s*(?:['\u2032\u2019m:]|min)?"
+    r"\s*(?:(\d{1,2}(?:\.\d*)?)\s*(?:[\"\u2033\u201ds]|''|sec)?)?\s*([NSEW]?)",
+    re.ASCII,
+)
+
+
 def about_unit(digits: str, written: str, dimension: Dimension) -> tuple[str, str]:
     """Problem and hint for a number with a unit that no dimension reads."""
     unit = normal_unit(written)
+    sexagesimal = _SEXAGESIMAL.fullmatch(digits + written) if dimension.si == "rad" else None
+    if sexagesimal is not None:
+        sign, degrees, minutes, seconds, side = sexagesimal.groups()
+        if float(minutes) < 60 and float(seconds or 0) < 60:
+            angle_deg = int(degrees) + float(minutes) / 60 + float(seconds or 0) / 3600
+            minus = "-" if (sign == "-") != (side in ("S", "W") and side != "") else ""
+            return "is in degrees, minutes and seconds", f"Write {minus}{angle_deg:.11g} deg"
     problem = f"has the unknown unit {written!r}"
     if other_level := _OTHER_LEVELS.get(unit.lower()):
         is_noise = unit.lower().endswith("/hz") and dimension.si == "dBc/Hz"

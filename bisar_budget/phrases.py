@@ -691,7 +691,7 @@ def mask_is_cut(bandwidth: float, last: float, beyond: float) -> str:
 @phrase
 def mask_begins(frequency: float, slope: float) -> str:
     """Said of an oscillator. [Hz]"""
-    return f"the mask begins at {frequency:g} Hz; below, it continues as f^-{slope:.3g}"
+    return f"the mask begins at {frequency:g} Hz; below, it continues as f^(\u2212{slope:.3g})"
 
 
 @phrase
@@ -1120,7 +1120,7 @@ def drawn_without_coverage() -> str:
 def waived(line: int | None, until: date, reason: str, is_expired: bool, waiver_id: str) -> str:
     """Said of a row, or a requirement, that fails."""
     place = "--set" if line is None else f"line {line}"
-    return f"{'expired ' if is_expired else ''}waiver {waiver_id} of {place}, until {until}: {reason}"
+    return f"{'expired ' if is_expired else ''}waiver of {place} ({waiver_id}), until {until}: {reason}"
 
 
 @phrase

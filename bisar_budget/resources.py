@@ -83,6 +83,36 @@ def held(file: str, most: int, read: Callable[[], bytes]) -> bytes:
     return read() if _held is None else _held.content(file, most, read)
 
 
+_STREAMS = (
+    "/dev/fd/",
+    "/proc/self/fd/",
+    "/dev/stdin",
+    "/dev/stdout",
+    "/dev/stderr",
+    "/dev/tty",
+    "/dev/null",
+    "/dev/full",
+)
+
+
+def special_file(path: str) -> str:
+    """Kind of a file that waits, or never ends: a named pipe, a device, a socket; empty for any other.
+
+    Streams that this process has open, such as those of a shell's `<(…)`, are none of them.
+    """
+    if os.path.abspath(path).startswith(_STREAMS):
+        return ""
+    try:
+        mode = os.stat(path).st_mode
+    except (OSError, ValueError):
+        return ""
+    if stat.S_ISFIFO(mode):
+        return "a named pipe"
+    if stat.S_ISSOCK(mode):
+        return "a socket"
+    return "a device" if stat.S_ISCHR(mode) or stat.S_ISBLK(mode) else ""
+
+
 class UnreadableError(Exception):
     """A file that cannot be read. The message begins with its name; `is_missing` where there is none of it."""
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import click
 
 from bisar_budget.faults import MissionError, printable
-from bisar_budget.resources import FILES_READ, locked
+from bisar_budget.resources import FILES_READ, locked, special_file
 
 if TYPE_CHECKING:
     from types import ModuleType
@@ -256,6 +256,8 @@ def replacing(path: str) -> Iterator[str]:
     """
     temporary = lock = None
     try:
+        if kind := special_file(path):
+            fail(f"cannot write {path}: {kind}; accepted: a regular file, or - for standard output")
         target = os.path.realpath(path)
         with suppress(OSError):  # a file that a mission, or the project, names: an orbit, a log, a part, a list
             there = os.stat(target)

@@ -24,6 +24,7 @@ from bisar_budget.mission.quantities import (
 )
 from bisar_budget.mission.readers import DIRECTION, TextList
 from bisar_budget.ranges.exact_ranges import Floats
+from bisar_budget.resources import special_file
 from bisar_budget.units import Dimension, normal_unit, parse_quantity
 
 Values = Floats | NDArray[np.object_]  # numbers in SI, or words
@@ -346,6 +347,8 @@ def _rounded(values: Floats) -> Floats:
 # ---------------------------------------------------------------- cases of a file
 def table_file(tree: dict[str, Any], path: str) -> Cases:
     """Read the CSV of cases of a file, as `table` does; a `TableError` too where it is unreadable or too large."""
+    if kind := special_file(path):
+        raise TableError.of_file(path, f"cannot be read: {kind}; accepted: a regular file")
     try:
         with open(path, encoding="utf-8", newline="") as file:
             text = file.read(LARGEST_TABLE + 1)

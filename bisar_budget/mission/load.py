@@ -13,7 +13,7 @@ from bisar_budget.faults import Fault, MissionError, SetValue, changes_words, fi
 from bisar_budget.mission.model import MISSION, Mission, PartFile, flies_on_earth, names_files, names_parts
 from bisar_budget.mission.readers import INVALID
 from bisar_budget.mission.tree import MAX_BYTES, Tree, UnusableError, read_tree
-from bisar_budget.resources import UnreadableError, held, standard_input
+from bisar_budget.resources import UnreadableError, held, special_file, standard_input
 
 # Imported where a file needs them: `changes`, `parts` and `paths`, which most missions do without. Compiled, as in an
 # environment without bytecode, they take 40 ms, a fifth of the start of a check.
@@ -49,6 +49,8 @@ def load_mission(
 def _content(path: str) -> bytes:
     if path == "-":
         return _bounded(standard_input())
+    if kind := special_file(path):
+        raise UnreadableError(f"{kind}; accepted: a regular file, or - for standard input")
     with open(path, "rb") as file:
         return _bounded(file)
 

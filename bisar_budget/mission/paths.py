@@ -52,9 +52,9 @@ from bisar_budget.paths.flight import (
     stretch_around,
     track_around,
 )
-from bisar_budget.paths.instant import DAY, Instant
+from bisar_budget.paths.instant import DAY, Instant, later
 from bisar_budget.paths.log_places import LogKeys, hold_to_motion
-from bisar_budget.paths.orientation import UNKNOWN, Orientation, read_finals
+from bisar_budget.paths.orientation import UNKNOWN, Orientation, read_earth_rotation
 from bisar_budget.paths.path_formats import ORBIT_FORMATS, hold_to_format, hold_to_log, read_log
 from bisar_budget.paths.sbet import read_accuracy
 from bisar_budget.resources import DISK, Files, UnreadableError
@@ -297,11 +297,12 @@ def _orientation(mission: Mission, center: Instant, read: Beside) -> tuple[Orien
     """How the Earth is turned in the middle of the aperture, and the table that says it with its SHA-256."""
     stated = mission.earth_orientation
     if stated is None:
-        return UNKNOWN, None
+        return UNKNOWN._replace(day=center.day), None
     if stated.file is None:
-        return stated.orientation, None
+        return stated.orientation._replace(day=center.day), None
     data = read(stated.file)  # that it can be read is known, see `with_paths`
-    return read_finals(data, stated.file, center), (stated.file, hashlib.sha256(data).hexdigest())
+    turned = read_earth_rotation(data, stated.file, center)._replace(day=center.day)
+    return turned, (stated.file, hashlib.sha256(data).hexdigest())
 
 
 def _kept(kept: dict[tuple[object, ...], _T], most: int, key: tuple[object, ...], made: Callable[[], _T]) -> _T:
@@ -331,11 +332,11 @@ def _orbit_path(
         raise PathFileError(f"{name}: is {words}")
 
     def places(times: earth.Floats) -> earth.Floats:
-        return axes.places(np.array([orbit.place(center.after(time)) for time in times.tolist()]))
+        return axes.places(np.array([orbit.place(later(center, time)) for time in times.tolist()]))
 
     fitted = interpolated(places, aperture_time_s, widest)
     # An interpolation is worst between the places of a file.
-    instants = [center.after(part * half) for part in (0.0, -0.5, 0.5, -1.0, 1.0)]
+    instants = [later(center, part * half) for part in (0.0, -0.5, 0.5, -1.0, 1.0)]
     of_orbit = max((orbit.doubts(instant) for instant in instants), key=len)
     doubt = max(orbit.doubt(instant) for instant in instants)
     _hold_to_range(doubt, fitted.state.slant_range, of_orbit, orbit.remedy, name)

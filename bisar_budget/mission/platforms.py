@@ -268,10 +268,13 @@ class _Instant(Reader):
     what = "2026-06-01T05:20:31.250Z and the like"
 
     def leaf(self, value: Any) -> Any:
-        """Read 2026-06-01T05:20:31.250Z."""
+        """Read 2026-06-01T05:20:31.250Z, or with an offset from UTC."""
         found = parse_instant(value) if isinstance(value, str) else None
         if found is None:
-            raise InvalidValueError("must be an instant of UTC", f"accepted: {self.what}")
+            is_zoneless = isinstance(value, str) and parse_instant(value, needs_zone=False) is not None
+            problem = "has no zone" if is_zoneless else "must be an instant of UTC"
+            hint = "Write Z behind it where it is UTC, or the offset from UTC, such as +01:00" if is_zoneless else ""
+            raise InvalidValueError(problem, f"accepted: {self.what}", hint)
         return found
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:

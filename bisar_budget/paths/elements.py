@@ -26,7 +26,7 @@ from bisar_budget.extras import install_command
 from bisar_budget.faults import shown
 from bisar_budget.geometry import Vector
 from bisar_budget.paths.flight import Orbit, PathDoubt, PathFileError, Sample, interpolate
-from bisar_budget.paths.instant import DAY, Instant, day_of_year
+from bisar_budget.paths.instant import DAY, Instant, day_of_year, later, tai_less_utc
 from bisar_budget.paths.messages import (
     EARLIEST,
     LATEST,
@@ -87,6 +87,18 @@ class Elements:
         return (object_key(self.name), str(self.number))
 
 
+@dataclass(frozen=True, kw_only=True)
+class BrokenEntry:
+    """An entry of a catalogue that cannot be used: why, and the names that tell whose it is, as far as it says."""
+
+    problem: str
+    names: tuple[str, ...] = ()
+    is_empty: bool = False  # it says nothing of anybody
+
+
+Entry = Elements | BrokenEntry
+
+
 def teme(elements: Elements) -> Callable[[Instant], Vector]:
     """Return a function that places an object in the true equator and mean equinox of date, by SGP4. [m]
 
@@ -109,7 +121,7 @@ def teme(elements: Elements) -> Callable[[Instant], Vector]:
         raise PathFileError(f"{elements.where}: SGP4 refuses {elements.object}: {_failure(satellite.error)}")
 
     def place(instant: Instant) -> Vector:
-        elapsed = instant.since(elements.epoch)
+        elapsed = instant.since(elements.epoch) + tai_less_utc(instant.day) - tai_less_utc(elements.epoch.day)
         if abs(elapsed) > _FARTHEST_DAYS * DAY:
             raise PathFileError(
                 f"{elements.where}: the elements of {elements.object} are of {elements.epoch.as_text()}, more than a"
@@ -138,8 +150,8 @@ def smooth(place: Callable[[Instant], Vector]) -> Callable[[Instant], Vector]:
 
     @lru_cache(maxsize=64)
     def node(day: int, count: int) -> Sample:
-        time = Instant(day, 0.0).after(count * _STEP_S)
-        return Sample(time, place(time), (0.0, 0.0, 0.0))
+        midnight = Instant(day, 0.0)  # the seconds of its day run on beside it, whatever leaps
+        return Sample(midnight.after(count * _STEP_S), place(later(midnight, count * _STEP_S)), (0.0, 0.0, 0.0))
 
     def between(instant: Instant) -> Vector:
         count = math.floor(instant.seconds / _STEP_S)
@@ -153,16 +165,28 @@ def smooth(place: Callable[[Instant], Vector]) -> Callable[[Instant], Vector]:
 
 
 def orbit_of(
-    found: Sequence[Elements], name: str, wanted: str | None, center: Instant, orientation: Orientation
+    entries: Sequence[Entry], name: str, wanted: str | None, center: Instant, orientation: Orientation
 ) -> Orbit:
     """Orbit of one object, by the elements whose epoch is nearest; of two that are as near the last of the file.
 
-    All but the elements of a file are arguments of its reader; `wanted` is a name or a catalogue number. A
-    `PathFileError` says that there are no elements, or those of several objects; that SGP4 is missing or refuses.
+    All but the entries of a file are arguments of its reader; `wanted` is a name or a catalogue number. Entries of
+    other objects that are broken are left out, and counted in the words of the orbit. A `PathFileError` says that
+    there are no elements, or those of several objects; that an entry of the object is broken, or one of nobody knows
+    whom where no object is named; that SGP4 is missing or refuses.
     """
+    found = [entry for entry in entries if isinstance(entry, Elements)]
+    broken = [entry for entry in entries if isinstance(entry, BrokenEntry)]
+    for entry in broken:
+        is_wanted = wanted is None and not (entry.is_empty and found)
+        if is_wanted or not found or (wanted is not None and object_key(wanted) in entry.names):
+            raise PathFileError(entry.problem)
     if not found:
         raise PathFileError(f"{name}: has no element set")
     elements = min(reversed(one_object(found, name, wanted, "number")), key=lambda one: abs(center.since(one.epoch)))
+    for entry in broken:
+        if elements.names[-1] in entry.names:
+            raise PathFileError(entry.problem)
+    left_out = f", {len(broken)} of {len(entries)} entries left out ({broken[0].problem})" if broken else ""
     inertial = smooth(teme(elements))
     inertial(elements.epoch)  # what SGP4 refuses is known before anybody asks
 
@@ -181,9 +205,10 @@ def orbit_of(
             f" {'before' if days > 0 else 'after'} the aperture; SGP4 may place it {least:.0f} to {most:.0f} km off",
         )
 
+    words = f"{elements.kind} of {elements.object}, epoch {elements.epoch.as_text()}, SGP4{orientation.words}"
     return Orbit(
         place=lambda instant: from_teme(inertial(instant), instant, orientation),
-        words=f"{elements.kind} of {elements.object}, epoch {elements.epoch.as_text()}, SGP4{orientation.words}",
+        words=words + left_out,
         epoch=elements.epoch,
         doubts=doubts,
         doubt=doubt,
@@ -228,40 +253,62 @@ def read_tle(
     A line of the name may stand above each. Blank lines, and those that begin with `#`, are no part of the file.
     """
     hold_to_size(len(data), name)
-    return orbit_of(list(element_sets(decoded(data, name), name)), name, wanted, center, orientation)
+    return orbit_of(list(_entries(decoded(data, name), name)), name, wanted, center, orientation)
 
 
 def element_sets(text: str, name: str) -> Iterator[Elements]:
-    """The element sets of a file."""
+    """The element sets of a file; a `PathFileError` says what is wrong with the first that is broken."""
+    for entry in _entries(text, name):
+        if isinstance(entry, BrokenEntry):
+            raise PathFileError(entry.problem)
+        yield entry
+
+
+def _entries(text: str, name: str) -> Iterator[Entry]:
+    """The element sets of a file, in its order; after a broken one reading goes on with the next line of its form."""
     above: tuple[int, str] | None = None
     first: tuple[int, str] | None = None
+
+    def broken(at: int, problem: str, *lines: str) -> BrokenEntry:
+        numbers = [object_key(line[2:7]) for line in lines]
+        names = (object_key(above[1]),) if above else ()
+        return BrokenEntry(problem=f"{name}:{at}: {problem}", names=(*names, *numbers))
+
     for at, line in enumerate(text.removeprefix("\ufeff").split("\n"), 1):
         line = line.rstrip(" \t\r")
         if not line or line.startswith("#"):
             continue
-        where = f"{name}:{at}"
         if not line.isascii() or not line.isprintable():
             wrong = next(one for one in line if not one.isascii() or not one.isprintable())
-            raise PathFileError(f"{where}: has a character that element sets do not have (got {shown(wrong)})")
-        if first is not None:
-            if not _begins(line, "2"):
-                raise PathFileError(f"{where}: must be line 2 of the set that begins in line {first[0]}{_got(line)}")
-            yield _from_lines(first, (at, line), above[1] if above else "", name)
+            lines = [one for one in (first[1] if first else "", line) if one and one[0] in "12"]
+            yield broken(at, f"has a character that element sets do not have (got {shown(wrong)})", *lines)
             above = first = None
-        elif _begins(line, "1"):
+            continue
+        if first is not None and _begins(line, "2"):
+            try:
+                yield _from_lines(first, (at, line), above[1] if above else "", name)
+            except PathFileError as error:
+                entry = broken(at, "", first[1], line)
+                yield BrokenEntry(problem=str(error), names=entry.names)
+            above = first = None
+            continue
+        if first is not None:
+            yield broken(at, f"must be line 2 of the set that begins in line {first[0]}{_got(line)}", first[1])
+            above = first = None
+        if _begins(line, "1"):
             first = (at, line)
         elif _begins(line, "2"):
-            raise PathFileError(f"{where}: is line 2 of an element set; its line 1 must come before it")
-        elif above is not None:
-            raise PathFileError(f"{where}: must be line 1 of the set that line {above[0]} names{_got(line)}")
+            yield broken(at, "is line 2 of an element set; its line 1 must come before it", line)
+            above = None
         else:
+            if above is not None:
+                yield broken(at, f"must be line 1 of the set that line {above[0]} names{_got(line)}")
             above = (at, shown(line.removeprefix("0 ").strip()))
     if first is not None:
-        raise PathFileError(f"{name}:{first[0]}: line 1 of an element set has no line 2 after it")
-    if above is not None:
-        raise PathFileError(
-            f"{name}:{above[0]}: must be line 1 of an element set, or a name above one{_got(above[1])}"
-        )
+        yield broken(first[0], "line 1 of an element set has no line 2 after it", first[1])
+    elif above is not None:
+        problem = f"must be line 1 of an element set, or a name above one{_got(above[1])}"
+        yield broken(above[0], problem)
 
 
 def _got(line: str) -> str:
@@ -276,6 +323,8 @@ def _from_lines(first: tuple[int, str], second: tuple[int, str], object_name: st
     lines = {}
     for at, line in (first, second):
         where = f"{name}:{at}"
+        if len(line) == _COLUMNS - 1:
+            raise PathFileError(f"{where}: has 68 columns: the checksum, column {_COLUMNS}, is missing")
         if len(line) != _COLUMNS:
             raise PathFileError(f"{where}: has {len(line)} columns, a line of an element set has {_COLUMNS}")
         digits = (sum(n * line.count(str(n), 0, -1) for n in range(1, 10)) + line.count("-", 0, -1)) % 10
@@ -348,7 +397,18 @@ def _drag(line: str, where: str) -> float:
 
 # ---------------------------------------------------------------------- orbit mean-elements messages
 _VERSION = "CCSDS_OMM_VERS"
-_Records = Iterator[tuple[str, Mapping[str, Any]]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Message:
+    """Keywords and values of a message; what is wrong with its form; and whether it may leave nothing out."""
+
+    where: str
+    leaves: Mapping[str, Any]
+    problem: str = ""
+    is_whole: bool = False  # as the standard has it; JSON and CSV of CelesTrak leave out what has one value only
+
+
 _MANDATORY = {
     "MEAN_ELEMENT_THEORY": ("SGP4", "SGP/SGP4"),  # the second in examples of CCSDS 502.0-B
     "REF_FRAME": ("TEME",),
@@ -371,50 +431,57 @@ def read_omm(
             records = _from_json(text, name)
         else:
             records = _from_keywords(text, name) if begins.startswith(_VERSION) else _from_csv(text, name)
-    found = [_from_message(record, where) for where, record in records]
-    return orbit_of(found, name, wanted, center, orientation)
+    return orbit_of([_entry(message) for message in records], name, wanted, center, orientation)
 
 
-def _from_markup(data: bytes, name: str) -> _Records:
+def _entry(message: _Message) -> Entry:
+    """Elements of a message, or what is wrong with it."""
+    try:
+        if message.problem:
+            raise PathFileError(message.problem)
+        for key in _MANDATORY if message.is_whole else ():
+            _value(message.leaves, key, message.where)
+        return _from_message(message.leaves, message.where)
+    except PathFileError as error:
+        stated = [message.leaves.get(key) for key in ("OBJECT_NAME", "NORAD_CAT_ID")]
+        names = tuple(object_key(str(value)) for value in stated if value not in (None, ""))
+        is_empty = not message.problem and not any(value not in (None, "") for value in message.leaves.values())
+        return BrokenEntry(problem=str(error), names=names, is_empty=is_empty)
+
+
+def _from_markup(data: bytes, name: str) -> Iterator[_Message]:
     for message in parse_markup(data, name).all("omm"):
         leaves = {}
         for block in ("metadata", "meanElements", "tleParameters"):
             for found in message.all(block):
                 leaves.update({one.name: one.text.strip() for one in found.children})
-        yield _complete(leaves, f"{name}:{message.line}")
+        yield _Message(where=f"{name}:{message.line}", leaves=leaves, is_whole=True)
 
 
-def _from_keywords(text: str, name: str) -> _Records:
+def _from_keywords(text: str, name: str) -> Iterator[_Message]:
     """Messages of a text that has a keyword and a value in each line; each begins with its version."""
     leaves: dict[str, str] = {}
-    began = 0
+    began, problem = 0, ""
     for at, line in enumerate(text.split("\n"), 1):
         line = line.strip()
         if not line or line.startswith("COMMENT"):
             continue
         key, equals, value = (part.strip() for part in line.partition("="))
-        if not equals:
-            raise PathFileError(f"{name}:{at}: must be a keyword, = and its value (got {shown(line)})")
         if key == _VERSION:
             if began:
-                yield _complete(leaves, f"{name}:{began}")
-            leaves, began = {}, at
+                yield _Message(where=f"{name}:{began}", leaves=leaves, problem=problem, is_whole=True)
+            leaves, began, problem = {}, at, ""
+        elif not equals:
+            problem = problem or f"{name}:{at}: must be a keyword, = and its value (got {shown(line)})"
         elif key in leaves:
-            raise PathFileError(f"{name}:{at}: {shown(key)} is there twice in the message of line {began}")
+            problem = problem or f"{name}:{at}: {shown(key)} is there twice in the message of line {began}"
         else:
             leaves[key] = value.partition("[")[0].strip()  # a unit, in brackets, is the standard's own
     if began:
-        yield _complete(leaves, f"{name}:{began}")
+        yield _Message(where=f"{name}:{began}", leaves=leaves, problem=problem, is_whole=True)
 
 
-def _complete(leaves: Mapping[str, Any], where: str) -> tuple[str, Mapping[str, Any]]:
-    """A message of the standard, which may not leave out what it is about."""
-    for key in _MANDATORY:
-        _value(leaves, key, where)
-    return where, leaves
-
-
-def _from_json(text: str, name: str) -> _Records:
+def _from_json(text: str, name: str) -> Iterator[_Message]:
     try:
         found = json.loads(text)
     except json.JSONDecodeError as error:
@@ -425,12 +492,14 @@ def _from_json(text: str, name: str) -> _Records:
     for count, record in enumerate(records, 1):
         where = f"{name}: record {count}" if records is found else name
         if not isinstance(record, dict):
-            raise PathFileError(f"{where}: must have keywords and values")
+            yield _Message(where=where, leaves={}, problem=f"{where}: must have keywords and values")
+            continue
         # A list or a mapping is no value of any keyword.
-        yield where, {key: value for key, value in record.items() if isinstance(value, str | int | float)}
+        leaves = {key: value for key, value in record.items() if isinstance(value, str | int | float)}
+        yield _Message(where=where, leaves=leaves)
 
 
-def _from_csv(text: str, name: str) -> _Records:
+def _from_csv(text: str, name: str) -> Iterator[_Message]:
     lines = csv.reader(io.StringIO(text, newline=""))
     try:
         header = next(lines, [])
@@ -441,9 +510,9 @@ def _from_csv(text: str, name: str) -> _Records:
             if not line:
                 continue
             where = f"{name}:{lines.line_num}"
-            if len(line) != len(header):
-                raise PathFileError(f"{where}: has {len(line)} values, line 1 has {len(header)} keywords")
-            yield where, dict(zip(header, line, strict=True))
+            is_cut = len(line) != len(header)
+            problem = f"{where}: has {len(line)} values, line 1 has {len(header)} keywords" if is_cut else ""
+            yield _Message(where=where, leaves=dict(zip(header, line, strict=False)), problem=problem)
     except csv.Error as error:
         raise PathFileError(f"{name}:{lines.line_num}: is not CSV: {error}") from None
 

@@ -10,7 +10,17 @@ from itertools import pairwise
 
 from bisar_budget.faults import shown
 from bisar_budget.paths.accuracy import StatedAccuracy
-from bisar_budget.paths.ephemeris import APART, OWN_VELOCITY, Interpolation, Segment, orbit_through, velocity_off
+from bisar_budget.paths.ephemeris import (
+    APART,
+    OWN_VELOCITY,
+    SPARSE_S,
+    Interpolation,
+    Segment,
+    every,
+    orbit_through,
+    usual_step,
+    velocity_off,
+)
 from bisar_budget.paths.flight import Orbit, PathFileError, Sample
 from bisar_budget.paths.instant import FIRST_DAY, Instant, tai
 from bisar_budget.paths.messages import (
@@ -53,10 +63,15 @@ def read_eof(
     system = _text(file, "Time_Reference") or "UTC"
     if system not in _SYSTEMS:
         raise PathFileError(f"{name}: Time_Reference must be UTC or TAI (got {shown(system)})")
-    samples, lines, flawed = _samples(file, system, name)
+    samples, lines, flawed, repeated = _samples(file, system, name)
     if len(samples) < _HERMITE.nodes:
         raise PathFileError(f"{name}: has {len(samples)} state vectors, at least {_HERMITE.nodes} are needed")
     off = velocity_off(samples)
+    if not off <= OWN_VELOCITY and usual_step(samples) > SPARSE_S:
+        raise PathFileError(
+            f"{name}:{lines[0]}: has {every(samples)}, too few to interpolate",
+            "accepted: a state vector every ten seconds, as in AUX_POEORB and AUX_RESORB",
+        )
     if not off <= OWN_VELOCITY:
         raise PathFileError(
             f"{name}:{lines[0]}: velocities are {100 * off:.2g} % off what the places do; they must be those"
@@ -73,12 +88,17 @@ def read_eof(
         first=samples[0].time,
         last=samples[-1].time,
         where=f"{name}:{lines[0]}",
-        words=f"{shown(kind)} of {satellite}, {_HERMITE.words}",
+        words=f"{shown(kind)} of {satellite}, {_HERMITE.words}{_dropped(repeated)}",
         interpolation=_HERMITE,
         accuracy=StatedAccuracy(f"accuracy of {kind}", total=stated) if stated else None,
         remarks=(flaws,) if flawed else (),
     )
     return orbit_through([segment], name, wanted, center, orientation)
+
+
+def _dropped(repeated: int) -> str:
+    """Words on state vectors that a file has twice, as joined files do."""
+    return f", {repeated} repeated state vector{'s' * (repeated > 1)} left out" if repeated else ""
 
 
 def _short(satellite: str) -> str:
@@ -91,21 +111,33 @@ def _text(file: MessageElement, key: str) -> str | None:
     return None if found is None else found.text.strip()
 
 
-def _samples(file: MessageElement, system: str, name: str) -> tuple[list[Sample], list[int], list[str]]:
-    """State vectors, the lines where each begins, and what is said of those that are not of nominal quality."""
-    samples, lines, flawed = [], [], []
+def _samples(file: MessageElement, system: str, name: str) -> tuple[list[Sample], list[int], list[str], int]:
+    """State vectors, the line of each, the qualities that are not nominal, and how many were there twice."""
+    samples: list[Sample] = []
+    lines: list[int] = []
+    flawed = []
+    repeated = 0
     for vector in file.all("OSV"):
         parts = {one.name: one for one in vector.children}
         x, y, z, u, v, w = _numbers(vector, parts, name)
-        samples.append(Sample(_time(vector, parts, system, name), (x, y, z), (u, v, w)))
+        sample = Sample(_time(vector, parts, system, name), (x, y, z), (u, v, w))
+        if samples and sample == samples[-1]:
+            repeated += 1
+            continue
+        samples.append(sample)
         lines.append(vector.line)
         quality = next(vector.all("Quality"), None)
         if quality is not None and quality.text.strip().upper() != "NOMINAL":
             flawed.append(shown(quality.text.strip()))
     for (before, after), line in zip(pairwise(samples), lines[1:], strict=True):
-        if after.time.since(before.time) < APART:
+        step = after.time.since(before.time)
+        if abs(step) < APART:
+            raise PathFileError(
+                f"{name}:{line}: is a state vector of the same time as the one before it, and another"
+            )
+        if step < 0:
             raise PathFileError(f"{name}:{line}: the time is not after that of the state vector before it")
-    return samples, lines, flawed
+    return samples, lines, flawed, repeated
 
 
 def _numbers(vector: MessageElement, parts: dict[str, MessageElement], name: str) -> Iterator[float]:

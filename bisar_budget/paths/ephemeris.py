@@ -9,6 +9,7 @@ from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import pairwise
 
 from bisar_budget.geometry import Vector
 from bisar_budget.paths.accuracy import EpochCovariance, StatedAccuracy, stated_of_orbit
@@ -29,6 +30,7 @@ OWN_VELOCITY = 0.001  # of the speed; one against the stars is up to 7 % off in 
 _SLOW = 100.0  # m/s; slower ones over the ground are held to a tenth of a metre a second
 _BESIDE = 4  # samples on each side that velocities are compared with places by
 # Nodes and weights of Gauss and Legendre on (0, 1), of three points: Abramowitz & Stegun, table 25.4.
+SPARSE_S = 300.0  # between states of a low orbit; what is farther apart says nothing about its velocities
 _GAUSS = ((0.5 - math.sqrt(0.15), 5 / 18), (0.5, 8 / 18), (0.5 + math.sqrt(0.15), 5 / 18))
 
 
@@ -110,7 +112,8 @@ class _Between:
         self._off = lru_cache(maxsize=16)(lambda at: _misses_around(segment.samples, tai(at), interpolation))
         if not self._off(center) < _LOST_M:
             raise PathFileError(
-                f"{segment.where}: the ephemeris is too sparse around {center.as_text()} to interpolate",
+                f"{segment.where}: the ephemeris is too sparse around {center.as_text()} to interpolate:"
+                f" its states there are {minutes(_step_around(segment.samples, tai(center)))} apart",
                 f"accepted: an interpolation that is less than {_LOST_M / 1e3:g} km off",
                 _MORE_OFTEN,
             )
@@ -189,6 +192,34 @@ class _Between:
         return (f"{begins} to about {turned + moved:.2g} m: UT1 or the pole is not known better",)
 
 
+def every(samples: Sequence[Sample]) -> str:
+    """Words on how often an ephemeris has a state, by its usual step."""
+    return f"one state every {minutes(usual_step(samples))}"
+
+
+def minutes(duration_s: float) -> str:
+    """A time between two states, in minutes where it is as long."""
+    return f"{duration_s / 60:.3g} min" if duration_s >= 60 else f"{duration_s:.3g} s"
+
+
+def _step_around(samples: Sequence[Sample], time: Instant) -> float:
+    """Time between the two samples around an instant. [s]"""
+    before, after = _times_around(samples, time)
+    return after.since(before)
+
+
+def usual_step(samples: Sequence[Sample]) -> float:
+    """Median time between two samples; 0 of a single one. [s]"""
+    steps = sorted(after.time.since(before.time) for before, after in pairwise(samples))
+    return steps[len(steps) // 2] if steps else 0.0
+
+
+def _times_around(samples: Sequence[Sample], time: Instant) -> tuple[Instant, Instant]:
+    """Times of the two samples around an instant; of the nearest two where it is outside."""
+    behind = min(max(bisect_right(samples, time, key=lambda one: one.time), 1), len(samples) - 1)
+    return samples[behind - 1].time, samples[behind].time
+
+
 def _misses_around(samples: Sequence[Sample], time: Instant, used: Interpolation) -> float:
     """How far an interpolation is from one of two more degrees, at a time or between the samples around it. [m]
 
@@ -204,8 +235,7 @@ def _misses_around(samples: Sequence[Sample], time: Instant, used: Interpolation
         error = math.dist(*both)
         return error if math.isfinite(error) else math.inf
 
-    behind = min(max(bisect_right(samples, time, key=lambda one: one.time), 1), len(samples) - 1)
-    before, after = samples[behind - 1].time, samples[behind].time
+    before, after = _times_around(samples, time)
     return max(misses(time), misses(before.after(after.since(before) / 2)))
 
 

@@ -12,7 +12,10 @@ GPS_EPOCH = 44244  # MJD of 1980-01-06
 UNIX_EPOCH = 40587  # MJD of 1970-01-01
 _MJD_OF_ORDINAL = 678576  # date.toordinal() less the modified Julian day
 _ROUNDED = re.compile(r"(.*:)60((?:[.,]0{1,12})?(?:Z|[+-]\d\d:?\d\d)?)", re.ASCII)
-_FORM = re.compile(r"(\d{4})-(\d\d)-(\d\d)[T ](\d\d):(\d\d):(\d\d)(?:[.,](\d{1,12}))?(Z|\+00:00)?", re.ASCII)
+_FORM = re.compile(r"(\d{4})-(\d\d)-(\d\d)[T ](\d\d):(\d\d):(\d\d)(?:[.,](\d{1,12}))?(Z|[+-]\d\d:?\d\d)?", re.ASCII)
+
+
+_FARTHEST_OFFSET_H = 18  # of a local time from UTC, as in ISO 8601's users
 
 
 class Instant(NamedTuple):
@@ -49,7 +52,7 @@ def day_of_year(year: int, day: int) -> int | None:
 
 
 def parse_instant(text: str, *, needs_zone: bool = True) -> Instant | None:
-    """Read 2026-06-01T05:20:31.250Z; None where the text is something else.
+    """Read 2026-06-01T05:20:31.250Z, or with an offset from UTC such as +01:00; None where it is something else.
 
     `needs_zone`: without a Z, an hour is nobody's.
     """
@@ -63,7 +66,14 @@ def parse_instant(text: str, *, needs_zone: bool = True) -> Instant | None:
         ordinal = date(year, month, day).toordinal()
     except ValueError:
         return None
-    return Instant(ordinal - _MJD_OF_ORDINAL, hour * 3600 + minute * 60 + second + float(f"0.{match[7] or 0}"))
+    local = Instant(ordinal - _MJD_OF_ORDINAL, hour * 3600 + minute * 60 + second + float(f"0.{match[7] or 0}"))
+    if match[8] in (None, "Z"):
+        return local
+    hours, minutes = int(match[8][1:3]), int(match[8][-2:])
+    if hours > _FARTHEST_OFFSET_H or minutes > 59:
+        return None
+    ahead = 3600 * hours + 60 * minutes
+    return local.after(ahead if match[8][0] == "-" else -ahead)
 
 
 def parse_stamp(text: str, *, needs_zone: bool = True) -> Instant | None:
@@ -112,6 +122,14 @@ def gps_week(instant: Instant) -> int:
 def tai(instant: Instant) -> Instant:
     """The day and seconds of TAI at an instant of UTC."""
     return instant.after(tai_less_utc(instant.day))
+
+
+def later(instant: Instant, seconds: float) -> Instant:
+    """The instant of UTC so many seconds later, leap seconds counted: time that runs on, as a satellite flies."""
+    found = instant.after(seconds)
+    if tai_less_utc(found.day) == tai_less_utc(instant.day):
+        return found  # adding the difference to TAI and taking it off would round twice
+    return utc(tai(instant).after(seconds))
 
 
 def utc(of_tai: Instant) -> Instant:

@@ -52,11 +52,20 @@ ORBIT_FORMATS: Mapping[str, OrbitFormat] = {
     "sp3": OrbitFormat("an orbit in SP3", re.compile(rb"\A#[abcd][PV]\d{4} "), b"", read_sp3),
 }
 # What is often taken for an orbit and cannot be read: its words, and what to do.
+_WRITE_OEM = "Write it as an OEM of CCSDS"
 _OTHERS = (
     (re.compile(rb"\A(\x1f\x8b|\x1f\x9d|PK\x03\x04|BZh|\xfd7zXZ)"), "a compressed file", "Unpack it"),
     (re.compile(rb"\A.{60}RINEX VERSION / TYPE"), "a RINEX file", "A precise orbit comes as SP3"),
     (re.compile(rb"\A\s*CCSDS_(OPM|OCM|TDM|AEM|APM|CDM)_VERS"), "another message of CCSDS", ""),
     (re.compile(rb"(?i)\A\s*<(!doctype html|html)"), "a page of a web site", "Save the file that it links to"),
+    (re.compile(rb"(?i)\A\s*stk\.v\."), "an ephemeris of STK", _WRITE_OEM),
+    (
+        re.compile(rb"(?m)^\$\$SOE|^ *Target body name:|JPL/HORIZONS|\AAPI VERSION:"),
+        "an answer of Horizons",
+        _WRITE_OEM,
+    ),
+    (re.compile(rb"\Acreated:.*\s+ephemeris_start:"), "an ephemeris of SpaceX (MEME)", _WRITE_OEM),
+    (re.compile(rb"(?m)^BEGIN Ephemeris"), "an ephemeris of STK", _WRITE_OEM),
 )
 _BEGINNING = 4096  # bytes that tell a format
 

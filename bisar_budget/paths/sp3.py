@@ -63,10 +63,13 @@ class _Heading:
 
     def __init__(self, lines: Sequence[str], name: str) -> None:
         first = lines[0].lstrip("\ufeff")
+        if not first.strip():
+            raise PathFileError(f"{name}:1: is blank; SP3 begins with a line like #cP or #dV in line 1")
         if not _FIRST_LINE.match(first):
             raise PathFileError(f"{name}:1: must begin like #cP or #dV, as SP3 does (got {shown(first[:20])})")
         self.frame = shown(first[46:51].strip()) or "ITRF"
         self.system = "GPS"
+        self.nameless = 0  # places whose satellite cannot be read
         ids: list[str] = []
         exponents: list[str] = []
         has_system = False
@@ -119,8 +122,8 @@ def _satellites(
             before, time, place = time, _epoch(line, header.system, f"{name}:{at}"), None
             if before is not None and time.since(before) < APART:
                 raise PathFileError(f"{name}:{at}: the epoch is not after the one before it; epochs must rise")
-        elif kind in ("P", "V") and key not in (None, object_key(_satellite_of(line, f"{name}:{at}"))):
-            continue
+        elif kind in ("P", "V") and key is not None and not _is_of(line, key):
+            header.nameless += kind == "P" and not _SATELLITE.fullmatch(line[1:4])
         elif kind == "P" and time is not None:
             place = _place(line, time, at, found, header, name)
         elif kind == "V" and place is not None:
@@ -157,6 +160,11 @@ def _place(
     satellite.samples.append(Sample(time, (1000 * x, 1000 * y, 1000 * z), (0.0, 0.0, 0.0)))
     satellite.lines.append(at)
     return satellite, len(satellite.samples) - 1
+
+
+def _is_of(line: str, key: str) -> bool:
+    """Whether a place or a velocity is of a satellite; of one without a name nobody knows, and it is not wanted."""
+    return bool(_SATELLITE.fullmatch(line[1:4])) and object_key(_id(line[1:4])) == key
 
 
 def _satellite_of(line: str, where: str) -> str:
@@ -200,6 +208,8 @@ def _segments(satellite: _Satellite, header: _Heading, name: str, center: Instan
         for n in range(1, len(samples))
         if n in satellite.breaks or samples[n].time.since(samples[n - 1].time) > _GAP * usual
     ]
+    lines = f"{header.nameless} place{'s' * (header.nameless > 1)}"
+    nameless = f", {lines} without a satellite's name left out" if header.nameless else ""
     for first, last in pairwise([0, *edges, len(samples)]):
         part = samples[first:last]
         if len(part) < 2:
@@ -215,7 +225,7 @@ def _segments(satellite: _Satellite, header: _Heading, name: str, center: Instan
             first=part[0].time,
             last=part[-1].time,
             where=f"{name}:{satellite.lines[first]}",
-            words=f"SP3 of {satellite.id}, {header.frame}" + (f", {used.words}" if used else ""),
+            words=f"SP3 of {satellite.id}, {header.frame}{nameless}" + (f", {used.words}" if used else ""),
             interpolation=used,
             accuracy=StatedAccuracy(f"accuracy of {satellite.id}", total=stated) if stated else None,
             remarks=(f"{name}: places of {satellite.id} around the aperture are predicted",) if is_predicted else (),

@@ -293,9 +293,7 @@ class TestAction:
     def test_the_good_mission_passes(self, design: Path) -> None:
         done = self.run(design, "Check the budgets", missions="missions/survey.yaml")
         assert (done.returncode, done.stderr) == (0, "")
-        assert re.findall("::[a-z]+ ", done.stdout) == ["::notice "] * done.stdout.count(
-            "title=From outside the file"
-        )
+        assert re.findall("::[a-z]+ ", done.stdout) == ["::notice "] * done.stdout.count("title=Overrides")
         assert "pass" in (design.parent / "summary.md").read_text()
 
     def test_the_bad_mission_fails_with_an_annotation_at_the_line_of_the_value(self, design: Path) -> None:

@@ -19,12 +19,13 @@ import yaml
 
 import bisar_budget as bb
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.findings.images import Verdict
+from bisar_budget.budget.verdicts import with_verdicts
+from bisar_budget.findings.images import Verdict, VerifiedMission
 from bisar_budget.front.checks import day_of
 from bisar_budget.report.formats.verification import geometry_remarks
 from bisar_budget.simulator.realisations import drawn_errors
 from bisar_budget.simulator.targets import parse_targets
-from tests.conftest import ROOT, mission_text
+from tests.conftest import ROOT, findings, mission_text
 
 MISSIONS = ROOT / "specs" / "missions"
 SECTION_V, TANDEM_X, DRONES = (
@@ -205,3 +206,54 @@ def test_a_clock_is_the_receivers_where_another_error_is_relaxed() -> None:
     ]
     assert relaxed.shares_after[1] < relaxed.shares_before[1]
     assert relaxed.receiver[0] == "timing.quadratic"
+
+
+def test_a_tecu_is_a_delay_of_40_3e16_over_f_squared() -> None:
+    """ITU-R P.531: an excess path of 40.3·N/f² m, N in 1/m²; at 1 GHz and overhead 0.403 m for a TECU."""
+    mission = bb.loads(
+        mission_text(
+            radar={"center_frequency": "1 GHz", "bandwidth": "10 MHz"},
+            platforms__transmitter={"position": [0, 0, "30 km"], "velocity": [0, "150 m/s", 0]},
+            propagation={"transmitter": {"zenith_electron_content": "1 TECU"}},
+        )
+    )
+    leg = mission.propagation.leg("transmitter")
+    assert 40.3 * leg.zenith_electron_content / 1e9**2 == pytest.approx(0.403, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("receiver", "is_refused"), [(0.501, True), (0.499, True), (0.5, False), (0.5 + 5e-7, False)]
+)
+def test_shares_that_miss_1_by_a_thousandth_are_refused(receiver: float, is_refused: bool) -> None:
+    text = mission_text(allocation={"split": {"transmitter": 0.5, "receiver": receiver}})
+    if not is_refused:
+        assert bb.loads(text)
+        return
+    with pytest.raises(bb.MissionError, match="shares must sum to 1"):
+        bb.loads(text)
+
+
+def test_a_requirement_that_an_image_refutes_keeps_its_own_unit() -> None:
+    """The row that fails by its image is in m/s; the requirement is in rad, and stays what the file states."""
+    found = findings(platforms__receiver__motion_error={"velocity": [0, "2 mm/s", 0], "acceleration": "50 um/s^2"})
+    (before,) = found.requirements
+    shown = next(row for row in found.rows if row.id == "receiver.velocity.y")
+    assert before.row != shown.id
+    verdict = Verdict(
+        id=shown.id, model="published", boundary_error=shown.allowable or 0.0, unit="m/s", verdict="optimistic"
+    )
+    (after,) = with_verdicts(found, VerifiedMission(found.file, found.name, rows=(verdict,))).requirements
+    assert (after.status, after.row, after.share) == ("fail", shown.id, None)
+    assert (after.allowed, after.reached, after.unit) == (before.allowed, before.reached, "rad")
+    assert after.utilization == shown.utilization
+
+
+@pytest.mark.parametrize(("combine", "words"), [("rss", "root-sum-square"), ("sum", "sum of all at their worst")])
+def test_the_specification_sheet_says_how_errors_add_up(run: Callable, combine: str, words: str) -> None:
+    file = str(MISSIONS / "holdover_roof_receiver.yaml")
+    for format_name in ("text", "markdown"):
+        arguments = ("allocate", file, "--set", f"allocation.combine={combine}", "--format", format_name)
+        said = " ".join(run(*arguments).stdout.split())
+        other = {"root-sum-square", "sum of all at their worst"} - {words}
+        assert words in said
+        assert not any(one in said for one in other)

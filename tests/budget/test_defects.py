@@ -9,7 +9,6 @@ import signal
 import stat
 import subprocess
 import sys
-import threading
 
 import pytest
 
@@ -42,16 +41,34 @@ def faults(text: str) -> list[str]:
 
 @needs_posix
 class TestOutputs:
-    def test_a_pipe_is_written_to_not_replaced(self, run, mission, tmp_path) -> None:
-        fifo = tmp_path / "pipe"
+    @pytest.mark.parametrize("option", ["-o", "--report"])
+    def test_a_named_pipe_is_refused_and_stays_one(self, run, mission, tmp_path, option) -> None:
+        """Without a reader at its other end the command waited for ever."""
+        fifo = tmp_path / "pipe.txt"
         os.mkfifo(fifo)
-        received = []
-        reader = threading.Thread(target=lambda: received.append(fifo.read_text()))
-        reader.start()
-        assert run("check", mission, "-q", "-o", fifo).exit_code == 1
-        reader.join(10)
-        assert "NOT EVAL" in received[0]
+        done = run("check", mission, "-q", option, fifo)
+        assert done.exit_code == 2
+        assert f"cannot write {fifo}: a named pipe; accepted: a regular file, or - for standard output" in done.stderr
         assert stat.S_ISFIFO(fifo.stat().st_mode)
+
+    def test_a_device_is_refused(self, run, mission) -> None:
+        done = run("check", mission, "-q", "-o", "/dev/zero")
+        assert done.exit_code == 2
+        assert "cannot write /dev/zero: a device" in done.stderr
+
+    def test_nothing_and_an_open_stream_are_written_to(self, run, mission) -> None:
+        assert run("check", mission, "-q", "-o", os.devnull).exit_code == 1
+
+    @pytest.mark.parametrize("command", [("check",), ("diff",), ("allocate",), ("sweep", "--cases")])
+    def test_a_named_pipe_is_not_read(self, run, mission, tmp_path, command) -> None:
+        fifo = tmp_path / "pipe.yaml"
+        os.mkfifo(fifo)
+        before = [mission] if command[0] in ("diff", "sweep") else []
+        done = run(command[0], *before, *command[1:], fifo)
+        assert done.exit_code == 2
+        assert "cannot be read: a named pipe; accepted: a regular file" in " ".join(
+            (done.stdout + done.stderr).split()
+        )
 
     def test_a_link_keeps_pointing_where_it_does(self, run, mission, tmp_path) -> None:
         real, link = tmp_path / "real.txt", tmp_path / "link.txt"

@@ -268,7 +268,7 @@ def test_what_is_extrapolated_is_said_once() -> None:
     """Below the first point of a mask, where that is within the aperture's own frequencies, and beyond the last τ."""
     found = check(platforms={"receiver": {"oscillator": MASK}})
     assert [n for n in row(found, "receiver.oscillator").notes if "mask begins" in n] == [
-        "the mask begins at 1 Hz; below, it continues as f^-3"
+        "the mask begins at 1 Hz; below, it continues as f^(\u22123)"
     ]
     early = {**MASK, "phase_noise": {"0.01 Hz": "-45 dBc/Hz", **MASK["phase_noise"]}}
     assert not row(check(platforms={"receiver": {"oscillator": early}}), "receiver.oscillator").notes
@@ -444,7 +444,7 @@ class TestSynchronisation:
             found = check(platforms={"receiver": {"oscillator": loud}}, allocation={"combine": combine})
             one = row(found, row_id)
             assert one.status == "fail"
-            assert "the mask begins at 1 Hz; below, it continues as f^-3" in (one.reason or "")
+            assert "the mask begins at 1 Hz; below, it continues as f^(\u22123)" in (one.reason or "")
 
     def test_waivers_and_requirement_ids_reach_the_rows(self) -> None:
         found = with_error(

@@ -754,16 +754,22 @@ class TestBounds:
         monkeypatch.setattr("bisar_budget.front.progress.LONG", 3600)
         assert run(*question, SECTION_V).stderr == b""
 
-    def test_a_table_of_cases_without_end(self, tmp_path, monkeypatch) -> None:
+    def test_a_table_of_cases_without_end(self) -> None:
         """A device was read until memory ran out."""
-        from bisar_budget.design import cases
-
-        monkeypatch.setattr(cases, "LARGEST_TABLE", 1 << 20)
         done = run("sweep", SECTION_V, "--cases", "/dev/zero")
         assert (done.returncode, done.stderr) == (
             2,
-            b"Error: /dev/zero: is larger than 1 MiB; accepted: up to 10000000 values\n",
+            b"Error: /dev/zero: cannot be read: a device; accepted: a regular file\n",
         )
+
+    def test_a_table_of_cases_that_is_too_large(self, tmp_path, monkeypatch) -> None:
+        from bisar_budget.design import cases
+
+        monkeypatch.setattr(cases, "LARGEST_TABLE", 1 << 20)
+        (tmp_path / "cases.csv").write_bytes(b"0" * ((1 << 20) + 1))
+        done = run("sweep", SECTION_V, "--cases", tmp_path / "cases.csv")
+        assert done.returncode == 2
+        assert b"cases.csv: is larger than 1 MiB; accepted: up to 10000000 values" in done.stderr
 
     @pytest.mark.skipif(sys.platform == "win32", reason="no such limit there")
     @pytest.mark.parametrize("suffix", ["csv", "parquet", "nc"])

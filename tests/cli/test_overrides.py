@@ -34,9 +34,9 @@ def readable(text: str) -> str:
     return text.replace("\\", "").replace("&#45;", "-").replace("%3A", ":").replace("%2C", ",")
 
 
-def test_nothing_from_outside(run, folder) -> None:
+def test_nothing_is_overridden(run, folder) -> None:
     assert overrides(run, "m.yaml") == []
-    assert "outside the file" not in run("check", "m.yaml").stdout
+    assert "Overrides" not in run("check", "m.yaml").stdout
 
 
 @pytest.mark.parametrize(

@@ -2,8 +2,10 @@
 
 import pytest
 
-from bisar_budget.faults import MissionError
+from bisar_budget.faults import InvalidValueError, MissionError
 from bisar_budget.mission.load import parse_mission
+from bisar_budget.paths.instant import parse_instant
+from bisar_budget.units import ANGLE, parse_quantity
 from tests.conftest import mission_text
 
 ERROR = "platforms__receiver__motion_error__"
@@ -61,3 +63,52 @@ def test_noise_of_acceleration_is_a_spectrum() -> None:
     assert hint(**{f"{ERROR}vibration": {"wideband": {"rms": "0.1 g"}}})[1] == (
         "Noise of acceleration is a spectrum, in g^2/Hz"
     )
+
+
+@pytest.mark.parametrize(
+    ("written", "decimal"),
+    [
+        ("47°15'04.3\"", "47.251194444"),
+        ("47°15'", "47.25"),
+        ("47d15m", "47.25"),
+        ("47d15m04.3s", "47.251194444"),
+        ("47:15:04.3", "47.251194444"),
+        ("-47:15:00", "-47.25"),
+        ("47°15'00\"S", "-47.25"),
+        ("0°30'00\"N", "0.5"),
+    ],
+)
+def test_degrees_minutes_and_seconds_are_named(written: str, decimal: str) -> None:
+    with pytest.raises(InvalidValueError) as error:
+        parse_quantity(written, ANGLE)
+    assert error.value.problem.problem == "is in degrees, minutes and seconds"
+    assert error.value.problem.hint == f"Write {decimal} deg"
+
+
+@pytest.mark.parametrize("written", ["47°75'", "47:15:75", "47 apples"])
+def test_what_is_no_angle_is_no_angle_in_another_form(written: str) -> None:
+    with pytest.raises(InvalidValueError) as error:
+        parse_quantity(written, ANGLE)
+    assert "unknown unit" in error.value.problem.problem
+
+
+@pytest.mark.parametrize(
+    "written", ["2026-06-01T06:20:31.250+01:00", "2026-06-01T06:20:31.250+0100", "2026-06-01T00:50:31.250-04:30"]
+)
+def test_an_instant_with_an_offset_is_that_of_utc(written: str) -> None:
+    mission = parse_mission(mission_text(collection__center_time=written))
+    assert mission.collection.center_time == parse_instant("2026-06-01T05:20:31.250Z")
+
+
+def test_an_offset_goes_over_midnight() -> None:
+    assert parse_instant("2026-06-01T00:30:00+01:00") == parse_instant("2026-05-31T23:30:00Z")
+    assert parse_instant("2026-06-01T00:30:00+25:00") is None
+    assert parse_instant("2026-06-01T00:30:00+01:75") is None
+
+
+def test_an_instant_without_a_zone_says_that_it_is_missing() -> None:
+    with pytest.raises(MissionError) as caught:
+        parse_mission(mission_text(collection__center_time="2026-06-01T05:20:31"), "m.yaml")
+    (fault,) = caught.value.faults
+    assert fault.problem == "has no zone"
+    assert fault.hint == "Write Z behind it where it is UTC, or the offset from UTC, such as +01:00"

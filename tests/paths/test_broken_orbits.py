@@ -14,7 +14,7 @@ from bisar_budget.paths.eof import read_eof
 from bisar_budget.paths.flight import PathFileError
 from bisar_budget.paths.instant import Instant
 from bisar_budget.paths.oem import read_oem
-from bisar_budget.paths.orientation import read_finals
+from bisar_budget.paths.orientation import read_earth_rotation
 from bisar_budget.paths.path_formats import LOG_FORMATS, ORBIT_FORMATS, hold_to_format, hold_to_log, orbit_format
 from bisar_budget.paths.sp3 import read_sp3
 from tests.conftest import ROOT
@@ -371,7 +371,7 @@ def test_bytes_that_were_changed_give_an_orbit_or_an_error(
                 text = "\n".join(checked(line) if line[:1] in ("1", "2") else line for line in text.split("\n"))
             orbit = read_tle(text.encode(), "x", wanted, CENTER)
         elif form == "finals":
-            assert all(math.isfinite(one) for one in read_finals(data, "x", Instant(57753, 100.0))[2:])
+            assert all(math.isfinite(one) for one in read_earth_rotation(data, "x", Instant(57753, 100.0))[2:4])
             return
         elif form in MIDDLES:
             reader, at = MIDDLES[form]

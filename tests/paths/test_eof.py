@@ -131,9 +131,41 @@ def test_what_is_refused(before: str, after: str, said: str) -> None:
 
 def test_times_must_rise_and_hold_the_aperture() -> None:
     second = re.findall(r"<UTC>UTC=(.*)</UTC>", TEXT)[1]
-    with pytest.raises(PathFileError, match=r"^s.EOF:\d+: the time is not after that of the state vector before it$"):
+    with pytest.raises(PathFileError, match=r"^s.EOF:\d+: is a state vector of the same time as the one before"):
         read_eof(TEXT.replace(f"UTC={second}", f"UTC={FIRST}").encode(), "s.EOF", None, MIDDLE)
     with pytest.raises(PathFileError, match=r"^s.EOF: has no place at 2023-08-24T.*; its useable time is 2023-08"):
         read_eof(DATA, "s.EOF", None, Instant(MIDDLE.day + 1, MIDDLE.seconds))
     with pytest.raises(PathFileError, match=r"^s.EOF:1: is not XML, which orbit files of the Sentinels are$"):
         read_eof(b"CCSDS_OEM_VERS = 2.0\n", "s.EOF", None, MIDDLE)
+
+
+def with_block(number: int, copies: int, change: str = "") -> bytes:
+    """The file with copies of a state vector behind it, whose first digit of X may be another."""
+    head, *blocks = TEXT.split("<OSV>")
+    block = blocks[number]
+    other = re.sub(r"(<X[^>]*>[+-]?)\d", rf"\g<1>{change}", block) if change else block
+    return "<OSV>".join([head, *blocks[: number + 1], *[other] * copies, *blocks[number + 1 :]]).encode()
+
+
+def test_a_repeated_state_vector_is_left_out_and_said() -> None:
+    whole = read_eof(DATA, "s.EOF", None, MIDDLE)
+    joined = read_eof(with_block(5, 2), "s.EOF", None, MIDDLE)
+    assert joined.place(MIDDLE) == whole.place(MIDDLE)
+    assert joined.words == f"{whole.words}, 2 repeated state vectors left out"
+
+
+def test_two_state_vectors_of_one_time_are_refused() -> None:
+    with pytest.raises(PathFileError, match=r"^s.EOF:\d+: is a state vector of the same time as the one before it"):
+        read_eof(with_block(5, 1, "1"), "s.EOF", None, MIDDLE)
+
+
+def test_one_state_each_orbit_says_the_cause() -> None:
+    """Ten places of one orbit each, 98.6 min apart, as an ephemeris of nodes has them."""
+    head, *blocks = TEXT.split("<OSV>")
+    written = re.compile(r"<UTC>UTC=.*</UTC>")
+    times = [instant(f"{FIRST}Z").after(5916.0 * n).as_text().removesuffix("Z") for n in range(10)]
+    rows = [written.sub(f"<UTC>UTC={time}</UTC>", blocks[n]) for n, time in enumerate(times)]
+    tail = "</OSV>" + blocks[-1].partition("</OSV>")[2]
+    data = "<OSV>".join([head, *rows[:-1], rows[-1].partition("</OSV>")[0] + tail]).encode()
+    with pytest.raises(PathFileError, match=r"^s.EOF:\d+: has one state every 98.6 min, too few to interpolate"):
+        read_eof(data, "s.EOF", None, instant(f"{FIRST}Z").after(5916.0 * 5))

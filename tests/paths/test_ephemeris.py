@@ -212,7 +212,10 @@ def test_a_gap_is_not_interpolated() -> None:
     text = oem(times=clock, interpolation=interpolation("LAGRANGE", 7))
     with pytest.raises(PathFileError) as error:
         read(text, START.after(6000))
-    assert str(error.value) == "c.oem:4: the ephemeris is too sparse around 2026-06-01T06:40:00.000Z to interpolate"
+    assert str(error.value) == (
+        "c.oem:4: the ephemeris is too sparse around 2026-06-01T06:40:00.000Z to interpolate: its"
+        " states there are 181 min apart"
+    )
     assert math.dist(read(text, START.after(300)).place(START.after(300)), on_circle(300)[0]) < 1e-6
 
 

@@ -6,8 +6,10 @@ import pytest
 
 from bisar_budget.mission.platforms import TrajectorySource
 from bisar_budget.paths.flight import PathFileError
+from bisar_budget.paths.instant import Instant
 from bisar_budget.paths.log_places import LogKeys
-from bisar_budget.paths.path_formats import LOG_FORMATS, log_format, read_log
+from bisar_budget.paths.path_formats import LOG_FORMATS, ORBIT_FORMATS, hold_to_format, log_format, read_log
+from bisar_budget.paths.sp3 import read_sp3
 from tests.paths.flown import earth_fixed_csv, flight, geodetic_csv, sbet, smrmsg
 from tests.paths.log_files import every_format
 from tests.paths.orbit_files import TLE, oem, oem_xml, omm_json, omm_xml
@@ -93,3 +95,30 @@ def test_an_sbet_says_its_scale_and_heights(keys: dict[str, Any], key: str | Non
 def test_the_mission_file_knows_every_format() -> None:
     (key,) = TrajectorySource.__annotations__["format"].__metadata__
     assert key.reader.names == tuple(LOG_FORMATS)
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        (b"stk.v.12.0\nBEGIN Ephemeris\nNumberOfEphemerisPoints 3\n", "an ephemeris of STK"),
+        (b"# made by us\nBEGIN Ephemeris\n", "an ephemeris of STK"),
+        (b"*******\n Revised: July 31, 2013\n$$SOE\n2459293.5 = A.D. 2021-Mar-20\n", "an answer of Horizons"),
+        (b"API VERSION: 1.2\nAPI SOURCE: NASA/JPL Horizons API\n", "an answer of Horizons"),
+        (
+            b"created:2024-01-01 00:00:00 UTC\nephemeris_start:2024-01-01 00:00:42 UTC\n",
+            "an ephemeris of SpaceX (MEME)",
+        ),
+        (b"<!DOCTYPE html>\n<html>", "a page of a web site"),
+    ],
+)
+@pytest.mark.parametrize("form", ["oem", "tle", "sp3"])
+def test_an_orbit_of_a_format_that_is_not_read_is_named(data: bytes, words: str, form: str) -> None:
+    with pytest.raises(PathFileError) as error:
+        hold_to_format(data, "a.e", form)
+    assert str(error.value) == f"a.e: is {words}"
+    assert error.value.accepted == f"accepted: {ORBIT_FORMATS[form].words}"
+
+
+def test_sp3_whose_first_line_is_blank_says_so() -> None:
+    with pytest.raises(PathFileError, match=r"^a\.sp3:1: is blank; SP3 begins with a line like #cP or #dV"):
+        read_sp3(b"\n#cP2021\n", "a.sp3", None, Instant(59000, 0.0))

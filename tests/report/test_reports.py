@@ -13,7 +13,7 @@ from bisar_budget.faults import Fault
 from bisar_budget.findings.mission import Report, UnusableMission
 from bisar_budget.findings.row import worst_first
 from bisar_budget.report import FORMATS, Style, render
-from bisar_budget.report.words.sentences import percent
+from bisar_budget.report.words.sentences import percent, spreadsheet_text
 from tests.conftest import ROOT, findings
 
 ROW_KEYS = [
@@ -144,9 +144,18 @@ class TestCsv:
             ):
                 assert row[column] == ("" if value is None else repr(float(value)))
 
-    def test_text_that_looks_like_a_formula_is_text(self) -> None:
-        rows = self.rows(findings(name="=HYPERLINK(1)"))
-        assert rows[0]["mission"] == "'=HYPERLINK(1)"
+    @pytest.mark.parametrize("sign", ["=", "+", "-", "@", "\uff1d", "\uff0b", "\uff0d", "\uff20", " =", "   @"])
+    def test_text_that_looks_like_a_formula_is_text(self, sign: str) -> None:
+        """Full-width signs and blanks before a sign are read over by some programs."""
+        rows = self.rows(findings(name=f"{sign}HYPERLINK(1)"))
+        assert rows[0]["mission"] == f"'{sign}HYPERLINK(1)"
+
+    @pytest.mark.parametrize("text", ["-", "-6 dB", "+3.5e-7 m/s", "a=b", "1 - 2"])
+    def test_text_that_runs_nothing_stays_as_it_is(self, text: str) -> None:
+        assert spreadsheet_text(text) == text
+
+    def test_a_size_with_a_call_behind_it_is_no_size(self) -> None:
+        assert spreadsheet_text("-2+3+cmd|' /C calc'!A0") == "'-2+3+cmd|' /C calc'!A0"
 
     def test_quotes_commas_and_line_ends(self) -> None:
         assert self.rows(findings(name='a "b", c'))[0]["mission"] == 'a "b", c'
@@ -279,7 +288,7 @@ def test_an_oscillator_as_declared_is_0_db_and_stands_in_the_table(run) -> None:
 
 def test_what_a_mask_is_extrapolated_by_stands_in_a_report(run) -> None:
     text = run("check", "specs/missions/ocxo_free_running.yaml", "--format", "markdown").stdout
-    assert "Oscillator of the receiver: The mask begins at 1 Hz; below, it continues as f^-3.5" in text
+    assert "Oscillator of the receiver: The mask begins at 1 Hz; below, it continues as f^(\u22123.5)" in text
 
 
 def test_a_cubic_phase_without_requirement_is_not_called_none(run, tmp_path) -> None:

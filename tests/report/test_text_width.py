@@ -74,7 +74,7 @@ def test_explain(run, odd) -> None:
         assert {row_id: too_long(text) for row_id, text in texts.items()} == {key: [] for key in texts}
         row_id = found.rows[0].id
         shown = run("check", path, "--explain", row_id).stdout
-        assert shown.partition("From outside the file: ")[0] == texts[row_id]
+        assert shown.partition("Overrides: ")[0] == texts[row_id]
         assert too_long(shown) == []
 
 

@@ -13,7 +13,10 @@ import pytest
 from click.testing import Result
 
 import bisar_budget as bb
+from bisar_budget.design.solve import Crossing, Solution, State
 from bisar_budget.findings.status import RANK, STATUS, complying, exit_code
+from bisar_budget.report import Style
+from bisar_budget.report.formats.answers import as_json
 from tests.conftest import ROOT
 
 Run = Callable[..., Result]
@@ -303,3 +306,52 @@ def test_python_counts_it_apart(waived: Path) -> None:
     assert list(table["status"]) == ["waived", "pass"]
     assert list(table["waived_by"]) == [WAIVER, ""]
     assert "1 comply (50 %), 1 waived" in repr(table)
+
+
+# ---------------------------------------------------------------- seams to the user
+def test_all_of_several_missions_have_to_comply_with_their_specifications(run: Run, tmp_path: Path) -> None:
+    good, bad = tmp_path / "good.yaml", tmp_path / "bad.yaml"
+    good.write_text(text(location="50 m"), encoding="utf-8")
+    bad.write_text(text(), encoding="utf-8")
+    key = "platforms.receiver.motion_error.velocity"
+    codes = [run("allocate", *files, "--for", key).exit_code for files in ((good,), (bad,), (good, bad))]
+    assert codes == [0, 1, 1]
+
+
+def test_a_displacement_in_csv_is_east_then_north(run: Run, tmp_path: Path) -> None:
+    path = tmp_path / "m.yaml"
+    path.write_text(text(), encoding="utf-8")
+    rows = {one["id"]: one["displacement_m"] for one in document(run, path)["rows"]}
+    lines = csv.DictReader(io.StringIO(checked(run, path, "--format", "csv")[1]))
+    said = {one["id"]: (one["displacement_x_m"], one["displacement_y_m"]) for one in lines if one["kind"] == "row"}
+    moved = {name: both for name, both in rows.items() if both and both[0] != both[1]}
+    assert moved
+    for name, both in moved.items():
+        assert [float(one) for one in said[name]] == both
+
+
+def test_sarif_says_what_a_requirement_allows(run: Run, tmp_path: Path) -> None:
+    """Nothing that spreads is declared: no row shows that ISLR cannot be judged, and the requirement is a result."""
+    path = tmp_path / "m.yaml"
+    path.write_text(text(location="50 m", more=", islr: -20 dB"), encoding="utf-8")
+    (log,) = json.loads(checked(run, path, "--format", "sarif")[1])["runs"]
+    (found,) = [one["properties"] for one in log["results"] if one.get("properties", {}).get("metric") == "islr"]
+    assert (found["status"], found["allowable"], found["unit"]) == ("not_evaluated", -20.0, "dB")
+
+
+def test_an_ascending_pass_flies_north(run: Run) -> None:
+    """The evening pass of Sentinel-1 over Europe is the ascending one, by its mission's source."""
+    found = run("passes", BESANCON, "--from", "2021-03-20", "--days", "2", "--format", "json")
+    directions = {one["center_time"][:13]: one["direction"] for one in json.loads(found.stdout)["passes"]}
+    assert (directions["2021-03-20T17"], directions["2021-03-20T06"]) == ("ascending", "descending")
+
+
+def test_the_binding_row_is_the_one_that_breaks() -> None:
+    inside, outside = State(1.0, True, "pass", row="a"), State(2.0, False, "fail", row="b", requirement="islr")
+    found = Solution(
+        file="m.yaml", name="m", key="k", unit="m", is_scale=False, target="fail", row=None, model="full", low=0.0,
+        high=3.0, is_circle=False, given=None, crossings=(Crossing(inside, outside, True, True),), nearest=inside,
+        is_constant=False, skipped=0, texts={1.0: "1 m", 2.0: "2 m", 0.0: "0 m", 3.0: "3 m"},
+    )  # fmt: skip
+    (one,) = json.loads(as_json([found], Style()))["missions"]
+    assert (one["binding_row"], one["binding_requirement"]) == ("b", "islr")

@@ -183,7 +183,7 @@ def as_markdown(comparison: ChangeSet, gate: Gate | None, all_rows: bool = False
     for mission in comparison.missions:
         lines += [f"### {markdown_text(file_words(mission.after))}: {_summary(mission, gate, all_rows)}", ""]
         if outside := overrides_words(mission.after, with_changes=False):
-            lines += [f"From outside the file: {markdown_text(outside)}", ""]
+            lines += [f"Overrides: {markdown_text(outside)}", ""]
         lines += [*_items(_changed(mission, gate)), *_items(_refused(mission, gate))]
         lines += [""] if lines[-1] else []
         changes = _shown(mission, gate, all_rows)

@@ -270,7 +270,7 @@ def _verdict(page: Page) -> Iterator[doc.Block]:
     for name, kinds in (("Not declared", found.kinds.missing), ("Without source", found.kinds.without_source)):
         facts += [(name, ", ".join(kind_names(kinds)))] if kinds else []
     facts += [
-        ("" if place else "From outside the file", f"{one.name} {one.value} ({one.origin})")
+        ("" if place else "Overrides", f"{one.name} {one.value} ({one.origin})")
         for place, one in enumerate(found.overrides)
     ]
     yield doc.Facts(facts, "facts wide")

@@ -348,7 +348,12 @@ def _slow(what: str, frequency: float, left: LeftTone, free: float, mission: Mis
 
 
 def _written(pieces: Sequence[PowerLawPiece]) -> list[str]:
-    return [f"{one.low:.6g} Hz to {one.high:.6g} Hz: {one.density:.6g} * f^-{one.slope:.6g}" for one in pieces]
+    return [f"{one.low:.6g} Hz to {one.high:.6g} Hz: {one.density:.6g} * {_power_of_f(-one.slope)}" for one in pieces]
+
+
+def _power_of_f(exponent: float) -> str:
+    """Write a power of f; what is negative stands in brackets, so that nobody reads it as a difference."""
+    return f"f^{exponent:.6g}" if exponent >= 0 else f"f^(\u2212{-exponent:.6g})"
 
 
 def _setting(pieces: Sequence[PowerLawPiece], mission: Mission, sync: Synchronization) -> Iterator[Step]:

@@ -69,7 +69,7 @@ def _annotations(report: Report, style: Style) -> Iterator[_Annotation]:
             how = requirement_finding(one, mission)
             yield _Annotation(STATUS[one.status].github, file, _region_of(one.line), title, how)
         if outside := overrides_words(mission):
-            yield _Annotation("notice", file, None, "From outside the file", outside)
+            yield _Annotation("notice", file, None, "Overrides", outside)
         for row in worst_first(mission.rows):
             if command := STATUS[row.status].github:
                 title = f"{STATUS[row.status].text} {row.id}"
@@ -120,7 +120,7 @@ def step_summary(report: Report, style: Style) -> str:
         if mission.changes:
             file += " " + markdown_text(changes_words(mission.changes))
         if outside := overrides_words(mission, with_changes=False):
-            file += "; from outside the file: " + markdown_text(outside)
+            file += "; overrides: " + markdown_text(outside)
         status = (
             STATUS[mission.status].text
             + confidence_words(mission)
@@ -222,7 +222,7 @@ def as_sarif(report: Report, style: Style) -> str:
             for one in mission.warnings
         ]
         if outside := overrides_words(mission):
-            said = f"From outside the file: {outside}"
+            said = f"Overrides: {outside}"
             name = identity.of("from outside the file")
             results.append(_located("mission_file", "note", said, None, artifact, name))
     run = {

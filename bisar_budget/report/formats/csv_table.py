@@ -79,29 +79,33 @@ def joined(pieces: Sequence[Piece], version: str, style: Style) -> str:
 
 
 def csv_text(rows: Iterable[Sequence[object]]) -> str:
-    """Write rows as lines of CSV; None is an empty cell, a number has all digits that it needs to be read back."""
+    """Write rows as lines of CSV; None is an empty cell, a number has all digits that it needs to be read back.
+
+    Text that a spreadsheet would take for a formula is made harmless here, in every CSV.
+    """
     output = io.StringIO()
-    csv.writer(output, lineterminator="\n").writerows(rows)
+    harmless = ([spreadsheet_text(cell) if isinstance(cell, str) else cell for cell in row] for row in rows)
+    csv.writer(output, lineterminator="\n").writerows(harmless)
     return output.getvalue()
 
 
 def _faults(mission: UnusableMission) -> Iterator[list[object]]:
     for fault in mission.faults:
         cells: dict[str, object] = {
-            "file": spreadsheet_text(mission.file),
-            "id": spreadsheet_text(fault.key),
+            "file": mission.file,
+            "id": fault.key,
             "status": mission.status,
             "line": fault.line,
             "kind": "fault",
-            "reason": spreadsheet_text(str(fault)),
+            "reason": str(fault),
         }
         yield [cells.get(column) for column in COLUMNS]
 
 
 def _rows(mission: MissionFindings) -> Iterator[list[object]]:
-    file, name = spreadsheet_text(mission.file), spreadsheet_text(mission.name)
-    changed = spreadsheet_text(changes_words(mission.changes)) or None
-    outside = spreadsheet_text(overrides_words(mission)) or None
+    file, name = mission.file, mission.name
+    changed = changes_words(mission.changes) or None
+    outside = overrides_words(mission) or None
     of_mission = {
         "file": file,
         "mission": name,
@@ -118,12 +122,12 @@ def _rows(mission: MissionFindings) -> Iterator[list[object]]:
         cells = dict(zip(_OF_ROW, _values_of(row), strict=True)) | {
             "file": file,
             "mission": name,
-            "id": spreadsheet_text(row.id),
+            "id": row.id,
             "displacement_x_m": x,
             "displacement_y_m": y,
-            "requirement_id": spreadsheet_text(row.requirement_id),
+            "requirement_id": row.requirement_id,
             "notes": "; ".join(row.notes),
-            "evidence": spreadsheet_text(row.evidence),
+            "evidence": row.evidence,
             "verdict": verdicts.get(row.id),
             "set": changed,
             "kind": "row",
@@ -146,7 +150,7 @@ def _requirement(one: JudgedRequirement) -> dict[str, object]:
         "reason": one.reason,
         "notes": "; ".join([*use_remarks(one), *(waiver.words for waiver in one.waivers)]),
         "kind": "requirement",
-        "decided_by": spreadsheet_text(one.row),
+        "decided_by": one.row,
         **share_columns(one),
         "waived_by": _waived_by(one),
     }
@@ -154,4 +158,4 @@ def _requirement(one: JudgedRequirement) -> dict[str, object]:
 
 def _waived_by(one: Row | JudgedRequirement) -> str | None:
     """Ids of the waivers that hold, as the file writes them; None where nothing is waived."""
-    return spreadsheet_text("; ".join(waiver.id for waiver in one.waived_by)) or None
+    return "; ".join(waiver.id for waiver in one.waived_by) or None

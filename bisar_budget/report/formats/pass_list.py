@@ -22,7 +22,6 @@ from bisar_budget.report.words.sentences import (
     percent,
     sentence,
     spaced,
-    spreadsheet_text,
     use_words,
     waived_count,
     waiver_names,
@@ -112,12 +111,11 @@ def direction(one: SatellitePass) -> str:
 
 def as_csv(passes: Passes, style: Style) -> str:
     """Write a line for each pass, values in SI and radians, empty where there is none."""
-    whose = [spreadsheet_text(text) for text in (passes.file, passes.name, passes.platform)]
+    whose = [passes.file, passes.name, passes.platform]
     lines: list[list[object]] = [["file", "name", "platform", *_item(_NO_PASS)]]
     for one in passes.found:
         values = _item(one) | {"waived_by": "; ".join(one.waived_by) or None}
-        cells = (spreadsheet_text(value) if isinstance(value, str) else value for value in values.values())
-        lines.append([*whose, *cells])
+        lines.append([*whose, *values.values()])
     return csv_text(lines)
 
 

@@ -24,7 +24,7 @@ from bisar_budget.report.formats.traceability import identifier, needs_document
 from bisar_budget.report.words.heading import overrides_words, title_lines
 from bisar_budget.report.words.identity import Identity, distinct, identities
 from bisar_budget.report.words.requirements import RequirementLine, requirement_lines
-from bisar_budget.report.words.sentences import counted, need_text, percent, rst_text, table, wrapped
+from bisar_budget.report.words.sentences import counted, need_text, percent, rst_text, share_percent, table, wrapped
 
 _LISTED = 3  # parts of the catalogue that a table names
 _COLUMNS = ("file", "key", "value", "ordered", "unit", "text", "declared", "weight", "parts")
@@ -159,7 +159,7 @@ def _terms(sheet: SpecificationSheet) -> str:
 
 def _line(one: Specification) -> list[str]:
     most = max(one.shares, key=lambda key: one.shares[key], default="")
-    share = f"{percent(one.shares[most])} of {NAMES[most]}" if most else "limited by nothing"
+    share = f"{share_percent(one.shares[most])} of {NAMES[most]}" if most else "limited by nothing"
     return [one.key, one.text or "free", one.declared_text or "-", share]
 
 
@@ -187,11 +187,9 @@ def _broken_words(one: Broken) -> list[str]:
 def _way_out(sheet: SpecificationSheet) -> str:
     """Remedies where other errors leave no room."""
     used = [math.inf if one.used is None else one.used for one in sheet.broken]
-    if max(used) <= 1:
-        least = 1 - max(used)
-        return (
-            f"The other errors use that much by themselves. A smaller --reserve, below {percent(least)}, leaves room."
-        )
+    permille = math.ceil(1e3 * (1 - max(used))) - 1 if max(used) < 1 else -1  # strictly less than they leave
+    if permille >= 0:
+        return f"The other errors use that much by themselves. --reserve {permille / 10:g}% or less leaves room."
     return "The other errors, which are fixed, use that much by themselves: make them smaller, or specify them too."
 
 
@@ -248,7 +246,7 @@ def _chapter(answer: Answer, anchor: str) -> doc.Chapter:
     sheet, offer = answer
     facts: list[tuple[doc.Text, doc.Text]] = [("File", doc.Name(printable(sheet.file))), ("Terms", _terms(sheet))]
     if outside := overrides_words(sheet):
-        facts.append(("From outside the file", outside))
+        facts.append(("Overrides", outside))
     blocks: list[doc.Block] = [
         doc.Paragraph(_verdict(sheet), f"verdict {'pass' if sheet.complies else 'fail'}"),
         doc.Facts(facts),
@@ -298,7 +296,7 @@ def _table(sheet: SpecificationSheet) -> Iterator[doc.Block]:
     heads = doc.heads(*doc.numbers("No."), "Specification", *sizes, "Parts")
     rows: list[doc.Line] = []
     for number, one in enumerate(sheet.specifications, 1):
-        shares = [percent(one.shares[key]) if one.shares.get(key, 0.0) > LIMITS else "–" for key in keys]
+        shares = [share_percent(one.shares[key]) if one.shares.get(key, 0.0) > LIMITS else "–" for key in keys]
         found = (one.text or "free", one.found_text or "–", one.declared_text or "–")
         rows.append([str(number), doc.Name(one.key), *found, *shares, _parts_words(one) or "–"])
     caption = "Specifications, rounded down to two digits; shares are those of what a limit may use."
@@ -383,7 +381,7 @@ def _statement(one: Specification) -> str:
 
 def _rationale(sheet: SpecificationSheet, one: Specification) -> str:
     shares = sorted(one.shares.items(), key=lambda item: -item[1])
-    parts = [f"{percent(part)} of the {NAMES[key]}" for key, part in shares if part >= _LEAST]
+    parts = [f"{share_percent(part)} of the {NAMES[key]}" for key, part in shares if part >= _LEAST]
     takes = f"It takes {' and '.join(parts)} that may be used. " if parts else ""
     reserve = f"{percent(sheet.reserve)} of each limit is in reserve."
     return f"{takes}With all specifications of the sheet together the check says {sheet.status}; {reserve}"

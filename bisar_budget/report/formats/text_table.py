@@ -82,7 +82,7 @@ def _mission(mission: MissionFindings, style: Style) -> list[str]:
         said = [_summary(mission, is_brief=True), *_alone(mission)]
         said += [f"{counted(count, 'warning')} about the file"] if count else []
         if outside := overrides_words(mission, with_changes=False):
-            said.append(f"from outside the file: {outside}")
+            said.append(f"overrides: {outside}")
         return [_lead("; ".join(said), mission.status, style)]
     lines = _verdict(mission, style)
     lines += ["", *_requirements(mission, style)]

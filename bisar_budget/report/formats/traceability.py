@@ -265,4 +265,4 @@ def _origin(line: int | None, mission: MissionFindings, file: str) -> Iterator[s
     if mission.changes:
         yield f"Not as the file says: {changes_words(mission.changes)}"
     if outside := overrides_words(mission, with_changes=False):
-        yield f"From outside the file: {outside}"
+        yield f"Overrides: {outside}"

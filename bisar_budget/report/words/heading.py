@@ -11,7 +11,7 @@ from bisar_budget.geometry import BistaticGeometry, PlatformState
 from bisar_budget.mission.model import Document
 from bisar_budget.mission.platforms import FlownPath
 from bisar_budget.report import Style
-from bisar_budget.report.words.sentences import phase_limit, sentence, wrapped
+from bisar_budget.report.words.sentences import WIDTH, phase_limit, sentence, wrapped
 from bisar_budget.units import format_quantity
 
 _MODELS = {"published": "published model", "full": "full model", "strictest": "stricter of both models"}
@@ -50,19 +50,25 @@ def rule_words(mission: MissionFindings) -> str:
 
 
 def overrides_words(found: AboutMission, *, with_changes: bool = True) -> str:
-    """Say what from outside the file bears on the verdict; empty if nothing does. `--set` may be said elsewhere."""
-    said = [
+    """Say what bears on the verdict besides the errors; empty if nothing does. `--set` may be said elsewhere."""
+    return "; ".join(_overrides(found, with_changes=with_changes))
+
+
+def _overrides(found: AboutMission, *, with_changes: bool) -> list[str]:
+    return [
         f"{one.name} {printable(one.value)} ({one.origin})"
         for one in found.overrides
         if with_changes or one.name != "--set"
     ]
-    return "; ".join(said)
 
 
 def overrides_lines(found: AboutMission) -> list[str]:
-    """The same for a terminal, beside `--set`; no line if there is nothing."""
-    said = overrides_words(found, with_changes=False)
-    return wrapped(f"From outside the file: {said}", "  ") if said else []
+    """The same for a terminal, beside `--set`: in one line, else each in its own; no line if there is nothing."""
+    said = _overrides(found, with_changes=False)
+    line = f"Overrides: {'; '.join(said)}"
+    if len(line) <= WIDTH or len(said) < 2:
+        return wrapped(line, "  ") if said else []
+    return ["Overrides:", *(part for one in said for part in wrapped(f"  {one}", "    "))]
 
 
 def file_words(found: AboutMission) -> str:

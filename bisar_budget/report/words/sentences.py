@@ -56,6 +56,11 @@ def percent(ratio: float) -> str:
     return f"{value} %"
 
 
+def share_percent(part: float) -> str:
+    """Write a part of a whole in percent, to three digits: it has no limit that it is on one side of."""
+    return "<0.01 %" if 0 < part < 1e-4 else f"{100 * part:.3g} %"
+
+
 def use_words(use: float | None) -> str:
     """A utilization in percent; a dash where there is none."""
     return "-" if use is None else percent(use)
@@ -145,7 +150,7 @@ def row_size(value: float | None, row: Row, mission: MissionFindings, rounding: 
     given = _given(row.line, row.unit)
     if not given and row.unit == "rad" and row.subject.kind in _OF_PHASES:
         given = phase_unit(mission)
-    return format_in(value, row.unit, given, 3, rounding)
+    return format_in(_level(value, row.unit), row.unit, given, 3, rounding)
 
 
 def row_limit(row: Row, mission: MissionFindings) -> str:
@@ -190,7 +195,15 @@ def requirement_size(value: float | None, one: JudgedRequirement, rounding: str 
     if value is None:
         return "-"
     given = _given(one.line, one.unit) or (_PHASE_UNIT if one.unit == "rad" else "")
-    return format_in(value, one.unit, given, 3, rounding)
+    return format_in(_level(value, one.unit), one.unit, given, 3, rounding)
+
+
+LEAST_LEVEL_DB = 5e-4  # an echo as strong as its point is 0 dB, but for rounding
+
+
+def _level(value: float, unit: str) -> float:
+    """The number itself; 0 of a level that is 0 dB but for rounding."""
+    return 0.0 if unit == "dB" and abs(value) < LEAST_LEVEL_DB else value
 
 
 def _given(line: int | None, unit: str) -> str:
@@ -310,7 +323,12 @@ def uri(path: str) -> str:
     return f"file:///{encoded.lstrip('/')}" if os.path.isabs(path) else encoded
 
 
+_SIGNS = "=+-@\uff1d\uff0b\uff0d\uff20"  # of a formula, and their full-width forms, which some programs take for them
+_SIZE = re.compile(r"-|[+-]?\d+(\.\d+)?(e[+-]?\d+)?( [A-Za-z\u00b5\u00b0%/\u00b2\u00b3\u221a]+)?")  # nothing to run
+
+
 def spreadsheet_text(value: str | None) -> str | None:
-    """Keep text of the user's own from being run: a spreadsheet takes what starts like a formula for one."""
+    """Keep text from being run: a spreadsheet takes what starts like a formula, after blanks too, for one."""
     value = printable(value) if value else value
-    return f"'{value}" if value and value != "-" and value[0] in "=+-@" else value
+    is_formula = bool(value) and (value or "").lstrip()[:1] in tuple(_SIGNS) and not _SIZE.fullmatch(value or "")
+    return f"'{value}" if is_formula else value
