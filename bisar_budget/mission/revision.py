@@ -189,10 +189,13 @@ class _Object:
     top: str = ""
 
 
+_MISSING = _Object(b"missing")
+
+
 def _object(top: str, commit: str, inside: str) -> _Object:
     """Find what stands at a path of a commit, in submodules too."""
-    if "\n" in inside:  # git reads one name from each line
-        return _Object(b"missing")
+    if "\n" in inside:
+        return _object_of_lines(top, commit, inside)
     asked = os.fsencode(f"{commit}:{'' if inside == os.curdir else inside}")
     is_read, answer, _ = _git(top, "cat-file", "--batch", "--follow-symlinks", given=asked + b"\n")
     head, _, rest = answer.partition(b"\n")
@@ -211,6 +214,29 @@ def _object(top: str, commit: str, inside: str) -> _Object:
             is_here, _, _ = _git(folder, "cat-file", "-e", its_commit)
             return _object(folder, its_commit, below) if is_here else _Object(b"submodule")
     return _Object(words[0] if words else b"missing")
+
+
+def _object_of_lines(top: str, commit: str, inside: str) -> _Object:
+    """Find what stands at a path with a line end, which `cat-file` cannot be asked for, by its hash.
+
+    Neither links nor submodules are followed: what is one, or below one, is said to be.
+    """
+    parts = inside.split("/")
+    for length in range(1, len(parts) + 1):
+        path = "/".join(parts[:length])
+        _, listed, _ = _git(top, "ls-tree", "-z", commit, "--", path)
+        head, _, name = listed.partition(b"\0")[0].partition(b"\t")
+        if name != os.fsencode(path):
+            break
+        mode, kind, hash = head.split()
+        if mode == _SUBMODULE:
+            return _Object(b"submodule")
+        if mode == _LINK or length == len(parts):
+            is_read, content, _ = _git(top, "cat-file", kind.decode(), hash.decode())
+            return (
+                _Object(b"symlink" if mode == _LINK else kind, content, hash.decode(), top) if is_read else _MISSING
+            )
+    return _MISSING
 
 
 def _existing(path: str) -> tuple[str, str]:

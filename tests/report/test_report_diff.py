@@ -234,6 +234,28 @@ class TestCommand:
         assert "pass -> FAIL" in result.stdout
         assert "1 newly failing" in result.stdout
 
+    @pytest.mark.parametrize("name", ["a\nb.yaml", "\n.yaml", "a\nb/m.yaml"])
+    def test_a_name_with_a_line_end_is_found(self, run, repository, name, monkeypatch) -> None:
+        """It was new in each comparison, so that no gate looked at it."""
+        monkeypatch.chdir(repository.parent)
+        mission = repository.parent / name
+        mission.parent.mkdir(exist_ok=True)
+        mission.write_text(mission_text(**BASE))
+        git(repository.parent, "add", ".")
+        git(repository.parent, "-c", "user.name=t", "-c", "user.email=t@example.org", "commit", "-q", "-m", "x")
+        gate = ("--base", "HEAD", "--fail-on-erosion", "10%")
+        assert run("diff", name, *gate).exit_code == 0
+        assert "new, there is nothing" not in run("diff", name, *gate).stdout
+        mission.write_text(mission_text(**{**BASE, "timing_error__quadratic": 1e-12}))
+        for pattern in (name, "**/*.yaml"):
+            done = run("diff", pattern, *gate)
+            assert done.exit_code == 1
+            assert "pass -> FAIL" in done.stdout
+        mission.unlink()
+        gone = run("diff", "**/*.yaml", *gate)
+        assert gone.exit_code == 1
+        assert "the mission file is gone" in gone.stdout
+
     def test_from_another_folder(self, run, repository, monkeypatch) -> None:
         monkeypatch.chdir(repository.parent)
         assert run("diff", "m.yaml", "--base", "HEAD").exit_code == 0
