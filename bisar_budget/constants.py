@@ -23,6 +23,7 @@ MAX_DRAWS = 10**12  # shared out between many
 
 EARTH_GRAVITATIONAL_PARAMETER = 3.986004418e14  # m³/s², GM of WGS-84, atmosphere included
 EARTH_RADIUS = 6.371e6  # m, mean radius; how far the Earth's centre is below the scene
+FASTEST_FLIGHT = 3e3  # m/s; no aircraft is as fast, and no satellite in a low orbit as slow
 MAX_DAYS = 366.0  # in which passes of a satellite are looked for
 
 # Here, since the command line says them without a mission, and a mission is read without the command line.

@@ -11,6 +11,7 @@ from bisar_budget.analysis.allocation import ROOM, caps, rounded_down
 from bisar_budget.analysis.analysis import Case
 from bisar_budget.budget.declarations import swings_nothing
 from bisar_budget.budget.doubts import input_doubts
+from bisar_budget.constants import FASTEST_FLIGHT
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.oscillator_acceleration import is_unshaken
 from bisar_budget.effects.oscillators import POOR_FIT, clocks_without_oscillator
@@ -143,9 +144,6 @@ def orbit_is_planned(platform: str) -> str:
 def path_is_doubtful(platform: str, doubt: str) -> str:
     """Said of a path by an orbit or a log."""
     return f"platforms.{platform}: {doubt}"
-
-
-FASTEST_FLIGHT = 3e3  # m/s; no aircraft is as fast, and no satellite in a low orbit as slow
 
 
 def straight_orbits(mission: Mission) -> Iterator[_Warned]:

@@ -21,7 +21,7 @@ from bisar_budget.budget.declarations import DECLARATIONS, is_asked_for, missing
 from bisar_budget.budget.dispersion_row import dispersion_rows
 from bisar_budget.budget.doubts import doubted_platforms, is_in_doubt, strays
 from bisar_budget.budget.error_rows import ErrorRows, specification_rows
-from bisar_budget.budget.file_warnings import FASTEST_FLIGHT, calm_oscillators
+from bisar_budget.budget.file_warnings import calm_oscillators
 from bisar_budget.budget.judged_requirements import (
     KEYS,
     RequirementState,
@@ -34,6 +34,7 @@ from bisar_budget.budget.random_rows import RandomRows
 from bisar_budget.budget.tone_rows import accelerated_rows, pslr_row, spur_rows
 from bisar_budget.budget.vibration_rows import Vibrations
 from bisar_budget.budget.waivers import holding_place
+from bisar_budget.constants import FASTEST_FLIGHT
 from bisar_budget.effects.declared import END_OF_IMAGE, LOCATION, MODELS
 from bisar_budget.effects.effect import PLATFORMS, subject
 from bisar_budget.effects.oscillators import clocks_without_oscillator

@@ -7,14 +7,17 @@ from typing import NamedTuple
 import numpy as np
 
 from bisar_budget import units
+from bisar_budget.constants import FASTEST_FLIGHT
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.oscillators import noise_of
 from bisar_budget.effects.spectra import PowerLawPiece, density
+from bisar_budget.geometry import norm
 from bisar_budget.mission.changes import ACCEPTED_ERRORS, is_error, parts_of
 from bisar_budget.mission.instruments import Oscillator
 from bisar_budget.mission.load import folder_of
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.parts import Entry, OscillatorPart, PartError, entries, folders
+from bisar_budget.mission.platforms import Platform
 from bisar_budget.mission.quantities import Number, QuestionError, as_number, number_of
 from bisar_budget.ranges.exact_ranges import Floats
 from bisar_budget.units import Dimension, format_quantity, parse_quantity
@@ -206,15 +209,23 @@ def suitable_parts(mission: Mission, one: Specified, most: float, among: Sequenc
 
     A sensor does with a figure of the same name that is no larger in any axis. An oscillator does whose phase noise
     is nowhere above the spectrum that is ordered, at the same frequency; one that says nothing of some offsets not.
+    A satellite is offered sensors that serve in orbit alone: receivers for the ground and the air stop at 515 m/s or
+    18 km by export rules, and inertial sensors feel nothing in free fall.
     """
     *above, section, figure = parts_of(one.key)
     if section == "oscillator" and figure == "level":
         yield from _quiet_oscillators(mission, above[-1], most, among)
     kind = {"motion_error": "gnss", "imu": "imu"}.get(section)
+    is_satellite = above[:1] == ["platforms"] and _is_satellite(getattr(mission.platforms, above[1]))
     for entry in among:
-        value = getattr(entry.part, figure, None) if entry.part.kind == kind else None
+        serves = not is_satellite or getattr(entry.part, "in_orbit", None)
+        value = getattr(entry.part, figure, None) if entry.part.kind == kind and serves else None
         if value is not None and np.abs(value).max() <= most:
             yield entry.id
+
+
+def _is_satellite(platform: Platform) -> bool:
+    return platform.orbit is not None or bool(norm(platform.state.velocity) > FASTEST_FLIGHT)
 
 
 def _quiet_oscillators(mission: Mission, name: str, level: float, among: Sequence[Entry]) -> Iterator[str]:

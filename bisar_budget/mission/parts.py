@@ -60,6 +60,7 @@ from bisar_budget.mission.readers import (
     Text,
     TextMap,
     Triple,
+    YesNo,
     did_you_mean,
     either,
 )
@@ -75,6 +76,7 @@ _NAME = Key(_TEXT, "Maker, type, and revision or mode; reports show it.")
 _SAYS = Key(_TEXT, "What its figures are in their source: which statistic, typical or largest, in which conditions.")
 _SOURCE = either(dict, TextMap("figure"), _TEXT)
 _SOURCES = Key(_SOURCE, "Document, revision and table of every figure, or of each by its key.")
+_IN_ORBIT = Key(YesNo(), "Whether it serves a satellite. `allocate` offers a satellite no other part of this kind.")
 _KIND = "Which kind of part it is, and which figures it has."
 _POSITION = "1 sigma east, north, up; a single value stands for each."
 _NOISE = "Position errors that change within an aperture: what is left of its noise."
@@ -95,6 +97,7 @@ class ImuPart(NamedTuple):
     gyro_bias: GyroBias = None
     velocity_random_walk: VelocityRandomWalk = None
     angle_random_walk: AngleRandomWalk = None
+    in_orbit: Annotated[bool | None, _IN_ORBIT] = None
     says: Annotated[str | None, _SAYS] = None
 
     @staticmethod
@@ -112,6 +115,7 @@ class GnssPart(NamedTuple):
     position: Annotated[Vector | None, Key(Triple(COORDINATE, or_scalar=True), _POSITION)] = None
     velocity: Annotated[Vector | None, Key(Triple(VELOCITY, or_scalar=True), _POSITION)] = None
     random: Annotated[tuple[GaussMarkov, ...], Key(ListOf(GaussMarkov), _NOISE)] = ()
+    in_orbit: Annotated[bool | None, _IN_ORBIT] = None
     says: Annotated[str | None, _SAYS] = None
 
     @staticmethod

@@ -261,6 +261,22 @@ def test_a_part_keeps_to_an_order_by_its_largest_figure() -> None:
     assert ("stim300" in one.parts) == (one.ordered >= math.radians(0.3) / 3600)
 
 
+def test_a_satellite_is_offered_no_receiver_of_a_drone() -> None:
+    """Boards for drones keep to the metres of the order on the ground alone; products of orbits keep to them."""
+    satellite = load_mission(str(ROOT / "specs" / "missions" / "holdover_roof_receiver.yaml"))
+    key = "platforms.transmitter.motion_error.position"
+    (one,) = allocate(satellite, keys={key: 1.0}, today=DAY).specifications
+    assert "sentinel-1-poeorb" in one.parts
+    assert not {"um980-rtk", "zed-x20p-rtk", "mosaic-x5-rtk"} & set(one.parts)
+
+
+def test_an_aircraft_is_offered_receivers_of_the_air() -> None:
+    aircraft = mission(platforms__receiver__motion_error={"position": "1 m"}, requirements={"location_error": "10 m"})
+    key = "platforms.receiver.motion_error.position"
+    (one,) = allocate(aircraft, keys={key: 1.0}, today=DAY).specifications
+    assert {"um980-rtk", "zed-x20p-rtk", "mosaic-x5-rtk"} <= set(one.parts)
+
+
 def test_an_oscillator_keeps_to_a_level_where_its_noise_is_nowhere_above_the_spectrum() -> None:
     """The BVA oscillator has a flicker floor of 8e-14: h₋₁ = σ²/(2·ln 2)."""
     file = mission(platforms__receiver__oscillator={"power_law": {"h-1": 1e-25}})

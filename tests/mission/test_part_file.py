@@ -218,7 +218,8 @@ class TestSchema:
             assert section["description"]
         for kind, section in SECTIONS.items():
             definition = part_schema()["definitions"][section.kind.__name__]
-            assert definition["properties"].keys() == {"kind", "name", "source", "says", *FIGURES[kind]}
+            beside = {"kind", "name", "source", "says"} | ({"in_orbit"} if kind in ("imu", "gnss") else set())
+            assert definition["properties"].keys() == {*beside, *FIGURES[kind]}
             assert all(one["description"] for one in definition["properties"].values())
 
     @pytest.mark.parametrize("file", BUNDLED, ids=lambda file: file.stem)

@@ -329,3 +329,12 @@ def test_errors_at_random_are_among_what_differs_at_the_edge(rule: str) -> None:
     together = {"each": max, "sum": math.fsum, "rss": lambda parts: math.hypot(*parts)}[rule](sizes.values())
     (row,) = (one for one in findings(**changes).rows if one.id == "mission.spatial_variance")
     assert row.declared == pytest.approx(together, rel=1e-4)
+
+
+def test_a_sensitivity_per_g_is_converted_where_si_units_begin() -> None:
+    """g is 9.80665 m/s²: 1 /g is 0.101972 s²/m, and 3e-10 /g is 3.05915e-11 s²/m."""
+    mission = load_mission(str(ROOT / "specs" / "missions" / "uav_vibrating_ocxo.yaml"))
+    text = explain(mission, check_mission(mission, TODAY), "receiver.oscillator.acceleration")
+    assert "acceleration_sensitivity: 3e-10 /g" in text
+    assert "Per g is per 9.80665 m/s²: 1 /g = 0.101972 s²/m" in text
+    assert "3.05915e-11 s²/m" in text

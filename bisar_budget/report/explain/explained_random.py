@@ -114,6 +114,8 @@ def _declared(mission: Mission, error: RandomError, row: Row) -> Iterator[Step]:
     yield from stated(mission, error.path, error.declared, row.evidence)
     if error.declared is None:
         return
+    if error.unit == "s^2/m":
+        yield step(f"Per g is per {STANDARD_GRAVITY:g} m/s²: 1 /g = {1 / STANDARD_GRAVITY:.6g} s²/m")
     k = mission.allocation.coverage_factor
     if error.unit != "dB" and error.is_covered:
         worked = WorkedEquation(
