@@ -124,10 +124,10 @@ VARIANTS = (
     ("uav_stim300", "attitude: 0.015 deg", "attitude: 0.02 deg", "receiver.quadratic_phase_error", "fail"),
     ("uav_stim300", "imu:\n", "imu:\n        accelerometer_bias: 1.1 mg\n", "receiver.quadratic_phase_error", "fail"),
     ("uav_stim300", "sigma: 0.5 mm", "sigma: 6 mm", "receiver.islr", "fail"),
-    ("ocxo_free_running", "time: 2.48 s", "time: 0.5 s", "receiver.quadratic_phase_error", "warn"),
-    ("ocxo_free_running", "time: 2.48 s", "time: 0.6 s", "receiver.quadratic_phase_error", "fail"),
+    ("ocxo_free_running", "time: 2.48 s", "time: 0.55 s", "receiver.quadratic_phase_error", "warn"),
+    ("ocxo_free_running", "time: 2.48 s", "time: 0.7 s", "receiver.quadratic_phase_error", "fail"),
     ("ocxo_free_running", "allocation:", "autofocus: {n_pull: 2}\nallocation:", "receiver.quadratic_phase_error",
-     "pass_with_autofocus"),
+     "warn"),  # what autofocus would bring to pass rests on the noise below the mask
     ("ocxo_free_running", "allocation:", "autofocus: {n_pull: 2}\nallocation:", "receiver.islr", "fail"),
     ("tandem_x_synchronized", "200 ms", "500 ms", "receiver.islr", "warn"),
     ("tandem_x_synchronized", "200 ms", "1 s", "receiver.islr", "fail"),

@@ -350,7 +350,7 @@ class TestGithub:
         levels = {"fail": "error", "warn": "warning", "not_evaluated": "error", "waived": "notice"}
         titles = {}
         for command, properties, message in commands:
-            titles[properties["title"].split(" ", 1)[1]] = (command, properties)
+            titles[properties["title"].partition(" ")[2]] = (command, properties)
             assert properties["file"] == "mission.yaml"
             assert message
         for row in rows.values():
