@@ -40,6 +40,7 @@ PER_PHASE = SPEED_OF_LIGHT / (2 * math.pi * F_0)  # m per radian
 HOLDOVER = {"method": "holdover", "age": "60 s", "averaging": "10 s"}
 LINK = {"interval": "1 s", "error": "1 deg"}
 OCXO = {"power_law": {"h-2": "4e-23", "h-1": "2e-24", "h0": "1e-25"}}
+STEADY = {"power_law": {"h0": "1e-40"}}  # a clock that hardly drifts
 RECEIVER = "platforms__receiver__oscillator"
 HELD = MISSION[: MISSION.index("    motion_error")].rstrip()
 
@@ -239,7 +240,8 @@ class TestLocation:
         assert row(self.of_age("600 s", "100 s"), "mission.location_error").status == "fail"
 
     def test_draws_agree(self) -> None:
-        text = mission_text(platforms__receiver__oscillator=OCXO, synchronization=HOLDOVER, **self.NEEDS)
+        clocks = {RECEIVER: OCXO, "platforms__transmitter__oscillator": STEADY}
+        text = mission_text(**clocks, synchronization=HOLDOVER, **self.NEEDS)
         analysis = Analysis(parse_mission(text))
         found = monte_carlo(analysis, 20_000, 1)
         (location,) = [one for one in found.requirements if one.id == "mission.location_error"]
@@ -270,7 +272,8 @@ class TestLocation:
 
     def test_an_age_is_solved_for_and_swept(self, run: Callable, tmp_path: Path) -> None:
         file, location = tmp_path / "m.yaml", "mission.location_error"
-        file.write_text(mission_text(**{RECEIVER: OCXO}, synchronization=HOLDOVER, **self.NEEDS))
+        clocks = {RECEIVER: OCXO, "platforms__transmitter__oscillator": STEADY}
+        file.write_text(mission_text(**clocks, synchronization=HOLDOVER, **self.NEEDS))
         done = run("solve", str(file), "--row", location, "--for", "synchronization.age", "--format", "json")
         assert done.exit_code == 0, done.stderr
         age = json.loads(done.stdout)["missions"][0]["value"]
