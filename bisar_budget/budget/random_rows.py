@@ -172,7 +172,7 @@ class RandomRows:
             yield RandomRow(row.in_decibel() if error.unit == "dB" else row, place, *others)
 
     def _rests_on_masks(self, effects: RandomEffect, sizes: Floats) -> Truths:
-        """Whether what an error uses of a requirement rests on noise below the first point of its mask."""
+        """Whether the use of a requirement by an error rests on noise below the first point of its mask."""
         found = np.zeros(sizes.shape[1:], dtype=bool)
         for row, error in enumerate(self.errors):
             for part, limit in zip(("quadratic", "cubic", "spread", "displacement"), sizes, strict=True):
