@@ -248,6 +248,35 @@ def input_states_more(
 
 
 @phrase
+def log_leaves_too_much(phase: float, most: float, key: str) -> str:
+    """Said of a log of which a smooth path leaves much, where the file does not say which one is flown. [rad]"""
+    return (
+        f"the smooth path leaves {phase:.3g} rad rms of the log along the line of sight, more than {most:g} rad:"
+        f" state {key}: smoothed where the processor flies the smooth path, raw where it flies the fixes"
+    )
+
+
+@phrase
+def log_is_flown_as_it_is(figure: str) -> str:
+    """Said of the rows of a log whose processor flies the fixes."""
+    if figure == "grid":
+        return "the fixes of the log are written to a step: a uniform error, constant over the aperture at worst"
+    return "the processor flies the fixes of the log: what a smooth path leaves of them spreads"
+
+
+@phrase
+def log_is_coarse(step: float, declared: float | None, axis: str, key: str) -> str:
+    """Said of a log whose fixes are written to a step that is large beside the declared position error. [m]"""
+    beside = "no position error is declared"
+    if declared is not None:
+        beside = f"more than a tenth of the {_size(declared, 'm')} that are declared"
+    return (
+        f"the log writes its fixes to steps of {_size(step, 'm')} ({axis}), {beside}: state {key}: smoothed where the"
+        " processor flies a smooth path through them, raw where it flies the fixes"
+    )
+
+
+@phrase
 def input_usually_has_more(
     words: str,
     kind: str,

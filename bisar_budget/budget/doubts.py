@@ -3,6 +3,10 @@
 A path by an orbit or a log says how far the truth may be from it: by the age of its elements, the interpolation of
 its ephemeris, the residual of its smoothed log. A position error that is smaller cannot be that of this path. Nor can
 a declared error that is smaller than the one that the source of the path states of itself.
+
+A log says more than its smooth path: what the path leaves of the fixes, and the step to which they are written. A
+processor that flies the smooth path does without both, and one that flies the fixes has both in its image. Where the
+file does not say which one it is (`trajectory.processed`), neither can be judged.
 """
 
 from collections.abc import Iterator, Sequence
@@ -15,11 +19,12 @@ from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Case
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.effect import MOTION_UNITS, PLATFORMS, Subject
+from bisar_budget.effects.navigation_errors import residual_subject
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import FRAME_AXES, BistaticGeometry, norm, unit
 from bisar_budget.mission.covariance import KINDS
 from bisar_budget.mission.model import Mission
-from bisar_budget.mission.platforms import FlownPath, MotionError, Platform
+from bisar_budget.mission.platforms import FlownPath, LogNoise, MotionError, Platform
 from bisar_budget.paths.accuracy import StatedAccuracy
 from bisar_budget.phrases import NOTHING, Note
 from bisar_budget.ranges.exact_ranges import Floats, Truths
@@ -28,6 +33,9 @@ LEAST_M = 1e-3  # of a doubt; what is less is no story beside any declared error
 NEGLIGIBLE_USE = 0.1  # of a requirement, by the doubt of a path or by a velocity that its source states
 NEGLIGIBLE_RAD = 0.08  # of quadratic phase, in any image
 _TYPICAL_SHARE = 1 / 3  # of a usual error; a fix may be as much better than those of its quality usually are
+MOST_RESIDUAL_RAD = 0.2  # rms phase along the line of sight that a smooth path may leave of a log, unsaid
+MOST_GRID_SHARE = 0.1  # of the declared position error, that a step of a log may have, unsaid
+RESIDUAL = "residual"  # kind of doubt of what a smooth path leaves
 _EQUAL = 1e-6  # relative, of variances: equal is enough, and turned axes round
 
 
@@ -38,6 +46,8 @@ class InputDoubt:
     `doubt` is how far the truth may be from the path, or the error that its source states, along the axis where it
     exceeds the declared one most. `declared` is that one, without the coverage factor, 0 where the file declares
     none. Both are root-sum-squares where the doubt has no direction. [m] or [m/s], by the `kind`. `note` says both.
+    Where `is_of_log`, it is what a smooth path leaves of a log [rad], beside the most that may go unsaid, or a step
+    of the log's fixes.
     """
 
     owner: str
@@ -46,6 +56,7 @@ class InputDoubt:
     note: Note
     kind: str = "position"
     is_stated: bool = False
+    is_of_log: bool = False
 
 
 def input_doubts(mission: Mission) -> list[InputDoubt]:
@@ -66,6 +77,12 @@ def input_doubts(mission: Mission) -> list[InputDoubt]:
                 for stated in path.stated
                 if np.any(states_more(mission, name, kind, stated))
             ]
+        if np.any(is_coarse(mission, name)):
+            found.append(_coarse_grid(platform, name))
+        if np.any(leaves_unsaid(mission, name)):
+            phase, key = float(residual_phase(mission, name)), f"platforms.{name}.trajectory.processed"
+            note = phrases.log_leaves_too_much(phase, MOST_RESIDUAL_RAD, key)
+            found.append(InputDoubt(name, phase, MOST_RESIDUAL_RAD, note, RESIDUAL, is_of_log=True))
     return found
 
 
@@ -76,9 +93,10 @@ def doubted_platforms(mission: Mission, cases: int) -> dict[tuple[str, str], Tru
         path: FlownPath | None = getattr(mission.platforms, name).path
         if path is not None:
             for kind in KINDS:
-                doubts = [strays(mission, name)] if kind == "position" else []
+                doubts = [strays(mission, name), is_coarse(mission, name)] if kind == "position" else []
                 doubts += [states_more(mission, name, kind, stated) for stated in path.stated]
                 found[name, kind] = np.any([np.broadcast_to(doubt, (cases,)) for doubt in (False, *doubts)], axis=0)
+            found[name, RESIDUAL] = np.array(np.broadcast_to(leaves_unsaid(mission, name), (cases,)))
     return found
 
 
@@ -113,7 +131,12 @@ def declared_position_error(error: MotionError) -> Any:
 
 
 def is_in_doubt(what: Subject, owner: str, mission: Mission, kind: str = "position") -> bool:
-    """Whether a row is of a kind of error of a platform, along the axes that the file states it in."""
+    """Whether a row is of a kind of error of a platform, along the axes that the file states it in.
+
+    What a smooth path leaves of a log spreads: its own row, and those of the powers that spread.
+    """
+    if kind == RESIDUAL:
+        return what == residual_subject(owner) or (what.kind == "islr" and what.owner in (owner, "mission"))
     error: MotionError = getattr(mission.platforms, owner).motion_error
     frame = "scene" if error.stated(kind) is None else error.frame
     return what.owner == owner and what.kind == kind and what.frame == frame
@@ -202,6 +225,70 @@ def _stated_doubt(platform: Platform, name: str, kind: str, stated: StatedAccura
     phrase = phrases.input_usually_has_more if stated.is_typical else phrases.input_states_more
     note = phrase(stated.words, kind, sizes[0], sizes[1], unit_name, key, is_declared, names)
     return InputDoubt(name, sizes[0][place], sizes[1][place], note, kind, is_stated=True)
+
+
+# ---------------------------------------------------------------------- what a smooth path leaves of a log
+def leaves_unsaid(mission: Mission, name: str) -> Any:
+    """Whether a smooth path leaves more of a log than may go unsaid, and the file does not say which one is flown."""
+    log = _unsaid_log(mission, name)
+    return False if log is None else np.asarray(residual_phase(mission, name)) > MOST_RESIDUAL_RAD
+
+
+def residual_phase(mission: Mission, name: str) -> Any:
+    """Phase of what a smooth path leaves of a log's fixes along the line of sight, rms over the aperture. [rad]"""
+    path: FlownPath | None = getattr(mission.platforms, name).path
+    if path is None or path.log_noise is None:
+        return 0.0
+    residual, half = _stack(path.log_noise.residual), np.asarray(mission.collection.aperture_time) / 2
+    square = 0.0
+    for weight, time in ((1 / 6, -half), (2 / 3, 0.0 * half), (1 / 6, half)):  # Simpson, over the aperture
+        sight = np.stack(np.broadcast_arrays(*_sight(mission, name, time)), axis=-1)
+        square = square + weight * np.einsum("...i,...ij,...j->...", sight, residual, sight)
+    return 2 * np.pi / np.asarray(mission.radar.wavelength) * np.sqrt(np.maximum(square, 0.0))
+
+
+def is_coarse(mission: Mission, name: str) -> Any:
+    """Whether a step of a log's fixes exceeds a tenth of the declared position error, and nobody says which is flown.
+
+    Along any direction. Where the file declares no position error, it counts where rounding to it would use more than
+    a negligible part of a requirement: its variance is that of a uniform error, a twelfth of the square of the step.
+    """
+    log = _unsaid_log(mission, name)
+    if log is None:
+        return False
+    platform: Platform = getattr(mission.platforms, name)
+    grid = _stack(log.grid)
+    squares = np.swapaxes(grid, -1, -2) @ grid
+    declared = _declared_covariance(platform, "position")
+    left = MOST_GRID_SHARE**2 * declared * (1 + _EQUAL) + LEAST_M**2 * np.eye(3) - squares
+    coarse = np.linalg.eigvalsh(left)[..., 0] < 0
+    if coarse.any() and platform.motion_error.stated("position") is None and not platform.motion_error.random:
+        coarse = coarse & _matters(mission, name, "position", squares / 12)
+    return coarse
+
+
+def _unsaid_log(mission: Mission, name: str) -> LogNoise | None:
+    """What a smooth path leaves of the log of a platform, of which the file does not say what is flown."""
+    path: FlownPath | None = getattr(mission.platforms, name).path
+    log = None if path is None else path.log_noise
+    return log if log is not None and log.processed is None else None
+
+
+def _coarse_grid(platform: Platform, name: str) -> InputDoubt:
+    """The step of a log's fixes that exceeds the declared position error most, along the axes of that error."""
+    assert platform.path is not None
+    assert platform.path.log_noise is not None
+    error = platform.motion_error
+    axes = np.array(platform.state.frame(error.frame), dtype=float)
+    grid, declared = np.array(platform.path.log_noise.grid), _declared_covariance(platform, "position")
+    steps = np.sqrt(np.sum((grid @ axes.T) ** 2, axis=0))
+    sigmas = np.sqrt(np.diag(axes @ declared @ axes.T))
+    place = int(np.argmax(steps - MOST_GRID_SHARE * sigmas))
+    is_declared = error.stated("position") is not None or bool(error.random)
+    key, axis = f"platforms.{name}.trajectory.processed", FRAME_AXES[error.frame][place]
+    step, sigma = float(steps[place]), float(sigmas[place])
+    note = phrases.log_is_coarse(step, sigma if is_declared else None, axis, key)
+    return InputDoubt(name, step, sigma, note, is_of_log=True)
 
 
 # ---------------------------------------------------------------------- what so much would do

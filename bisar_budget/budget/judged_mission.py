@@ -19,7 +19,7 @@ from bisar_budget.analysis.spread import noise
 from bisar_budget.budget.aggregates import Aggregates, JudgedScene, unplaced, untaken_effects
 from bisar_budget.budget.declarations import DECLARATIONS, is_asked_for, missing_declarations
 from bisar_budget.budget.dispersion_row import dispersion_rows
-from bisar_budget.budget.doubts import doubted_platforms, is_in_doubt, strays
+from bisar_budget.budget.doubts import RESIDUAL, doubted_platforms, is_in_doubt, strays
 from bisar_budget.budget.error_rows import ErrorRows, specification_rows
 from bisar_budget.budget.file_warnings import calm_oscillators
 from bisar_budget.budget.judged_requirements import (
@@ -30,6 +30,7 @@ from bisar_budget.budget.judged_requirements import (
     requirement_states,
 )
 from bisar_budget.budget.judged_rows import CODE, REQUIREMENTS, Codes, FamilyRow, Judged, Judging, Why
+from bisar_budget.budget.log_rows import log_rows
 from bisar_budget.budget.random_rows import RandomRows
 from bisar_budget.budget.tone_rows import accelerated_rows, pslr_row, spur_rows
 from bisar_budget.budget.vibration_rows import Vibrations
@@ -130,7 +131,8 @@ class _Judgement:
         nowhere = np.zeros(self.cases, dtype=bool)
         # A clock in holdover whose oscillator the file does not state drifts by nobody knows how much.
         is_unknown = np.full(self.cases, bool(clocks_without_oscillator(mission)))
-        is_misplaced = np.any([nowhere, is_unknown, *drifting.values(), *self._in_doubt.values()], axis=0)
+        paths = [is_doubtful for (_, kind), is_doubtful in self._in_doubt.items() if kind != RESIDUAL]
+        is_misplaced = np.any([nowhere, is_unknown, *drifting.values(), *paths], axis=0)
         has_noise = self._has_noise()
         own = of_all.status.copy()
         of_all.judge_effects(untaken)
@@ -178,6 +180,7 @@ class _Judgement:
         yield from spur_rows(self.judging, self.analysis, model)
         yield from accelerated_rows(self.judging, self.analysis, model)
         yield from dispersion_rows(self.judging, self.analysis)
+        yield from log_rows(self.judging, self.mission)
         if needs.pslr is not None:
             yield pslr_row(self.judging, self.analysis.tones, needs.pslr)
         if needs.islr is not None:
@@ -251,7 +254,8 @@ class _Judgement:
         """Rows that are shown, and of position errors of paths in doubt, that no case declares."""
         wanted = dict(self.shown or {})
         for (name, kind), is_doubtful in self._in_doubt.items():
-            own = (subject(name, kind, axis) for axis in "xyz") if is_doubtful.any() else ()
+            is_shown = is_doubtful.any() and kind != RESIDUAL  # which has a family of its own
+            own = (subject(name, kind, axis) for axis in "xyz") if is_shown else ()
             wanted |= {one.id: one for one in own if is_in_doubt(one, name, self.mission, kind)}
         there = {*known, DECLARATIONS.id}
         return (Judged.of_none(one, self.cases) for row_id, one in wanted.items() if row_id not in there)
@@ -349,7 +353,7 @@ class RowStatuses:
         """ISLR is not evaluated where nothing but a cubic phase makes it."""
         if not has_noise.all():
             which = [what.kind == "islr" for what in self.subjects]
-            self._settle(which, ~has_noise & self._is_open, Why.NOTHING_SPREADS)
+            self._settle(which, ~has_noise & self._is_open & (self.why != Why.INPUT_IN_DOUBT), Why.NOTHING_SPREADS)
 
     @property
     def _is_open(self) -> Truths:

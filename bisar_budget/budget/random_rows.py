@@ -31,7 +31,7 @@ from bisar_budget.budget.tone_rows import evidence, notes_of_acceleration
 from bisar_budget.effects.air_delays import CONTENT, legs_of
 from bisar_budget.effects.declared import CUBIC, LOCATION, OTHER_MODEL, QUADRATIC
 from bisar_budget.effects.effect import PLATFORMS, override_notes, subject
-from bisar_budget.effects.navigation_errors import process_of
+from bisar_budget.effects.navigation_errors import CORRELATED, process_of
 from bisar_budget.effects.oscillator_acceleration import lacks_a_spectrum
 from bisar_budget.effects.oscillator_tones import spurs_of
 from bisar_budget.effects.oscillators import POOR_FIT
@@ -41,7 +41,7 @@ from bisar_budget.findings.row import Row
 from bisar_budget.geometry import GroundVector
 from bisar_budget.mission.instruments import FORMS, Oscillator, Synchronization
 from bisar_budget.mission.model import Mission
-from bisar_budget.mission.platforms import MotionError
+from bisar_budget.mission.platforms import FlownPath, MotionError
 from bisar_budget.mission.readers import SortedPoints
 from bisar_budget.mission.vibrations import Vibration
 from bisar_budget.phrases import NOTHING, Note
@@ -400,6 +400,9 @@ def _said(mission: Mission, error: RandomError) -> tuple[str, str | None, tuple[
     if kind == "vibration":
         motion_error: MotionError = getattr(mission.platforms, error.owner).motion_error
         return "spectrum of vibration", motion_error.source, _said_of_spectrum(mission, error.owner)
+    if kind == "trajectory":
+        path: FlownPath | None = getattr(mission.platforms, error.owner).path
+        return "Gauss-Markov", path and path.source, (phrases.log_is_flown_as_it_is(figure),)
     if kind == "random":
         source, figure, equation = process_of(mission, error).source, "random", "Gauss-Markov"
         if error.owner not in PLATFORMS:
@@ -486,7 +489,7 @@ def _unlimited(mission: Mission, error: RandomError, effect: RandomEffect) -> No
 
 def no_effect(mission: Mission, error: RandomError) -> Note:
     """Say why an error does nothing."""
-    if error.subject.kind in ("imu", "random", "lever_arm", "vibration"):
+    if error.subject.kind in ("imu", *CORRELATED, "lever_arm", "vibration"):
         return phrases.across_the_line_of_sight()
     if error.subject.kind == "propagation":
         is_content = error.subject.axis == CONTENT

@@ -13,7 +13,7 @@ from bisar_budget.analysis.together import quadratics
 from bisar_budget.analysis.vibration_limits import level_of, tone_limits
 from bisar_budget.budget.aggregates import PULL_IN
 from bisar_budget.budget.declarations import DECLARATIONS, Missing, is_asked_for, missing_declarations
-from bisar_budget.budget.doubts import input_doubts, is_in_doubt
+from bisar_budget.budget.doubts import RESIDUAL, input_doubts, is_in_doubt
 from bisar_budget.budget.judged_mission import JudgedMission
 from bisar_budget.budget.judged_requirements import (
     TAKEN_BY,
@@ -115,7 +115,7 @@ def unknown_place(judged: JudgedMission, case: Case) -> Note:
     unstated = clocks_without_oscillator(case.mission)
     if unstated:
         return phrases.drift_is_not_stated(unstated)
-    doubts = input_doubts(case.mission)
+    doubts = [one for one in input_doubts(case.mission) if one.kind != RESIDUAL]
     return doubts[0].note if doubts else NOTHING
 
 

@@ -16,7 +16,7 @@ row, and what attitude does through the arm alone is a row that counts nowhere a
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from itertools import product
 from typing import Any, NamedTuple
@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bisar_budget import evaluators
-from bisar_budget.effects.effect import PLATFORMS, subject
+from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.random_effect import (
     NODES,
     Moves,
@@ -40,7 +40,7 @@ from bisar_budget.faults import KeyPath
 from bisar_budget.geometry import PlatformState, Vector, cross, unit, without_rounding
 from bisar_budget.mission.instruments import IMU_KINDS, GaussMarkov, LeverArm
 from bisar_budget.mission.model import Mission
-from bisar_budget.mission.platforms import CommonMotionError, MotionError
+from bisar_budget.mission.platforms import RAW, CommonMotionError, FlownPath, LogNoise, MotionError
 from bisar_budget.ranges.exact_ranges import Floats
 
 _IMU_UNITS = dict(zip(IMU_KINDS, ("m/s^2", "1", "rad", "rad/s", "m/s/sqrt(s)", "rad/sqrt(s)"), strict=True))
@@ -58,13 +58,42 @@ _GROWS = {
 
 
 # ---------------------------------------------------------------------- inertial sensors
+CORRELATED = ("random", "trajectory")  # kinds of error that are correlated noise of a position
+_CONSTANT_S = 1e9  # correlation time of what is constant over any aperture
+_UNIFORM = 12**-0.5  # sigma of an error that is uniform over a step
+
+
 def process_of(mission: Mission, error: RandomError) -> GaussMarkov:
-    """Process of an error that is correlated noise of a position."""
+    """Process of an error that is correlated noise of a position; along the axes that `process_axes` gives."""
+    if error.subject.kind == "trajectory":
+        return _log_process(mission, error.owner, error.subject.axis)[0]
     motion: MotionError | CommonMotionError | None = mission.common_motion_error
     if error.owner in PLATFORMS:
         motion = getattr(mission.platforms, error.owner).motion_error
     assert motion is not None
     return next(one for one in motion.random if one.name == error.subject.axis)
+
+
+def process_axes(mission: Mission, error: RandomError) -> dict[str, Floats]:
+    """Axes (3, 3) along which a process moves each platform that has it, by the platform's name."""
+    if error.subject.kind == "trajectory":
+        return {error.owner: _log_process(mission, error.owner, error.subject.axis)[1]}
+    common, names = mission.common_motion_error, [error.owner]
+    if error.owner not in PLATFORMS and common is not None:
+        names, frame = [*PLATFORMS], common.frame
+    else:
+        frame = getattr(mission.platforms, error.owner).motion_error.frame
+    return {name: np.array(getattr(mission.platforms, name).state.frame(frame)) for name in names}
+
+
+def _log_process(mission: Mission, name: str, figure: str) -> tuple[GaussMarkov, Floats]:
+    """Noise of a log that is flown as it is, and its axes, in one case."""
+    path: FlownPath | None = getattr(mission.platforms, name).path
+    assert path is not None
+    assert path.log_noise is not None
+    sizes, axes, correlation_time = _log_parts(path.log_noise, 1)[figure]
+    x, y, z = sizes[:, 0].tolist()
+    return GaussMarkov(figure, (x, y, z), float(np.ravel(correlation_time)[0])), axes[:, :, 0]
 
 
 def specific_force(mission: Mission, state: PlatformState) -> Vector:
@@ -354,7 +383,56 @@ def position_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
     key = error.key_of("random")
     for index, process in enumerate(error.random):
         path = ("platforms", name, "motion_error", *((key, index, "sigma") if key == "random" else (key,)))
-        yield _noise(seen, process, name, {name: seen.axes(name)}, path)
+        yield _noise(seen, _Process.of(process, name), {name: seen.axes(name)}, path)
+
+
+def residual_subject(name: str) -> Subject:
+    """The subject of what a smooth path leaves of the log of a platform."""
+    return subject(name, "trajectory", "residual")
+
+
+def log_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
+    """Noise of the log of a platform whose processor flies the fixes as they are; nothing of any other path.
+
+    The residual of the smooth path is a process with the covariance of that residual and with its correlation; what
+    joins white fixes by straight lines is correlated over half an interval. It spreads, and has the part of the lower
+    orders that noise has.
+
+    The grid of the fixes is an error that is uniform over a step, of the variance q²/12 along each coordinate. Where
+    the platform crosses many steps, the rounding of each fix is another one, is in the residual, and moves the image
+    by next to nothing. Where it crosses none, rounding is one error for all of the aperture, of which the residual
+    knows nothing. The log does not say which, and between both any part of the variance may be constant: it is taken
+    as constant, in addition to the residual.
+    """
+    path: FlownPath | None = getattr(seen.mission.platforms, name).path
+    log = None if path is None else path.log_noise
+    if log is None or log.processed != RAW:
+        return
+    key = ("platforms", name, "trajectory", "processed")
+    for figure, (sizes, axes, correlation_time) in _log_parts(log, seen.cases).items():
+        process = _Process(subject(name, "trajectory", figure), tuple(sizes), correlation_time, figure == "residual")
+        yield _noise(seen, process, {name: axes}, key)
+
+
+def _log_parts(log: LogNoise, cases: int) -> dict[str, tuple[Floats, Floats, Any]]:
+    """Sigmas (3, cases) [m], axes (3, 3, cases) and correlation time [s] of the residual, and of the grid."""
+    residual, grid = (
+        np.moveaxis(
+            np.array([[np.broadcast_to(value, (cases,)) for value in row] for row in matrix], dtype=float), -1, 0
+        )
+        for matrix in (log.residual, log.grid)
+    )
+    variances, ways = np.linalg.eigh(residual)  # (cases, 3), (cases, 3, 3): columns are the ways
+    steps = np.linalg.norm(grid, axis=2)
+    along = grid / np.where(steps > 0, steps, 1.0)[..., None]
+    return {
+        "residual": (
+            np.sqrt(np.maximum(variances, 0.0)).T,
+            np.moveaxis(ways, (2, 1, 0), (0, 1, 2)),
+            log.correlation_time,
+        ),
+        "grid": (_UNIFORM * steps.T, np.moveaxis(along, 0, -1), _CONSTANT_S),
+    }
 
 
 def common_noise(seen: SensorCases) -> Iterator[RandomError]:
@@ -362,12 +440,23 @@ def common_noise(seen: SensorCases) -> Iterator[RandomError]:
     error = seen.mission.common_motion_error
     for index, process in enumerate(() if error is None else error.random):
         axes = {name: seen.axes(name, error.frame) for name in PLATFORMS} if error is not None else {}
-        yield _noise(seen, process, "mission", axes, ("common_motion_error", "random", index, "sigma"))
+        yield _noise(seen, _Process.of(process, "mission"), axes, ("common_motion_error", "random", index, "sigma"))
 
 
-def _noise(
-    seen: SensorCases, process: GaussMarkov, owner: str, axes: Mapping[str, Floats], path: KeyPath
-) -> RandomError:
+class _Process(NamedTuple):
+    """A Gauss-Markov process, its subject, and its sigmas [m]; numbers may be arrays (cases,)."""
+
+    subject: Subject
+    sigma: Sequence[Any]
+    correlation_time: Any
+    spreads: bool = True
+
+    @classmethod
+    def of(cls, process: GaussMarkov, owner: str) -> "_Process":
+        return cls(subject(owner, "random", process.name), process.sigma, process.correlation_time)
+
+
+def _noise(seen: SensorCases, process: _Process, axes: Mapping[str, Floats], path: KeyPath) -> RandomError:
     """Noise along axes of the platforms that it moves, (axes, 3, cases) each."""
     k = 2 * math.pi / seen.mission.radar.wavelength
     largest, sizes = parts_of_largest(seen.vector(process.sigma))
@@ -384,7 +473,7 @@ def _noise(
     (own, own_cubic, east, north), covariance = seen.of_orders(found.covariance, sum(moved))
     quadratic, cubic, left = (np.sqrt(one) for one in found[:3])
     return RandomError(
-        subject=subject(owner, "random", process.name),
+        subject=process.subject,
         unit="m",
         declared=largest * seen.factor,
         path=path,
@@ -395,5 +484,6 @@ def _noise(
             *seen.moved(found.constant * along**2, found.linear * along**2),
         ),
         full=RandomEffect(own, own_cubic, k * along_heard * left / seen.factor, east, north, covariance),
+        spreads=process.spreads,
         moves=tuple(moves),
     )

@@ -12,7 +12,13 @@ import numpy as np
 
 from bisar_budget.effects.air_delays import delay_errors
 from bisar_budget.effects.effect import PLATFORMS, plain, subject
-from bisar_budget.effects.navigation_errors import common_noise, inertial_errors, lever_arm_errors, position_noise
+from bisar_budget.effects.navigation_errors import (
+    common_noise,
+    inertial_errors,
+    lever_arm_errors,
+    log_noise,
+    position_noise,
+)
 from bisar_budget.effects.oscillator_acceleration import oscillator_acceleration
 from bisar_budget.effects.oscillators import link_noise, noise_of, oscillator_noise
 from bisar_budget.effects.random_effect import RandomEffect, RandomError, SensorCases
@@ -39,6 +45,7 @@ def random_errors(mission: Mission, geometry: BistaticGeometry | None = None, ca
     found += [error for name in PLATFORMS for error in inertial_errors(seen, name)]
     found += [error for name in PLATFORMS for error in lever_arm_errors(seen, name)]
     found += [error for name in PLATFORMS for error in position_noise(seen, name)]
+    found += [error for name in PLATFORMS for error in log_noise(seen, name)]
     found += common_noise(seen)
     found += [error for name in PLATFORMS for error in oscillator_noise(seen, name)]
     found += [error for name in PLATFORMS for error in oscillator_acceleration(seen, name)]

@@ -592,6 +592,7 @@ def has_instruments(mission: Mission) -> bool:
             or platform.motion_error.random
             or platform.motion_error.lever_arm is not None
             or platform.motion_error.vibration.spectrum is not None
+            or (platform.path is not None and platform.path.is_raw)
             for platform in mission.platforms
         )
         or bool(mission.common_motion_error is not None and mission.common_motion_error.random)

@@ -17,8 +17,11 @@ from bisar_budget.mission.instruments import Overridden
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import (
     ORBIT,
+    RAW,
+    SMOOTHED,
     TRAJECTORY,
     FlownPath,
+    LogNoise,
     MotionError,
     OrbitSource,
     Platform,
@@ -32,6 +35,7 @@ from bisar_budget.paths import earth
 from bisar_budget.paths.accuracy import (
     StatedAccuracy,
     as_matrix,
+    as_rows,
     block_turned,
     correlations,
     covering_sigmas,
@@ -51,6 +55,7 @@ from bisar_budget.paths.flight import (
     smoothed,
     stretch_around,
     track_around,
+    widest_stretch,
 )
 from bisar_budget.paths.instant import DAY, Instant, later
 from bisar_budget.paths.log_places import LogKeys, hold_to_motion
@@ -392,19 +397,34 @@ def _log_path(
     log = dated(track_around(_log(route, data, digest), center, route.center, aperture_time, route.file), center)
     if log.is_earth_fixed:
         known = _known(axes, "trajectory")
-        log = replace(log, places=known.places(log.places), is_earth_fixed=False)
+        grid = as_rows(np.array(log.grid) @ np.array(known.axes).T)
+        log = replace(log, places=known.places(log.places), is_earth_fixed=False, grid=grid)
     times = slow_times(log, center, route.center, aperture_time, route.file)
-    hold_to_usable_records(log, times, stretch_around(times, aperture_time))
-    hold_to_motion(times, log.places, stretch_around(times, aperture_time), route.file)
-    fitted = smoothed(times, log.places, aperture_time)
-    words = log.words
+    needed = stretch_around(times, aperture_time)
+    hold_to_usable_records(log, times, needed)
+    hold_to_motion(times, log.places, needed, route.file)
+    fitted = smoothed(times, log.places, aperture_time, widest_stretch(log, times, aperture_time))
+    if fitted.stretch > needed:
+        try:
+            hold_to_motion(times, log.places, fitted.stretch, route.file)
+        except PathFileError:  # beside what is needed, a place that cannot be flown does not refuse the log
+            fitted = smoothed(times, log.places, aperture_time)
+    words = log.words + {SMOOTHED: ", flown smooth by the processor", RAW: ", flown as it is by the processor"}.get(
+        route.processed or "", ""
+    )
     if log.start is None:
         words += f", {route.center or 0.0:.12g} s of it at mid-aperture"
     path = _flown(fitted, words, route.file, digest)
     path = path._replace(stated=tuple(_stated_of_log(log, around_aperture(times, aperture_time), route.file)))
     # The root mean square is what a sigma is compared with: the largest of thousands of places is four of them.
     words = "residual of the smoothed log at places left out, root mean square"
-    return path._replace(doubt_m=fitted.missed, doubt_of=words, is_doubted=fitted.missed > _NOISE_M)
+    return path._replace(
+        doubt_m=fitted.missed,
+        doubt_of=words,
+        is_doubted=fitted.missed > _NOISE_M,
+        log_noise=LogNoise(fitted.residual, fitted.correlation_time, log.grid, route.processed),
+        acceleration_noise=fitted.acceleration_noise,
+    )
 
 
 def _log(route: TrajectorySource, data: bytes, digest: str) -> Log:

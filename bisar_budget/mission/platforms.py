@@ -63,7 +63,7 @@ from bisar_budget.mission.readers import (
     either,
 )
 from bisar_budget.mission.vibrations import Vibration
-from bisar_budget.paths.accuracy import StatedAccuracy
+from bisar_budget.paths.accuracy import Matrix, StatedAccuracy
 from bisar_budget.paths.instant import SCALES, parse_instant
 
 LEAST_BASELINE = 1.0  # m, between platforms of which one hears the other
@@ -76,6 +76,7 @@ _PLACES = np.linspace(-1, 1, 65)[:, None]
 FRAMES = Choice("scene", "track", "look", "ric")
 TIME_TAG = Quantity(units.TIME, ge=-1e3, le=1e3)
 # As of `paths.path_formats`, which every check would wait for: it loads the readers of them all.
+SMOOTHED, RAW = "smoothed", "raw"  # what a processor flies of a log
 _LOG_FORMATS = ("csv", "sbet", "pos", "nmea", "gpx", "ulog")
 PARTS = either(list, TextList(), Reference())
 
@@ -339,6 +340,14 @@ class TrajectorySource(NamedTuple):
     instance: Annotated[
         int | None, Key(Whole(0, 255), "Receiver of a log of PX4 or ArduPilot with fixes of several, from 0.")
     ] = None
+    processed: Annotated[
+        str | None,
+        Key(
+            Choice(SMOOTHED, RAW),
+            "Path that the processor flies: smoothed, a smooth one through the log; raw, its fixes as they are, of "
+            "which the noise spreads.",
+        ),
+    ] = None
 
 
 ORBIT, TRAJECTORY, INSTANT = Section(OrbitSource), Section(TrajectorySource), _Instant()
@@ -377,6 +386,20 @@ ACCEPTED_WAYS = (
 )
 
 
+class LogNoise(NamedTuple):
+    """What a smooth path leaves of a log, along the scene's axes, and what the processor flies of both.
+
+    `residual` is the covariance of what is left of the fixes in the aperture [m²], `correlation_time` that of a
+    Gauss-Markov process which is correlated as they are [s]. `grid` is one step of each coordinate that the log
+    writes [m]. `processed` is a value of `trajectory.processed`, None where the file does not say it.
+    """
+
+    residual: Matrix
+    correlation_time: float
+    grid: Matrix
+    processed: str | None = None
+
+
 class FlownPath(NamedTuple):
     """The path of a platform that the scene's place on the Earth, an orbit or a log of a flight decide.
 
@@ -407,6 +430,13 @@ class FlownPath(NamedTuple):
     accuracy: tuple[str, str] | None = None  # file that states its errors, and its SHA-256
     orientation: tuple[str, str] | None = None  # table by which it is turned to the Earth, and its SHA-256
     stated: tuple[StatedAccuracy, ...] = ()  # by its own source, along the scene's axes
+    log_noise: LogNoise | None = None
+    acceleration_noise: Matrix | None = None  # covariance of the error of a fit at mid-aperture [m²/s⁴]
+
+    @property
+    def is_raw(self) -> bool:
+        """Whether it is that of a log whose processor flies the fixes as they are."""
+        return self.log_noise is not None and self.log_noise.processed == RAW
 
     @property
     def largest_doubt_m(self) -> float:

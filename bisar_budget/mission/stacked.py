@@ -55,6 +55,7 @@ def _bare(mission: Mission) -> Mission:
                 doubt_m=path.doubt_m,
                 is_doubted=path.is_doubted,
                 stated=tuple(one._replace(words="") for one in path.stated),
+                log_noise=path.log_noise,
             )
             platforms = mission.platforms._replace(**{name: platform._replace(path=path)})
             mission = mission._replace(platforms=platforms)

@@ -56,6 +56,11 @@ def as_matrix(values: Floats) -> Matrix:
     return tuple(tuple(float(value) for value in row) for row in (values + values.T) / 2)
 
 
+def as_rows(values: Floats) -> Matrix:
+    """A matrix as tuples of plain numbers."""
+    return tuple(tuple(row) for row in np.asarray(values, dtype=float).tolist())
+
+
 def diagonal(variances: Sequence[float]) -> Matrix:
     """Covariance of errors that are independent."""
     return as_matrix(np.diag(np.asarray(variances, dtype=float)))

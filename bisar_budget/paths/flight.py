@@ -16,7 +16,7 @@ from numpy.polynomial import chebyshev, legendre
 from numpy.typing import NDArray
 
 from bisar_budget.geometry import STRAIGHT, PlatformState, Vector
-from bisar_budget.paths.accuracy import StatedAccuracy
+from bisar_budget.paths.accuracy import Matrix, StatedAccuracy, as_matrix
 from bisar_budget.paths.earth import Floats
 from bisar_budget.paths.instant import DAY, Instant, gps_week
 
@@ -30,9 +30,19 @@ _STRAY = 8  # times the usual residual; noise of thousands of places reaches 4
 _HIGHEST = 8  # order of a smoothed path
 _FEWEST = 5  # places of a log that give a path
 _ENOUGH = 9  # of them that say what is noise; of a log that has fewer in the aperture, places beside it help
+_GROWTH = 1.5  # of a stretch to the next wider one
+_WIDEST_RATIO = 64.0  # of a stretch over the narrowest
+_MOST_FITTED = 20_000  # places
+_SETTLED_M = 1e-6  # of the fit's own noise in the path: less decides nothing, at any carrier
+_CHANCE = 2.0  # times the variance that two fits are apart by chance
+_HOPELESS = 9.0  # times the least predicted error (squares), from which on no wider stretch is tried
+_RESIDUAL_GROWTH = 1.1  # of the residual in the aperture, from which on a wider fit does not follow the path
 _WIDEST_GAP = 5  # usual intervals between samples
 _LISTED = 3  # tracks that an error names
 _ROUNDED = 1 + 1e-6  # of an interval whose ends are rounded
+
+
+NO_MATRIX: Matrix = ((0.0,) * 3,) * 3
 
 
 class PathFileError(Exception):
@@ -124,6 +134,7 @@ class Log:
     `sigmas` (n, 3) are one-sigma errors east, north, up, where the log states them; NaN at fixes without [m].
     `typical_sigmas` (n,) are those that a fix of the stated quality usually has, on each axis; NaN where the log
     says no quality [m]. `quality_words` names the quality of the fix of an index: "GGA quality 1, autonomous".
+    `grid` is one step of each coordinate that the log writes, in the axes of the places [m].
     """
 
     times: Floats
@@ -137,6 +148,7 @@ class Log:
     clock: str = ""
     left_out: LeftOut | None = None
     tracks: tuple["Log", ...] = ()
+    grid: Matrix = NO_MATRIX
 
 
 @dataclass(frozen=True)
@@ -145,7 +157,10 @@ class Fitted:
 
     `samples` is how many of a log's places the polynomial smooths, over `stretch` [s]; none of an orbit, which is
     interpolated. `missed` is how far the path goes by a place of the log that it does not know, root mean square [m].
-    `doubts` are warnings.
+    `doubts` are warnings. `residual` (3, 3) is the covariance of what the polynomial leaves of the fixes in the
+    aperture [m²], and `correlation_time` that of a Gauss-Markov process which is correlated as they are [s].
+    `acceleration_noise` (3, 3) is the covariance of the fit's own error of the acceleration at mid-aperture [m²/s⁴],
+    with what a wider stretch may have smeared.
     """
 
     state: PlatformState
@@ -156,6 +171,9 @@ class Fitted:
     doubts: tuple[str, ...] = ()
     stretch: float = 0.0
     missed: float = 0.0
+    residual: Matrix = NO_MATRIX
+    correlation_time: float = 0.0
+    acceleration_noise: Matrix = NO_MATRIX
 
 
 def interpolated(places: Callable[[Floats], Floats], aperture_time_s: float, widest_s: float = math.inf) -> Fitted:
@@ -186,7 +204,7 @@ def interpolated(places: Callable[[Floats], Floats], aperture_time_s: float, wid
 
 
 def stretch_around(times: Floats, aperture_time_s: float) -> float:
-    """Time around the middle of an aperture whose places of a log are smoothed. [s]
+    """Shortest time around the middle of an aperture whose places of a log are smoothed. [s]
 
     It is the aperture, or as much longer as holds nine places: a log at 1 Hz has three in 3 s.
     """
@@ -194,12 +212,130 @@ def stretch_around(times: Floats, aperture_time_s: float) -> float:
     return max(aperture_time_s, 2 * float(apart.max(initial=0.0)))
 
 
-def smoothed(times: Floats, places: Floats, aperture_time_s: float) -> Fitted:
+@dataclass(frozen=True, eq=False)
+class _SmoothFit:
+    """A Legendre series through the fixes of a stretch: slow times (n,) [s], and what it leaves of them (n, 3) [m].
+
+    `independent` is how many independent fixes they are worth. `covariance` (order + 1, order + 1) is that of the
+    coefficients, over the variance of a fix.
+    """
+
+    half_s: float
+    times: Floats
+    series: Floats
+    left: Floats
+    independent: float
+    covariance: Floats
+
+    @property
+    def order(self) -> int:
+        return len(self.series) - 1
+
+    @property
+    def variances(self) -> Floats:
+        """Variance of a fix on each axis, (3,). [m²]"""
+        found: Floats = (self.left**2).sum(axis=0) / max(len(self.left) - len(self.series), 1)
+        return found
+
+    def places(self, times: Floats) -> Floats:
+        """Places at slow times [s], (m, 3). [m]"""
+        found: Floats = legendre.legvander(times / self.half_s, self.order) @ self.series
+        return found
+
+    def noise(self, times: Floats, left_out: Floats) -> float:
+        """Mean square of the fit's own error over times (m,), of which a projection (m, m) is left out. [m²]"""
+        basis = legendre.legvander(times / self.half_s, self.order)
+        basis = basis - left_out @ basis
+        return float(np.einsum("mi,ij,mj->", basis, self.covariance, basis) / times.size * self.variances.sum())
+
+    def acceleration_noise(self) -> Floats:
+        """Covariance of the error of the acceleration at mid-aperture, (3, 3). [m²/s⁴]"""
+        bends = np.array([legendre.legval(0.0, legendre.legder(one, 2)) for one in np.eye(self.order + 1)])
+        variance = float(bends @ self.covariance @ bends) / self.half_s**4
+        return np.diag(variance * self.variances)
+
+
+def _fit(times: Floats, places: Floats, half_s: float) -> _SmoothFit:
+    """The series of the least Bayesian information criterion (Schwarz 1978) through the fixes of a stretch."""
+    inside = np.abs(times) <= half_s * (1 + 1e-9)
+    used, wanted, count = times[inside], places[inside], int(inside.sum())
+    at = used / half_s
+    fits = [least_squares(at, wanted, order) for order in range(2, min(_HIGHEST, (count - 1) // 2) + 1)]
+    independent = _independent(fits[-1][1])
+
+    def information(left: Floats, order: int) -> float:
+        squares = (left**2).mean(axis=0) + _UNSEEN_M**2
+        # Each axis has its own noise, and a coefficient of each order. The last factor is that of AICc (Hurvich &
+        # Tsai 1989): a few samples are fitted too well by chance.
+        coefficients = 3 * (order + 1) * math.log(independent) * count / (count - order - 2)
+        return float(independent * np.log(squares).sum()) + coefficients
+
+    series, left = min(fits, key=lambda fit: information(fit[1], len(fit[0]) - 1))
+    triangle = np.linalg.qr(legendre.legvander(at, len(series) - 1))[1]
+    inverse = np.linalg.inv(triangle)
+    return _SmoothFit(half_s, used, series, left, independent, inverse @ inverse.T * (count / independent))
+
+
+def _widened(
+    narrowest: _SmoothFit, times: Floats, places: Floats, aperture_time_s: float, widest_s: float
+) -> tuple[_SmoothFit, float]:
+    """The fit of the stretch whose path over the aperture has the smallest predicted error; that over its noise.
+
+    A longer stretch averages more noise: the acceleration of a parabola has an error of σ√(720/(n·T⁴)). It may smear
+    what the platform did, and nobody knows that. What is known is how far the path is from those of narrower
+    stretches: the square of that has the expectation of the smear and of the noise that the wider fit does without.
+    What exceeds that noise is counted as smear (Goldenshluger & Lepski 2011, whose rule this is; Lepski 1991). The
+    error that counts is that beyond a straight line, which defocuses; the whole path must not become worse, and the
+    residual in the aperture must not grow.
+    """
+    looks = aperture_time_s / 2 * np.linspace(-1, 1, _LOOKS)
+    straight = np.linalg.qr(np.vander(looks, 2))[0]
+    projection, nothing = straight @ straight.T, np.zeros((_LOOKS, _LOOKS))
+    kept = (projection, nothing)  # what is left out of the error that counts, and of the whole
+    reach_s = min(widest_s / 2, max(abs(float(times[0])), abs(float(times[-1]))), _WIDEST_RATIO * narrowest.half_s)
+    candidates, half_s = [(narrowest, [narrowest.noise(looks, one) for one in kept])], narrowest.half_s
+    best, least = narrowest, candidates[0][1][0]
+    residual = _residual_within(narrowest, aperture_time_s)
+    while least > _SETTLED_M**2 and half_s < reach_s * (1 - 1e-9):
+        half_s = min(half_s * _GROWTH, reach_s)
+        if np.searchsorted(times, half_s, "right") - np.searchsorted(times, -half_s) > _MOST_FITTED:
+            break
+        fit = _fit(times, places, half_s)
+        noises = [fit.noise(looks, one) for one in kept]
+        smears = [0.0, 0.0]
+        for other, of_other in candidates:
+            apart = fit.places(looks) - other.places(looks)
+            for place, left_out in enumerate(kept):
+                square = float(np.mean(np.sum((apart - left_out @ apart) ** 2, axis=1)))
+                smears[place] = max(smears[place], square - _CHANCE * max(of_other[place] - noises[place], 0.0))
+        candidates.append((fit, noises))
+        errors = [noise + smear for noise, smear in zip(noises, smears, strict=True)]
+        grows = _residual_within(fit, aperture_time_s) > _RESIDUAL_GROWTH**2 * residual
+        if grows or errors[0] > _HOPELESS * least:
+            break
+        if errors[0] < least and errors[1] <= candidates[0][1][1]:
+            best, least = fit, errors[0]
+    own = best.noise(looks, projection)
+    return best, least / own if own > 0 else 1.0
+
+
+def _residual_within(fit: _SmoothFit, aperture_time_s: float) -> float:
+    """Mean square of what a fit leaves of the fixes in the aperture, or of all where it has few. [m²]"""
+    inside = np.abs(fit.times) <= aperture_time_s / 2 * (1 + 1e-9)
+    left = fit.left[inside] if inside.sum() >= _ENOUGH else fit.left
+    count, coefficients = len(fit.left), len(fit.series)
+    return float(np.mean(np.sum(left**2, axis=1))) * count / max(count - coefficients, 1)
+
+
+def smoothed(times: Floats, places: Floats, aperture_time_s: float, widest_s: float = 0.0) -> Fitted:
     """Path that fits the places of a log around the aperture by least squares.
 
     The order is that of the least Bayesian information criterion (Schwarz 1978), to 8 at most and to half the
     samples: what a platform does faster is in the log's noise, or is vibration. Samples with correlated residuals
     count as fewer. A slow error of the log, which looks like motion, is then not fitted as if it were white noise.
+
+    The stretch is that around the aperture, or as much longer as makes the predicted error of the path least, see
+    `_widened`: noise of the log is an acceleration of the path, by which allowables are wrong.
 
     `missed` leaves out each place in the aperture, and the ones next to it, in turn (Allen 1974): that is noise, what
     the polynomial does not follow, and what the platform did between two places, of which a log that is slow for its
@@ -213,6 +349,8 @@ def smoothed(times: Floats, places: Floats, aperture_time_s: float) -> Fitted:
         In the scene's axes. [m]
     aperture_time_s : float
         Length of the aperture.
+    widest_s : float
+        Longest time around the middle whose places may be smoothed; omitted: the shortest stretch that is needed.
 
     Raises
     ------
@@ -223,29 +361,17 @@ def smoothed(times: Floats, places: Floats, aperture_time_s: float) -> Fitted:
     -----
     A residual r of a place of the leverage h is r/(1 - h) of the fit without it (Belsley, Kuh & Welsch 1980, 2.1).
     """
-    stretch = stretch_around(times, aperture_time_s)
-    half = stretch / 2
-    inside = np.abs(times) <= half * (1 + 1e-9)
-    count = int(inside.sum())
+    half = stretch_around(times, aperture_time_s) / 2
+    count = int((np.abs(times) <= half * (1 + 1e-9)).sum())
     if count < _FEWEST:
         raise PathFileError(
             f"has {count} places around the aperture of {aperture_time_s:g} s, at least {_FEWEST} are needed; keep"
             " more of the log"
         )
-    used = times[inside]
-    at, wanted = used / half, places[inside]
-    fits = [least_squares(at, wanted, order) for order in range(2, min(_HIGHEST, (count - 1) // 2) + 1)]
-    independent = _independent(fits[-1][1])
-
-    def information(left: Floats, order: int) -> float:
-        squares = (left**2).mean(axis=0) + _UNSEEN_M**2
-        # Each axis has its own noise, and a coefficient of each order. The last factor is that of AICc (Hurvich &
-        # Tsai 1989): a few samples are fitted too well by chance.
-        coefficients = 3 * (order + 1) * math.log(independent) * count / (count - order - 2)
-        return float(independent * np.log(squares).sum()) + coefficients
-
-    found, left = min(fits, key=lambda fit: information(fit[1], len(fit[0]) - 1))
-    rms = math.sqrt(float((left**2).sum()) / max(count - len(found), 1))
+    fit, excess = _widened(_fit(times, places, half), times, places, aperture_time_s, widest_s)
+    half, used, left, order = fit.half_s, fit.times, fit.left, fit.order
+    at, count = used / half, len(used)
+    rms = math.sqrt(float((left**2).sum()) / max(count - len(fit.series), 1))
     apart = np.linalg.norm(left, axis=1)
     farthest, usual = float(apart.max()), float(np.median(apart))
     doubts: tuple[str, ...] = ()
@@ -257,13 +383,25 @@ def smoothed(times: Floats, places: Floats, aperture_time_s: float) -> Fitted:
         )
     first = max(int(np.searchsorted(used, -aperture_time_s / 2)) - 1, 0)
     near = slice(first, int(np.searchsorted(used, aperture_time_s / 2, "right")) + 1)
-    order = len(found) - 1
     missed = float(np.sqrt(np.mean((apart / (1 - _leverage(at, at, order)))[near] ** 2)))
     # Noise of places beside a gap may be more in it.
-    widest = _leverage(at, np.linspace(-1, 1, _LOOKS) * (aperture_time_s / stretch), order)
+    widest = _leverage(at, np.linspace(-1, 1, _LOOKS) * (aperture_time_s / 2 / half), order)
     missed *= max(1.0, math.sqrt(float(widest.max())))
-    path = path_of(powers_of(found, half))
-    return Fitted(path, order, farthest, rms, count, doubts, stretch, missed)
+    of_aperture = left[near]
+    residual = of_aperture.T @ of_aperture / len(of_aperture) * (count / max(count - len(fit.series), 1))
+    return Fitted(
+        path_of(powers_of(fit.series, half)),
+        order,
+        farthest,
+        rms,
+        count,
+        doubts,
+        2 * half,
+        missed,
+        as_matrix(residual),
+        float(used[-1] - used[0]) / max(count - 1, 1) * count / fit.independent / 2,
+        as_matrix(excess * fit.acceleration_noise()),
+    )
 
 
 def _leverage(at: Floats, where: Floats, order: int) -> Floats:
@@ -452,6 +590,33 @@ def hold_to_usable_records(log: Log, times: Floats, stretch_s: float) -> None:
             f"{log.left_out.faults[int(is_inside.argmax())]}; the record lies within the {stretch_s:.4g} s around"
             " mid-aperture that are used"
         )
+
+
+def widest_stretch(log: Log, times: Floats, aperture_time_s: float) -> float:
+    """Longest time around the middle of an aperture within which a log has all its fixes. [s]
+
+    It ends before a record that cannot be used, and before a gap of more than five usual intervals: neither refuses a
+    log outside the stretch that it needs, and nothing is known of the path in them.
+
+    Parameters
+    ----------
+    log : Log
+        Its records that are left out lie between usable ones.
+    times : (n,) ndarray
+        Slow times of the log. [s]
+    aperture_time_s : float
+        Length of the aperture. [s]
+    """
+    steps = np.diff(times)
+    is_gap = steps > _WIDEST_GAP * _ROUNDED * float(np.median(steps)) if steps.size else np.zeros(0, dtype=bool)
+    earlier, later = times[:-1][is_gap], times[1:][is_gap]
+    if log.left_out is not None:
+        edges = np.concatenate([[-np.inf], times, [np.inf]])
+        earlier = np.concatenate([earlier, edges[log.left_out.before]])
+        later = np.concatenate([later, edges[log.left_out.before + 1]])
+    # A fix at the edge of what is lost is left out too: rounding must not put it inside.
+    reach = np.maximum(earlier, -later) / _ROUNDED
+    return max(stretch_around(times, aperture_time_s), 2 * float(reach.min(initial=np.inf)))
 
 
 def _independent(left: Floats) -> float:

@@ -168,6 +168,7 @@ def read_csv(data: bytes, name: str, keys: LogKeys = NOTHING_SAID) -> Log:
         lambda kept: _earth_fixed(places[:, kept], header),
         clock_words=clock_words,
         is_earth_fixed=is_earth_fixed,
+        geodetic=tuple(places) if header.axes == _GEODETIC else None,
     )
     without_fix += found.empty
     said = f", {counted(without_fix, 'row')} without a fix left out" if without_fix else ""

@@ -2,7 +2,7 @@
 
 import re
 from bisect import bisect_left
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget.paths.earth import Floats, earth_fixed_places
-from bisar_budget.paths.flight import LeftOut, Log, PathFileError
+from bisar_budget.paths.flight import NO_MATRIX, LeftOut, Log, PathFileError
 from bisar_budget.paths.instant import SCALES, TAI_LESS, UNIX_EPOCH, Instant, tai_less_utc, utc
+from bisar_budget.paths.position_grid import cartesian_grid, geodetic_grid
 from bisar_budget.units import format_quantity
 
 # Realisations of both agree to some centimetres, those of WGS-84 from G730 on. EPSG: 4326 and 4979 are WGS-84.
@@ -349,6 +350,7 @@ def geodetic_log(
         scale,
         lambda kept: earth_fixed_places(latitude[kept], longitude[kept], height[kept]),
         sigmas=sigmas,
+        geodetic=places,
     )
 
 
@@ -363,11 +365,12 @@ def usable_log(
     clock_words: str = "",
     is_earth_fixed: bool = True,
     sigmas: Floats | None = None,
+    geodetic: Sequence[Floats] | None = None,
 ) -> Log:
     """The log of the records that can be used, whose times rise.
 
-    `places` gives those of records that are kept (n,), `clock_words` says how well times are known. All else is as in
-    `geodetic_log`.
+    `places` gives those of records that are kept (n,), `clock_words` says how well times are known, `geodetic` are
+    latitude, longitude and height of each record where the log has them. All else is as in `geodetic_log`.
     """
     start_utc = None if start is None else utc_of(start, scale)
     records.keep_what_rises(times, start_utc)
@@ -381,14 +384,17 @@ def usable_log(
     if start_utc is not None:
         words += scale_words(start_utc, scale)
     words += records.left_out_words()
+    own = places(kept)
+    grid = NO_MATRIX if geodetic is None else geodetic_grid(times, *(values[kept] for values in geodetic))
     return Log(
         times,
-        places(kept),
+        own,
         is_earth_fixed,
         words,
         start_utc,
         None if sigmas is None else sigmas[kept],
         left_out=records.left_out(),
+        grid=grid if np.any(grid) else cartesian_grid(times, own),
     )
 
 

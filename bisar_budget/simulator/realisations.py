@@ -16,10 +16,12 @@ from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.air_delays import CONTENT, DELAY, group_delay, legs_of
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.navigation_errors import (
+    CORRELATED,
     TILTS,
     acceleration_errors,
     arm_at,
     body_axes,
+    process_axes,
     process_of,
     specific_force,
 )
@@ -87,16 +89,11 @@ def _drawn_parts(
 ) -> dict[str, _Parts]:
     """Motion of each platform by a unit of the largest axis."""
     kind, figure = error.subject.kind, error.subject.axis
-    if kind == "random":
+    if kind in CORRELATED:
         process = process_of(mission, error)
         _, sizes = parts_of_largest(np.array(process.sigma))
         of_axis = [(axis, size * _correlated(process, times, draws, rng)) for axis, size in enumerate(sizes) if size]
-        common, names = mission.common_motion_error, [error.owner]
-        if error.owner not in PLATFORMS and common is not None:
-            names, frame = [*PLATFORMS], common.frame
-        else:
-            frame = _motion(mission, error.owner).frame
-        axes = {name: np.array(getattr(mission.platforms, name).state.frame(frame)) for name in names}
+        axes = process_axes(mission, error)
         return {name: [(drawn, of_platform[axis]) for axis, drawn in of_axis] for name, of_platform in axes.items()}
     state: PlatformState = getattr(mission.platforms, error.owner).state
     motion = _motion(mission, error.owner)
@@ -206,7 +203,7 @@ def drawn_errors(analysis: Analysis) -> Errors:
     return Errors(transmitter, receiver, clock_course=clock, electrons=electrons)
 
 
-MOVING = ("imu", "random", "lever_arm")  # kinds of error that move platforms
+MOVING = ("imu", *CORRELATED, "lever_arm")  # kinds of error that move platforms
 _Draw = Callable[[Floats, int, np.random.Generator], tuple[Floats, Floats]]
 
 

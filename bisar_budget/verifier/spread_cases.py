@@ -21,7 +21,7 @@ from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.air_delays import CONTENT, seen_course
 from bisar_budget.effects.declared import CUBIC, LOCATION
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
-from bisar_budget.effects.navigation_errors import process_of
+from bisar_budget.effects.navigation_errors import CORRELATED, process_of
 from bisar_budget.effects.oscillator_acceleration import accelerated_tones
 from bisar_budget.effects.oscillator_tones import spurs_of
 from bisar_budget.effects.random_effect import RandomError
@@ -411,7 +411,7 @@ def _sigma(study: Study, error: RandomError, rng: np.random.Generator, is_cubic:
 def _drawn_effects(study: Study, error: RandomError, rng: np.random.Generator) -> Found:
     """Effects of many histories of a sensor or the air, by exact ranges, (draws,)."""
     moments = aperture_nodes(study.collection.aperture_time)
-    if error.subject.kind == "random":  # not smooth between the nodes, as what is integrated is
+    if error.subject.kind in CORRELATED:  # not smooth between the nodes, as what is integrated is
         return study.exact_effects(_smooth_noise(study, error, rng))
     if error.subject.kind != "propagation":
         return study.exact_effects(position_courses(study.mission, error, moments, _DRAWS, rng))

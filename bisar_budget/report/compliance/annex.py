@@ -48,7 +48,7 @@ _MOST = 20  # lines of the table of a sweep
 _FEW = 6  # words that are listed in a sentence
 _SOURCED = (
     *(*MOTION_UNITS, "time_tag", "lever_arm", "vibration", "other"),
-    *("imu", "random", "oscillator", "synchronization", "propagation"),
+    *("imu", "random", "trajectory", "oscillator", "synchronization", "propagation"),
 )
 
 

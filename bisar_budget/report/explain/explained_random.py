@@ -24,7 +24,14 @@ from bisar_budget.effects.air_delays import (
 )
 from bisar_budget.effects.declared import CUBIC, LOCATION
 from bisar_budget.effects.effect import PLATFORMS
-from bisar_budget.effects.navigation_errors import TILTS, arm_at, body_axes, process_of, specific_force
+from bisar_budget.effects.navigation_errors import (
+    CORRELATED,
+    TILTS,
+    arm_at,
+    body_axes,
+    process_of,
+    specific_force,
+)
 from bisar_budget.effects.oscillator_acceleration import (
     accelerated_tones,
     felt,
@@ -86,7 +93,7 @@ def explained_random(analysis: Analysis, allocation: Allocation, error: RandomEr
         yield from _with_arm(analysis, error)
     elif kind == "lever_arm":
         yield from _lever_arm(analysis, error)
-    elif kind == "random":
+    elif kind in CORRELATED:
         yield from _position(analysis, error)
     elif kind == "vibration":
         yield from _spectrum(mission, error)
@@ -121,7 +128,7 @@ def _declared(mission: Mission, error: RandomError, row: Row) -> Iterator[Step]:
         worked = WorkedEquation(
             "declared", "k*|value|", {"k": k, "value": error.declared / k}, error.declared, error.unit
         )
-        of_axes = "; of three axes the largest value" if error.subject.kind in ("imu", "random") else ""
+        of_axes = "; of three axes the largest value" if error.subject.kind in ("imu", *CORRELATED) else ""
         yield step(f"Coverage factor allocation.coverage_factor{of_axes}", worked)
 
 

@@ -13,7 +13,14 @@ from bisar_budget.analysis.together import Together, cubics, quadratics
 from bisar_budget.analysis.vibration_limits import amplitude_share, echo_phase, slow_limits
 from bisar_budget.budget.aggregates import effect_parts, untaken_effects
 from bisar_budget.budget.declarations import missing_declarations
-from bisar_budget.budget.doubts import InputDoubt, declared_position_error, input_doubts, is_in_doubt
+from bisar_budget.budget.doubts import (
+    MOST_GRID_SHARE,
+    RESIDUAL,
+    InputDoubt,
+    declared_position_error,
+    input_doubts,
+    is_in_doubt,
+)
 from bisar_budget.budget.judged_requirements import (
     MAKES_UP,
     SMALL_RAD,
@@ -613,6 +620,9 @@ def _path_in_doubt(mission: Mission, row: Row) -> Iterator[Step]:
         if one.is_stated:
             yield _stated_by_source(one)
             continue
+        if one.is_of_log:
+            yield _of_log(one)
+            continue
         platform: Platform = getattr(mission.platforms, one.owner)
         error, path = platform.motion_error, platform.path
         said = f": {printable(path.doubt_of)}" if path is not None and path.doubt_of else ""
@@ -625,6 +635,16 @@ def _path_in_doubt(mission: Mission, row: Row) -> Iterator[Step]:
         terms = " + ".join(f"{number(size)}^2" for size in sizes)
         line = Sum(f"stated = sqrt({terms}) = {with_unit(declared, 'm')}")
         yield step("Position errors that it declares, without coverage factor: less than the doubt", line)
+
+
+def _of_log(one: InputDoubt) -> Step:
+    """What a log's smooth path leaves of it, or the step of its fixes, beside the most that may go unsaid."""
+    if one.kind == RESIDUAL:
+        title = f"Phase that the smooth path leaves of the {one.owner}’s log along the line of sight, rms"
+        return step(title, f"left = {with_unit(one.doubt, 'rad')}", f"most = {with_unit(one.declared, 'rad')}")
+    title = f"The step to which the {one.owner}’s log writes its fixes, beside the declared position error"
+    most = MOST_GRID_SHARE * one.declared
+    return step(title, f"step = {with_unit(one.doubt, 'm')}", f"most = a tenth of it = {with_unit(most, 'm')}")
 
 
 def _stated_by_source(one: InputDoubt) -> Step:

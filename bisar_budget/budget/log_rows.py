@@ -1,0 +1,42 @@
+"""The row of what a smooth path leaves of a log, where the file does not say which of both the processor flies.
+
+Where it flies the fixes, the residual is a random error with a row of its own (`effects.navigation_errors`). Where
+it flies the smooth path there is none. Between both nothing can be judged: this row says so, whatever is required.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from bisar_budget.analysis.analysis import Case
+from bisar_budget.budget.doubts import leaves_unsaid
+from bisar_budget.budget.judged_rows import CODE, FamilyRow, Judged, Judging, Why, worded
+from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.effects.navigation_errors import residual_subject
+from bisar_budget.findings.row import Row
+from bisar_budget.mission.model import Mission
+
+
+def log_rows(judging: Judging, mission: Mission) -> Iterator["UnsaidResidual"]:
+    """One row for each platform whose log leaves too much, in the cases in which it does."""
+    for name in PLATFORMS:
+        is_there = np.broadcast_to(leaves_unsaid(mission, name), (judging.cases,))
+        if is_there.any():
+            none = Judged.of_none(residual_subject(name), judging.cases)
+            judged = none._replace(
+                status=np.where(is_there, CODE["not_evaluated"], none.status),
+                why=np.where(is_there, np.int8(Why.INPUT_IN_DOUBT), none.why),
+                metric="islr",
+            )
+            yield UnsaidResidual(judged, is_there=is_there)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class UnsaidResidual(FamilyRow):
+    """The residual of a log in many cases; its reason is that of the doubt."""
+
+    def in_words(self, case: Case, model: str) -> Row:
+        """The row of one case; models do not differ in it."""
+        path = ("platforms", self.judged.subject.owner, "trajectory", "processed")
+        return worded(case, self.judged, unit="m", path=path, equation="residual of the smoothed log")
