@@ -11,6 +11,7 @@ from bisar_budget.analysis.allocation import ROOM, caps, rounded_down
 from bisar_budget.analysis.analysis import Case
 from bisar_budget.budget.declarations import swings_nothing
 from bisar_budget.budget.doubts import input_doubts
+from bisar_budget.budget.fit_noise import MOST_CHANGE, allowable_noise
 from bisar_budget.constants import FASTEST_FLIGHT
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.oscillator_acceleration import is_unshaken
@@ -59,6 +60,7 @@ def file_warnings(
         *_unused_correlations(mission),
         *straight_orbits(mission),
         *_doubtful_paths(mission),
+        *_noisy_fits(mission),
         *_of_instruments(case),
         *_of_lever_arms(mission),
         *_of_calm_oscillators(mission),
@@ -132,6 +134,27 @@ def _doubtful_paths(mission: Mission) -> Iterator[_Warned]:
                 _Warned(("platforms", name, platform.way), path_is_doubtful(name, doubt), is_doubt=True)
                 for doubt in path.doubts
             )
+
+
+def _noisy_fits(mission: Mission) -> Iterator[_Warned]:
+    """Logs whose noise changes the allowables, through the path that is fitted to them."""
+    for name in PLATFORMS:
+        noise = allowable_noise(mission, name)
+        if noise is not None and noise.change > MOST_CHANGE:
+            note = fit_changes_allowables(name, noise.acceleration, noise.change, noise.row_id)
+            yield _Warned(("platforms", name, "trajectory"), note)
+
+
+@phrase
+def fit_changes_allowables(platform: str, acceleration: float, change: float, row_id: str) -> str:
+    """Said of a log whose noise is an error of the path's acceleration. [m/s²]"""
+    size = format_quantity(acceleration, "m/s^2")
+    by = f"by up to {100 * change:.2g} %" if change < 1 else "by a factor of two and more"
+    return (
+        f"platforms.{platform}: the noise of the log leaves the acceleration of its path uncertain by {size} (1"
+        f" sigma, along the line of sight), which changes allowables {by} ({row_id}): a longer or a better log makes"
+        " them sure"
+    )
 
 
 @phrase

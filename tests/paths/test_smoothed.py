@@ -1,6 +1,7 @@
 """Slow times of a log, and the polynomial that smooths it."""
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bisar_budget.geometry import PlatformState
-from bisar_budget.paths.flight import Log, PathFileError, slow_times, smoothed
+from bisar_budget.paths.flight import (
+    LeftOut,
+    Log,
+    PathFileError,
+    hold_to_usable_records,
+    slow_times,
+    smoothed,
+    widest_stretch,
+)
 from bisar_budget.paths.instant import Instant
 
 START = Instant(61192, 19201.25)  # 2026-06-01T05:20:01.250Z
@@ -292,3 +301,91 @@ def test_a_log_of_nine_places_in_the_aperture_needs_none_beside_it() -> None:
     assert smoothed(times, turning(times), 2.0).stretch == 2.0
     assert smoothed(times, turning(times), 1.9).stretch == pytest.approx(2.0)
     assert smoothed(times, turning(times), 2.0).samples == 9
+
+
+# ---------------------------------------------------------------------- a stretch that is longer than the aperture
+def straight(times: np.ndarray) -> np.ndarray:
+    return times[:, None] * np.array([SPEED, 0.0, 0.0])
+
+
+def acceleration_error(flown: Any, span: float, widest: float, rate: float = 5.0, noise: float = 0.12) -> float:
+    """Root mean square over flights and axes of the acceleration's error at the middle of 6 s. [m/s²]"""
+    times = np.arange(-round(span / 2 * rate), round(span / 2 * rate) + 1) / rate
+    step = 1e-2
+    true = (flown(np.array([step])) - 2 * flown(np.array([0.0])) + flown(np.array([-step])))[0] / step**2
+    off = []
+    for seed in range(30):
+        log = flown(times) + noise * np.random.default_rng(seed).standard_normal((times.size, 3))
+        off.append(np.array(smoothed(times, log, 6.0, widest).state.acceleration) - true)
+    return float(np.sqrt(np.mean(np.square(off))))
+
+
+def test_noise_is_averaged_over_what_lies_outside_the_aperture() -> None:
+    """σ√(720/(n·T⁴)) of a parabola: 15 mm/s² over the aperture of 6 s, whatever the log has; 1 mm/s² over 18 s."""
+    assert acceleration_error(straight, 60, 0.0) == pytest.approx(0.0147, rel=0.25)
+    assert acceleration_error(straight, 6, math.inf) == pytest.approx(0.0147, rel=0.25)
+    assert acceleration_error(straight, 60, math.inf) < 0.2 * 0.0147
+
+
+@pytest.mark.parametrize(
+    "flown",
+    [
+        turning,
+        lambda times: turning(7 * times) / 7,
+        lambda times: straight(times) + np.maximum(times - 4, 0)[:, None] ** 2 * [0.0, 1.5, 0.0],
+        lambda times: straight(times) + 0.5 * np.sin(0.6 * times + 0.7)[:, None] * [0.0, 0.3, 1.0],
+    ],
+    ids=["standard-rate turn", "hard turn", "roll-in after the aperture", "wave of 10 s"],
+)
+def test_a_turn_is_not_smeared(flown: Any) -> None:
+    """A longer stretch is no worse than the aperture, where there is motion beside it."""
+    assert acceleration_error(flown, 60, math.inf) < 1.1 * acceleration_error(flown, 60, 0.0)
+
+
+@pytest.mark.parametrize("rate", [10.0, 50.0])
+def test_a_clean_log_keeps_its_numbers(rate: float) -> None:
+    """Noise of 10 µm: acceleration to 5e-3 of that of the turn."""
+    times = np.arange(-round(30 * rate), round(30 * rate) + 1) / rate
+    log = turning(times) + 1e-5 * np.random.default_rng(2).standard_normal((times.size, 3))
+    short, wide = (smoothed(times, log, 2.0, widest) for widest in (0.0, math.inf))
+    bend = SPEED * RATE_OF_TURN
+    assert np.abs(np.subtract(short.state.acceleration, wide.state.acceleration)).max() < 5e-3 * bend
+    assert np.abs(np.subtract(wide.state.acceleration, [0, bend, 0])).max() < 5e-3 * bend
+
+
+def test_the_fit_says_its_own_noise() -> None:
+    """σ²·720/(n·T⁴) on each axis, of a parabola through the aperture."""
+    times = np.arange(-150, 151) / 50.0
+    said = []
+    for seed in range(20):
+        noise = NOISE * np.random.default_rng(seed).standard_normal((times.size, 3))
+        found = smoothed(times, straight(times) + noise, 6.0)
+        assert found.order == 2
+        said.append(np.diag(found.acceleration_noise))
+    assert np.mean(said) == pytest.approx(NOISE**2 * 720 / (301 * 6.0**4), rel=0.05)
+
+
+def test_the_residual_is_that_of_the_fixes() -> None:
+    """White noise of its own size on each axis, correlated over half an interval."""
+    times = np.arange(-1000, 1001) / 50.0
+    sizes = np.array([0.01, 0.02, 0.05])
+    log = straight(times) + sizes * np.random.default_rng(6).standard_normal((times.size, 3))
+    found = smoothed(times, log, 40.0)
+    assert np.sqrt(np.diag(found.residual)) == pytest.approx(sizes, rel=0.1)
+    assert found.correlation_time == pytest.approx(0.01, rel=0.3)
+
+
+def test_the_stretch_ends_before_a_gap_and_a_record_that_is_left_out() -> None:
+    times = np.arange(-200, 201) / 10.0
+    whole = Log(times, straight(times), False, "test")
+    assert widest_stretch(whole, times, 2.0) == math.inf
+    late = np.concatenate([times[times < 5], times[times > 9]])
+    gap = widest_stretch(replace(whole, times=late, places=straight(late)), late, 2.0)
+    assert gap == pytest.approx(2 * 4.9, rel=1e-4)
+    lost = LeftOut(np.array([int(np.searchsorted(times, -7.0))]), ("a.csv:7: height is empty",))
+    broken = replace(whole, left_out=lost)
+    stretch = widest_stretch(broken, times, 2.0)
+    assert stretch == pytest.approx(2 * 7.0, rel=1e-4)
+    hold_to_usable_records(broken, times, stretch)
+    with pytest.raises(PathFileError, match="height is empty"):
+        hold_to_usable_records(broken, times, 2 * 7.1)

@@ -1,0 +1,78 @@
+"""What the noise of a log does to the allowables, through the path that is fitted to it.
+
+An allowable of a position or a velocity follows from how the range to the platform bends. A fit to a noisy log has an
+error in its acceleration, and every allowable with it. How much, is looked at with the path as it would be one sigma
+to either side.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from bisar_budget.effects.effect import PLATFORMS, subject
+from bisar_budget.effects.sources import ErrorListing, exact_ranges
+from bisar_budget.mission.model import Mission
+from bisar_budget.mission.platforms import Platform
+from bisar_budget.ranges.exact_ranges import Floats, nodes_for
+
+MOST_CHANGE = 0.05  # of an allowable, that goes unsaid
+_MATTERS = 0.1  # of the largest effect per unit of a kind: what does less has an allowable that decides nothing
+_KINDS = ("position", "velocity")
+
+
+@dataclass(frozen=True)
+class AllowableNoise:
+    """The allowable that changes most where a platform's path is off by one sigma of its fit.
+
+    `acceleration` is that sigma along the line of sight at mid-aperture [m/s²], `change` the relative change of the
+    allowable of a row.
+    """
+
+    acceleration: float
+    change: float
+    row_id: str
+
+
+def allowable_noise(mission: Mission, name: str) -> AllowableNoise | None:
+    """What the fit's own noise does to the allowables of both platforms; None of a path that is no fit to a log."""
+    platform: Platform = getattr(mission.platforms, name)
+    path = platform.path
+    if path is None or path.acceleration_noise is None:
+        return None
+    covariance, look = np.array(path.acceleration_noise), np.array(path.state.look)
+    along = covariance @ look
+    sigma = float(np.sqrt(max(look @ along, 0.0)))
+    if not sigma > 0:
+        return None
+    shift = along / sigma  # of one sigma along the line of sight, with what goes with it
+    here, sides = np.array(path.state.acceleration), np.array([0.0, 1.0, -1.0])
+    state: Any = replace(path.state, acceleration=tuple(here[axis] + sides * shift[axis] for axis in range(3)))
+    shifted = platform._replace(path=path._replace(state=state))
+    cases = mission._replace(platforms=mission.platforms._replace(**{name: shifted}))
+    geometry = cases.geometry
+    count = nodes_for(geometry, mission.collection.aperture_time, has_direct_path=mission.has_direct_path)
+    exact = exact_ranges(cases, geometry, int(np.max(count)), cases=len(sides))
+    listing = ErrorListing(cases, geometry, exact)
+    worst = AllowableNoise(sigma, 0.0, "")
+    for kind in _KINDS:
+        units = np.array(
+            [
+                [np.broadcast_to(effect.qpe, (len(sides),)) for effect in listing.legs(place, kind)[1]]
+                for place in range(len(PLATFORMS))
+            ]
+        )  # (platforms, axes, sides)
+        changes = _changes(np.abs(units))
+        place, axis = np.unravel_index(int(changes.argmax()), changes.shape)
+        if changes[place, axis] > worst.change:
+            row_id = subject(PLATFORMS[place], kind, "xyz"[axis]).id
+            worst = replace(worst, change=float(changes[place, axis]), row_id=row_id)
+    return worst
+
+
+def _changes(units: Floats) -> Floats:
+    """Largest relative change of the allowable of each error, (platforms, axes), by effects per unit at each side."""
+    here = units[..., 0]
+    with np.errstate(all="ignore"):
+        changes = np.abs(here[..., None] / units[..., 1:] - 1).max(axis=-1)
+    return np.where(here > _MATTERS * here.max(), np.nan_to_num(changes, nan=0.0, posinf=np.inf), 0.0)
