@@ -34,9 +34,9 @@ def noisy(sigma: float, seed: int = 0) -> bytes:
 
 
 def logged(folder: Path, log: bytes, **error: Any) -> Mission:
-    """A mission whose receiver is a log."""
+    """A mission whose receiver is a log, of which the smooth path is flown: its residual does not spread."""
     (folder / "flight.csv").write_bytes(log)
-    receiver = {"trajectory": {"file": "flight.csv"}, "motion_error": {"velocity": "1 mm/s", **error}}
+    receiver = {"trajectory": {"file": "flight.csv", "processed": "smoothed"}, "motion_error": {"velocity": "1 mm/s", **error}}
     (folder / "m.yaml").write_text(aircraft(platforms__receiver=receiver))
     return load_mission(str(folder / "m.yaml"))
 
@@ -99,7 +99,7 @@ class TestALog:
         error = {"velocity": "1 mm/s"} | error
         kept = {key: value for key, value in error.items() if value is not None}
         (tmp_path / "flight.csv").write_bytes(noisy(0.02))
-        receiver = {"trajectory": {"file": "flight.csv"}, "motion_error": kept}
+        receiver = {"trajectory": {"file": "flight.csv", "processed": "smoothed"}, "motion_error": kept}
         (tmp_path / "m.yaml").write_text(aircraft(platforms__receiver=receiver))
         assert input_doubts(load_mission(str(tmp_path / "m.yaml"))) == []
         text = (tmp_path / "m.yaml").read_text().replace("3 cm", "1 cm")
@@ -254,4 +254,5 @@ def test_json_has_the_doubt_of_each_path(run: Callable[..., Any], tmp_path: Path
     found = json.loads(run("check", tmp_path / "m.yaml", "--format", "json").stdout)["missions"][0]
     path = mission.platforms.receiver.path
     assert found["geometry"]["receiver"]["path"]["doubt_m"] == path.doubt_m
-    assert path.doubt_m == pytest.approx(path.rms, rel=0.05)  # of a hundred places few change what is fitted to them
+    left = math.sqrt(np.trace(path.log_noise.residual))  # in the aperture, as the doubt
+    assert path.doubt_m == pytest.approx(left, rel=0.05)  # of a hundred places few change what is fitted to them
