@@ -94,7 +94,11 @@ def test_both_legs_alike_or_each_its_own(propagation: dict[str, object], legs: l
             "is of no leg: each that states a delay has its own; accepted: correlation_time here, or of each leg its",
         ),
         ({"zenith_delay": "5 cm", "correlation_time": 0}, "propagation.correlation_time", "must be greater than 0 s"),
-        ({"zenith_delay": "5 cm", "correlation_time": "-1 s"}, "propagation.correlation_time", "must be greater than"),
+        (
+            {"zenith_delay": "5 cm", "correlation_time": "-1 s"},
+            "propagation.correlation_time",
+            "must be greater than",
+        ),
         ({"zenith_delay": "5 cm", "correlation_time": "1 ns"}, "propagation.correlation_time", "must be at least 1"),
         ({"zenith_delay": "5 cm", "correlation_time": "1e10 s"}, "propagation.correlation_time", "must be at most"),
         ({"zenith_delay": "5 cm", "correlation_time": ".inf"}, "propagation.correlation_time", "must be a finite"),
