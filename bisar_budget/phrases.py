@@ -705,6 +705,24 @@ def rests_on_the_continuation(platforms: Sequence[str], percent: float, least: f
 
 
 @phrase
+def mask_at_the_frequency_of_a_part(platform: str, frequency: str, part: str) -> str:
+    """Said of phase noise that the file states without a frequency, beside a part."""
+    return (
+        f"platforms.{platform}.oscillator.phase_noise: states no frequency, and is taken at {frequency}, that of "
+        f"{part}: add oscillator.frequency"
+    )
+
+
+@phrase
+def no_power_law_fits(key: str, misfit: float) -> str:
+    """Said of an oscillator's Allan deviation."""
+    return (
+        f"{key}: no power law fits the Allan deviation; the fit is off by {100 * misfit:.3g} %: state phase_noise or "
+        "power_law instead of allan_deviation"
+    )
+
+
+@phrase
 def power_law_fits(misfit: float) -> str:
     """Said of an oscillator."""
     return f"the power law fits the Allan deviation to {100 * misfit:.2g} %"
