@@ -159,7 +159,7 @@ _NEEDED_DECLARATIONS = {
     "cubic_phase_error": "has a cubic phase (velocity, acceleration, imu, random, oscillator, timing)",
     "location_error": "displaces the image (position, velocity, time_tag, lever_arm, random, timing, propagation)",
     "pslr": "makes echoes (vibration.sinusoidal, oscillator.spurs, oscillator.acceleration_sensitivity)",
-    "islr": "spreads (vibration, random, oscillator, synchronization)",
+    "islr": "spreads (vibration, random, oscillator, synchronization, propagation with a correlation_time)",
 }
 
 
@@ -730,6 +730,24 @@ def rests_on_the_continuation(platforms: Sequence[str], percent: float, least: f
     return (
         f"{percent:.0f} % of its power lies below the first point of the mask of {keys}, where the noise is taken to "
         f"continue as f^-3: a mask down to {format_quantity(least, 'Hz', 2, 'down')} would say it"
+    )
+
+
+@phrase
+def mask_at_the_frequency_of_a_part(platform: str, frequency: str, part: str) -> str:
+    """Said of phase noise that the file states without a frequency, beside a part."""
+    return (
+        f"platforms.{platform}.oscillator.phase_noise: states no frequency, and is taken at {frequency}, that of "
+        f"{part}: add oscillator.frequency"
+    )
+
+
+@phrase
+def no_power_law_fits(key: str, misfit: float) -> str:
+    """Said of an oscillator's Allan deviation."""
+    return (
+        f"{key}: no power law fits the Allan deviation; the fit is off by {100 * misfit:.3g} %: state phase_noise or "
+        "power_law instead of allan_deviation"
     )
 
 

@@ -14,6 +14,7 @@ from bisar_budget.analysis.scene import Corrections, SceneEdge, SceneEdges
 from bisar_budget.analysis.spread import noise
 from bisar_budget.analysis.together import Together, cubics, quadratics
 from bisar_budget.budget.continued_masks import continuation_note, rests_on_masks
+from bisar_budget.budget.doubted_noise import doubted_noise_note, rests_on_doubted_noise
 from bisar_budget.budget.judged_requirements import (
     MAKES_UP,
     SMALL_RAD,
@@ -25,7 +26,7 @@ from bisar_budget.budget.judged_requirements import (
 from bisar_budget.budget.judged_rows import BOUND, CODE, FamilyRow, Judging, worded
 from bisar_budget.effects.combined import Phases, correlation_notes
 from bisar_budget.effects.declared import CUBIC, LOCATION, OTHER_MODEL, QUADRATIC
-from bisar_budget.effects.effect import Subject, subject
+from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.oscillator_tones import spurs_of
 from bisar_budget.effects.random_effect import RandomError
 from bisar_budget.effects.vibration import DeclaredPhase
@@ -166,9 +167,11 @@ class Aggregates:
         """Judge what errors add up to; a sum without a finite value fails: one of them has no image at all.
 
         `without_value` is its status there, where it is another one. `continued` names the part of random errors that
-        the row adds up, and those errors: a pass that rests on noise below the first points of masks is a warning.
+        the row adds up, and those errors: a pass that rests on noise below the first points of masks is a warning,
+        and one that rests on noise in doubt is not evaluated.
         """
         rests_on: Any = False
+        is_in_doubt: Any = False
         is_over_by_other: Any = False
         is_over_of_all: Any = False
         by_model: dict[str, Any] = {}
@@ -179,6 +182,8 @@ class Aggregates:
             is_over_by_other = self.errors.doubts(theirs.model, by_other > limit * BOUND)
             is_over_of_all = of_all > limit * BOUND
             rests_on = rests_on_masks(continued[1], continued[0], size, limit)
+            is_in_doubt = rests_on_doubted_noise(continued[1], continued[0], OTHER_MODEL[theirs.model], limit)
+            is_in_doubt = is_in_doubt & ~(size > limit * BOUND) & (not never_fails)
         judged = self.judging.row(
             what,
             size,
@@ -186,6 +191,7 @@ class Aggregates:
             doubt=is_over_by_other | is_over_of_all | rests_on,
             without_autofocus=without_autofocus,
             is_info=limit is None,
+            is_unknown=is_in_doubt,
             never_fails=never_fails,
         )._replace(**fields, **by_model)
         has_value = is_declared & np.isfinite(size)
@@ -196,7 +202,7 @@ class Aggregates:
             judged = judged.where(~has_value, nothing)
         rule = "sum" if never_fails else self.combine
         by_others = (by_other, of_all, is_over_by_other, is_over_of_all)
-        return Aggregate(judged, rule, phases, *by_others, without_autofocus, rests_on, continued)
+        return Aggregate(judged, rule, phases, *by_others, without_autofocus, rests_on, continued, is_in_doubt)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -217,6 +223,7 @@ class Aggregate(FamilyRow):
     without_autofocus: Any = 0.0
     rests_on: Any = False  # noise below the first points of masks, which `continued` names as `Aggregates._row`
     continued: tuple[str, Sequence[RandomError]] = ("quadratic", ())
+    is_in_doubt: Any = False  # the noise that it rests on
 
     def in_words(self, case: Case, model: str) -> Row:
         """The row of one case, by the model that judges it."""
@@ -237,6 +244,10 @@ class Aggregate(FamilyRow):
         elif over and size is not None and what.kind != LOCATION:
             over = over.then(phrases.no_gain() if what.kind == CUBIC else phrases.one_total())
         doubt = over if what.kind == PULL_IN else NOTHING
+        doubted = NOTHING
+        if case.number(self.is_in_doubt):
+            owners = {error.owner for error in self.continued[1]}
+            doubted = doubted_noise_note(mission, [name for name in PLATFORMS if name in owners])
         return worded(
             case,
             self.judged,
@@ -246,7 +257,7 @@ class Aggregate(FamilyRow):
             over=over,
             doubt=doubt or _doubt(case, OTHER_MODEL[model], self, said, limit),
             no_limit=phrases.no_requirement(),
-            not_evaluated=case.degeneracy(model) or phrases.no_image_to_place(),
+            not_evaluated=doubted or case.degeneracy(model) or phrases.no_image_to_place(),
             info=phrases.no_requirement(),
             without_autofocus=case.number(self.without_autofocus),
             remarks=notes,

@@ -151,6 +151,7 @@ class _Judgement:
             np.array([row.quadratic_use for row in rows]),
             {key: place >= 0 for key, place in of_requirements.items()},
             before=own,
+            in_doubt=self._doubted_rows(rows),
             has_noise=has_noise,
             is_misplaced=is_misplaced,
         )
@@ -267,6 +268,12 @@ class _Judgement:
         if self.mission.requirements.pslr is None:
             found += [np.broadcast_to(one.is_there, (self.cases,)) for one in self.analysis.tones]
         return np.asarray(np.any([np.zeros(self.cases, bool), *found], axis=0))
+
+    def _doubted_rows(self, rows: Sequence[Judged]) -> Truths:
+        """Rows of oscillators whose noise is not what the file states, (rows, cases)."""
+        doubted = {error.id: error.is_in_doubt for error in self.analysis.random if np.any(error.is_in_doubt)}
+        by_row = [np.broadcast_to(doubted.get(row.subject.id, False), (self.cases,)) for row in rows]
+        return np.array(by_row, dtype=bool).reshape(len(rows), self.cases)
 
     def _floor(self) -> Codes:
         """Best status that each case can have: paths may be in doubt, and nothing declared."""

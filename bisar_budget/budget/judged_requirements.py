@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from bisar_budget.budget.continued_masks import LEAST_USE
 from bisar_budget.budget.judged_rows import BOUND, Codes
 from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.findings.status import BROKEN, RANK, STATUS
@@ -93,6 +94,7 @@ def requirement_states(
     waived: Mapping[str, Any],
     *,
     before: Codes,
+    in_doubt: Truths,
     has_noise: Any,
     is_misplaced: Any,
 ) -> list[RequirementState]:
@@ -114,6 +116,8 @@ def requirement_states(
         Keys of the requirements that a valid waiver names.
     before : (rows, n)
         Statuses of the rows before waivers.
+    in_doubt : (rows, n)
+        Rows of oscillators whose noise is not what the file states.
     has_noise : (n,) bool
         Whether something that spreads, or a tone that ISLR holds, is declared: without it ISLR is not judged.
     is_misplaced : (n,) bool
@@ -131,7 +135,9 @@ def requirement_states(
                 codes == RANK["waived"], codes, RANK["fail"]
             )  # a waiver of the row covers all it breaks
             breaks = np.nan_to_num(quadratic_use) > BOUND
-            levels = np.where(is_other, np.where(breaks, broken, by_autofocus), levels)
+            rests_on = in_doubt & is_open & (np.nan_to_num(quadratic_use) > LEAST_USE)
+            kept = np.where(rests_on, codes, by_autofocus)
+            levels = np.where(is_other, np.where(breaks, broken, kept), levels)
             used = np.where(is_other, quadratic_use, uses)
             mine = mine | is_other
         else:  # autofocus corrects a quadratic phase alone

@@ -25,7 +25,8 @@ from bisar_budget.analysis.spread import (
     spread_limit,
     stated_powers,
 )
-from bisar_budget.budget.continued_masks import continuation_note, continued_power, part_of, rests_on_masks
+from bisar_budget.budget.continued_masks import LEAST_USE, continuation_note, continued_power, part_of, rests_on_masks
+from bisar_budget.budget.doubted_noise import doubted_noise_note, rests_on_doubted_noise
 from bisar_budget.budget.judged_rows import BOUND, CODE, EFFECTS, REQUIREMENTS, FamilyRow, Judging, worded
 from bisar_budget.budget.tone_rows import evidence, notes_of_acceleration
 from bisar_budget.effects.air_delays import CONTENT, legs_of
@@ -140,6 +141,10 @@ class RandomRows:
         is_over_other = declared > sizes_of_other.min(axis=0) * BOUND
         published, full = (mine, theirs) if model == "published" else (theirs, mine)
         is_continued = self._rests_on_masks(mine, sizes)
+        in_doubt = self._table([one.is_in_doubt for one in self.errors]) > 0
+        with np.errstate(all="ignore"):
+            use = declared / allowable
+        is_in_doubt = in_doubt & (use > LEAST_USE) & ~(use > BOUND)
         judged = self.judging.row(
             self.errors[0].subject,
             declared,
@@ -147,7 +152,7 @@ class RandomRows:
             doubt=is_over_other | is_continued,
             without_autofocus=without_autofocus,
             is_info=(self._table([combine != "each" or bool(one.counted_in) for one in self.errors]) > 0) & ~is_open,
-            is_unknown=is_open,
+            is_unknown=is_open | is_in_doubt,
         )._replace(
             binding=np.array([-1, *map(REQUIREMENTS.index, HELD)], np.int8)[binds + 1],
             qpe_published_rad=published.quadratic * declared,
@@ -207,11 +212,16 @@ class RandomRows:
             np.broadcast_to(rests_on_masks(some, "spread", size, most), size.shape)
             for some, size, most in zip(masked, rms, limit, strict=True)
         ])  # fmt: skip
+        is_in_doubt = np.array([
+            np.broadcast_to(rests_on_doubted_noise(some, "spread", model, most), most.shape)
+            for some, most in zip(masked, limit, strict=True)
+        ])  # fmt: skip
         judged = self.judging.row(
             subject("mission", ISLR),
             np.where(is_declared, rms, math.nan),
             np.where(is_there, limit, math.nan),
             doubt=(rms > limit_of_other * BOUND) | rests_on,
+            is_unknown=is_in_doubt & is_there & ~(rms > limit * BOUND),
         )
         published, full = (limit, limit_of_other) if model == "published" else (limit_of_other, limit)
         columns = (judged.declared, judged.allowable, published, full)  # by one rule: the whole reads as required
@@ -288,7 +298,9 @@ class RandomRow(FamilyRow):
             over=over,
             doubt=doubt,
             no_limit=_unlimited(mission, error, error.effect(gating)),
-            not_evaluated=phrases.wideband_has_no_spectrum(error.owner),
+            not_evaluated=doubted_noise_note(mission, [error.owner])
+            if error.is_in_doubt
+            else phrases.wideband_has_no_spectrum(error.owner),
             info=phrases.counted_in_another_row(error.counted_in)
             if error.counted_in
             else NOTHING
@@ -327,6 +339,7 @@ class IslrRow(FamilyRow):
             makers = [one for one in case.random if one.id in {each.row_id for each in self.members}]
             if case.number(rests_on_masks(makers, "spread", math.sqrt(variance), limit)):
                 doubt = continuation_note(case, makers, "spread", math.sqrt(variance))
+        owners = {each.owner for each in self.members}
         if self.judged.status[case.place] == CODE["fail"]:
             known = [one for one in self.members if not math.isnan(case.number(one.variance))]
             largest = max(known, key=lambda one: case.number(one.variance))
@@ -342,6 +355,7 @@ class IslrRow(FamilyRow):
             equation="powers of the rows",
             over=over,
             doubt=doubt,
+            not_evaluated=doubted_noise_note(case.mission, [name for name in PLATFORMS if name in owners]),
             binding_requirement=ISLR,
         )
 

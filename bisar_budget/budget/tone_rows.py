@@ -11,6 +11,8 @@ from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Analysis, Case
 from bisar_budget.analysis.spread import Tone, islr_of
 from bisar_budget.analysis.vibration_limits import Echo, VibrationLimits, highest_echo, tone_limits
+from bisar_budget.budget.continued_masks import LEAST_USE
+from bisar_budget.budget.doubted_noise import doubted_noise_note, has_doubted_frequency
 from bisar_budget.budget.judged_rows import BOUND, FamilyRow, Judging, worded
 from bisar_budget.effects.declared import OTHER_MODEL
 from bisar_budget.effects.effect import override_notes, subject
@@ -89,12 +91,13 @@ def spur_rows(judging: Judging, analysis: Analysis, model: str) -> Iterator["Spu
             limits = VibrationLimits(*(2 * math.pi / mission.radar.wavelength * limit for limit in limits))
             is_over_other = phase > limits.by(OTHER_MODEL[model]) * BOUND
             is_near = spur.left.slowest_echo(T) * T < ECHO_CYCLES
+            is_in_doubt = has_doubted_frequency(mission, spur.name) & _is_used(phase, limits.by(model))
             judged = judging.row(  # the amplitude of an echo over that of the response
                 what,
                 phase / 2,
                 judging.array(limits.by(model) / 2),
                 doubt=is_over_other | is_over_phase,
-                is_unknown=is_near & (metric == "pslr"),
+                is_unknown=(is_near & (metric == "pslr")) | is_in_doubt,
             )
             published, full = (judging.array(limit / 2) for limit in limits)
             judged = judged._replace(allowable_published=published, allowable_full=full)
@@ -103,6 +106,11 @@ def spur_rows(judging: Judging, analysis: Analysis, model: str) -> Iterator["Spu
             judged = judged._replace(islr_db=islr_of(mission, phase**2 / 2))
         is_there = (phase > 0) | (not spur.left.is_folded)
         yield SpurRow(judged, place, is_over_other, is_over_phase, is_there=is_there)
+
+
+def _is_used(size: Any, limit: Any) -> Truths:
+    """Where a size uses enough of its limit that a doubt about it counts, and does not break it."""
+    return np.asarray((size > LEAST_USE * limit) & ~(size > limit * BOUND))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -121,6 +129,7 @@ class SpurRow(FamilyRow):
         T, missing = mission.collection.aperture_time, phrases.no_requirement_of("pslr")
         near = float(spur.left.slowest_echo(T))
         on_mainlobe = phrases.echoes_on_the_mainlobe(near * T, ECHO_CYCLES)
+        doubted = doubted_noise_note(mission, [spur.name]) if has_doubted_frequency(mission, spur.name) else NOTHING
         if not math.isnan(row.allowable[case.place]):
             over = phrases.echoes_over(case.number(row.declared), case.number(row.allowable))
             if self.is_over_other[case.place]:
@@ -137,7 +146,8 @@ class SpurRow(FamilyRow):
             over=over,
             doubt=doubt,
             no_limit=missing,
-            not_evaluated=phrases.echo_is_folded(near, on_mainlobe) if spur.left.is_folded else on_mainlobe,
+            not_evaluated=doubted
+            or (phrases.echo_is_folded(near, on_mainlobe) if spur.left.is_folded else on_mainlobe),
             info=missing,
             evidence=oscillator.source,
             remarks=(

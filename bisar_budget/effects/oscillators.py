@@ -20,7 +20,7 @@ from bisar_budget.mission.instruments import Oscillator, PowerLaw
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.readers import Points, SortedPoints
 from bisar_budget.phrases import NOTHING, Note
-from bisar_budget.ranges.exact_ranges import Floats
+from bisar_budget.ranges.exact_ranges import Floats, Truths
 
 BANDWIDTH = 1e3  # Hz, to which noise counts that is stated without an end
 POOR_FIT = 0.2  # of an Allan deviation, from where a power law does not describe it
@@ -215,7 +215,9 @@ def oscillator_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
     error = RandomError(
         subject(name, "oscillator"), "dB", 1.0, path, published.times(seen.factor), full.times(seen.factor)
     )
-    yield error._replace(continued=_continued(seen, name, oscillator, scale))
+    yield error._replace(
+        continued=_continued(seen, name, oscillator, scale), is_in_doubt=_is_in_doubt(seen, oscillator)
+    )
 
 
 def _continued(seen: SensorCases, name: str, oscillator: Oscillator, scale: Any) -> RandomEffect | None:
@@ -226,6 +228,17 @@ def _continued(seen: SensorCases, name: str, oscillator: Oscillator, scale: Any)
     left = _left_at_1_hz(seen, name, oscillator.noise_alone, is_below_mask=True)
     _, full = _of_clock(seen, Parts(*left * scale), Parts(*np.zeros_like(left)))
     return full.times(seen.factor)
+
+
+def _is_in_doubt(seen: SensorCases, oscillator: Oscillator) -> Truths:
+    """Cases in which the spectrum is another one than the file states: another frequency's, or a poor fit's."""
+    found = np.full(seen.cases, bool(oscillator.mask_at_frequency_of_part))
+    if oscillator.allan_deviation is None:
+        return found
+    for alike, places in seen.alike(oscillator.noise_alone):
+        for place in places.tolist():
+            found[place] |= noise_of(alike, 1.0, float(seen.aperture_time[place])).misfit > POOR_FIT
+    return found
 
 
 def _of_clock(seen: SensorCases, found: Parts, tones: Parts) -> tuple[RandomEffect, RandomEffect]:

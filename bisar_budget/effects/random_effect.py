@@ -96,6 +96,7 @@ class RandomError(NamedTuple):
     `counted_in` is the id of a row whose error does this too, so that this one counts nowhere. `moves` says how a
     unit moves platforms, where the edge of a scene is looked at; of clocks and the air nothing. `continued` is the
     effect of what lies below the first point of an oscillator's mask, where the mask does not reach far enough down.
+    `is_in_doubt` says in which cases the spectrum of an oscillator is not what the file states of it.
     """
 
     subject: Subject
@@ -109,6 +110,7 @@ class RandomError(NamedTuple):
     counted_in: str = ""
     moves: tuple[Moves, ...] = ()
     continued: RandomEffect | None = None
+    is_in_doubt: Any = False
 
     @property
     def id(self) -> str:

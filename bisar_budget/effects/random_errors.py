@@ -76,4 +76,7 @@ def in_one_case(mission: Mission, error: RandomError, case: int = 0) -> RandomEr
         noise = noise_of(oscillator, mission.radar.center_frequency, mission.collection.aperture_time)
     declared = None if error.declared is None else plain(error.declared, case)
     continued = None if error.continued is None else error.continued.of(case)
-    return error._replace(declared=declared, published=published, full=full, noise=noise, continued=continued)
+    is_in_doubt = bool(plain(error.is_in_doubt, case))
+    return error._replace(
+        declared=declared, published=published, full=full, noise=noise, continued=continued, is_in_doubt=is_in_doubt
+    )

@@ -278,6 +278,11 @@ class Oscillator(NamedTuple):
         return self.phase_noise is not None or bool(self.spurs)
 
     @property
+    def mask_at_frequency_of_part(self) -> Overridden | None:
+        """Noise of a part that a mask without a frequency replaces; it is taken at the frequency of that part."""
+        return next((one for one in self.overridden if one.frequency), None)
+
+    @property
     def noise_alone(self) -> "Oscillator":
         """The same without its level, without aging and without what it feels."""
         return self._replace(level=0.0, aging=None, acceleration_sensitivity=None, vibration=None)

@@ -53,6 +53,7 @@ ORBIT_FORMATS: Mapping[str, OrbitFormat] = {
 }
 # What is often taken for an orbit and cannot be read: its words, and what to do.
 _WRITE_OEM = "Write it as an OEM of CCSDS"
+_EXPORT_GPX = "Write its track as GPX, with times and heights"
 _OTHERS = (
     (re.compile(rb"\A(\x1f\x8b|\x1f\x9d|PK\x03\x04|BZh|\xfd7zXZ)"), "a compressed file", "Unpack it"),
     (re.compile(rb"\A.{60}RINEX VERSION / TYPE"), "a RINEX file", "A precise orbit comes as SP3"),
@@ -66,7 +67,17 @@ _OTHERS = (
     ),
     (re.compile(rb"\Acreated:.*\s+ephemeris_start:"), "an ephemeris of SpaceX (MEME)", _WRITE_OEM),
     (re.compile(rb"(?m)^BEGIN Ephemeris"), "an ephemeris of STK", _WRITE_OEM),
+    (re.compile(rb"(?s)\A\s*<(?:.{0,2000}<)?(?:\w+:)?kml[\s>/]"), "KML of Google Earth", _EXPORT_GPX),
+    (re.compile(rb"(?s)\A[\x0c\x0e].{7}\.FIT"), "a FIT file of Garmin", _EXPORT_GPX),
+    (re.compile(rb"(?m)^HFDTE|^B\d{13}[NS]\d{8}[EW][AV]"), "an IGC file of a glider", _EXPORT_GPX),
+    (
+        re.compile(rb"\A\xa3\x95\x80\x80\x59FMT"),
+        "a dataflash log of ArduPilot in binary",
+        "Write it as text, or its GPS rows as CSV, by mavlogdump.py",
+    ),
 )
+_UBX = "messages of u-blox (UBX)"
+_FROM_UBX = "Write it as a solution of RTKLIB, or as sentences of NMEA 0183"
 _BEGINNING = 4096  # bytes that tell a format
 
 
@@ -93,16 +104,44 @@ def hold_to_format(data: bytes, name: str, form: str) -> None:
 
 def hold_to_log(data: bytes, name: str) -> None:
     """Refuse a file that is known to be no log of a flight, and say which key reads it."""
-    _refuse(data, name, orbit_format(data), "accepted: a log of a flight")
+    _refuse(data, name, orbit_format(data), f"accepted: a log of a flight, {_words_of_logs()}")
+
+
+def _words_of_logs() -> str:
+    """Formats of logs that are read, each with its word."""
+    return ", ".join(f"{format.words} ({one})" for one, format in LOG_FORMATS.items())
 
 
 def _refuse(data: bytes, name: str, found: str | None, accepted: str) -> None:
     """Refuse a file that is an orbit of a format that was found, or something else that is known and not wanted."""
     if found is not None:
-        raise PathFileError(f"{name}: is {ORBIT_FORMATS[found].words}", accepted, f"orbit.{found} reads it")
+        key = f"orbit: {{{found}: …}} reads it"
+        raise PathFileError(f"{name}: is {ORBIT_FORMATS[found].words}", accepted, key)
     for sign, words, remedy in _OTHERS:
-        if sign.search(data[:_BEGINNING]):
+        if sign.search(data[:_BEGINNING].removeprefix(b"\xef\xbb\xbf")):
             raise PathFileError(f"{name}: is {words}", accepted, remedy)
+    if _has_ubx(data[:_BEGINNING]) and log_format(data) is None:
+        raise PathFileError(f"{name}: is {_UBX}", accepted, _FROM_UBX)
+
+
+def _has_ubx(data: bytes) -> bool:
+    """Whether bytes have a whole message of u-blox: two bytes of sync, class, id, length, payload, two sums."""
+    at = data.find(b"\xb5b")
+    while at >= 0:
+        end = at + 6 + int.from_bytes(data[at + 4 : at + 6], "little")
+        if data[end : end + 2] == _ubx_sums(data[at + 2 : end]) or (at == 0 and end + 2 > len(data) >= 6):
+            return True
+        at = data.find(b"\xb5b", at + 1)
+    return False
+
+
+def _ubx_sums(data: bytes) -> bytes:
+    """Checksum of a message of u-blox, after Fletcher."""
+    first = second = 0
+    for byte in data:
+        first = (first + byte) & 0xFF
+        second = (second + first) & 0xFF
+    return bytes((first, second))
 
 
 # ---------------------------------------------------------------------- logs of flights
@@ -165,10 +204,9 @@ def read_log(data: bytes, name: str, stated: str | None, keys: LogKeys) -> Log:
     by_ending = (one for one, format in LOG_FORMATS.items() if name.lower().endswith(format.endings))
     chosen = stated or found or next(by_ending, None)
     if chosen is None:
-        known = ", ".join(f"{format.words} ({one})" for one, format in LOG_FORMATS.items())
         raise PathFileError(
             f"{name}: is no log that is known by its content",
-            f"accepted: {known}",
+            f"accepted: {_words_of_logs()}",
             "trajectory.format: csv says what is wrong with a header" if b"\0" not in data[:10_000] else "",
         )
     for key, (formats, words) in _KEYS_OF_FORMATS.items():

@@ -5,7 +5,7 @@ of a satellite's centre of mass in the Earth-fixed axes that the header names.
 """
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -15,6 +15,7 @@ from bisar_budget.paths.ephemeris import APART, OWN_VELOCITY, USUAL_DEGREE, Inte
 from bisar_budget.paths.ephemeris import velocity_off as off_places
 from bisar_budget.paths.flight import Orbit, PathFileError, Sample
 from bisar_budget.paths.instant import FIRST_DAY, TAI_LESS, Instant, parse_instant, tai, tai_less_utc
+from bisar_budget.paths.log_places import counted, most_left_out
 from bisar_budget.paths.messages import LATEST, coordinate_in, decoded, hold_to_size, number_in, object_key
 from bisar_budget.paths.orientation import UNKNOWN, Orientation
 
@@ -24,6 +25,7 @@ _SATELLITE = re.compile(r"[A-Z ][ \d]\d", re.ASCII)
 _AHEAD = {"GPS": TAI_LESS["GPS"], "GAL": 19.0, "QZS": 19.0, "IRN": 19.0, "BDT": 33.0, "TAI": 0.0}
 _OF_UTC = ("UTC", "GLO")
 _NO_PLACE = 1e-6  # km; all three are 0 where a place is bad or absent
+_LISTED = 3  # lines that the words of an orbit name
 _GAP = 1.5  # usual intervals; beyond it no polynomial goes
 
 
@@ -47,7 +49,8 @@ def read_sp3(
     Between a satellite's places that are missing, and over a manoeuvre that the file flags, nothing is interpolated.
     Places with velocities of their own are interpolated after Hermite, degree 7; places alone after Lagrange, of the
     degree from 7 to 15 that is nearest to one of two more degrees around the aperture. The orientation is not needed:
-    the axes are those of the Earth.
+    the axes are those of the Earth. Lines that cannot be used are left out and counted, up to 1 % of the satellite's
+    places; nothing is interpolated over a place that is left out.
     """
     hold_to_size(len(data), name, "time")
     lines = decoded(data, name).split("\n")
@@ -55,7 +58,19 @@ def read_sp3(
     # Of a hundred satellites one is read; all of them where that is needed to say which there are.
     satellites = (wanted and _satellites(lines, header, name, wanted)) or _satellites(lines, header, name)
     segments = [segment for one in satellites.values() for segment in _segments(one, header, name, tai(center))]
-    return orbit_through(segments, name, wanted, center, orientation)
+    try:
+        return orbit_through(segments, name, wanted, center, orientation)
+    except PathFileError as error:
+        if not header.broken:
+            raise
+        problem = f"{error}; {_first_of(header.broken)}"
+        raise PathFileError(problem, error.accepted, error.hint, error.key, error.spans) from None
+
+
+def _first_of(broken: Mapping[int, str]) -> str:
+    """The first line that cannot be used, and how many there are, for messages."""
+    problem = broken[min(broken)]
+    return problem if len(broken) == 1 else f"{problem}; {len(broken)} lines cannot be used"
 
 
 class _Heading:
@@ -70,6 +85,7 @@ class _Heading:
         self.frame = shown(first[46:51].strip()) or "ITRF"
         self.system = "GPS"
         self.nameless = 0  # places whose satellite cannot be read
+        self.broken: dict[int, str] = {}  # lines that cannot be used otherwise, and what is wrong with each
         ids: list[str] = []
         exponents: list[str] = []
         has_system = False
@@ -115,29 +131,54 @@ def _satellites(
     key = None if wanted is None else object_key(wanted)
     found: dict[str, _Satellite] = {}
     time: Instant | None = None
+    last: Instant | None = None  # epoch that can be read
     place: tuple[_Satellite, int] | None = None  # what the next line may give the velocity of
     for at, line in enumerate(lines[header.begins - 1 :], header.begins):
         kind = line[:1]
         if kind == "*":
-            before, time, place = time, _epoch(line, header.system, f"{name}:{at}"), None
-            if before is not None and time.since(before) < APART:
-                raise PathFileError(f"{name}:{at}: the epoch is not after the one before it; epochs must rise")
+            place, time = None, None
+            try:
+                time = _epoch_after(line, last, header.system, f"{name}:{at}")
+                last = time
+            except PathFileError as error:
+                header.broken[at] = str(error)
         elif kind in ("P", "V") and key is not None and not _is_of(line, key):
             header.nameless += kind == "P" and not _SATELLITE.fullmatch(line[1:4])
         elif kind == "P" and time is not None:
-            place = _place(line, time, at, found, header, name)
+            try:
+                place = _place(line, time, at, found, header, name)
+            except PathFileError as error:
+                header.broken[at], place = str(error), None
         elif kind == "V" and place is not None:
-            satellite, index = place
-            if _satellite_of(line, f"{name}:{at}") != satellite.id:
-                raise PathFileError(f"{name}:{at}: the velocity is not of {satellite.id}, whose place is above it")
-            speed = [one / 10 for one in _numbers(line, f"{name}:{at}", "dm/s")]
-            if any(speed):
-                satellite.samples[index] = satellite.samples[index]._replace(velocity=(speed[0], speed[1], speed[2]))
+            try:
+                _add_velocity(line, *place, f"{name}:{at}")
+            except PathFileError as error:
+                header.broken[at] = str(error)
         elif line.startswith("EOF"):
             break
-        elif line.strip() and kind not in ("V", "E", "/", "%"):
-            raise PathFileError(f"{name}:{at}: must be an epoch, a place or a velocity (got {shown(line[:20])})")
+        elif line.strip() and kind not in ("P", "V", "E", "/", "%"):
+            header.broken[at] = f"{name}:{at}: must be an epoch, a place or a velocity (got {shown(line[:20])})"
+    most = max((len(one.samples) for one in found.values()), default=0) + len(header.broken)
+    if len(header.broken) > most_left_out(most):
+        raise PathFileError(_first_of(header.broken), "accepted: 1 % of the places, and one of 20 or more")
     return found
+
+
+def _epoch_after(line: str, last: Instant | None, system: str, where: str) -> Instant:
+    """Time of an epoch, of TAI, which is after the last one."""
+    time = _epoch(line, system, where)
+    if last is not None and time.since(last) < APART:
+        raise PathFileError(f"{where}: the epoch is not after the one before it; epochs must rise")
+    return time
+
+
+def _add_velocity(line: str, satellite: _Satellite, index: int, where: str) -> None:
+    """Give a place the velocity of the line below it."""
+    if _satellite_of(line, where) != satellite.id:
+        raise PathFileError(f"{where}: the velocity is not of {satellite.id}, whose place is above it")
+    speed = [one / 10 for one in _numbers(line, where, "dm/s")]
+    if any(speed):
+        satellite.samples[index] = satellite.samples[index]._replace(velocity=(speed[0], speed[1], speed[2]))
 
 
 def _place(
@@ -151,11 +192,20 @@ def _place(
         satellite.breaks.add(len(satellite.samples))
     if line[79:80] == "P" and satellite.predicted is None:
         satellite.predicted = time
-    x, y, z = _numbers(line, where, "km")
+    try:
+        x, y, z = _numbers(line, where, "km")
+    except PathFileError:
+        satellite.breaks.add(len(satellite.samples))
+        raise
     if max(abs(x), abs(y), abs(z)) < _NO_PLACE:
         satellite.breaks.add(len(satellite.samples))
         return None
     if satellite.samples and time.since(satellite.samples[-1].time) < APART:
+        if satellite.samples[-1].place == (1000 * x, 1000 * y, 1000 * z):
+            return None
+        satellite.samples.pop()  # nobody knows which of them it is
+        satellite.lines.pop()
+        satellite.breaks.add(len(satellite.samples))
         raise PathFileError(f"{where}: {satellite_id} has two places at one epoch")
     satellite.samples.append(Sample(time, (1000 * x, 1000 * y, 1000 * z), (0.0, 0.0, 0.0)))
     satellite.lines.append(at)
@@ -210,6 +260,10 @@ def _segments(satellite: _Satellite, header: _Heading, name: str, center: Instan
     ]
     lines = f"{header.nameless} place{'s' * (header.nameless > 1)}"
     nameless = f", {lines} without a satellite's name left out" if header.nameless else ""
+    if header.broken:
+        listed = ", ".join(map(str, sorted(header.broken)[:_LISTED])) + ", …" * (len(header.broken) > _LISTED)
+        noun = "line" if len(header.broken) == 1 else "lines"
+        nameless += f", {counted(len(header.broken), 'record')} that cannot be used left out ({noun} {listed})"
     for first, last in pairwise([0, *edges, len(samples)]):
         part = samples[first:last]
         if len(part) < 2:

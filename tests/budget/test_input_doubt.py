@@ -36,7 +36,10 @@ def noisy(sigma: float, seed: int = 0) -> bytes:
 def logged(folder: Path, log: bytes, **error: Any) -> Mission:
     """A mission whose receiver is a log, of which the smooth path is flown: its residual does not spread."""
     (folder / "flight.csv").write_bytes(log)
-    receiver = {"trajectory": {"file": "flight.csv", "processed": "smoothed"}, "motion_error": {"velocity": "1 mm/s", **error}}
+    receiver = {
+        "trajectory": {"file": "flight.csv", "processed": "smoothed"},
+        "motion_error": {"velocity": "1 mm/s", **error},
+    }
     (folder / "m.yaml").write_text(aircraft(platforms__receiver=receiver))
     return load_mission(str(folder / "m.yaml"))
 

@@ -372,7 +372,8 @@ class TestCatalogue:
         """The file's mask was taken at the frequency of the part, and nothing said so."""
         found = check_mission(parse_mission(receiver(f"oscillator: {{sensor: wenzel-5mhz, {noise}}}")), TODAY)
         warned = f"states no frequency, and is taken at 5 MHz, that of {_name('wenzel-5mhz')}"
-        assert any(warned in one.message for one in found.warnings) is said
+        sentences = [*(one.message for one in found.warnings), *(str(one.reason) for one in found.rows)]
+        assert any(warned in sentence for sentence in sentences) is said
 
     def test_a_frequency_replaces_nothing_where_noise_is_the_same_at_any(self) -> None:
         text = "oscillator: {sensor: wenzel-5mhz, frequency: 10 MHz}"

@@ -446,7 +446,7 @@ def test_a_file_of_another_format_is_named_with_the_key_that_reads_it(form: str,
         hold_to_format(data, "x", asked)
     assert str(error.value) == f"x: is {ORBIT_FORMATS[form].words}"
     assert error.value.accepted == f"accepted: {ORBIT_FORMATS[asked].words}"
-    assert error.value.hint == f"orbit.{form} reads it"
+    assert error.value.hint == f"orbit: {{{form}: …}} reads it"
 
 
 @pytest.mark.parametrize(
@@ -483,5 +483,5 @@ def test_an_orbit_where_a_log_is_asked_for_is_named(form: str) -> None:
     with pytest.raises(PathFileError) as error:
         hold_to_log(SHOWN[form][0], "x")
     assert str(error.value) == f"x: is {ORBIT_FORMATS[form].words}"
-    assert error.value.accepted == "accepted: a log of a flight"
-    assert error.value.hint == f"orbit.{form} reads it"
+    assert error.value.accepted.startswith("accepted: a log of a flight, CSV with a header (csv), an SBET of records")
+    assert error.value.hint == f"orbit: {{{form}: …}} reads it"

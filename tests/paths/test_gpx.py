@@ -84,7 +84,7 @@ FIRST = GOOD.splitlines()[4]
     ("text", "says"),
     [
         ("", "a.gpx:1: is not XML: no element found"),
-        ("<kml/>", "a.gpx:1: is no GPX, its root is kml"),
+        ("<tcx/>", "a.gpx:1: is no GPX, its root is tcx"),
         (GOOD.replace(TRACK, ""), "a.gpx: has no track with points"),
         (GOOD[:-60], "a.gpx:"),
         (

@@ -1,5 +1,6 @@
 """Formats of logs by their content, and what is said where another one is stated, or none fits."""
 
+import re
 from typing import Any
 
 import pytest
@@ -8,7 +9,14 @@ from bisar_budget.mission.platforms import TrajectorySource
 from bisar_budget.paths.flight import PathFileError
 from bisar_budget.paths.instant import Instant
 from bisar_budget.paths.log_places import LogKeys
-from bisar_budget.paths.path_formats import LOG_FORMATS, ORBIT_FORMATS, hold_to_format, log_format, read_log
+from bisar_budget.paths.path_formats import (
+    LOG_FORMATS,
+    ORBIT_FORMATS,
+    hold_to_format,
+    hold_to_log,
+    log_format,
+    read_log,
+)
 from bisar_budget.paths.sp3 import read_sp3
 from tests.paths.flown import earth_fixed_csv, flight, geodetic_csv, sbet, smrmsg
 from tests.paths.log_files import every_format
@@ -62,7 +70,7 @@ def test_what_is_no_log_is_none(data: bytes) -> None:
         (sbet(SHORT)[: 10 * 136 - 1], "b.out", "b.out: ends at byte 1359, 135 into record 10"),
         (smrmsg(SHORT.times), "b.out", "b.out: is the accuracy file of an SBET (smrmsg), records of ten doubles, 80"),
         (b"ULog", "a.ulg", "a.ulg: is no ULog"),
-        (b"<kml/>", "a.gpx", "a.gpx:1: is no GPX"),
+        (b"<tcx/>", "a.gpx", "a.gpx:1: is no GPX, its root is tcx"),
         (b"hello\n", "a.csv", "a.csv:1: names no place"),
         (b"hello\n", "a.txt", "a.txt: is no log that is known by its content"),
     ],
@@ -117,6 +125,46 @@ def test_an_orbit_of_a_format_that_is_not_read_is_named(data: bytes, words: str,
         hold_to_format(data, "a.e", form)
     assert str(error.value) == f"a.e: is {words}"
     assert error.value.accepted == f"accepted: {ORBIT_FORMATS[form].words}"
+
+
+UBX = b"\xb5b\x0a\x04\x00\x00\x0e4"  # a request of MON-VER, with its sums
+DATAFLASH = b"\xa3\x95\x80\x80YFMT\0BBnNZ\0" + bytes(70)
+NOT_READ = {
+    "flight.kml": (b'<?xml version="1.0"?>\n<kml xmlns="http://www.opengis.net/kml/2.2"/>', "KML of Google Earth"),
+    "a.ubx": (UBX, "messages of u-blox (UBX)"),
+    "noise-first.ubx": (b"\0\1\xb5b\xff" + UBX, "messages of u-blox (UBX)"),
+    "a.fit": (b"\x0e\x10\xd9\x07\0\0\0\0.FIT\0\0", "a FIT file of Garmin"),
+    "a.igc": (b"AXCS123\r\nHFDTE010626\r\nB0520014805196N01116782EA0295303000\r\n", "an IGC file of a glider"),
+    "00000017.bin": (DATAFLASH, "a dataflash log of ArduPilot in binary"),
+}
+
+
+@pytest.mark.parametrize("ending", ["", ".gpx", ".csv", ".nmea", ".out"])
+@pytest.mark.parametrize("name", NOT_READ)
+def test_a_log_of_a_format_that_is_not_read_is_named(name: str, ending: str) -> None:
+    """By its content, whatever its name: KML was no GPX, and u-blox an SBET that ended early."""
+    data, words = NOT_READ[name]
+    with pytest.raises(PathFileError) as error:
+        hold_to_log(data, name + ending)
+    assert str(error.value) == f"{name}{ending}: is {words}"
+    assert all(f"({one})" in error.value.accepted for one in LOG_FORMATS)
+    assert error.value.hint.startswith("Write it")
+    with pytest.raises(PathFileError, match=rf": is {re.escape(words)}"):
+        hold_to_format(data, name, "oem")
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_logs_that_are_read_are_none_of_those(name: str) -> None:
+    hold_to_log(FILES[name][1], name)
+
+
+def test_sentences_among_messages_of_u_blox_are_read() -> None:
+    """A receiver that writes both: the sentences are the log."""
+    hold_to_log(UBX + FILES["a.nmea"][1], "both.ubx")
+
+
+def test_two_bytes_of_sync_alone_are_no_message() -> None:
+    hold_to_log(b"abc \xb5b\x01\x07\x02\x00xx--", "a.txt")
 
 
 def test_sp3_whose_first_line_is_blank_says_so() -> None:

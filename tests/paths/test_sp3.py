@@ -183,17 +183,57 @@ LINE = TEXT.splitlines().index(epochs(TEXT)[0].splitlines()[0]) + 1
             "XYZ ccc",
             "g.sp3:13: the time system XYZ is not known; accepted: GPS, GAL, QZS, IRN, BDT, TAI, UTC",
         ),
-        ("*  2010  7  1  0 15", "*  2010  7  1  0  0", f"g.sp3:{LINE + 3}: the epoch is not after the one before it"),
-        ("*  2010  7  1  0 15", "*  2010  7 41  0 15", f"g.sp3:{LINE + 3}: must be an epoch such as *  2026  5 31"),
-        ("PG05 -25251.856884", "PG05 -2525x.856884", f"g.sp3:{LINE + 1}: must be a number of km in columns 5 to 18"),
-        ("PG16", "PG05", f"g.sp3:{LINE + 2}: G05 has two places at one epoch"),
-        ("PG16", "XG16", f"g.sp3:{LINE + 2}: must be an epoch, a place or a velocity (got XG16"),
     ],
 )
 def test_what_is_refused(before: str, after: str, said: str) -> None:
     with pytest.raises(PathFileError) as error:
         read(TEXT.replace(before, after, 1))
     assert str(error.value).startswith(said)
+
+
+GARBLED = {
+    "epoch-not-after": ("*  2010  7  1  0 15", "*  2010  7  1  0  0", 3, "the epoch is not after the one before it"),
+    "epoch": ("*  2010  7  1  0 15", "*  2010  7 41  0 15", 3, "must be an epoch such as *  2026  5 31"),
+    "place": ("PG05 -25251.856884", "PG05 -2525x.856884", 1, "must be a number of km in columns 5 to 18"),
+    "name-of-another": ("PG16", "PG05", 2, "G05 has two places at one epoch"),
+    "no-record": ("PG16", "XG16", 2, "must be an epoch, a place or a velocity (got XG16"),
+}
+
+
+@pytest.mark.parametrize("kind", GARBLED)
+def test_one_garbled_line_of_the_chosen_satellite_does_not_refuse_a_file(kind: str) -> None:
+    """Far from the aperture: the orbit is the same, and says how many lines are left out."""
+    before, after, line, _ = GARBLED[kind]
+    orbit, whole = read(TEXT.replace(before, after, 1)), read(TEXT)
+    assert f", 1 record that cannot be used left out (line {LINE + line})" in orbit.words
+    assert orbit.place(NOON) == whole.place(NOON)
+
+
+@pytest.mark.parametrize("kind", GARBLED)
+def test_more_than_a_percent_of_garbled_lines_refuse_a_file(kind: str) -> None:
+    before, after, line, problem = GARBLED[kind]
+    text = TEXT.replace(before, after, 1)
+    at = text.rindex("PG05", 0, text.rindex("PG05"))
+    with pytest.raises(PathFileError) as error:
+        read(text[:at] + "PG05 x" + text[at + 6 :])
+    assert str(error.value).startswith(f"g.sp3:{LINE + line}: {problem}")
+    assert str(error.value).endswith("; 2 lines cannot be used")
+
+
+def test_a_garbled_place_of_another_satellite_does_not_refuse_a_file() -> None:
+    text = TEXT.replace("PG16", "PG16 x", 1)
+    assert read(text).place(NOON) == read(TEXT).place(NOON)
+    assert "left out" not in read(text).words  # none of its records
+
+
+def test_nothing_is_interpolated_over_a_garbled_place() -> None:
+    """At the aperture the file is refused, and the message names the line."""
+    block = epochs(TEXT)[48]  # of noon
+    garbled = block.replace("PG05", "PG05 x")
+    text = TEXT.replace(block, garbled)
+    line = TEXT[: TEXT.index(block)].count("\n") + 2
+    with pytest.raises(PathFileError, match=rf"g\.sp3:{line}: must be a number of km in columns 5 to 18"):
+        read(text)
 
 
 def test_a_file_without_epochs() -> None:

@@ -7,7 +7,6 @@ from random import Random
 from typing import Any
 
 import pytest
-import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -19,7 +18,8 @@ from bisar_budget.mission.load import parse_mission
 from bisar_budget.report.change.comparison import Gate, compare
 from tests.conftest import TODAY, findings
 from tests.families import FAMILIES, mission_text
-from tests.fuzz import _Plain, _with_instruments, places, tree_of
+from tests.fuzz import _with_instruments, places, tree_of
+from tests.yaml_text import yaml_text
 
 TX, RX = "platforms__transmitter", "platforms__receiver"
 MASK = {"1 Hz": "-80 dBc/Hz", "10 Hz": "-110 dBc/Hz", "1 kHz": "-140 dBc/Hz"}
@@ -115,6 +115,21 @@ def test_less_of_the_same_is_refused(path: str, value: object, row: str) -> None
     assert row in refused((path, value))
 
 
+@pytest.mark.parametrize("value", [None, "2 h"])
+def test_air_that_changes_more_slowly_is_refused(value: str | None) -> None:
+    """Or that does not change any more. One that changes faster does more, and one of another source is another."""
+    air = {"zenith_delay": "1 cm", "correlation_time": "20 min", "source": "model"}
+    before = findings(**at(("propagation", air)))
+
+    def refusals(**changes: object) -> set[str]:
+        after = {key: stated for key, stated in (air | changes).items() if stated is not None}
+        return {one.id for one in compare(before, findings(**at(("propagation", after)))).refusals(Gate(1.0))}
+
+    assert "propagation.zenith_delay" in refusals(correlation_time=value)
+    assert "propagation.zenith_delay" not in refusals(correlation_time="10 min")
+    assert "propagation.zenith_delay" not in refusals(correlation_time=value, source="another model")
+
+
 @pytest.mark.parametrize(
     ("path", "value", "row"),
     [
@@ -207,7 +222,7 @@ def _mission(family: str, seed: int) -> dict[str, Any]:
 
 def _checked(tree: dict[str, Any]) -> MissionFindings | None:
     try:
-        return check_mission(parse_mission(yaml.dump(tree, Dumper=_Plain, sort_keys=False)), TODAY)
+        return check_mission(parse_mission(yaml_text(tree)), TODAY)
     except MissionError:
         return None
 

@@ -1,0 +1,61 @@
+"""Rows that rest on an oscillator whose noise is not what the file states: they are not evaluated.
+
+A mask without its frequency, beside a part, is taken at the part's: at another one the same decibels are other noise.
+A power law that fits an Allan deviation badly is not that oscillator's. Where such noise uses more than a tenth of a
+limit, the row that has this limit is not evaluated, unless it fails anyway.
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from bisar_budget import phrases
+from bisar_budget.budget.continued_masks import LEAST_USE, Part, part_of
+from bisar_budget.effects.effect import PLATFORMS
+from bisar_budget.effects.oscillators import POOR_FIT, noise_of
+from bisar_budget.effects.random_effect import RandomError
+from bisar_budget.mission.model import Mission
+from bisar_budget.phrases import NOTHING, Note
+
+
+def rests_on_doubted_noise(errors: Iterable[RandomError], part: Part, model: str, limit: Any) -> Any:
+    """Whether oscillators in doubt use more than a tenth of a limit by a part of their effects, in which cases."""
+    power: Any = 0.0
+    for error in errors:
+        if error.declared is not None and np.any(error.is_in_doubt):
+            size = part_of(error.effect(model), part) * np.asarray(error.declared)
+            power = power + np.where(error.is_in_doubt, np.nan_to_num(np.square(size)), 0.0)
+    with np.errstate(all="ignore"):
+        return np.sqrt(power) > LEAST_USE * np.asarray(limit)
+
+
+def has_doubted_frequency(mission: Mission, platform: str) -> bool:
+    """Whether the tones of an oscillator are taken at the frequency of a part that the file replaces."""
+    oscillator = getattr(mission.platforms, platform).oscillator
+    return oscillator is not None and bool(oscillator.spurs) and oscillator.mask_at_frequency_of_part is not None
+
+
+def doubted_noise_note(mission: Mission, platforms: Sequence[str] = PLATFORMS) -> Note:
+    """Say which keys leave the noise of oscillators in doubt, and what to write instead."""
+    notes = [note for name in platforms for _, note in noise_doubts(mission, name)]
+    return notes[0].then(*notes[1:]) if notes else NOTHING
+
+
+def noise_doubts(mission: Mission, platform: str) -> Iterator[tuple[str, Note]]:
+    """Keys of an oscillator that leave its noise in doubt, each with a sentence."""
+    oscillator = getattr(mission.platforms, platform).oscillator
+    if oscillator is None:
+        return
+    replaced = oscillator.mask_at_frequency_of_part
+    if replaced is not None:
+        sentence = phrases.mask_at_the_frequency_of_a_part(platform, replaced.frequency, replaced.part)
+        yield replaced.figure, sentence
+    if oscillator.allan_deviation is not None:
+        misfit = noise_of(oscillator, mission.radar.center_frequency, mission.collection.aperture_time).misfit
+        if misfit > POOR_FIT:
+            key = f"platforms.{platform}.oscillator"
+            yield (
+                ("allan_deviation" if oscillator.sensor is None else "sensor"),
+                phrases.no_power_law_fits(key, misfit),
+            )
