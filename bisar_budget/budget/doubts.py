@@ -268,7 +268,7 @@ def is_coarse(mission: Mission, name: str) -> Any:
 
 
 def _unsaid_log(mission: Mission, name: str) -> LogNoise | None:
-    """What a smooth path leaves of the log of a platform, of which the file does not say what is flown."""
+    """Noise of a platform's log where the file does not say which path of it is flown; None elsewhere."""
     path: FlownPath | None = getattr(mission.platforms, name).path
     log = None if path is None else path.log_noise
     return log if log is not None and log.processed is None else None

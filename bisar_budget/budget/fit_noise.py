@@ -1,7 +1,7 @@
-"""What the noise of a log does to the allowables, through the path that is fitted to it.
+"""Changes of the allowables by the noise of a log, through the path that is fitted to it.
 
 An allowable of a position or a velocity follows from how the range to the platform bends. A fit to a noisy log has an
-error in its acceleration, and every allowable with it. How much, is looked at with the path as it would be one sigma
+error in its acceleration, and every allowable with it. The change is found with the path one sigma
 to either side.
 """
 
@@ -35,7 +35,7 @@ class AllowableNoise:
 
 
 def allowable_noise(mission: Mission, name: str) -> AllowableNoise | None:
-    """What the fit's own noise does to the allowables of both platforms; None of a path that is no fit to a log."""
+    """Largest change of an allowable of both platforms by the fit's own noise; None of a path that is no fit."""
     platform: Platform = getattr(mission.platforms, name)
     path = platform.path
     if path is None or path.acceleration_noise is None:

@@ -387,7 +387,7 @@ ACCEPTED_WAYS = (
 
 
 class LogNoise(NamedTuple):
-    """What a smooth path leaves of a log, along the scene's axes, and what the processor flies of both.
+    """Noise of a log beside its smooth path, along the scene's axes, and which of both the processor flies.
 
     `residual` is the covariance of what is left of the fixes in the aperture [m²], `correlation_time` that of a
     Gauss-Markov process which is correlated as they are [s]. `grid` is one step of each coordinate that the log

@@ -638,7 +638,7 @@ def _path_in_doubt(mission: Mission, row: Row) -> Iterator[Step]:
 
 
 def _of_log(one: InputDoubt) -> Step:
-    """What a log's smooth path leaves of it, or the step of its fixes, beside the most that may go unsaid."""
+    """Residual of a log, or the step of its fixes, beside the most that may go unsaid."""
     if one.kind == RESIDUAL:
         title = f"Phase that the smooth path leaves of the {one.owner}’s log along the line of sight, rms"
         return step(title, f"left = {with_unit(one.doubt, 'rad')}", f"most = {with_unit(one.declared, 'rad')}")
