@@ -159,7 +159,7 @@ _NEEDED_DECLARATIONS = {
     "cubic_phase_error": "has a cubic phase (velocity, acceleration, imu, random, oscillator, timing)",
     "location_error": "displaces the image (position, velocity, time_tag, lever_arm, random, timing, propagation)",
     "pslr": "makes echoes (vibration.sinusoidal, oscillator.spurs, oscillator.acceleration_sensitivity)",
-    "islr": "spreads (vibration, random, oscillator, synchronization)",
+    "islr": "spreads (vibration, random, oscillator, synchronization, propagation with a correlation_time)",
 }
 
 
