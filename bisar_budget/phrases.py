@@ -224,6 +224,12 @@ def declarations_are_missing(keys: Sequence[str]) -> str:
 
 
 @phrase
+def declared_off_its_source(key: str, level: str, off: str) -> str:
+    """Said of all errors that the file should declare, where a level shifts one off what its source states."""
+    return f"{key}: {level} {off}"
+
+
+@phrase
 def input_in_doubt(doubt: float, words: str, declared: float | None, key: str) -> str:
     """Said of a position error that is less than the doubt of the platform's path. [m]"""
     stated = "no position error is declared" if declared is None else f"{_size(declared, 'm')} is declared"

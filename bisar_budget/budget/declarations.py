@@ -14,7 +14,7 @@ import numpy as np
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.navigation_errors import TILTS
 from bisar_budget.effects.oscillator_acceleration import is_unshaken
-from bisar_budget.findings.requirement import DeclaredKinds
+from bisar_budget.findings.requirement import DeclaredKinds, ShiftedFigure
 from bisar_budget.findings.row import DECLARE
 from bisar_budget.mission.instruments import LeverArm
 from bisar_budget.mission.model import Mission
@@ -272,7 +272,23 @@ def declared_kinds(mission: Mission) -> DeclaredKinds:
                 without_source.append(kind)
         elif of_mission.is_owed(mission):
             missing.append(kind)
-    return DeclaredKinds(tuple(declared), tuple(missing), tuple(without_source))
+    return DeclaredKinds(tuple(declared), tuple(missing), tuple(without_source), tuple(shifted_figures(mission)))
+
+
+def shifted_figures(mission: Mission) -> Iterator[ShiftedFigure]:
+    """Phase noise and spectra of vibration that the file shifts by a level off what their source states."""
+    for name in PLATFORMS:
+        platform: Platform = getattr(mission.platforms, name)
+        oscillator, vibration = platform.oscillator, platform.motion_error.vibration
+        source, levels = platform.motion_error.source, list[tuple[str, str, float | None, str | None]]()
+        levels.append(("vibration", "motion_error.vibration.spectrum_level", vibration.spectrum_level, source))
+        if oscillator is not None:
+            felt = None if oscillator.vibration is None else oscillator.vibration.spectrum_level
+            levels.append(("oscillator", "oscillator.level", oscillator.level, oscillator.source))
+            levels.append(("oscillator", "oscillator.vibration.spectrum_level", felt, oscillator.source))
+        for kind, key, level, its_source in levels:
+            if level:
+                yield ShiftedFigure(f"{name}.{kind}", f"platforms.{name}.{key}", level, its_source)
 
 
 def still_platforms(mission: Mission) -> list[str]:

@@ -461,9 +461,8 @@ class TestPreCommit:
         # A commit that only deletes: pre-commit has no file to pass on.
         (design / "unit.yaml").write_text("kind: imu\nname: unit\naccelerometer_bias: 100 ug\nsource: sheet\n")
         good_mission = design / "missions" / "survey.yaml"
-        text = good_mission.read_text(encoding="utf-8").replace(
-            "motion_error: {", "motion_error: { sensor: ../unit.yaml,"
-        )
+        text = good_mission.read_text(encoding="utf-8")
+        text = text.replace("    motion_error:\n", "    motion_error:\n      sensor: ../unit.yaml\n", 1)
         assert "../unit.yaml" in text
         good_mission.write_text(text, encoding="utf-8")
         git(design, "add", "-A")
