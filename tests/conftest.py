@@ -19,7 +19,6 @@ if "PYTEST_XDIST_WORKER" in os.environ:
 
 import numpy as np
 import pytest
-import yaml
 from click.testing import CliRunner, Result
 from hypothesis import settings
 
@@ -28,6 +27,7 @@ from bisar_budget.cli import cli
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.row import Row
 from bisar_budget.mission.load import load_mission, parse_mission
+from tests.yaml_text import yaml_text
 
 # Shared machines: how long an example takes says nothing.
 settings.register_profile("shared", deadline=None)
@@ -135,7 +135,7 @@ def mission_text(**changes: Any) -> str:
         node[last] = value
     if isinstance(rules := tree.get("allocation", {}), dict):
         tree["allocation"] = rules | {key: rule for key, rule in PAPER.items() if key not in rules}
-    return yaml.safe_dump(with_radians(tree), sort_keys=False, allow_unicode=True)
+    return yaml_text(with_radians(tree), allow_unicode=True)
 
 
 def findings(**changes: Any) -> MissionFindings:

@@ -20,6 +20,7 @@ import yaml
 from bisar_budget.mission.model import mission_schema
 from tests.conftest import ROOT
 from tests.families import FAMILIES, mission_text
+from tests.yaml_text import yaml_text
 
 # What does something to a terminal, and what a runner takes for a command.
 RAW = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200b-\u200f\u2028-\u202e\u2066-\u2069]")
@@ -209,7 +210,7 @@ def original(random: Random) -> str:
         return text
     tree = tree_of(text)
     _with_instruments(tree, random)
-    return yaml.dump(tree, Dumper=_Plain, sort_keys=False, width=1000)
+    return yaml_text(tree, width=1000)
 
 
 def _mask(random: Random) -> dict[str, str]:
@@ -292,14 +293,7 @@ def _written(tree: Any, random: Random) -> str:
     if random.random() < 0.1:
         return json.dumps(tree, ensure_ascii=random.random() < 0.5)
     style = {"default_flow_style": random.choice((None, True, False)), "allow_unicode": random.random() < 0.7}
-    return yaml.dump(tree, Dumper=_Plain, sort_keys=False, width=random.choice((40, 1000)), **style)
-
-
-class _Plain(yaml.SafeDumper):
-    """Writes no aliases; a lone surrogate is written as it is."""
-
-    def ignore_aliases(self, data: Any) -> bool:
-        return True
+    return yaml_text(tree, width=random.choice((40, 1000)), **style)
 
 
 def places(node: Any) -> Iterator[tuple[Any, Any]]:

@@ -67,6 +67,7 @@ def assert_found_alike(missions: Sequence[Mission]) -> list[MissionFindings]:
     assert sorted(found) == list(range(len(missions)))
     for place, mission in enumerate(missions):
         alone = check_mission(mission, DAY)
+        assert alone.confidence == found[place].confidence
         for name in ("rows", "requirements", "warnings", "notes", "allocation", "scene", "resolution", "model_doubt"):
             assert_alike(getattr(alone, name), getattr(found[place], name), f"{place} {name}")
     return [found[place] for place in range(len(missions))]
@@ -125,3 +126,21 @@ def test_a_waiver_holds_for_its_own_mission_only() -> None:
     waived = [{row.id for row in one.rows if row.status == "waived"} for one in found]
     assert not waived[0]
     assert waived[1]
+
+
+def test_the_confidence_is_that_of_each() -> None:
+    """An error of 0 has no part in it, whichever mission is judged first."""
+    still, moving = (
+        parse_mission(
+            mission_text(
+                platforms__transmitter__motion_error={"velocity": size, "distribution": "uniform"},
+                platforms__receiver__motion_error={"velocity": "1 mm/s"},
+            ),
+            "m.yaml",
+        )
+        for size in ("0 m/s", "1 mm/s")
+    )
+    for missions in ([still, moving], [moving, still]):
+        assert len(list(stacked(missions))) == 1
+        found = assert_found_alike(missions)
+        assert found[0].confidence != found[1].confidence

@@ -7,7 +7,6 @@ from random import Random
 from typing import Any
 
 import pytest
-import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -19,7 +18,8 @@ from bisar_budget.mission.load import parse_mission
 from bisar_budget.report.change.comparison import Gate, compare
 from tests.conftest import TODAY, findings
 from tests.families import FAMILIES, mission_text
-from tests.fuzz import _Plain, _with_instruments, places, tree_of
+from tests.fuzz import _with_instruments, places, tree_of
+from tests.yaml_text import yaml_text
 
 TX, RX = "platforms__transmitter", "platforms__receiver"
 MASK = {"1 Hz": "-80 dBc/Hz", "10 Hz": "-110 dBc/Hz", "1 kHz": "-140 dBc/Hz"}
@@ -207,7 +207,7 @@ def _mission(family: str, seed: int) -> dict[str, Any]:
 
 def _checked(tree: dict[str, Any]) -> MissionFindings | None:
     try:
-        return check_mission(parse_mission(yaml.dump(tree, Dumper=_Plain, sort_keys=False)), TODAY)
+        return check_mission(parse_mission(yaml_text(tree)), TODAY)
     except MissionError:
         return None
 
