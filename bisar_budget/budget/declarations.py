@@ -191,6 +191,15 @@ def _runs_two_clocks(mission: Mission) -> bool:
     return not mission.has_direct_path
 
 
+def _lacking_of_setting(mission: Mission) -> list[str]:
+    """Keys of the synchronisation that the file should have: of clocks in holdover, both errors that setting left."""
+    sync = mission.synchronization
+    if sync is None:
+        return ["synchronization"]
+    halves = ("time_error", "frequency_error") if sync.is_holdover else ()
+    return [f"synchronization.{key}" for key in halves if getattr(sync, key) is None]
+
+
 def _legs_without_delay(mission: Mission) -> list[str]:
     """Keys of the air that the file should have: of both legs, or of each leg of which a file may state a delay."""
     if mission.propagation is None:
@@ -226,7 +235,7 @@ _KINDS_OF_MISSION: Mapping[str, _OfMission] = {
         "clock",
         lambda mission: mission.synchronization is not None,
         lambda mission: mission.synchronization is not None and bool(mission.synchronization.source),
-        lambda mission: ["synchronization"],
+        _lacking_of_setting,
         _runs_two_clocks,
     ),
     "propagation": _OfMission(
@@ -243,6 +252,9 @@ _KINDS_OF_MISSION: Mapping[str, _OfMission] = {
         lambda mission: ["other_errors"],
     ),
 }
+
+
+_OF_HALVES = ("propagation", "synchronization")  # kinds that the file may state in part
 
 
 # ---------------------------------------------------------------------- what a mission declares
@@ -324,7 +336,7 @@ def _missing(mission: Mission, still: Container[str]) -> Iterator[Missing]:
         owner, dot, kind = asked.rpartition(".")
         if kind in _KINDS_OF_MISSION:
             of_mission = _KINDS_OF_MISSION[kind]
-            if kind == "propagation" or not of_mission.is_stated(mission):
+            if kind in _OF_HALVES or not of_mission.is_stated(mission):
                 yield from (Missing(of_mission.owner, kind, key) for key in of_mission.missing(mission))
             continue
         of_platform = _KINDS_OF_PLATFORMS[kind]
