@@ -9,7 +9,8 @@ root-sum-squares is less.
 - A clock moves nothing: a place has the phase of the centre, and what the constant and the linear term add where the
   displacement they make is another one. These terms are those of the displacement at the centre. What the file leaves
   open of them, as of a free oscillator, is not counted, and the report says so.
-- A delay of the zenith is that of the whole scene; each place sees its leg at another elevation.
+- A delay of the zenith is that of the whole scene; each place sees its leg at another elevation. One that changes
+  within the aperture is as many independent courses as its correlation takes.
 - The phase of a slow vibration is not known: cosine and sine are parts of one size, and the worst phase has the root
   of the sum of their squares. Its axes may have any phases, so that they add up. One along the line of sight moves
   along that of the centre.
@@ -25,7 +26,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bisar_budget.constants import ROUNDING
-from bisar_budget.effects.air_delays import delay_course, legs_of, metres_per_unit
+from bisar_budget.effects.air_delays import (
+    group_at_nodes,
+    legs_of,
+    metres_per_unit,
+    seen_course,
+    zenith_courses,
+)
 from bisar_budget.effects.declared import DeclaredErrors
 from bisar_budget.effects.effect import PLATFORMS, Subject
 from bisar_budget.effects.random_effect import NODES, Moves, RandomError, SensorCases, factor
@@ -120,22 +127,26 @@ class _Clock(NamedTuple):
 class _Delay(NamedTuple):
     """A delay of the air, so many metres of the zenith, on the legs of platforms, by their places.
 
-    The centre sees each of these at the place in `middles` at mid-aperture.
+    The centre sees each of these at the place in `middles` at mid-aperture. `courses` (courses, nodes, cases) are
+    independent, and together the delay of the zenith over the aperture, of variance 1.
     """
 
     places: tuple[int, ...]
     delay: str
     middles: Sequence[Vectors]
     metres: Floats
+    courses: Floats
     groups: int = 1
 
     def there(self, there: ExactRanges, of: Places) -> Floats:
-        """Quadratic phase, (1, places). [rad]"""
-        course: Any = 0.0
+        """Quadratic phase of each course, (courses, places). [rad]"""
+        along: Any = 0.0
         for place, middle in zip(self.places, self.middles, strict=True):
             x, y, z = (part[of] for part in middle)
-            course = course + delay_course(self.delay, there.tracks[place], (x, y, z), self.metres[of], there.fit)
-        return np.asarray(np.einsum("np,np->p", there.phase_weights[0], course)[None])
+            along = along + group_at_nodes(self.delay, there.tracks[place], (x, y, z), self.metres[of])
+        group = along * _of(self.courses, of)
+        mean = np.einsum("n,mnp->mp", there.fit[0], group)[:, None]
+        return np.asarray(np.einsum("np,mnp->mp", there.phase_weights[0], seen_course(group, mean, self.delay)))
 
 
 # ---------------------------------------------------------------------- those of a mission
@@ -154,7 +165,10 @@ def _at_random(
         elif kind == "propagation":
             places = tuple(map(PLATFORMS.index, legs_of(what.owner)))
             middles = [errors.exact.positions[place] for place in places]
-            yield what, _Delay(places, what.axis, middles, size * metres_per_unit(errors.mission, what.axis))
+            between = _between(errors.exact.fit.shape[1])
+            courses = zenith_courses(errors.mission, what.owner, 2 * errors.exact.half)
+            courses = np.einsum("nm,fmc->fnc", between, courses)
+            yield what, _Delay(places, what.axis, middles, size * metres_per_unit(errors.mission, what.axis), courses)
 
 
 def _vibrating(errors: DeclaredErrors) -> Iterator[tuple[Subject, _Moving]]:

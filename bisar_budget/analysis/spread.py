@@ -157,7 +157,7 @@ def noise(analysis: "Analysis", model: str) -> list[SpreadPhase]:
             variance = (2 * math.pi * rms / mission.radar.wavelength) ** 2
             found.append(SpreadPhase(subject(name, "vibration", "wideband").id, name, variance))
     for one in analysis.random:
-        if one.declared is not None and one.spreads:
+        if one.declared is not None and one.spreads and not one.counted_in:
             found.append(SpreadPhase(one.id, one.owner, (one.effect(model).spread * one.declared) ** 2))
     energy = mainlobe_energy(mission)
     for power in stated_powers(mission):

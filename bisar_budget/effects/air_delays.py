@@ -7,6 +7,9 @@ The troposphere delays every frequency alike. Free electrons delay the group of 
 advance the phase at the centre frequency by as much. An image finds its range by the band, the group, and everything
 else by the phase. So its range error is that of the phase, −g, with the constant part of the group, +ḡ: the
 displacement Q⁻¹[ḡ, −g₁] and the phases of −g, with what the displacement adds. Derived here.
+
+With a correlation time the delay of the zenith changes within the aperture (`changing_delays`): the published model
+takes the parts of such a process along the line of sight of mid-aperture, the full one follows the leg.
 """
 
 import math
@@ -16,9 +19,11 @@ from typing import Any
 import numpy as np
 
 from bisar_budget.constants import EARTH_RADIUS
+from bisar_budget.effects.changing_delays import changing_effects, departure_at_nodes
 from bisar_budget.effects.combined import combined
 from bisar_budget.effects.effect import PLATFORMS, subject
-from bisar_budget.effects.random_effect import RandomError, SensorCases
+from bisar_budget.effects.random_effect import NODES, RandomEffect, RandomError, SensorCases, factor, sigmas
+from bisar_budget.effects.spectra import gauss_markov
 from bisar_budget.geometry import BistaticGeometry, PlatformState, Vectors, norm
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.propagation import (
@@ -82,8 +87,8 @@ def seen_course(group: Any, mean: Any, delay: str) -> Any:
     return group if delay == DELAY else 2 * mean - group
 
 
-def delay_course(delay: str, track: Vectors, middle: Vectors, scale: Any, fit: Any) -> Any:
-    """Range error that an image shows at the nodes by the delay of the leg to a track, `scale` m/unit of the zenith.
+def group_at_nodes(delay: str, track: Vectors, middle: Vectors, scale: Any) -> Floats:
+    """Group delay of the leg to a track by a delay of the zenith that stays, `scale` m/unit, (nodes, cases).
 
     Parameters
     ----------
@@ -95,11 +100,8 @@ def delay_course(delay: str, track: Vectors, middle: Vectors, scale: Any, fit: A
         At mid-aperture, as the scene centre does. [m]
     scale : (cases,)
         `metres_per_unit`.
-    fit : (4, nodes)
-        Of the sampling.
     """
-    group = scale * leg_factor(delay, track, middle) + np.zeros_like(track[0])
-    return seen_course(group, fit[0] @ group, delay)
+    return np.asarray(scale * leg_factor(delay, track, middle) + np.zeros_like(track[0]))
 
 
 def dispersion_per_unit(mission: Mission, path: PlatformState) -> Any:
@@ -149,7 +151,7 @@ def delay_errors(seen: SensorCases) -> Iterator[RandomError]:
     if propagation is None:
         return
     by_leg = {
-        (name, delay): _courses_of_leg(seen, name, delay)
+        (name, delay): _groups_of_leg(seen, name, delay)
         for name in PLATFORMS
         if propagation.leg(name) is not None
         for delay in DELAYS
@@ -161,24 +163,29 @@ def delay_errors(seen: SensorCases) -> Iterator[RandomError]:
         yield _delay_error(seen, "mission", delay, [by_leg[name, delay] for name in PLATFORMS])
 
 
-def _courses_of_leg(seen: SensorCases, name: str, delay: str) -> tuple[Floats, Floats]:
-    """Range error at the nodes by a unit of a delay on one leg, as it turns and held at mid-aperture. [m/unit]"""
+def _groups_of_leg(seen: SensorCases, name: str, delay: str) -> tuple[Floats, Floats]:
+    """Group delay at the nodes by a unit at the zenith on one leg, as it turns and held at mid-aperture. [m/unit]"""
     exact, middle = seen.exact, getattr(seen.geometry, name).position
     scale = metres_per_unit(seen.mission, delay)
-    moving = delay_course(delay, exact.tracks[PLATFORMS.index(name)], middle, scale, exact.fit)
+    moving = group_at_nodes(delay, exact.tracks[PLATFORMS.index(name)], middle, scale)
     return moving, np.broadcast_to(scale * leg_factor(delay, middle, middle), exact.times.shape)
 
 
 def _delay_error(
-    seen: SensorCases, owner: str, delay: str, courses: Sequence[tuple[Floats, Floats]], counted_in: str = ""
+    seen: SensorCases, owner: str, delay: str, groups: Sequence[tuple[Floats, Floats]], counted_in: str = ""
 ) -> RandomError:
     """A delay of one leg, or of one air over both."""
     propagation = seen.mission.propagation
     name = legs_of(owner)[0]
     leg = None if propagation is None else propagation.leg(name)
     value = None if leg is None else getattr(leg, delay)
-    moving, held = (sum(parts) for parts in zip(*courses, strict=True))
-    published, full = seen.of_courses(np.asarray(moving)[None], np.asarray(held)[None])
+    moving, held = (np.asarray(sum(of_legs)) for of_legs in zip(*groups, strict=True))
+    correlation_time = correlation_time_of(seen.mission, owner)
+    if correlation_time is None:
+        course = seen_course(moving, seen.exact.fit[0] @ moving, delay)
+        published, full = seen.of_courses(course[None], held[None])
+    else:
+        published, full = _changing(seen, delay, moving, held[0], correlation_time)
     return RandomError(
         subject=subject(owner, "propagation", delay),
         unit=UNITS[delay],
@@ -186,6 +193,56 @@ def _delay_error(
         path=("propagation", delay) if propagation is None else propagation.path(name, delay),
         published=published,
         full=full,
-        spreads=False,
+        spreads=correlation_time is not None,
         counted_in=counted_in,
     )
+
+
+def correlation_time_of(mission: Mission, owner: str) -> Any:
+    """Time in which the delays of a leg, or of one air over both, change; None where they stay. [s]"""
+    leg = None if mission.propagation is None else mission.propagation.leg(legs_of(owner)[0])
+    return None if leg is None else leg.correlation_time
+
+
+def _changing(
+    seen: SensorCases, delay: str, group: Floats, held: Floats, correlation_time: Any
+) -> tuple[RandomEffect, RandomEffect]:
+    """Effects by both models of a unit that changes, along group delays of a leg as it turns, and held. [m/unit]"""
+    k, half = seen.exact.k, seen.exact.half
+    along = gauss_markov(2 * half, np.broadcast_to(correlation_time, half.shape)).times(np.square(held))
+    quadratic, cubic, left = (k * np.sqrt(power) for power in along[:3])
+    # What spreads is a mean power, which has no coverage factor.
+    published = RandomEffect(quadratic, cubic, left / seen.factor, *seen.moved(along.constant, along.linear))
+    found = changing_effects(seen.exact, group, half / correlation_time, is_phase_advanced=delay == CONTENT)
+    (quadratic, cubic, east, north), covariance = sigmas(found.covariance, found.sizes)
+    spread = k * np.sqrt(found.left) / seen.factor
+    return published, RandomEffect(quadratic, cubic, spread, east, north, covariance)
+
+
+def changing_air(mission: Mission, correlation_time: float) -> list[RandomError]:
+    """Declared delays that stay within the aperture, as if they changed in a correlation time. [s]
+
+    Each counts once: of one air both legs together.
+    """
+    propagation = mission.propagation
+    staying = [name for name in PLATFORMS if correlation_time_of(mission, name) is None]
+    if propagation is None or not staying:
+        return []
+    changed = mission._replace(propagation=propagation._replace(correlation_time=correlation_time))
+    owners = ("mission",) if propagation.is_one_air else staying
+    return [
+        error
+        for error in delay_errors(SensorCases(changed, mission.geometry, 1))
+        if error.declared is not None and error.owner in owners
+    ]
+
+
+def zenith_courses(mission: Mission, owner: str, aperture_time: Floats) -> Floats:
+    """Independent courses of the zenith at `NODES` nodes, (courses, nodes, cases), together of variance 1."""
+    correlation_time = correlation_time_of(mission, owner)
+    if correlation_time is None:
+        return np.ones((1, NODES, 1))
+    ratios, place = np.unique(aperture_time / (2 * correlation_time), return_inverse=True)
+    between = 1 + departure_at_nodes(NODES, ratios)
+    courses = np.swapaxes(factor(np.moveaxis(between, 2, 0)), 1, 2)  # (ratios, courses, nodes)
+    return np.moveaxis(courses, 0, 2)[..., place.ravel()]

@@ -13,11 +13,13 @@ from bisar_budget.mission.platforms import Platforms
 from bisar_budget.mission.readers import Key, Quantity, Section, Source
 
 DELAYS = ("zenith_delay", "zenith_electron_content")
+_TIME = "correlation_time"
 LEAST_ELEVATION_DEG = 3.0  # below, a delay does not follow from that of the zenith
 ABOVE_THE_AIR = 80e3  # m; below, there are no free electrons to speak of, and hardly any air above
 
 _ZENITH_DELAY = Quantity(units.LENGTH, ge=0, le=1e3)
 _ELECTRON_CONTENT = Quantity(units.ELECTRON_CONTENT, ge=0, le=1e20)
+_CORRELATION_TIME = Quantity(units.TIME, gt=0, ge=1e-6, le=1e9)  # as of any Gauss-Markov error
 _PLACES = np.linspace(-1.0, 1.0, 9)[:, None]  # of an aperture, in halves of it
 
 
@@ -28,13 +30,24 @@ class LegDelay(NamedTuple):
     zenith_electron_content: Annotated[
         float | None, Key(_ELECTRON_CONTENT, "Of the ionosphere; 1 TECU is 1e16/m².")
     ] = None
+    correlation_time: Annotated[
+        float | None, Key(_CORRELATION_TIME, "In which the delays of this leg change; without it they stay.")
+    ] = None
     source: Source = None
 
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
-        """Hold it to state something."""
-        if values.keys() >= set(DELAYS) and all(values[one] is None for one in DELAYS):
+        """Reject a leg without a delay."""
+        if not values.keys() >= {*DELAYS, _TIME} or any(values[delay] is not None for delay in DELAYS):
+            return
+        if values[_TIME] is None:
             yield Problem("states no delay", f"accepted: {' or '.join(DELAYS)}")
+            return
+        yield Problem(
+            f"states a {_TIME} and no delay of this leg that changes in it",
+            f"accepted: {' or '.join(DELAYS)} of this leg beside it. One air over both legs changes in one time, "
+            f"propagation.{_TIME}",
+        )
 
 
 _LEG = Section(LegDelay)
@@ -49,22 +62,42 @@ class Propagation(NamedTuple):
     zenith_electron_content: Annotated[
         float | None, Key(_ELECTRON_CONTENT, "Of the ionosphere, likewise; 1 TECU is 1e16/m².")
     ] = None
+    correlation_time: Annotated[
+        float | None,
+        Key(
+            _CORRELATION_TIME,
+            "In which the delays change, as a Gauss-Markov process, of one air or of each leg that states no other; "
+            "without it they stay as they are within the aperture.",
+        ),
+    ] = None
     transmitter: Annotated[LegDelay | None, Key(_LEG, "From the transmitter to the scene, alone.")] = None
     receiver: Annotated[LegDelay | None, Key(_LEG, "From the scene to the receiver, alone.")] = None
     source: Source = None
 
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
-        """Hold it to figures of both legs, or of each."""
-        if not values.keys() >= {*DELAYS, *Platforms._fields}:
+        """Reject a mixture of figures of both legs and of one, none at all, and a time in which nothing changes."""
+        if not values.keys() >= {*DELAYS, _TIME, *Platforms._fields}:
             return
-        of_both = [one for one in DELAYS if values[one] is not None]
+        of_both = [delay for delay in DELAYS if values[delay] is not None]
         of_one = [name for name in Platforms._fields if values[name] is not None]
         accepted = f"accepted: {' and '.join(DELAYS)} of both legs, or transmitter and receiver with their own"
         if of_both and of_one:
             yield Problem(f"mixes {of_both[0]} of both legs with {of_one[0]}", accepted, at=(of_one[0],))
         elif not (of_both or of_one):
-            yield Problem("states no delay", accepted)
+            what = "states no delay" if values[_TIME] is None else f"states a {_TIME} and no delay that changes in it"
+            yield Problem(what, accepted)
+        elif (
+            not of_both
+            and values[_TIME] is not None
+            and all(values[name].correlation_time is not None for name in of_one)
+        ):
+            yield Problem(
+                "is of no leg: each that states a delay has its own",
+                f"accepted: {_TIME} here, or of each leg its own",
+                at=(_TIME,),
+                is_of_key=True,
+            )
 
     @property
     def is_one_air(self) -> bool:
@@ -84,9 +117,12 @@ class Propagation(NamedTuple):
     def leg(self, platform: str) -> LegDelay | None:
         """The leg of a platform as stated; None where that of the other alone is."""
         if self.is_one_air:
-            return LegDelay(self.zenith_delay, self.zenith_electron_content, self.source)
+            return LegDelay(self.zenith_delay, self.zenith_electron_content, self.correlation_time, self.source)
         own: LegDelay | None = getattr(self, platform)
-        return own if own is None or own.source else own._replace(source=self.source)
+        if own is None:
+            return None
+        time = self.correlation_time if own.correlation_time is None else own.correlation_time
+        return own._replace(correlation_time=time, source=own.source or self.source)
 
     def path(self, platform: str, delay: str) -> KeyPath:
         """Where a figure of a leg stands in the file."""

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.constants import SPEED_OF_LIGHT
-from bisar_budget.effects.air_delays import CONTENT, DELAY, group_delay, legs_of
+from bisar_budget.effects.air_delays import CONTENT, DELAY, correlation_time_of, group_delay, legs_of
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.navigation_errors import (
     TILTS,
@@ -36,7 +36,6 @@ from bisar_budget.effects.random_errors import random_errors
 from bisar_budget.effects.spectra import PowerLawPiece, density
 from bisar_budget.effects.vibration import SLOWEST, counted, pieces_of_vibration
 from bisar_budget.geometry import PlatformState
-from bisar_budget.mission.instruments import GaussMarkov
 from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.mission.platforms import MotionError
 from bisar_budget.mission.propagation import DELAYS
@@ -90,7 +89,11 @@ def _drawn_parts(
     if kind == "random":
         process = process_of(mission, error)
         _, sizes = parts_of_largest(np.array(process.sigma))
-        of_axis = [(axis, size * _correlated(process, times, draws, rng)) for axis, size in enumerate(sizes) if size]
+        of_axis = [
+            (axis, size * _correlated(process.correlation_time, times, draws, rng))
+            for axis, size in enumerate(sizes)
+            if size
+        ]
         common, names = mission.common_motion_error, [error.owner]
         if error.owner not in PLATFORMS and common is not None:
             names, frame = [*PLATFORMS], common.frame
@@ -136,15 +139,29 @@ def delay_courses(
 ) -> Floats:
     """Group delays at the centre frequency, (draws, times), of one sigma of what is declared. [m]
 
-    On one leg, or of one air the sum of both legs. What is above the scene stays as it is within an aperture.
+    On one leg, or of one air the sum of both legs.
     """
+    return group_delays(mission, error, times, zenith_delays(mission, error, times, draws, rng))
+
+
+def zenith_delays(
+    mission: Mission, error: RandomError, times: Floats, draws: int, rng: np.random.Generator
+) -> Floats:
+    """Delays at the zenith in sigmas of what is declared, (draws, times): one number each, or what changes."""
+    correlation_time = correlation_time_of(mission, error.owner)
+    if correlation_time is not None:
+        return _correlated(correlation_time, times, draws, rng)
+    return np.multiply.outer(rng.standard_normal(draws), np.ones(times.size))
+
+
+def group_delays(mission: Mission, error: RandomError, times: Floats, at_zenith: Floats) -> Floats:
+    """Group delays at the centre frequency by delays at the zenith in sigmas of the declared, (draws, times). [m]"""
     size = (error.declared or 0.0) / mission.allocation.coverage_factor
     of_unit = np.zeros(times.shape)
     for name in legs_of(error.owner):
         path: PlatformState = getattr(mission.geometry, name)
         of_unit = of_unit + group_delay(mission, path, error.subject.axis, times)
-    found: Floats = np.multiply.outer(size * rng.standard_normal(draws), of_unit)
-    return found
+    return np.asarray(size * of_unit * at_zenith)
 
 
 def electrons_at_1_hz(mission: Mission, times: Floats, group: Floats) -> Course:
@@ -245,11 +262,11 @@ def _walk(integrals: int) -> _Draw:
     return draw
 
 
-def _correlated(process: GaussMarkov, times: Floats, draws: int, rng: np.random.Generator) -> Floats:
+def _correlated(correlation_time: float, times: Floats, draws: int, rng: np.random.Generator) -> Floats:
     """First-order Gauss-Markov noise of variance 1, by its recursion from time to time."""
     found = rng.standard_normal((times.size, draws))
     for index, step in enumerate(np.diff(times).tolist(), 1):
-        decay = math.exp(-step / process.correlation_time)
+        decay = math.exp(-step / correlation_time)
         found[index] = decay * found[index - 1] + math.sqrt(1 - decay**2) * found[index]
     return found.T
 

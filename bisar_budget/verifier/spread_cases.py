@@ -18,7 +18,7 @@ from bisar_budget.analysis.spread import declared_powers, islr_db, islr_of, main
 from bisar_budget.analysis.vibration_limits import echo_phase, highest_echo, tone_limits, vibration_limits
 from bisar_budget.budget.random_rows import HELD, ISLR, held_effect, limits_for, sizes_at
 from bisar_budget.constants import SPEED_OF_LIGHT
-from bisar_budget.effects.air_delays import CONTENT, seen_course
+from bisar_budget.effects.air_delays import CONTENT, correlation_time_of, seen_course
 from bisar_budget.effects.declared import CUBIC, LOCATION
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.navigation_errors import process_of
@@ -49,9 +49,11 @@ from bisar_budget.simulator.realisations import (
     electrons_at_1_hz,
     fast_steps,
     fastest_shake,
+    group_delays,
     phase_courses,
     position_courses,
     slowest_shake,
+    zenith_delays,
 )
 from bisar_budget.verifier import reasons
 from bisar_budget.verifier.aperture_reading import measured_shift
@@ -415,7 +417,7 @@ def _drawn_effects(study: Study, error: RandomError, rng: np.random.Generator) -
         return study.exact_effects(_smooth_noise(study, error, rng))
     if error.subject.kind != "propagation":
         return study.exact_effects(position_courses(study.mission, error, moments, _DRAWS, rng))
-    group = delay_courses(study.mission, error, moments, _DRAWS, rng)
+    group = group_delays(study.mission, error, moments, _delays_at_nodes(study, error, rng))
     mean = (group @ nodes(FINE).fit[0])[:, None]
     return study.exact_effects({"clock": seen_course(group, mean, error.subject.axis)})
 
@@ -425,7 +427,7 @@ def _left_at_the_point(study: Study, error: RandomError, times: Floats, group: F
     half, geometry = study.collection.aperture_time / 2, study.geometry
     mean = group.mean(axis=1, keepdims=True)
     seen = seen_course(group, mean, error.subject.axis)
-    at_nodes = np.stack([np.interp(aperture_nodes(2 * half), times, one) for one in seen])
+    at_nodes = seen @ _smooth_at_nodes(2 * half, times).T
     found = study.exact_effects({"clock": at_nodes})
     for path in geometry.both:
         position = np.stack(np.broadcast_arrays(*path.place(times)))
@@ -453,24 +455,47 @@ def _fits(study: Study, error: RandomError, rng: np.random.Generator) -> tuple[F
     return np.concatenate(found, axis=1), draws
 
 
-def _smooth_noise(study: Study, error: RandomError, rng: np.random.Generator) -> dict[str, Floats]:
-    """Correlated noise at the nodes of exact ranges, (draws, nodes, 3) each, without what they cannot tell. [m]
+def _delays_at_nodes(study: Study, error: RandomError, rng: np.random.Generator) -> Floats:
+    """Delays at the zenith at the nodes of exact ranges in sigmas of what is declared, (draws, nodes)."""
+    T, correlation_time = study.collection.aperture_time, correlation_time_of(study.mission, error.owner)
+    if correlation_time is None:
+        return zenith_delays(study.mission, error, aperture_nodes(T), _DRAWS, rng)
+    times = _moments(study, _FINE)
+    smooth = _smooth_at_nodes(T, times).T * math.sqrt(_power_of_samples(times, correlation_time))
+    drawn = [zenith_delays(study.mission, error, times, _AT_ONCE, rng) @ smooth for _ in range(_DRAWS // _AT_ONCE)]
+    return np.concatenate(drawn)
 
-    At the nodes alone noise of a short correlation time would pass for a larger phase.
-    """
+
+def _smooth_noise(study: Study, error: RandomError, rng: np.random.Generator) -> dict[str, Floats]:
+    """Correlated noise at the nodes of exact ranges, (draws, nodes, 3) each, without what they cannot tell. [m]"""
     T, time = study.collection.aperture_time, process_of(study.mission, error).correlation_time
     times = _moments(study, _FINE)
-    legendre = np.polynomial.legendre
-    fit = np.linalg.pinv(legendre.legvander(2 * times / T, SMOOTH))
-    at_nodes = legendre.legvander(2 * aperture_nodes(T) / T, SMOOTH) @ fit
+    at_nodes = _smooth_at_nodes(T, times)
     drawn = [
         {name: at_nodes @ one for name, one in position_courses(study.mission, error, times, _AT_ONCE, rng).items()}
         for _ in range(_DRAWS // _AT_ONCE)
     ]
-    # Samples a step Δ apart have more power at low frequencies than the noise: Δ·coth(Δ/2τ_c), not 2τ_c.
+    scale = math.sqrt(_power_of_samples(times, time))
+    return {name: np.concatenate([one[name] for one in drawn]) * scale for name in drawn[0]}
+
+
+def _smooth_at_nodes(aperture_time: float, times: Floats) -> Floats:
+    """Takes courses at times to the nodes of exact ranges, (nodes, times), by what is smooth of them.
+
+    At the nodes alone noise of a short correlation time would pass for a larger phase.
+    """
+    legendre = np.polynomial.legendre
+    fit = np.linalg.pinv(legendre.legvander(2 * times / aperture_time, SMOOTH))
+    return np.asarray(legendre.legvander(2 * aperture_nodes(aperture_time) / aperture_time, SMOOTH) @ fit)
+
+
+def _power_of_samples(times: Floats, correlation_time: float) -> float:
+    """Power of correlated noise at low frequencies over that of its samples.
+
+    Samples a step Δ apart have more than the noise: Δ·coth(Δ/2τ_c), not 2τ_c.
+    """
     step = float(times[1] - times[0])
-    power = 2 * time / step * math.tanh(step / (2 * time))
-    return {name: np.concatenate([one[name] for one in drawn]) * math.sqrt(power) for name in drawn[0]}
+    return 2 * correlation_time / step * math.tanh(step / (2 * correlation_time))
 
 
 def _moments(study: Study, count: int) -> Floats:
@@ -489,7 +514,10 @@ def _series(study: Study, error: RandomError, rng: np.random.Generator) -> list[
             found = [one.of(name, error_of_path) for one, error_of_path in zip(found, smooth, strict=True)]
         return found
     if error.subject.kind == "propagation":
-        groups = delay_courses(study.mission, error, times, _IMAGES, rng)
+        at_zenith = zenith_delays(study.mission, error, times, _IMAGES, rng)
+        if correlation_time_of(study.mission, error.owner) is not None:
+            at_zenith = Course(times, at_zenith.T).smooth(_ORDER).values.T
+        groups = group_delays(study.mission, error, times, at_zenith)
         if error.subject.axis == CONTENT:
             return [Errors(electrons=electrons_at_1_hz(study.mission, times, one)) for one in groups]
         return [Errors(clock_course=Course(times, one / SPEED_OF_LIGHT)) for one in groups]

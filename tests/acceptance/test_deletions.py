@@ -97,7 +97,8 @@ MOTION = {
 
 BESIDE = {
     "propagation": st.fixed_dictionaries(
-        {"zenith_delay": sizes("m", 1e-3, 1), "zenith_electron_content": sizes("TECU", 0.01, 10)}
+        {"zenith_delay": sizes("m", 1e-3, 1), "zenith_electron_content": sizes("TECU", 0.01, 10)},
+        optional={"correlation_time": sizes("s", 1, 1e5)},
     ),
     "other_errors": sizes("deg", 0.1, 90).map(lambda size: [{"name": "antenna", "quadratic_phase_error": size}]),
     "common_motion_error": st.fixed_dictionaries({"position": sizes("m", 1e-3, 30)}),

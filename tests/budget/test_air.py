@@ -310,6 +310,162 @@ def test_with_a_direct_path() -> None:
     assert row(found, DELAY).displacement_m == pytest.approx(row(plain, DELAY).displacement_m, rel=1e-3)
 
 
+# ---------------------------------------------------------------------- delays that change within the aperture
+CHANGING = {"zenith_delay": "0.2 mm", "correlation_time": "20 s", "source": "weather model"}
+
+
+def of_two_that_change(**figures: object) -> dict[str, object]:
+    return dict.fromkeys(PLATFORMS, CHANGING | figures)
+
+
+def variance_of(level: float) -> float:
+    """Phase variance that makes an image's ISLR under a uniform window."""
+    return math.log1p(10 ** (level / 10) * 0.9028233335802807)
+
+
+def test_what_changes_spreads_and_islr_judges_it() -> None:
+    changes, stays = (
+        findings(propagation={**air, "zenith_delay": "0.2 mm"}, requirements=NEEDS) for air in (CHANGING, AIR)
+    )
+    status = [{one.key: one.status for one in found.requirements}["islr"] for found in (changes, stays)]
+    assert status == ["pass", "not_evaluated"]  # of a delay that stays nothing spreads
+    assert row(changes, "mission.islr").islr_db == pytest.approx(row(changes, "propagation.zenith_delay").islr_db)
+    assert row(stays, "propagation.zenith_delay").islr_db is None
+
+
+@pytest.mark.parametrize("combine", ["each", "sum", "rss"])
+def test_of_one_air_amplitudes_add_and_legs_count_once(combine: str) -> None:
+    one, two = (
+        findings(propagation=air, requirements=NEEDS, allocation={"combine": combine})
+        for air in (CHANGING, of_two_that_change())
+    )
+    of_air = row(one, "propagation.zenith_delay")
+    legs = [[row(found, f"propagation.{name}.zenith_delay") for name in PLATFORMS] for found in (one, two)]
+    for counted, own in zip(*legs, strict=True):
+        assert counted.islr_db == own.islr_db is not None
+        assert (counted.status, own.status) == ("info", "pass" if combine == "each" else "info")
+    roots = [math.sqrt(variance_of(leg.islr_db)) for leg in legs[0]]
+    assert variance_of(of_air.islr_db) == pytest.approx(sum(roots) ** 2, rel=1e-3)
+    assert of_air.qpe_full_rad == pytest.approx(sum(leg.qpe_full_rad for leg in legs[0]), rel=1e-3)
+    assert variance_of(row(one, "mission.islr").islr_db) == pytest.approx(sum(roots) ** 2, rel=1e-3)
+    assert variance_of(row(two, "mission.islr").islr_db) == pytest.approx(sum(root**2 for root in roots), rel=1e-6)
+    assert variance_of(row(two, "transmitter.islr").islr_db) == pytest.approx(roots[0] ** 2, rel=1e-6)
+
+
+def test_with_each_one_air_gates_where_no_leg_would() -> None:
+    """Between what one air may have and what a leg may have that is alone."""
+    rules = {"requirements": NEEDS, "allocation": {"combine": "each"}}
+    found = findings(propagation=CHANGING, **rules)
+    legs = [f"propagation.{name}.zenith_delay" for name in PLATFORMS]
+    alone = findings(propagation=of_two_that_change(), **rules)
+    air = row(found, "propagation.zenith_delay").allowable
+    most = min(row(alone, leg).allowable for leg in legs)
+    assert air < 0.8 * most
+    size = f"{math.sqrt(air * most)} m"
+    found = findings(propagation={**CHANGING, "zenith_delay": size}, **rules)
+    alone = findings(propagation=of_two_that_change(zenith_delay=size), **rules)
+    assert row(found, "propagation.zenith_delay").status == "fail"
+    assert row(found, "propagation.zenith_delay").binding_requirement == "islr"
+    assert not any(row(alone, leg).status == "fail" for leg in legs)
+
+
+def test_each_leg_may_change_in_a_time_of_its_own() -> None:
+    own = {"correlation_time": "20 s", "transmitter": {"zenith_delay": "0.2 mm"}}
+    own["receiver"] = {"zenith_delay": "0.2 mm", "correlation_time": "2 h"}
+    found, alike = (findings(propagation=air, requirements=NEEDS) for air in (own, of_two_that_change()))
+    levels = [[row(one, f"propagation.{name}.zenith_delay").islr_db for name in PLATFORMS] for one in (found, alike)]
+    assert levels[0][0] == levels[1][0]
+    assert variance_of(levels[1][1]) / variance_of(levels[0][1]) == pytest.approx(7200 / 20, rel=0.15)  # 2·T/3τ_c
+
+
+def test_what_spreads_without_a_requirement_is_not_judged() -> None:
+    """0.1 rad rms are not negligible; 1 µm of it is."""
+    for size, status in (("0.6 mm", "not_evaluated"), ("1 um", "info")):
+        found = findings(propagation={**CHANGING, "zenith_delay": size}, requirements={"cubic_phase_error": "360 deg",
+                         "quadratic_phase_error": "360 deg", "location_error": "1 m"})  # fmt: skip
+        assert row(found, "propagation.zenith_delay").status == status
+        assert found.status == ("not_evaluated" if status == "not_evaluated" else "pass")
+
+
+def test_a_coverage_factor_is_not_in_what_spreads() -> None:
+    once, twice = (
+        row(
+            findings(propagation=CHANGING, requirements=NEEDS, allocation={"coverage_factor": factor}),
+            "propagation.zenith_delay",
+        )
+        for factor in (1, 2)
+    )
+    assert twice.islr_db == pytest.approx(once.islr_db)
+    for name in ("qpe_full_rad", "cubic_rad"):
+        assert getattr(twice, name) == pytest.approx(2 * getattr(once, name))
+
+
+@pytest.mark.parametrize("model", ["published", "full", "strictest"])
+def test_every_model_sees_that_it_changes(model: str) -> None:
+    found = findings(propagation=CHANGING, requirements=NEEDS, allocation={"model": model})
+    one = row(found, "propagation.zenith_delay")
+    assert one.qpe_published_rad == pytest.approx(one.qpe_full_rad, rel=0.05)
+    assert found.status == "pass"
+
+
+@pytest.mark.parametrize("of_both", [True, False])
+def test_sweeps_of_a_correlation_time_are_checks(of_both: bool) -> None:
+    air = CHANGING if of_both else of_two_that_change()
+    mission = parse_mission(mission_text(propagation=air, requirements=NEEDS, scene={"radius": "500 m"}))
+    key = "propagation__correlation_time" if of_both else "propagation__receiver__correlation_time"
+    cases = grid(mission, collection__aperture_time=[2.0, 6.0], **{key: [1e-6, 0.1, 10.0, 1e4, 1e9]})
+    owner = "" if of_both else "receiver."
+    columns = [
+        f"propagation.{owner}zenith_delay.{name}" for name in ("qpe_full_rad", "islr_db", "allowable", "status")
+    ]
+    columns += ["mission.islr.islr_db", "mission.spatial_variance.declared"]
+    assert_as_checked(mission, cases, swept(mission, cases, columns), columns)
+
+
+# ---------------------------------------------------------------------- delays that stay in a long aperture
+LONG = {
+    "collection__aperture_time": "1200 s",
+    "platforms__transmitter": {"position": ["200 km", 0, "500 km"], "velocity": [0, "1 m/s", 0]},
+    "platforms__receiver": {"position": ["1 km", "1 km", "8 km"], "velocity": [0, 0, 0]},
+    "requirements": {"location_error": "1 km", "cubic_phase_error": "360 deg"},
+}
+
+
+@pytest.mark.parametrize(
+    ("air", "aperture_time", "is_doubted"),
+    [
+        ({"zenith_delay": "6 mm"}, "1200 s", True),
+        ({"zenith_electron_content": "1 TECU"}, "1200 s", True),
+        ({"transmitter": {"zenith_delay": "6 mm"}}, "1200 s", True),
+        ({"transmitter": {"zenith_delay": "6 mm", "correlation_time": "1 h"}, "receiver": {"zenith_delay": "6 mm"}},
+         "1200 s", True),
+        ({"zenith_delay": "6 mm"}, "60 s", True),
+        ({"zenith_delay": "6 mm"}, "59 s", False),  # as long as the air stays, or nearly
+        ({"zenith_delay": "1 um"}, "1200 s", False),  # negligible even if it changes
+        ({"zenith_delay": 0}, "1200 s", False),
+        ({"receiver": {"zenith_electron_content": "1 TECU"}}, "1200 s", False),  # has no electrons on its way
+        ({"zenith_delay": "6 mm", "correlation_time": "20 min"}, "1200 s", False),
+        ({"zenith_delay": "6 mm", "correlation_time": "1e9 s"}, "1200 s", False),  # somebody has said that it stays
+    ],
+)  # fmt: skip
+def test_a_delay_that_stays_in_a_long_aperture_is_in_doubt(air: dict, aperture_time: str, is_doubted: bool) -> None:
+    found = findings(**LONG | {"collection__aperture_time": aperture_time}, propagation=air)
+    said = [one for one in found.warnings if one.message.code == "air-stays"]
+    assert bool(said) == is_doubted
+    if is_doubted:
+        assert said[0].is_doubt
+        assert "Add correlation_time; 1e9 s for a delay that stays" in str(said[0].message)
+        assert found.status in ("warn", "fail", "not_evaluated")
+
+
+def test_a_warning_of_air_that_stays_breaks_a_strict_gate_alone() -> None:
+    """What passes with it would spread -11 dB if it changed: a strict gate does not let it through."""
+    needs = {"location_error": "1 km", "quadratic_phase_error": "360 deg"}
+    found = findings(**LONG | {"requirements": needs}, propagation={"zenith_delay": "6 mm"})
+    assert found.status == "warn"
+    assert all(one.status in ("pass", "info", "not_declared") for one in found.rows)
+
+
 # ---------------------------------------------------------------------- effects from elsewhere
 @pytest.mark.parametrize("combine", ["each", "sum", "rss"])
 def test_effects_from_elsewhere_count_in_the_missions_sums(combine: str) -> None:

@@ -18,18 +18,31 @@ def faults(**changes: object) -> tuple[Fault, ...]:
 @pytest.mark.parametrize(
     ("propagation", "legs"),
     [
-        ({"zenith_delay": "5 cm"}, [(0.05, None, None), (0.05, None, None)]),
-        ({"zenith_delay": 0, "source": "model"}, [(0, None, "model")] * 2),
-        ({"zenith_electron_content": "2 TECU"}, [(None, 2e16, None)] * 2),
-        ({"zenith_electron_content": 0}, [(None, 0, None)] * 2),
-        ({"zenith_electron_content": "3e15 1/m^2"}, [(None, 3e15, None)] * 2),
+        ({"zenith_delay": "5 cm"}, [(0.05, None, None, None)] * 2),
+        ({"zenith_delay": 0, "source": "model"}, [(0, None, None, "model")] * 2),
+        ({"zenith_electron_content": "2 TECU"}, [(None, 2e16, None, None)] * 2),
+        ({"zenith_electron_content": 0}, [(None, 0, None, None)] * 2),
+        ({"zenith_electron_content": "3e15 1/m^2"}, [(None, 3e15, None, None)] * 2),
         (
             {"transmitter": {"zenith_delay": "1 mm", "source": "GNSS"}, "source": "model"},
-            [(0.001, None, "GNSS"), None],
+            [(0.001, None, None, "GNSS"), None],
         ),
         (
             {"receiver": {"zenith_delay": "1 mm", "zenith_electron_content": "0.5 TECU"}, "source": "model"},
-            [None, (0.001, 5e15, "model")],
+            [None, (0.001, 5e15, None, "model")],
+        ),
+        ({"zenith_delay": "5 cm", "correlation_time": "20 min"}, [(0.05, None, 1200, None)] * 2),
+        (
+            {"receiver": {"zenith_delay": "1 mm", "correlation_time": "90 s"}, "transmitter": {"zenith_delay": 0}},
+            [(0, None, None, None), (0.001, None, 90, None)],
+        ),
+        (
+            {
+                "correlation_time": "1 h",
+                "receiver": {"zenith_delay": "1 mm", "correlation_time": "90 s"},
+                "transmitter": {"zenith_electron_content": "1 TECU"},
+            },
+            [(None, 1e16, 3600, None), (0.001, None, 90, None)],
         ),
     ],
 )
@@ -57,6 +70,39 @@ def test_both_legs_alike_or_each_its_own(propagation: dict[str, object], legs: l
             "propagation.receiver",
             f"mixes zenith_delay of both legs with receiver; {LEGS}",
         ),
+        (
+            {"correlation_time": "20 min"},
+            "propagation",
+            f"states a correlation_time and no delay that changes in it; {LEGS}",
+        ),
+        ({"correlation_time": "20 min", "source": "a"}, "propagation", "states a correlation_time and no delay that"),
+        (
+            {"zenith_delay": "5 cm", "receiver": {"correlation_time": "20 min"}},
+            "propagation.receiver",
+            "states a correlation_time and no delay of this leg that changes in it; accepted: zenith_delay or "
+            "zenith_electron_content of this leg beside it. One air over both legs changes in one time, "
+            "propagation.correlation_time",
+        ),
+        (
+            {"zenith_delay": "5 cm", "receiver": {"zenith_delay": "1 cm", "correlation_time": "20 min"}},
+            "propagation.receiver",
+            f"mixes zenith_delay of both legs with receiver; {LEGS}",
+        ),
+        (
+            {"correlation_time": "1 h", "receiver": {"zenith_delay": "1 mm", "correlation_time": "90 s"}},
+            "propagation.correlation_time",
+            "is of no leg: each that states a delay has its own; accepted: correlation_time here, or of each leg its",
+        ),
+        ({"zenith_delay": "5 cm", "correlation_time": 0}, "propagation.correlation_time", "must be greater than 0 s"),
+        (
+            {"zenith_delay": "5 cm", "correlation_time": "-1 s"},
+            "propagation.correlation_time",
+            "must be greater than",
+        ),
+        ({"zenith_delay": "5 cm", "correlation_time": "1 ns"}, "propagation.correlation_time", "must be at least 1"),
+        ({"zenith_delay": "5 cm", "correlation_time": "1e10 s"}, "propagation.correlation_time", "must be at most"),
+        ({"zenith_delay": "5 cm", "correlation_time": ".inf"}, "propagation.correlation_time", "must be a finite"),
+        ({"zenith_delay": "5 cm", "correlation_time": "5 m"}, "propagation.correlation_time", "must be a time"),
         ({"zenith": "5 cm"}, "propagation.zenith", "is not a known key"),
         ({"transmiter": {"zenith_delay": "1 cm"}}, "propagation.transmiter", "Did you mean 'transmitter'?"),
     ],

@@ -115,6 +115,21 @@ def test_less_of_the_same_is_refused(path: str, value: object, row: str) -> None
     assert row in refused((path, value))
 
 
+@pytest.mark.parametrize("value", [None, "2 h"])
+def test_air_that_changes_more_slowly_is_refused(value: str | None) -> None:
+    """Or that does not change any more. One that changes faster does more, and one of another source is another."""
+    air = {"zenith_delay": "1 cm", "correlation_time": "20 min", "source": "model"}
+    before = findings(**at(("propagation", air)))
+
+    def refusals(**changes: object) -> set[str]:
+        after = {key: stated for key, stated in (air | changes).items() if stated is not None}
+        return {one.id for one in compare(before, findings(**at(("propagation", after)))).refusals(Gate(1.0))}
+
+    assert "propagation.zenith_delay" in refusals(correlation_time=value)
+    assert "propagation.zenith_delay" not in refusals(correlation_time="10 min")
+    assert "propagation.zenith_delay" not in refusals(correlation_time=value, source="another model")
+
+
 @pytest.mark.parametrize(
     ("path", "value", "row"),
     [

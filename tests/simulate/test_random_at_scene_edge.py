@@ -265,6 +265,32 @@ def test_delays_of_the_air_are_those_of_each_elevation(combine: str) -> None:
     assert declared(found) == pytest.approx(together[combine], rel=2e-2)  # 30 m moves what is matched, too
 
 
+@pytest.mark.parametrize("correlation_time", [0.5, 20.0, 1e6])
+@pytest.mark.parametrize("is_one_air", [True, False])
+def test_a_delay_that_changes_is_a_course_for_each_order(is_one_air: bool, correlation_time: float) -> None:
+    """By orders of the delay at the zenith, whose covariance is a sum over a fine grid of moments."""
+    air = {"zenith_delay": 10.0, "correlation_time": correlation_time}
+    legs = (0, 1) if is_one_air else (1,)
+    found = checked(propagation=air if is_one_air else {"receiver": air}, allocation={"combine": "rss"})
+    assert found.scene is not None
+    rim = found.scene.radius * np.array([math.cos(found.scene.azimuth), math.sin(found.scene.azimuth)])
+    orders = np.polynomial.legendre.legvander(NODES, 9).T
+    still, phases = np.zeros((2, len(orders), 3, TIMES.size)), []
+    for point in (rim, np.zeros(2)):
+        along = np.zeros(TIMES.size)
+        for leg in legs:
+            x, y, z = PATHS[leg].T @ [np.ones_like(TIMES), TIMES, TIMES**2 / 2]
+            along += np.sqrt((x - point[0]) ** 2 + (y - point[1]) ** 2 + z**2) / z
+        phases.append(quadratics(still, 10.0 * along * orders, point))
+    cells = 2000
+    place = (np.arange(cells) + 0.5) / cells * 2 - 1
+    between = np.exp(-np.abs(place[:, None] - place) * T / 2 / correlation_time)
+    weights = (np.arange(len(orders)) + 0.5)[:, None] * 2 / cells * np.polynomial.legendre.legvander(place, 9).T
+    covariance = weights @ between @ weights.T
+    apart_rad = phases[0] - phases[1]
+    assert declared(found) == pytest.approx(math.sqrt(apart_rad @ covariance @ apart_rad), rel=2e-2)
+
+
 def test_a_clock_that_feels_a_turn_displaces_otherwise_there() -> None:
     """Each axis of its sensitivity: the time is Γ·(v(τ) − v(0)), and moves nothing."""
     gamma = 3e-10

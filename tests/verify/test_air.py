@@ -54,6 +54,39 @@ def test_a_limit_that_is_wrong_is_seen() -> None:
     assert verify_random(study, error._replace(full=smaller, published=smaller)).verdict == "optimistic"
 
 
+# ---------------------------------------------------------------------- delays that change within the aperture
+@pytest.mark.parametrize("correlation_time", ["1 ms", "10 s", "20 min"])
+@pytest.mark.parametrize(
+    "needs",
+    ["{islr: -20 dB, cubic_phase_error: 360 deg}", "{quadratic_phase_error: 30 deg}", "{location_error: 5 mm}"],
+)
+def test_images_confirm_limits_of_air_that_changes(needs: str, correlation_time: str) -> None:
+    text = SECTION_V.replace("zenith_electron_content: 2 TECU", f"correlation_time: {correlation_time}")
+    assert limits(text, needs, "propagation.*zenith_delay") == {
+        "transmitter.zenith_delay": "confirmed",
+        "receiver.zenith_delay": "confirmed",
+        "zenith_delay": "confirmed",
+    }
+
+
+@pytest.mark.parametrize("needs", ["{islr: -20 dB, cubic_phase_error: 360 deg}", "{quadratic_phase_error: 10 deg}"])
+def test_images_confirm_limits_of_free_electrons_that_change(needs: str) -> None:
+    text = ORBITS.replace("20 TECU", "20 TECU, correlation_time: 5 min")
+    found = limits(text, needs, "propagation.*zenith_*")
+    assert set(found.values()) == {"confirmed"}
+    assert len(found) == 6
+
+
+def test_a_limit_of_what_spreads_that_is_wrong_is_seen() -> None:
+    """A spread that is said to be a quarter less, as if the line of sight did not turn."""
+    text = SECTION_V.replace("zenith_electron_content: 2 TECU", "correlation_time: 10 s")
+    study = Study(parse_mission(f"{text.strip()}\nrequirements: {{islr: -20 dB, cubic_phase_error: 360 deg}}\n"))
+    error = next(one for one in study.analysis.random if one.id == "propagation.zenith_delay")
+    assert verify_random(study, error).verdict == "confirmed"
+    smaller = error.full._replace(spread=error.full.spread * 0.75)
+    assert verify_random(study, error._replace(full=smaller, published=smaller)).verdict == "optimistic"
+
+
 def test_where_only_islr_takes_a_cubic_phase_it_is_drawn_too() -> None:
     """A squinted leg bends the delay by a cubic as well; without a requirement of its own ISLR holds it.
 
@@ -88,6 +121,37 @@ def test_draws_of_a_leg_are_one_number_times_its_course() -> None:
     level = np.hypot(x, y) / np.sqrt(x**2 + y**2 + z**2) * 6371 / 6721  # a shell at 350 km
     want = 40.308 * 20 * TECU / 1.25e9**2 / np.sqrt(1 - level**2)
     assert drawn.std(axis=0) == pytest.approx(want, rel=0.015)  # 20 000 draws know a sigma to 0.5 %
+
+
+def test_draws_of_air_that_changes_forget_in_its_time() -> None:
+    """Of one air both legs have the same delay at every moment: the mapping of each, added."""
+    text = SECTION_V.replace("zenith_electron_content: 2 TECU", "correlation_time: 2 s")
+    mission = parse_mission(text)
+    by_id = {one.id.removeprefix("propagation."): one for one in Analysis(mission).random}
+    times = np.linspace(-3, 3, 7)
+    drawn = delay_courses(mission, by_id["zenith_delay"], times, 20_000, np.random.default_rng(4))
+    sight = [math.hypot(30.41, 6) / 6, 1 / math.sin(math.radians(13.6))]
+    assert drawn[:, 3].std() == pytest.approx(0.05 * sum(sight), rel=0.02)
+    between = np.corrcoef(drawn.T)
+    assert between[3] == pytest.approx(np.exp(-np.abs(times) / 2), abs=0.02)
+    alone = delay_courses(mission, by_id["receiver.zenith_delay"], times, 20_000, np.random.default_rng(4))
+    assert alone[:, 3] / drawn[:, 3] == pytest.approx(sight[1] / sum(sight), rel=1e-3)
+
+
+def test_a_changing_delay_is_flown() -> None:
+    """Seeds together have the sigmas of the row."""
+    text = ORBITS.replace("zenith_electron_content: 20 TECU", "correlation_time: 5 min")
+    text = text.replace("{zenith_delay: 5 cm", "{zenith_delay: 2 mm")
+    found = []
+    for seed in range(300):
+        mission = parse_mission(f"{text.strip()}\nsimulation: {{seed: {seed}}}\n")
+        effect = PointCollection(mission, mission.geometry).effect(declared_errors(mission))
+        found.append((effect.quadratic, effect.cubic, *effect.displacement))
+    (error,) = (one for one in Analysis(mission).random if one.id == "propagation.zenith_delay")
+    quadratic, cubic, east, north = np.sqrt(np.square(found).mean(axis=0))  # 300 of them know a sigma to 4 %
+    assert quadratic == pytest.approx(error.full.quadratic * error.declared, rel=0.12)
+    assert cubic == pytest.approx(error.full.cubic * error.declared, rel=0.12)
+    assert math.hypot(east, north) == pytest.approx(error.full.displacement * error.declared, rel=0.12)
 
 
 @pytest.mark.parametrize("seed", [1, 2])

@@ -12,6 +12,8 @@ from bisar_budget.findings.requirement import NAMES
 from bisar_budget.findings.row import Row
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.model import Document
+from bisar_budget.mission.platforms import Platforms
+from bisar_budget.mission.propagation import Propagation
 from bisar_budget.report import Style
 from bisar_budget.report.compliance import document as doc
 from bisar_budget.report.compliance.annex import annex, sources
@@ -529,13 +531,30 @@ def _assumptions(page: Page) -> Iterator[tuple[str, str]]:
     if mission.propagation is not None:
         yield (
             "Delays in the air",
-            "one sigma of what correction leaves above the scene, legs independent. Below 80 km a leg is as long as "
-            "over a flat Earth and crosses no free electrons; above, it crosses spherical shells at 7 km and 350 km",
+            f"one sigma of what correction leaves above the scene, {_air_of(mission.propagation)}. Below 80 km a leg "
+            "is as long as over a flat Earth and crosses no free electrons; above, it crosses spherical shells at "
+            "7 km and 350 km",
         )
     for row in found.rows:
         if row.subject.kind == "oscillator" and row.remarks:
             shaken = " under acceleration" if row.subject.axis == "acceleration" else ""
             yield f"Oscillator of the {row.owner}{shaken}", "; ".join(row.remarks)
+
+
+def _air_of(propagation: Propagation) -> str:
+    """Say which air the legs have, and in which time it changes."""
+    legs = {name: propagation.leg(name) for name in Platforms._fields}
+    times = {name: leg.correlation_time for name, leg in legs.items() if leg is not None}
+    said = {
+        name: "as it is within the aperture"
+        if time is None
+        else f"with a correlation time of {format_quantity(time, 's')}"
+        for name, time in times.items()
+    }
+    air = "one air over both legs" if propagation.is_one_air else "legs independent"
+    if len({*said.values()}) == 1:
+        return f"{air}, {next(iter(said.values()))}"
+    return f"{air}: {', '.join(f'{name} {words}' for name, words in said.items())}"
 
 
 def _inputs(page: Page) -> Iterator[tuple[str, str, str]]:

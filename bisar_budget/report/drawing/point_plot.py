@@ -285,7 +285,7 @@ def _flown(mission: Mission) -> str:
     seed = (mission.simulation or Simulation()).seed
     drawn = f"; of sensors and clocks one time series each, seed {seed}" if has_instruments(mission) else ""
     if mission.propagation is not None:
-        drawn += f"; of delays in the air one draw each, seed {seed}"
+        drawn += f"; of delays in the air one draw each, seed {seed}, of those that change a time series"
     if any(platform.oscillator and platform.oscillator.spurs for platform in mission.platforms):
         drawn += "; spurs are left out, but for what exchanges fold below one cycle per aperture"
     if has_instruments(mission) and has_unset_clocks(mission):

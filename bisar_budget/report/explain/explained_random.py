@@ -17,6 +17,7 @@ from bisar_budget.effects.air_delays import (
     ELECTRONS,
     IONOSPHERE,
     TROPOSPHERE,
+    correlation_time_of,
     group_delay,
     leg_factor,
     legs_of,
@@ -99,6 +100,7 @@ def explained_random(analysis: Analysis, allocation: Allocation, error: RandomEr
             yield from _delay_on_a_leg(analysis, error, name)
         if error.owner not in PLATFORMS:
             yield step("One air over both legs: their range errors add, with their signs, before anything is squared")
+        yield from _changing_delay(analysis, error)
     elif kind == "other":
         yield effect_from_elsewhere()
     else:
@@ -289,24 +291,49 @@ def _of_one(kind: str, which: int, wavelength: float, T: float) -> float:
 
 
 def _position(analysis: Analysis, error: RandomError) -> Iterator[Step]:
-    mission, effect = analysis.mission, error.published
-    process = process_of(mission, error)
-    T, tau = mission.collection.aperture_time, process.correlation_time
+    mission = analysis.mission
+    yield from _gauss_markov(
+        mission,
+        error,
+        process_of(mission, error).correlation_time,
+        "u",
+        "Along the line of sight at mid-aperture, u; of three values the root-sum-square of each",
+    )
+
+
+def _changing_delay(analysis: Analysis, error: RandomError) -> Iterator[Step]:
+    """The delay of the zenith as a process, where it changes within the aperture."""
+    correlation_time = correlation_time_of(analysis.mission, error.owner)
+    if correlation_time is not None and error.published.quadratic:
+        yield from _gauss_markov(
+            analysis.mission,
+            error,
+            correlation_time,
+            "m",
+            "Along the way through the air at mid-aperture, m per unit of the zenith, of one air that of both legs",
+        )
+
+
+def _gauss_markov(
+    mission: Mission, error: RandomError, correlation_time: float, along: str, title: str
+) -> Iterator[Step]:
+    """Parts of the process, and the quadratic phase of a unit along `along` by the published model."""
+    T, quadratic = mission.collection.aperture_time, error.published.quadratic
     yield step(
         "Half the aperture over the correlation time",
-        WorkedEquation("a", "T/(2*τ_c)", {"T": T, "τ_c": tau}, T / (2 * tau), ""),
+        WorkedEquation("a", "T/(2*τ_c)", {"T": T, "τ_c": correlation_time}, T / (2 * correlation_time), ""),
     )
-    found = gauss_markov(T, tau)
+    found = gauss_markov(T, correlation_time)
     words = ("quadratic", "cubic", "left after the cubic", "constant", "linear")
     yield step(
         "Mean squares of a process of variance 1 with the spectrum 4·τ_c/(1 + (2πf·τ_c)²)",
         *(f"{word} = {number(value)}" for word, value in zip(words, found, strict=False)),
     )
     k = 2 * math.pi / mission.radar.wavelength
-    values = {"λ": mission.radar.wavelength, "u": effect.quadratic / (k * math.sqrt(found.quadratic)),
+    values = {"λ": mission.radar.wavelength, along: quadratic / (k * math.sqrt(found.quadratic)),
               "q": found.quadratic}  # fmt: skip
-    worked = WorkedEquation("QPE/unit", "2*π*u*sqrt(q)/λ", values, effect.quadratic, "rad per m")
-    yield step("Along the line of sight at mid-aperture, u; of three values the root-sum-square of each", worked)
+    worked = WorkedEquation("QPE/unit", f"2*π*{along}*sqrt(q)/λ", values, quadratic, _per_unit("rad", error))
+    yield step(title, worked)
 
 
 def _oscillator(mission: Mission, error: RandomError) -> Iterator[Step]:
