@@ -8,6 +8,7 @@ and radians, ids of rows, names.
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from datetime import date
 from functools import wraps
 from typing import ParamSpec
@@ -224,49 +225,57 @@ def declarations_are_missing(keys: Sequence[str]) -> str:
 
 
 @phrase
+def declared_off_its_source(key: str, level: str, off: str) -> str:
+    """Said of all errors that the file should declare, where a level shifts one off what its source states."""
+    return f"{key}: {level} {off}"
+
+
+@phrase
 def input_in_doubt(doubt: float, words: str, declared: float | None, key: str) -> str:
     """Said of a position error that is less than the doubt of the platform's path. [m]"""
     stated = "no position error is declared" if declared is None else f"{_size(declared, 'm')} is declared"
     return f"the path may be {_size(doubt, 'm')} off ({words}), {stated}: state it in {key}"
 
 
+@dataclass(frozen=True)
+class StatedError:
+    """An error that the source of a path states, beside the declared one: sizes along `axes`, in a unit.
+
+    `words` name the source, `key` is where the file would declare it. Without `axes` both are root-sum-squares.
+    """
+
+    words: str
+    kind: str
+    stated: Sequence[float]
+    declared: Sequence[float]
+    unit: str
+    key: str
+    is_declared: bool
+    axes: Sequence[str] = ()
+
+    @property
+    def declared_words(self) -> str:
+        """The declared error in a sentence."""
+        if not self.is_declared:
+            return f"no {self.kind} error is declared"
+        return f"{_sizes(self.declared, self.unit)} is declared"
+
+
 @phrase
-def input_states_more(
-    words: str,
-    kind: str,
-    stated: Sequence[float],
-    declared: Sequence[float],
-    unit: str,
-    key: str,
-    is_declared: bool,
-    axes: Sequence[str] = (),
-) -> str:
+def input_states_more(error: StatedError) -> str:
     """Said of a declared error that is less than the one which the source of the path states. [m], [m/s]"""
-    within = f" ({_axes(axes)})" if axes else ""
-    own = _declared(kind, declared, unit, is_declared)
-    return f"{words}: a {kind} error of {_sizes(stated, unit)}{within} is stated, {own}: state at least that in {key}"
+    within = f" ({_axes(error.axes)})" if error.axes else ""
+    stated = f"a {error.kind} error of {_sizes(error.stated, error.unit)}{within} is stated"
+    return f"{error.words}: {stated}, {error.declared_words}: state at least that in {error.key}"
 
 
 @phrase
-def input_usually_has_more(
-    words: str,
-    kind: str,
-    stated: Sequence[float],
-    declared: Sequence[float],
-    unit: str,
-    key: str,
-    is_declared: bool,
-    axes: Sequence[str] = (),
-) -> str:
+def input_usually_has_more(error: StatedError) -> str:
     """Said of a declared error that is less than a third of the usual one of a log's quality. [m]"""
     return (
-        f"{words} usually have an error of {_size(max(stated), unit)} on each axis,"
-        f" {_declared(kind, declared, unit, is_declared)}: state at least a third of the usual error in {key}"
+        f"{error.words} usually have an error of {_size(max(error.stated), error.unit)} on each axis,"
+        f" {error.declared_words}: state at least a third of the usual error in {error.key}"
     )
-
-
-def _declared(kind: str, declared: Sequence[float], unit: str, is_declared: bool) -> str:
-    return f"{_sizes(declared, unit)} is declared" if is_declared else f"no {kind} error is declared"
 
 
 def _sizes(sizes: Sequence[float], unit: str) -> str:

@@ -37,7 +37,7 @@ settings.load_profile("shared")
 _FIRST = (
     *("test_scheduler.py", "test_compliance_page.py", "test_hostile.py", "test_gate.py"),
     *("test_report_explanation.py", "test_sweep.py", "test_allocate.py", "test_random_errors.py"),
-    *("test_cphd.py", "test_point.py"),
+    *("test_cphd.py", "test_point.py", "test_navigation_sweep.py", "test_report_compliance.py", "test_symmetries.py"),
 )
 
 

@@ -1,4 +1,4 @@
-"""What errors of any size do to an image, by exact ranges alone: the reference that the check is held against.
+"""Effects of errors of any size on an image, by exact ranges alone: the reference that the check is held against.
 
 Nothing here comes from the package's own exact ranges, full model or theory. It takes the mission as loaded, frames
 of axes and the speed of light, and has its own quadrature (24 Gauss-Legendre nodes over the aperture).

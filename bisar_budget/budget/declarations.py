@@ -14,7 +14,7 @@ import numpy as np
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.navigation_errors import TILTS
 from bisar_budget.effects.oscillator_acceleration import is_unshaken
-from bisar_budget.findings.requirement import DeclaredKinds
+from bisar_budget.findings.requirement import DeclaredKinds, ShiftedFigure
 from bisar_budget.findings.row import DECLARE
 from bisar_budget.mission.instruments import LeverArm
 from bisar_budget.mission.model import Mission
@@ -191,6 +191,15 @@ def _runs_two_clocks(mission: Mission) -> bool:
     return not mission.has_direct_path
 
 
+def _lacking_of_setting(mission: Mission) -> list[str]:
+    """Keys of the synchronisation that the file should have: of clocks in holdover, both errors that setting left."""
+    sync = mission.synchronization
+    if sync is None:
+        return ["synchronization"]
+    halves = ("time_error", "frequency_error") if sync.is_holdover else ()
+    return [f"synchronization.{key}" for key in halves if getattr(sync, key) is None]
+
+
 def _legs_without_delay(mission: Mission) -> list[str]:
     """Keys of the air that the file should have: of both legs, or of each leg of which a file may state a delay."""
     if mission.propagation is None:
@@ -226,7 +235,7 @@ _KINDS_OF_MISSION: Mapping[str, _OfMission] = {
         "clock",
         lambda mission: mission.synchronization is not None,
         lambda mission: mission.synchronization is not None and bool(mission.synchronization.source),
-        lambda mission: ["synchronization"],
+        _lacking_of_setting,
         _runs_two_clocks,
     ),
     "propagation": _OfMission(
@@ -243,6 +252,9 @@ _KINDS_OF_MISSION: Mapping[str, _OfMission] = {
         lambda mission: ["other_errors"],
     ),
 }
+
+
+_OF_HALVES = ("propagation", "synchronization")  # kinds that the file may state in part
 
 
 # ---------------------------------------------------------------------- what a mission declares
@@ -272,7 +284,23 @@ def declared_kinds(mission: Mission) -> DeclaredKinds:
                 without_source.append(kind)
         elif of_mission.is_owed(mission):
             missing.append(kind)
-    return DeclaredKinds(tuple(declared), tuple(missing), tuple(without_source))
+    return DeclaredKinds(tuple(declared), tuple(missing), tuple(without_source), tuple(shifted_figures(mission)))
+
+
+def shifted_figures(mission: Mission) -> Iterator[ShiftedFigure]:
+    """Phase noise and spectra of vibration that the file shifts by a level off what their source states."""
+    for name in PLATFORMS:
+        platform: Platform = getattr(mission.platforms, name)
+        oscillator, vibration = platform.oscillator, platform.motion_error.vibration
+        source, levels = platform.motion_error.source, list[tuple[str, str, float | None, str | None]]()
+        levels.append(("vibration", "motion_error.vibration.spectrum_level", vibration.spectrum_level, source))
+        if oscillator is not None:
+            felt = None if oscillator.vibration is None else oscillator.vibration.spectrum_level
+            levels.append(("oscillator", "oscillator.level", oscillator.level, oscillator.source))
+            levels.append(("oscillator", "oscillator.vibration.spectrum_level", felt, oscillator.source))
+        for kind, key, level, its_source in levels:
+            if level:
+                yield ShiftedFigure(f"{name}.{kind}", f"platforms.{name}.{key}", level, its_source)
 
 
 def still_platforms(mission: Mission) -> list[str]:
@@ -308,7 +336,7 @@ def _missing(mission: Mission, still: Container[str]) -> Iterator[Missing]:
         owner, dot, kind = asked.rpartition(".")
         if kind in _KINDS_OF_MISSION:
             of_mission = _KINDS_OF_MISSION[kind]
-            if kind == "propagation" or not of_mission.is_stated(mission):
+            if kind in _OF_HALVES or not of_mission.is_stated(mission):
                 yield from (Missing(of_mission.owner, kind, key) for key in of_mission.missing(mission))
             continue
         of_platform = _KINDS_OF_PLATFORMS[kind]

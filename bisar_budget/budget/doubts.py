@@ -187,7 +187,8 @@ def _stated_doubt(platform: Platform, name: str, kind: str, stated: StatedAccura
     is_declared = error.stated(kind) is not None or (kind == "position" and bool(error.random))
     if own is None:
         total = float(np.trace(declared)) ** 0.5
-        note = phrases.input_states_more(stated.words, kind, (stated.total,), (total,), unit_name, key, is_declared)
+        both = phrases.StatedError(stated.words, kind, (stated.total,), (total,), unit_name, key, is_declared)
+        note = phrases.input_states_more(both)
         return InputDoubt(name, stated.total, total, note, kind, is_stated=True)
     axes = _stack(platform.state.frame(error.frame))
     names: Sequence[str] = FRAME_AXES[error.frame]
@@ -200,7 +201,7 @@ def _stated_doubt(platform: Platform, name: str, kind: str, stated: StatedAccura
         sizes, names = [[float(worst @ one @ worst) ** 0.5] for one in (own, declared)], ("between the axes",)
     place = max(range(len(sizes[0])), key=lambda axis: share * sizes[0][axis] - sizes[1][axis])
     phrase = phrases.input_usually_has_more if stated.is_typical else phrases.input_states_more
-    note = phrase(stated.words, kind, sizes[0], sizes[1], unit_name, key, is_declared, names)
+    note = phrase(phrases.StatedError(stated.words, kind, sizes[0], sizes[1], unit_name, key, is_declared, names))
     return InputDoubt(name, sizes[0][place], sizes[1][place], note, kind, is_stated=True)
 
 

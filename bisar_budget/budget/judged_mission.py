@@ -268,8 +268,10 @@ class _Judgement:
     def _doubted_rows(self, rows: Sequence[Judged]) -> Truths:
         """Rows of oscillators whose noise is not what the file states, (rows, cases)."""
         doubted = {error.id: error.is_in_doubt for error in self.analysis.random if np.any(error.is_in_doubt)}
-        by_row = [np.broadcast_to(doubted.get(row.subject.id, False), (self.cases,)) for row in rows]
-        return np.array(by_row, dtype=bool).reshape(len(rows), self.cases)
+        in_doubt = np.zeros((len(rows), self.cases), dtype=bool)
+        for place, row in enumerate(rows) if doubted else ():
+            in_doubt[place] = doubted.get(row.subject.id, False)
+        return in_doubt
 
     def _floor(self) -> Codes:
         """Best status that each case can have: paths may be in doubt, and nothing declared."""

@@ -12,7 +12,13 @@ from bisar_budget.analysis.spread import islr_db, mainlobe_energy, spread_limit
 from bisar_budget.analysis.together import quadratics
 from bisar_budget.analysis.vibration_limits import level_of, tone_limits
 from bisar_budget.budget.aggregates import PULL_IN
-from bisar_budget.budget.declarations import DECLARATIONS, Missing, is_asked_for, missing_declarations
+from bisar_budget.budget.declarations import (
+    DECLARATIONS,
+    Missing,
+    is_asked_for,
+    missing_declarations,
+    shifted_figures,
+)
 from bisar_budget.budget.doubts import input_doubts, is_in_doubt
 from bisar_budget.budget.judged_mission import JudgedMission
 from bisar_budget.budget.judged_requirements import (
@@ -59,7 +65,7 @@ def rows_in_words(judged: JudgedMission, case: Case) -> Iterator[Row]:
 def _declarations(case: Case, one: Judged) -> Row:
     """The row that says whether all is declared: of kinds, too, that have no row where nothing is declared."""
     mission = case.mission
-    missing = missing_declarations(mission)
+    missing, shifted = missing_declarations(mission), shifted_figures(mission)
     return Row(
         DECLARATIONS,
         DECLARE,
@@ -71,6 +77,7 @@ def _declarations(case: Case, one: Judged) -> Row:
         requirement_id=mission.requirement_ids.get(DECLARATIONS.id),
         model=mission.gating_model,
         is_unjudged=bool(missing),
+        remarks=tuple(phrases.declared_off_its_source(one.key, one.level, one.off) for one in shifted),
     )
 
 

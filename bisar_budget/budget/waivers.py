@@ -11,14 +11,13 @@ from fnmatch import translate
 from typing import NamedTuple
 
 from bisar_budget.budget import file_warnings
+from bisar_budget.budget.declarations import shifted_figures
 from bisar_budget.budget.judged_requirements import KEYS
-from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.faults import KeyPath, printable
 from bisar_budget.findings.requirement import JudgedRequirement, Outside, Override
 from bisar_budget.findings.row import DECLARE, AppliedWaiver, Row
 from bisar_budget.findings.status import BROKEN
 from bisar_budget.mission.model import Mission
-from bisar_budget.mission.platforms import Platform
 from bisar_budget.phrases import Note
 from bisar_budget.resources import resource
 
@@ -129,25 +128,8 @@ def overrides(mission: Mission, outside: Outside, today: date) -> tuple[Override
     if mission.waivers or outside.is_day_given:
         found.append(Override("--date", today.isoformat(), outside.day_origin))
     found += [Override("--set", f"{change.key}={change.text}", outside.set_origin) for change in mission.changes]
-    return (*found, *_own_parts(mission), *_levels(mission))
-
-
-def _levels(mission: Mission) -> Iterator[Override]:
-    """Levels by which the file shifts phase noise or a spectrum of vibration off what its source states."""
-    for name in PLATFORMS:
-        platform: Platform = getattr(mission.platforms, name)
-        oscillator, vibration = platform.oscillator, platform.motion_error.vibration
-        shifts: list[tuple[str, float | None, str | None]] = [
-            ("motion_error.vibration.spectrum_level", vibration.spectrum_level, platform.motion_error.source)
-        ]
-        if oscillator is not None:
-            felt_level = None if oscillator.vibration is None else oscillator.vibration.spectrum_level
-            shifts.append(("oscillator.level", oscillator.level, oscillator.source))
-            shifts.append(("oscillator.vibration.spectrum_level", felt_level, oscillator.source))
-        for key, level, source in shifts:
-            if level:
-                off = "off the data sheet" if source is None else f"off {printable(source)}"
-                yield Override(f"platforms.{name}.{key}", f"{level:g} dB", off)
+    levels = (Override(one.key, one.level, one.off) for one in shifted_figures(mission))
+    return (*found, *_own_parts(mission), *levels)
 
 
 def _own_parts(mission: Mission) -> Iterator[Override]:

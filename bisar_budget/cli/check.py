@@ -4,6 +4,7 @@ import os
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from datetime import date, datetime
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -13,9 +14,8 @@ from bisar_budget import __version__
 from bisar_budget.cli.options import (
     COMMAND_LINE,
     FILE,
-    MISSIONS,
+    MISSIONS_OR_NONE,
     SET,
-    SETTINGS_FILE,
     ParamType,
     date_option,
     day_and_outside,
@@ -24,17 +24,16 @@ from bisar_budget.cli.options import (
     origin_of,
     output_option,
     scheduler_options,
-    settings_of,
 )
+from bisar_budget.cli.projects import Project, by_settings
 from bisar_budget.cli.streams import (
     EXIT_BROKEN,
-    MISSION_SUFFIXES,
     complain,
     deliver,
     expand,
     fail,
     is_terminal,
-    load_all,
+    read_all,
     root_of_names,
     say_faults,
     spare,
@@ -48,21 +47,54 @@ from bisar_budget.report import FORMATS
 if TYPE_CHECKING:
     from bisar_budget.faults import SetValue
     from bisar_budget.findings.mission import MissionFindings, Report, UnusableMission
-    from bisar_budget.findings.requirement import Outside, Override
-    from bisar_budget.report import Style
+    from bisar_budget.findings.requirement import Override
+    from bisar_budget.report import Piece, Style
     from bisar_budget.settings import Settings
 
 
+_PROJECTS = "bisar_budget.projects"  # in the context of a command
+_OF_RUN = ("format", "color")  # settings that are of a whole run, where all its projects have the same
+
+
 class _Gate(click.Command):
-    """A command whose options default to the project's settings; BISAR_BUDGET_… stands above them."""
+    """A command whose options default to the settings nearest to each mission; BISAR_BUDGET_… stands above them."""
 
     def make_context(self, info_name: str | None, args: list[str], *more: Any, **extra: Any) -> click.Context:
-        names = [name for name in args if not name.startswith("-") and name.endswith(MISSION_SUFFIXES)]
-        settings = settings_of(expand(names))
+        asked = self._context({}, info_name, list(args), *more, **extra)
+        if asked.resilient_parsing:
+            return asked
+        names = asked.params["missions"]
+        if not names and not asked.params["is_of_change"]:
+            raise click.UsageError("Missing argument 'MISSION...'.", asked)
+        files = _touched(names) if asked.params["is_of_change"] else expand(names)
+        projects = []
+        for settings, of_settings in by_settings(files):
+            context = self._context(self._defaults(settings), info_name, list(args), *more, **extra)
+            context.obj = settings
+            projects.append(Project(settings, of_settings, context))
+        context = projects[0].context
+        if len(projects) > 1:
+            defaults = self._common_defaults([project.settings for project in projects])
+            context = self._context(defaults, info_name, list(args), *more, **extra)
+        context.params["missions"] = tuple(files)
+        context.meta[_PROJECTS] = projects
+        return context
+
+    def _common_defaults(self, settings: "Sequence[Settings | None]") -> dict[str, Any]:
+        """Defaults of a run of several projects: what is of the run, where all say the same."""
+        found = {}
+        for key in _OF_RUN:
+            values = {one.values.get(key) if one else None for one in settings}
+            if len(values) == 1:
+                found[key] = values.pop()
+            else:
+                complain(f"warning: the settings of the missions have different {key}s: none of them is taken.")
+        options = {p.opts[0].removeprefix("--"): str(p.name) for p in self.params}
+        return {options[key]: value for key, value in found.items() if value is not None}
+
+    def _context(self, defaults: dict[str, Any], *arguments: Any, **extra: Any) -> click.Context:
         try:
-            context = super().make_context(info_name, args, *more, default_map=self._defaults(settings), **extra)
-            context.meta[SETTINGS_FILE] = settings.file if settings else None
-            return context
+            return super().make_context(*arguments, default_map=defaults, **extra)
         except click.BadParameter as error:
             if error.ctx is not None and error.param is not None and error.param.envvar:
                 source = error.ctx.get_parameter_source(str(error.param.name))
@@ -139,7 +171,7 @@ class _Draws(ParamType[int]):
 
 
 @click.command(cls=_Gate)
-@MISSIONS
+@MISSIONS_OR_NONE
 @format_option(
     FORMATS,
     f"Format of the report; {', '.join(f'{one.name}: {one.about}' for one in FORMATS.values() if one.about)}.",
@@ -206,7 +238,7 @@ class _Draws(ParamType[int]):
     "is_of_change",
     is_flag=True,
     help="MISSION... are the files of a change, of any kind: check the missions among them, and those below the "
-    "current folder that read one of them (a part, an orbit, a log, a table, settings).",
+    "current folder that read one of them (a part, an orbit, a log, a table, settings), or name a file that is gone.",
 )
 @click.option("-q", "--quiet", is_flag=True, help="One line per mission.")
 @click.option("--all", "all_rows", is_flag=True, help="Show every row, also those that are not declared.")
@@ -261,24 +293,25 @@ def check(
     the tool.
 
     Defaults of --format, --report, --strict, --exit-zero, --model, --monte-carlo, --seed and --color:
-    [tool.bisar-budget] in the nearest pyproject.toml, and over it the variables BISAR_BUDGET_FORMAT and so on.
+    [tool.bisar-budget] in the pyproject.toml nearest to each mission, and over it the variables BISAR_BUDGET_FORMAT
+    and so on. Missions of several projects are judged each by its own settings.
     """
-    from bisar_budget.findings.status import exit_code
     from bisar_budget.report import Style, joined
 
-    written = [(name, _format_of(name)) for name in reports]
-    formats = [format_name, *(its_format for _, its_format in written)]
-    files = _touched(missions) if is_of_change else expand(missions)
-    if any(map(os.path.isfile, files)):
-        nearest = settings_of(files)
-        if (nearest.file if nearest else None) != click.get_current_context().meta.get(SETTINGS_FILE):
-            raise click.UsageError("the missions have other settings than those that were read; name their files.")
-    folders = [_folder_of_pictures(name, its_format) for name, its_format in [*written, (output or "-", format_name)]]
-    spare(files, [output, *reports, _step_summary(format_name)], [*filter(None, folders)])
+    files = list(missions)
+    projects: list[Project] = click.get_current_context().meta[_PROJECTS]
     given = click.get_current_context().get_parameter_source
-    if seed is not None and draws is None and given("seed") is ParameterSource.COMMANDLINE:
-        raise click.UsageError("--seed needs --monte-carlo N.")
-    _check_draws(draws, scheduler)
+    if len(projects) > 1 and given("reports") not in (ParameterSource.COMMANDLINE, ParameterSource.ENVIRONMENT):
+        reports = ()
+    written = [(name, _format_of(name)) for name in reports]
+    own_reports = _reports_of(projects) if len(projects) > 1 else []
+    formats = [format_name, *(its_format for _, its_format in written), *(each[2] for each in own_reports)]
+    places = [*written, *(each[1:] for each in own_reports), (output or "-", format_name)]
+    folders = [_folder_of_pictures(name, its_format) for name, its_format in places]
+    spare(files, [output, *(name for name, _ in places[:-1]), _step_summary(format_name)], [*filter(None, folders)])
+    for project in projects:
+        _check_draws(project.context, scheduler)
+    is_drawn = any(project.context.params["draws"] is not None for project in projects)
     if explain is not None:
         excluded = ("format_name", "reports", "draws", "scheduler", "swept")
         if any(given(name) is ParameterSource.COMMANDLINE for name in excluded):
@@ -286,11 +319,10 @@ def check(
                 "--explain writes text; it cannot be combined with --format, --report, --monte-carlo, --scheduler or "
                 "--sweep."
             )
-        _explain(files, explain, model, output, changes, *day_and_outside(today))
+        _explain(projects, explain, output, changes, today)
         return
     _check_sweep(swept, formats)
     illustrated = any(FORMATS[name].is_illustrated for name in formats)
-    judged_on, from_outside = day_and_outside(today)
     use_color = color == "always" or (color == "auto" and output is None and wants_color())
     verbosity = -1 if quiet else 1 if verbose else 0
     root, is_checkout = root_of_names()
@@ -298,50 +330,103 @@ def check(
         color=use_color, verbosity=verbosity, root=root, is_checkout=is_checkout, all_rows=all_rows, detail=detail
     )
     says_faults = format_name != "text" or output is not None or quiet or not is_terminal()
-    asked: dict[str, Any] = {"model": model, "changes": changes, "outside": from_outside}
-    if FORMATS[format_name].is_piecewise and not (written or verifying or draws):
+    if FORMATS[format_name].is_piecewise and not (written or own_reports or verifying or is_drawn):
         from bisar_budget.front.checks import pieces
 
-        texts = pieces(files, judged_on, format_name, style, **asked)
+        texts: dict[str, Piece] = {}
+        for project in projects:
+            judged_on, asked = _asked(project, len(projects) > 1, today, changes)
+            texts |= zip(project.files, pieces(project.files, judged_on, format_name, style, **asked), strict=True)
+        ordered = [texts[file] for file in files]
         if says_faults:
-            _say_faults(one.unusable for one in texts)
-        deliver(joined(format_name, texts, __version__, style), output, format_name)
-        statuses = frozenset[str]().union(*(one.statuses for one in texts))
+            _say_faults(one.unusable for one in ordered)
+        deliver(joined(format_name, ordered, __version__, style), output, format_name)
+        statuses = {file: one.statuses for file, one in texts.items()}
     else:
         from bisar_budget.findings.mission import Report
         from bisar_budget.front.checks import checked, drawn_by
         from bisar_budget.mission.quantities import QuestionError
 
-        asked |= {"swept": swept, "is_verified": verifying, "is_illustrated": illustrated}
-        try:
-            with drawn_by(scheduler, patience, draws, seed, len(files)) as drawn:
-                found = checked(files, judged_on, drawn=drawn, **asked)
-        except QuestionError as error:
-            fail(str(error))
-        # The day that somebody gave, or that decides: with no other a report is reproducible.
-        is_given = today is not None or os.environ.get("SOURCE_DATE_EPOCH")
-        told = [one.name for mission in found for one in getattr(mission, "overrides", ())]
-        shown_day = judged_on if is_given or "--date" in told else None
-        options = tuple(_options(shown_day, today))
-        report = Report(version=__version__, missions=tuple(found), options=options, day=shown_day)
+        more: dict[str, Any] = {"swept": swept, "is_verified": verifying, "is_illustrated": illustrated}
+        found: dict[str, MissionFindings | UnusableMission] = {}
+        for project in projects:
+            judged_on, asked = _asked(project, len(projects) > 1, today, changes)
+            draws, seed = (project.context.params[name] for name in ("draws", "seed"))
+            try:
+                with drawn_by(scheduler, patience, draws, seed, len(project.files)) as drawn:
+                    of_project = checked(project.files, judged_on, drawn=drawn, **asked, **more)
+            except QuestionError as error:
+                fail(str(error))
+            found |= zip(project.files, of_project, strict=True)
+
+        def report_of(of: Sequence[Project], its_files: Sequence[str]) -> Report:
+            """The report of some files, with the options of their projects."""
+            its_missions = tuple(found[file] for file in its_files)
+            # The day that somebody gave, or that decides: with no other a report is reproducible.
+            is_given = today is not None or os.environ.get("SOURCE_DATE_EPOCH")
+            told = [one.name for mission in its_missions for one in getattr(mission, "overrides", ())]
+            shown_day = judged_on if is_given or "--date" in told else None
+            options = dict.fromkeys(one for project in of for one in _options(project, shown_day, today))
+            return Report(version=__version__, missions=its_missions, options=tuple(options), day=shown_day)
+
+        report = report_of(projects, files)
         if says_faults:
             _say_faults(report.missions)
+        plain = style._replace(color=False, verbosity=max(style.verbosity, 0))
         for path, its_format in written:
-            _write_report(path, its_format, report, style._replace(color=False, verbosity=max(style.verbosity, 0)))
+            _write_report(path, its_format, report, plain)
+        for project, path, its_format in own_reports:
+            _write_report(path, its_format, report_of([project], project.files), plain)
         _write_report(output or "-", format_name, report, style)
         if summary := _step_summary(format_name):
             _append_step_summary(summary, report, style)
-        statuses = frozenset[str]().union(*(mission.statuses for mission in report.missions))
-    code = exit_code(statuses, strict)
-    sys.exit(0 if exit_zero and code == EXIT_BROKEN else code)
+        statuses = {file: found[file].statuses for file in files}
+    sys.exit(max(_code_of(project, [statuses[file] for file in project.files]) for project in projects))
 
 
-def _options(judged_on: date | None, today: datetime | None) -> "Iterator[Override]":
+def _code_of(project: Project, statuses: "Sequence[frozenset[str]]") -> int:
+    """Exit code of the missions of a project, by its own options."""
+    from bisar_budget.findings.status import exit_code
+
+    strict, exit_zero = (project.context.params[name] for name in ("strict", "exit_zero"))
+    code = exit_code(frozenset[str]().union(*statuses), strict)
+    return 0 if exit_zero and code == EXIT_BROKEN else code
+
+
+def _reports_of(projects: Sequence[Project]) -> list[tuple[Project, str, str]]:
+    """Reports that the settings of several projects ask for, each of its own missions: project, file and format."""
+    return [
+        (project, name, _format_of(name))
+        for project in projects
+        if project.context.get_parameter_source("reports") is ParameterSource.DEFAULT_MAP
+        for name in project.context.params["reports"]
+    ]
+
+
+def _asked(
+    project: Project, is_among_others: bool, today: datetime | None, changes: "Sequence[SetValue]"
+) -> tuple[date, dict[str, Any]]:
+    """The day, and how the missions of a project are checked; of several projects each says its settings."""
+    from bisar_budget.findings.requirement import Override
+
+    with project.options() as context:
+        judged_on, outside = day_and_outside(today)
+    if is_among_others:
+        settings = Override("settings", project.settings_file or "none", "folder nearest to the mission")
+        outside = outside._replace(options=(*outside.options, settings))
+    return judged_on, {"model": context.params["model"], "changes": changes, "outside": outside}
+
+
+def _options(project: Project, judged_on: date | None, today: datetime | None) -> "list[Override]":
     """Say what the options that bear on the result are, and where each came from."""
+    with project.options() as context:
+        return list(_options_in(context, judged_on, today))
+
+
+def _options_in(context: click.Context, judged_on: date | None, today: datetime | None) -> "Iterator[Override]":
     from bisar_budget.findings.requirement import Override
     from bisar_budget.front.checks import day_origin
 
-    context = click.get_current_context()
     for parameter in context.command.params:
         name, value = str(parameter.name), context.params[str(parameter.name)]
         origin = origin_of(parameter)
@@ -367,16 +452,19 @@ def _options(judged_on: date | None, today: datetime | None) -> "Iterator[Overri
             yield Override(parameter.opts[0], said, origin)
 
 
-def _check_draws(draws: int | None, scheduler: str | None) -> None:
-    """Refuse a scheduler that has nothing to draw, and more draws than are made without one."""
-    if scheduler is None:
-        if draws is not None and draws > MAX_DRAWS_HERE:
-            raise click.UsageError(
-                f"--monte-carlo {draws:,}: must be at most {MAX_DRAWS_HERE:,} draws; with --scheduler ADDRESS, whose "
-                f"workers share them, {MAX_DRAWS:,}."
-            )
-    elif draws is None:
-        raise click.UsageError(f"--scheduler {scheduler}: shares out draws, and needs --monte-carlo N.")
+def _check_draws(context: click.Context, scheduler: str | None) -> None:
+    """Refuse a seed or a scheduler that has nothing to draw, and more draws than are made without one."""
+    draws, seed = context.params["draws"], context.params["seed"]
+    if draws is None:
+        if seed is not None and context.get_parameter_source("seed") is ParameterSource.COMMANDLINE:
+            raise click.UsageError("--seed needs --monte-carlo N.")
+        if scheduler is not None:
+            raise click.UsageError(f"--scheduler {scheduler}: shares out draws, and needs --monte-carlo N.")
+    elif scheduler is None and draws > MAX_DRAWS_HERE:
+        raise click.UsageError(
+            f"--monte-carlo {draws:,}: must be at most {MAX_DRAWS_HERE:,} draws; with --scheduler ADDRESS, whose "
+            f"workers share them, {MAX_DRAWS:,}."
+        )
 
 
 def _check_sweep(texts: Sequence[str], formats: Sequence[str]) -> None:
@@ -393,26 +481,29 @@ def _check_sweep(texts: Sequence[str], formats: Sequence[str]) -> None:
 
 
 def _explain(
-    files: Sequence[str],
+    projects: Sequence[Project],
     row_id: str,
-    model: str | None,
     output: str | None,
     changes: "Sequence[SetValue]",
-    today: date,
-    from_outside: "Outside",
+    today: datetime | None,
 ) -> None:
     """Explain a row, or a requirement, in every mission that has it."""
     from bisar_budget.findings.row import unknown_id
     from bisar_budget.front.checks import DAY_OF_RUN
     from bisar_budget.front.checks import check as ask
+    from bisar_budget.mission.load import load_mission
     from bisar_budget.report.explain.explanation import explain, explain_requirement
     from bisar_budget.report.words.heading import overrides_lines
     from bisar_budget.report.words.requirements import requirement_id
 
     texts: list[str] = []
     known: dict[str, None] = {}
-    for mission in load_all(files, model, changes):
-        found = ask(mission, date=today, outside=from_outside).findings
+    each = {project: _asked(project, len(projects) > 1, today, changes) for project in projects}
+    files = [file for project in projects for file in project.files]
+    reads = [partial(load_mission, file, each[one][1]["model"], changes) for one in projects for file in one.files]
+    asked = [each[project] for project in projects for _ in project.files]
+    for mission, (judged_on, how) in zip(read_all(reads), asked, strict=True):
+        found = ask(mission, date=judged_on, outside=how["outside"]).findings
         required = {requirement_id(one): one for one in found.requirements}
         known |= dict.fromkeys([*(row.id for row in found.rows), *required])
         required |= {one.id: one for one in found.requirements}

@@ -20,6 +20,7 @@ from bisar_budget.cli.options import (
     set_option,
     settings_here,
 )
+from bisar_budget.cli.projects import folder_of_file
 from bisar_budget.cli.streams import EXIT_BROKEN, deliver, expand, fail, read_all, spare
 from bisar_budget.faults import printable
 from bisar_budget.resources import DISK, Files
@@ -27,7 +28,7 @@ from bisar_budget.resources import DISK, Files
 if TYPE_CHECKING:
     from bisar_budget.faults import SetValue
     from bisar_budget.mission.model import Mission
-    from bisar_budget.report.change.comparison import ChangeSet, MissionChange
+    from bisar_budget.report.change.comparison import ChangeSet, Loosened, MissionChange
 
 _Read = Callable[[], "Mission"]
 
@@ -132,15 +133,19 @@ def _with_files(
 ) -> "ChangeSet":
     """Compare two files, or each with itself with other values."""
     from bisar_budget.mission.load import load_mission
-    from bisar_budget.report.change.comparison import ChangeSet
+    from bisar_budget.report.change.comparison import ChangeSet, loosened_settings
 
     files = expand(files) if changes else files
     spare(files, [output])
-    model = _settings().get("model")
     old, new = (files, files) if changes else (files[:1], files[1:])
-    before = [partial(load_mission, file, model) for file in old]
-    after = [partial(load_mission, file, model, changes) for file in new]
-    return ChangeSet(_compared(before, after, today))
+    held_before, held_after = ([_settings(file) for file in of] for of in (old, new))
+    before = [partial(load_mission, file, held.get("model")) for file, held in zip(old, held_before, strict=True)]
+    after = [
+        partial(load_mission, file, held.get("model"), changes) for file, held in zip(new, held_after, strict=True)
+    ]
+    pairs = zip(held_before, held_after, strict=True)
+    loosened = dict.fromkeys(one for pair in pairs for one in loosened_settings(*pair))
+    return ChangeSet(_compared(before, after, today), settings=tuple(loosened))
 
 
 def _with_revision(patterns: Sequence[str], base: str, output: str | None, today: datetime | None) -> "ChangeSet":
@@ -153,14 +158,13 @@ def _with_revision(patterns: Sequence[str], base: str, output: str | None, today
     if "-" in patterns:
         raise click.UsageError("--base needs files: standard input is in no revision.")
     spare(expand(patterns), [output])
-    settings = _settings()
+    loosened: dict[Loosened, None] = {}
     gone, new, before, after = list[str](), list[str](), list[_Read](), list[_Read]()
     revisions: dict[str, Revision] = {}
     try:
         for pattern in patterns:
             revision = Revision(pattern, base)
             revision = revisions.setdefault(revision.top, revision)
-            then = _settings(revision)
             now = [file for file in expand([pattern]) if os.path.lexists(file)]
             was = revision.matching(pattern)
             gone += [revision.path_of(file) for file in was if not os.path.lexists(file)]
@@ -168,19 +172,20 @@ def _with_revision(patterns: Sequence[str], base: str, output: str | None, today
                 if now and not revision.has(file):
                     new.append(revision.path_of(file))
                     continue
+                then, held = _settings(file, revision), _settings(file)
+                loosened |= dict.fromkeys(loosened_settings(then, held))
                 before.append(partial(mission_at, file, revision, then.get("model")))
-                after.append(partial(load_mission, file, settings.get("model")))
+                after.append(partial(load_mission, file, held.get("model")))
         changes = _compared(before, after, today)
     except RevisionError as error:
         fail(str(error))
-    loosened = [one for revision in revisions.values() for one in loosened_settings(_settings(revision), settings)]
     bundled = str(resource("specs"))
     outside = [one for revision in revisions.values() for one in revision.outside if not one.startswith(bundled)]
     return ChangeSet(
         changes,
         gone=tuple(dict.fromkeys(gone)),
         new=tuple(dict.fromkeys(new)),
-        settings=tuple(dict.fromkeys(loosened)),
+        settings=tuple(loosened),
         outside=tuple(dict.fromkeys(outside)),
     )
 
@@ -196,11 +201,11 @@ def _compared(before: Sequence[_Read], after: Sequence[_Read], today: datetime |
     return tuple(compare(*pair) for pair in zip(found[::2], found[1::2], strict=True))
 
 
-def _settings(files: Files = DISK) -> Mapping[str, Any]:
-    """Settings of the project for the current folder: those that `check` takes here, now or in a revision."""
+def _settings(mission: str, files: Files = DISK) -> Mapping[str, Any]:
+    """Settings nearest to a mission: those that `check` takes for it, now or in a revision."""
     from bisar_budget.settings import TABLE
 
-    found = settings_here(files)
+    found = settings_here(files, None if mission == "-" else folder_of_file(mission))
     if found is None:
         return {}
     try:

@@ -32,7 +32,6 @@ else:
 
 
 COMMAND_LINE = "command line"
-SETTINGS_FILE = "bisar_budget.settings"  # in the context of a command: where its defaults come from
 _Option = Callable[[Callable[..., Any]], Callable[..., Any]]  # it is put on a command
 _BEARING = ("model", "strict", "exit_zero")  # on the verdict, besides the day and --set
 
@@ -51,6 +50,7 @@ class FileName(click.types.StringParamType):
 
 FILE = FileName()
 MISSIONS = click.argument("missions", type=FILE, nargs=-1, required=True, metavar="MISSION...")
+MISSIONS_OR_NONE = click.argument("missions", type=FILE, nargs=-1, metavar="MISSION...")
 
 
 def output_option(words: str = "Write to FILE instead of standard output.", metavar: str = "FILE") -> _Option:
@@ -150,25 +150,8 @@ def origin_of(parameter: click.Parameter) -> str:
         return f"environment, {parameter.envvar}"
     if source is not ParameterSource.DEFAULT_MAP:
         return "default"
-    file = click.get_current_context().meta.get(SETTINGS_FILE)
-    return os.path.relpath(file) if file else "pyproject.toml"
-
-
-def settings_of(names: Sequence[str]) -> "Settings | None":
-    """Settings of the folders nearest to some mission files, which must be the same; without a file those of here.
-
-    Two projects in one run are wrong usage: one of them would be held to the settings of the other.
-    """
-    found: dict[str, tuple[str, Settings | None]] = {}
-    for name in names:
-        if os.path.isfile(name):
-            settings = settings_here(folder=os.path.dirname(os.path.abspath(name)))
-            found.setdefault(settings.file if settings else "", (name, settings))
-    if len(found) > 1:
-        words = (f"{name} has {os.path.relpath(file) if file else 'none'}" for file, (name, _) in found.items())
-        said = f"the missions have different settings: {', '.join(words)}; check each project in a run of its own."
-        raise click.UsageError(printable(said))
-    return next((settings for _, settings in found.values()), None) if found else settings_here()
+    settings = click.get_current_context().obj
+    return os.path.relpath(settings.file) if settings else "pyproject.toml"
 
 
 def settings_here(files: Files = DISK, folder: str | None = None) -> "Settings | None":

@@ -21,7 +21,7 @@ from bisar_budget.design.row_uses import Near, SpecifiedMission
 from bisar_budget.design.specified import Specified, catalogue, ordered_noise, specified_errors, suitable_parts
 from bisar_budget.design.table import Variation
 from bisar_budget.effects.declared import END_OF_IMAGE, LOCATION
-from bisar_budget.findings.specification import Broken, RowUse, Specification, SpecificationSheet
+from bisar_budget.findings.specification import LEAST_ROOM, Broken, RowUse, Specification, SpecificationSheet
 from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.parts import Entry
@@ -97,7 +97,7 @@ def _broken(of: SpecifiedMission) -> tuple[Broken, ...]:
         for row_id, requirement, use, most in zip(
             found.ids, found.requirements, found.uses[:, 0], of.allowed(found.ids), strict=True
         )
-        if use >= most * (1 - 1e-6)
+        if use >= most * (1 - LEAST_ROOM)
     )
 
 

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from bisar_budget.faults import printable
 from bisar_budget.findings.row import AppliedWaiver, holding
 from bisar_budget.phrases import Note
 
@@ -82,15 +83,37 @@ class JudgedRequirement(NamedTuple):
         return NAMES[self.key]
 
 
+@dataclass(frozen=True)
+class ShiftedFigure:
+    """Figures of a kind of error that the file shifts by a level off what their source states."""
+
+    kind: str
+    key: str
+    level_db: float
+    source: str | None
+
+    @property
+    def level(self) -> str:
+        """The level in a sentence."""
+        return f"{self.level_db:g} dB"
+
+    @property
+    def off(self) -> str:
+        """Where from the figures are shifted."""
+        return "off the data sheet" if self.source is None else f"off {printable(self.source)}"
+
+
 class DeclaredKinds(NamedTuple):
     """Kinds of error that a mission can declare, by the names of `requirements.declare` with their owner.
 
-    `declared` and `missing` are all of them; `without_source` are the declared ones that state no source.
+    `declared` and `missing` are all of them; `without_source` are the declared ones that state no source, `shifted`
+    what a level shifts off its source.
     """
 
     declared: tuple[str, ...] = ()
     missing: tuple[str, ...] = ()
     without_source: tuple[str, ...] = ()
+    shifted: tuple[ShiftedFigure, ...] = ()
 
     @property
     def in_all(self) -> int:

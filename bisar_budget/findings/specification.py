@@ -61,6 +61,9 @@ class RowUse(NamedTuple):
     multiplier: float
 
 
+LEAST_ROOM = 1e-6  # of a limit, that other errors must leave
+
+
 class Broken(NamedTuple):
     """A row that the other errors leave no room in, by its requirement, with what they use of it.
 

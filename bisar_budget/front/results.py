@@ -25,6 +25,7 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.report import FORMATS, Style, format_of, pictures, render
 from bisar_budget.report.words.requirements import declared_words, requirement_lines, verdict
 from bisar_budget.report.words.sentences import allowable_words, matters, row_size, shown_use, use_words, waived_count
+from bisar_budget.resources import special_file
 
 if TYPE_CHECKING:
     from bisar_budget.design.compare import Comparison
@@ -100,8 +101,21 @@ class Picture:
         kind = os.path.splitext(os.fspath(path))[1][1:].lower()
         if kind not in ("svg", "png", "pdf"):
             raise ValueError(f"{os.fspath(path)}: the suffix must be one of .svg, .png, .pdf")
-        with open(path, "wb") as file:
-            file.write(self.of(kind))
+        write_file(os.fspath(path), self.of(kind))
+
+
+def write_file(path: str, content: bytes) -> None:
+    """Write a file.
+
+    Raises
+    ------
+    ValueError
+        What is there is a named pipe, a socket or a device: it would wait, or never end.
+    """
+    if kind := special_file(path):
+        raise ValueError(f"cannot write {path}: {kind}; accepted: a regular file")
+    with open(path, "wb") as file:
+        file.write(content)
 
 
 # ---------------------------------------------------------------------- a check
@@ -206,10 +220,8 @@ class CheckResult(Mapping[str, Row]):
         text = render(form, shown, style)
         for picture, content in pictures(form, shown, style).items():
             os.makedirs(folder, exist_ok=True)
-            with open(os.path.join(folder, picture), "wb") as file:
-                file.write(content)
-        with open(name, "w", encoding="utf-8", newline="\n") as written:
-            written.write(text)
+            write_file(os.path.join(folder, picture), content)
+        write_file(name, text.encode())
 
     @property
     def _report(self) -> Report:

@@ -45,6 +45,8 @@ BENT = 0.05  # of what Doppler turns by at the centre: velocity errors turn it b
 FEW = 4
 SHRINKS = 0.5  # square of each step of the search over that of the one before; else it does not settle
 EPSILON = 2e-15  # of a range sum: what rounding of a few operations leaves
+AT_FOLD = 0.1  # of what gradients span at the centre: with less, what they span changes much in a small step
+OF_UNSEEN = 1e-4  # of the square of a last step elsewhere, that is left of the last one there
 UNSEEN_RAD = 3e-5  # what the last step of the search may change a phase by beyond the part counted linearly
 
 STILL = [np.zeros((1, 1))] * 3  # a platform that no error moves
@@ -632,8 +634,10 @@ class _PointSearch:
             step = step_east * step_east + step_north * step_north
             k, meets, at_centre, half = _of([exact.k, exact.nearest, exact.determinant, exact.half], self.of)
             is_apart = nearest >= MEETS * meets
-            is_done = is_apart & (k * step < UNSEEN_RAD * nearest)
-            self._keep(is_done & (determinant * at_centre > 0), phases, determinant / (at_centre * half))
+            turn = determinant / (at_centre * half)
+            unseen = np.where(np.abs(turn) < AT_FOLD, OF_UNSEEN * UNSEEN_RAD, UNSEEN_RAD)
+            is_done = is_apart & (k * step < unseen * nearest)
+            self._keep(is_done & (determinant * at_centre > 0), phases, turn)
             going = np.flatnonzero(~is_done & (step < SHRINKS * before) & is_apart)
             if not going.size:
                 return

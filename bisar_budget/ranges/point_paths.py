@@ -24,9 +24,12 @@ FINEST_STEP = 1e-6  # where the gradients stay apart, the way only turns
 OF_FOLD = 0.8  # of the way to where the gradients seem to become parallel, that one step makes
 SHORT = 0.1  # of the last step, below which that step says little of the way left
 FOLDS = 0.1  # of what the gradients span at the centre; a way that ends at more of it does not end in a fold
-NEAR_FOLD = 0.03  # likewise; nearer, the square of what they span is a straight line
+NEAR_FOLD = 0.03  # likewise; nearer, the square of what they span is nearly a straight line
+BESIDE_FOLD = 1e-6  # of the size: so near to both sides of a fold it is one, to 1e-9
 CLOSE = 1e-5  # of a limit, where a search ends
 ALMOST = 0.002  # of a limit, from where a curve leads to it
+BENDS = 0.1  # of a slope: what changes more within an interval is bent, and a curve through its ends misses more
+ALMOST_BENT = 3e-5  # of a limit, from where a curve leads to it there
 CREST = 0.01  # of a limit: so little below it, the crest of a curve through few points may be above
 DEPARTS = 0.5  # of the limit: a value so far from a straight line may have been anywhere in between
 COARSE = 0.02  # of the size: within a shorter interval a curve is trusted
@@ -193,8 +196,10 @@ class PointPaths:
         end = _parallel_between(before, point)
         step = np.where(is_end, 0.9 * (end - before[0]), np.maximum((point[0] - before[0]) / 2, went))
         is_fold = (np.abs(before[5]) < FOLDS) & (fold < LEAST_STEP * point[0])
-        is_near = is_end & (np.abs(before[5]) < NEAR_FOLD)
-        is_over = ~is_near & ((is_fold & ~is_end) | (step < FINEST_STEP * point[0]))
+        apart = (end - before[0]) * (point[0] - end)  # what a straight line is off by grows with that
+        is_nearing = is_end & (np.abs(before[5]) < NEAR_FOLD)
+        is_near = is_nearing & (apart < (BESIDE_FOLD * point[0]) ** 2)
+        is_over = ~is_nearing & ((is_fold & ~is_end) | (step < FINEST_STEP * point[0]))
         self.end[some[is_near]] = end[is_near]
         self.end[some[is_over]] = (before[0] + np.minimum(step, fold))[is_over]
         self._step[some], self._step_from[some], self._is_lost[some] = step, before[0], True
@@ -368,8 +373,9 @@ class _SearchState:
             part = np.where((part >= 0) & (part <= 1), part, chord)
         self.top, found = top, top - (1 - part) * width
         is_narrow = width <= CLOSE * top
-        is_close = (b - 1 < ALMOST) & (top - found < 2 * ALMOST * top)
-        is_close |= (1 - a < ALMOST) & (found - (top - width) < 2 * ALMOST * top)
+        almost = np.where(np.abs(ends - begins) > BENDS * (b - a), ALMOST_BENT, ALMOST)
+        is_close = (b - 1 < almost) & (top - found < 2 * almost * top)
+        is_close |= (1 - a < almost) & (found - (top - width) < 2 * almost * top)
         self.inside = top - (1 - np.where(self.tries % 4 == 3, 0.5, np.minimum(np.maximum(part, 0.01), 0.99))) * width
         return np.where(is_narrow, top - width, found), is_close | is_narrow
 
@@ -384,7 +390,8 @@ class _SearchState:
         root = slope * slope + 2 * bend * left
         steep = slope + np.sqrt(np.maximum(root, 0.0))
         ahead = np.where((root >= 0) & (steep > 0), self.low + 2 * left / steep, math.inf)
-        is_sure = (left < ALMOST) & (ahead < (1 + 1.5 * ALMOST) * self.low) & (self.turn > 0.5)
+        almost = np.where(np.abs(bend) * self.width[every, before] > BENDS * np.abs(slope), ALMOST_BENT, ALMOST)
+        is_sure = (left < almost) & (ahead < (1 + 1.5 * almost) * self.low) & (self.turn > 0.5)
         return ahead, is_sure
 
     def next(self, going: Places, *, is_few: bool) -> tuple[Places, Floats]:

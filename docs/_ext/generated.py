@@ -130,6 +130,8 @@ def _documents() -> list[dict[str, Any]]:
     checked = (
         ("specs/missions/one_stationary_spotlight.yaml", "--verify"),
         ("specs/missions/drones_same_gnss.yaml", "--monte-carlo", "1000"),
+        ("specs/missions/gps_aircraft_direct_path.yaml",),
+        ("specs/missions/sentinel1_aircraft_log.yaml",),
         ("no such file.yaml",),
         ("specs/missions/rigling_moses_section_v.yaml", "--set", "radar.bandwidth=200 m"),
     )

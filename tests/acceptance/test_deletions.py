@@ -28,6 +28,7 @@ from tests.paths.test_accuracy import START, triangle, with_covariance
 
 PLATFORMS = ("transmitter", "receiver")
 KINDS = ("position", "velocity", "acceleration", "vibration", "imu", "random", "time_tag", "lever_arm")
+HALVES_OF_THE_MISSION = (("synchronization", "time_error"), ("synchronization", "frequency_error"))
 OF_THE_MISSION = {
     "propagation": "propagation",
     "synchronization": "synchronization",
@@ -188,6 +189,8 @@ def deletions(document: Document) -> Iterator[tuple[str, Document]]:
     paths = [("platforms", name, "motion_error", kind) for name in PLATFORMS for kind in KINDS]
     paths += [("platforms", name, *half) for name in PLATFORMS for half in (("motion_error",), *HALVES)]
     paths += [(section,) for section in OF_THE_MISSION]
+    if document.get("synchronization", {}).get("method") == "holdover":
+        paths += HALVES_OF_THE_MISSION
     for path in paths:
         if (left := without(document, path)) is not None:
             yield ".".join(path), left

@@ -436,7 +436,7 @@ class TestPreCommit:
 
         def hook(*files: str) -> subprocess.CompletedProcess[str]:
             return subprocess.run(
-                [sys.executable, "-I", "-m", "pre_commit", "run", "bisar-budget", "--files", *files],
+                [sys.executable, "-I", "-m", "pre_commit", "run", "bisar-budget", *(files and ("--files", *files))],
                 cwd=design,
                 env=environment(**variables),
                 capture_output=True,
@@ -457,6 +457,21 @@ class TestPreCommit:
         settings = hook("pyproject.toml")  # hold every mission below their folder
         assert settings.returncode == 1
         assert "FAIL missions/fine_survey.yaml" in settings.stdout
+
+        # A commit that only deletes: pre-commit has no file to pass on.
+        (design / "unit.yaml").write_text("kind: imu\nname: unit\naccelerometer_bias: 100 ug\nsource: sheet\n")
+        good_mission = design / "missions" / "survey.yaml"
+        text = good_mission.read_text(encoding="utf-8")
+        text = text.replace("    motion_error:\n", "    motion_error:\n      sensor: ../unit.yaml\n", 1)
+        assert "../unit.yaml" in text
+        good_mission.write_text(text, encoding="utf-8")
+        git(design, "add", "-A")
+        git(design, "commit", "-q", "--no-verify", "-m", "a part")
+        git(design, "rm", "-q", "unit.yaml")
+        deleted = hook()
+        assert deleted.returncode == 1
+        assert "missions/survey.yaml" in deleted.stdout
+        git(design, "reset", "-q", "--hard", "HEAD~1")
 
         variables["PYTHONPATH"] = set_traps(design)["PYTHONPATH"]
         trapped = hook("missions/fine_survey.yaml")

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from tests.conftest import ROOT, mission_text
+from tests.conftest import COMPLIES, ROOT, mission_text
 from tests.house.test_structure import loaded_after
 
 WARNING = mission_text(timing_error__quadratic=6e-13)  # passes, unless strict
@@ -176,9 +176,95 @@ def test_settings_are_those_of_the_folder_of_the_mission(run, tmp_path, monkeypa
     assert "a/pyproject.toml" in done.stdout
     assert run("check", "a/**/*.yaml").exit_code == 1
     assert run("check", "b/missions/m.yaml").exit_code == 0
-    both = run("check", "a/missions/m.yaml", "b/missions/m.yaml")
-    assert both.exit_code == 2
-    said = (
-        "a/missions/m.yaml has a/pyproject.toml, b/missions/m.yaml has none; check each project in a run of its own."
-    )
-    assert said in " ".join(both.stderr.split())
+
+
+@pytest.fixture
+def two_projects(tmp_path, monkeypatch):
+    """Two projects, of which the first is strict; the test runs above both."""
+    for name in ("a", "b"):
+        (tmp_path / name / "missions").mkdir(parents=True)
+        (tmp_path / name / "missions" / "m.yaml").write_text(WARNING)
+    (tmp_path / "a" / "pyproject.toml").write_text(table("strict = true"))
+    (tmp_path / "b" / "pyproject.toml").write_text(table("strict = false"))
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+BOTH = ("a/missions/m.yaml", "b/missions/m.yaml")
+
+
+class TestTwoProjects:
+    """They were refused in one run; each is judged by its own settings, and says their file."""
+
+    def test_the_strict_one_fails_and_the_other_does_not(self, run, two_projects) -> None:
+        assert run("check", *BOTH).exit_code == 1
+        assert run("check", BOTH[1]).exit_code == 0
+        (two_projects / "a" / "missions" / "m.yaml").write_text(mission_text(**COMPLIES))
+        assert run("check", *BOTH).exit_code == 0
+
+    def test_each_says_its_settings(self, run, two_projects) -> None:
+        text = run("check", *BOTH).stdout
+        assert all(f"settings {name}/pyproject.toml" in text for name in "ab")
+        (two_projects / "b" / "pyproject.toml").unlink()
+        missions = json.loads(run("check", *BOTH, "--format", "json").stdout)["missions"]
+        assert [one["file"] for one in missions] == list(BOTH)
+        said = [{each["name"]: each["value"] for each in one["overrides"]} for one in missions]
+        assert said[0] == {"--strict": "yes", "settings": "a/pyproject.toml"}
+        assert said[1] == {"settings": "none"}
+
+    @pytest.mark.parametrize("format_name", ["markdown", "html", "junit", "csv", "github", "sarif"])
+    def test_every_format_has_both_in_their_order(self, run, two_projects, format_name: str) -> None:
+        done = run("check", *reversed(BOTH), "--format", format_name)
+        assert done.exit_code == 1
+        text = done.stdout.replace("<wbr>", "").replace("\\", "")
+        places = [text.find(f"settings {name}/pyproject.toml") for name in "ba"]
+        assert -1 < places[0] < places[1]
+
+    def test_a_model_holds_for_its_own_project(self, run, two_projects) -> None:
+        (two_projects / "a" / "pyproject.toml").write_text(table('model = "full"'))
+        missions = json.loads(run("check", *BOTH, "--format", "json").stdout)["missions"]
+        assert [one["model"] for one in missions] == ["full", "published"]
+
+    def test_exit_zero_holds_for_its_own_project(self, run, two_projects) -> None:
+        (two_projects / "a" / "pyproject.toml").write_text(table("strict = true\nexit-zero = true"))
+        assert run("check", *BOTH).exit_code == 0
+        (two_projects / "b" / "pyproject.toml").write_text(table("strict = true"))
+        assert run("check", *BOTH).exit_code == 1
+
+    def test_the_command_line_holds_for_both(self, run, two_projects) -> None:
+        assert run("check", *BOTH, "--no-strict").exit_code == 0
+
+    def test_reports_of_settings_have_their_own_missions(self, run, two_projects) -> None:
+        (two_projects / "a" / "pyproject.toml").write_text(table('strict = true\nreport = ["a.json"]'))
+        (two_projects / "b" / "pyproject.toml").write_text(table('report = ["b.json"]'))
+        run("check", *BOTH, "--report", "both.json")
+        assert not (two_projects / "a" / "a.json").exists()  # the command line stands above
+        assert len(json.loads((two_projects / "both.json").read_text())["missions"]) == 2
+        run("check", *BOTH)
+        for name, file in zip("ab", BOTH, strict=True):
+            (mission,) = json.loads((two_projects / name / f"{name}.json").read_text())["missions"]
+            assert mission["file"] == file
+
+    def test_different_formats_are_said(self, run, two_projects) -> None:
+        (two_projects / "a" / "pyproject.toml").write_text(table('format = "json"'))
+        done = run("check", *BOTH)
+        assert done.stdout.startswith("WARN")
+        assert "the settings of the missions have different formats: none of them is taken" in done.stderr
+        (two_projects / "b" / "pyproject.toml").write_text(table('format = "json"'))
+        assert run("check", *BOTH).stdout.startswith("{")
+
+    def test_a_row_is_explained_in_each(self, run, two_projects) -> None:
+        (two_projects / "a" / "pyproject.toml").write_text(table('model = "full"'))
+        text = run("check", *BOTH, "--explain", "timing.quadratic").stdout
+        assert all(f"settings {name}/pyproject.toml" in text for name in "ab")
+
+    def test_a_change_of_files_in_both(self, run, two_projects) -> None:
+        (two_projects / "a" / "notes.txt").write_text("x")
+        assert run("check", "--changed", "a/notes.txt", *BOTH).exit_code == 1
+        assert run("check", "--changed", "a/pyproject.toml").exit_code == 1
+        assert run("check", "--changed", "a/notes.txt").exit_code == 0
+
+    def test_draws_are_those_of_each_project(self, run, two_projects) -> None:
+        (two_projects / "a" / "pyproject.toml").write_text(table("monte-carlo = 1000"))
+        missions = json.loads(run("check", *BOTH, "--format", "json").stdout)["missions"]
+        assert [one["monte_carlo"] is not None for one in missions] == [True, False]

@@ -79,3 +79,20 @@ def test_a_file_below_missions_is_one_whatever_it_says(run: Callable, project: P
     (project / "missions" / "sub" / "part.yaml").write_text(PART)
     assert run("check", "--changed", "missions/sub/b.yaml").exit_code == 2
     assert run("check", "--changed", "missions/sub/part.yaml").exit_code == 0
+
+
+def test_a_commit_that_only_deletes_has_no_file(run: Callable, project: Path) -> None:
+    """pre-commit passes no deleted file on: the missions that name one that is gone are checked without any."""
+    whole = run("check", "--changed", "-q")
+    assert whole.exit_code == 0
+    assert whole.stderr == "No mission is among the changed files, and none reads one of them (0 given).\n"
+    (project / "parts" / "imu.yaml").unlink()
+    done = run("check", "--changed", "-q")
+    assert done.exit_code == 2
+    assert {name for name in ALL if name in done.stdout} == {"missions/sub/beside.yaml"}
+
+
+def test_without_a_change_a_mission_is_needed(run: Callable, project: Path) -> None:
+    done = run("check")
+    assert done.exit_code == 2
+    assert "Missing argument 'MISSION...'" in done.stderr

@@ -182,6 +182,14 @@ def test_every_case_is_that_of_check(data, family, seed) -> None:
     assert_as_checked(mission, cases, whole)
 
 
+def test_where_an_image_ends_is_found_to_rounding() -> None:
+    """Gradients become parallel at 1.4533 s, and a limit is reached shortly before at 2.9066 s: 4e-8 and 2e-6 off."""
+    noise = SetValue("platforms.receiver.motion_error.random", _RULES["platforms.receiver.motion_error.random"][0])
+    mission = parse_mission(of_family("satellite_fixed", 21), "m.yaml", changes=[noise])
+    cases = grid(mission, collection__aperture_time=[1.4533, 2.9066])
+    assert_as_checked(mission, cases, swept(mission, cases))
+
+
 EXAMPLES = [
     "rigling_moses_section_v.yaml",
     "rigling_moses_section_v_autofocus.yaml",

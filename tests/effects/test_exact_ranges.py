@@ -115,7 +115,7 @@ def test_a_start_nearby_changes_nothing() -> None:
 
 @pytest.mark.parametrize("together", [1, 2 * FINE, 3 * FINE])
 def test_blocks_change_nothing(monkeypatch: pytest.MonkeyPatch, together: int) -> None:
-    """Of seven lanes, the last block is shorter; one platform is still, and one lane has no point."""
+    """Seven lanes, of which the last block is shorter; one platform is still, and one lane has no point."""
     study = Study(parse_mission(mission_text()))
     exact, generator, case = of_study(study), np.random.default_rng(1), np.zeros(7, dtype=int)
     shifts = [STILL, generator.normal(scale=5.0, size=(3, FINE, 7))]
@@ -132,7 +132,7 @@ def test_blocks_change_nothing(monkeypatch: pytest.MonkeyPatch, together: int) -
 
 
 def test_a_far_point_is_followed() -> None:
-    """Of errors as large as the geometry the search from the centre settles on no point, and steps find it."""
+    """The search from the centre settles on no point for errors as large as the geometry; steps find it."""
     study = Study(parse_mission(family_text("drones", 1)))
     exact = of_study(study)
     nearest = float(exact.nearest[0])

@@ -304,7 +304,7 @@ def test_an_error_beyond_a_tenth_of_the_range_is_held_to_its_limit_all_the_same(
 
 @pytest.mark.parametrize("family", FAMILIES)
 def test_of_few_lanes_and_of_many_the_same_is_found(family: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of a few lanes several sizes are looked at in each step, of many one."""
+    """Each step looks at several sizes of a few lanes, and at one size of many."""
 
     def found() -> np.ndarray:
         analysis = Analysis(parse_mission(family_text(family, 3)))

@@ -69,7 +69,7 @@ def arm(times: np.ndarray) -> np.ndarray:
 
 
 def through(mission: Mission, receiver: np.ndarray | None, transmitter: np.ndarray | None = None) -> Found:
-    """What histories of position errors do, (draws, nodes, 3) each."""
+    """Effects of histories of position errors, (draws, nodes, 3) each."""
     exact = ExactRanges.of(mission.geometry.both, mission.radar.wavelength, T, FINE)
     draws = len(receiver if receiver is not None else transmitter)
     shifts = [STILL if one is None else np.ascontiguousarray(one.T) for one in (transmitter, receiver)]

@@ -52,7 +52,7 @@ def of(text: str, row_id: str) -> tuple[Mission, RandomError]:
 
 
 def through_exact_ranges(mission: Mission, range_error: Callable[[np.ndarray], np.ndarray]) -> Found:
-    """What a range error over the aperture [m] does, to any order."""
+    """Effect of a range error over the aperture [m], to any order."""
     T = mission.collection.aperture_time
     heard = mission.has_direct_path
     exact = ExactRanges.of(mission.geometry.both, mission.radar.wavelength, T, FINE, has_direct_path=heard)
@@ -174,7 +174,7 @@ class DirectSum:
         self.half = mission.collection.aperture_time / 2
 
     def pulses(self, east: float, north: float) -> np.ndarray:
-        """What each pulse adds to the image of a scene centre's echo, at a ground point."""
+        """Contribution of each pulse to the image of a scene centre's echo, at a ground point."""
         away = sum(
             np.linalg.norm(track - np.array([[east], [north], [0.0]]), axis=0) - np.linalg.norm(track, axis=0)
             for track in self.tracks

@@ -57,7 +57,7 @@ def of(analysis: Analysis, row_id: str) -> RandomError:
 
 
 def through_exact_ranges(mission: Mission, position_error: np.ndarray, times: np.ndarray) -> Found:
-    """What a position error of the receiver does, (draws, nodes, 3), sampled at the nodes."""
+    """Effects of position errors of the receiver, (draws, nodes, 3), sampled at the nodes."""
     T = mission.collection.aperture_time
     paths = (mission.geometry.transmitter, mission.geometry.receiver)
     assert np.allclose(times, aperture_nodes(T))
@@ -67,7 +67,7 @@ def through_exact_ranges(mission: Mission, position_error: np.ndarray, times: np
 
 
 def through_the_clock(mission: Mission, phase: np.ndarray) -> Found:
-    """What phases of a clock do, (draws, nodes), sampled at the nodes. [rad]"""
+    """Effects of phases of a clock, (draws, nodes), sampled at the nodes. [rad]"""
     exact = ExactRanges.of(mission.geometry.both, mission.radar.wavelength, mission.collection.aperture_time, FINE)
     moved = phase.T * mission.radar.wavelength / (2 * math.pi)
     return followed(exact, moved, (STILL, STILL), np.zeros(len(phase), dtype=int))
@@ -264,7 +264,7 @@ platforms:
 # Slow against 6 s; as the receiver's filter; the fastest is half a knot of 24 nodes: its fast part would alias there.
 @pytest.mark.parametrize("time", [30.0, 1.5, 0.3])
 def test_gnss_noise_does_what_whole_time_series_do(time: float) -> None:
-    """Of three axes of its own, through exact ranges: orders 0 to 3 of each, which are all that 24 nodes can tell."""
+    """Three axes of its own, through exact ranges: orders 0 to 3 of each, which are all that 24 nodes can tell."""
     analysis = analysed(MISSION.replace("correlation_time: 1.5 s", f"correlation_time: {time} s"))
     mission, error = analysis.mission, of(analysis, "receiver.random.GNSS")
     rng = np.random.default_rng(5)

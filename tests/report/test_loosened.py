@@ -433,6 +433,38 @@ class TestCommand:
         settings.write_text(settings.read_text().replace("foo", "full"))
         assert run("diff", "missions/m.yaml", "--base", "HEAD").exit_code == 2
 
+    def test_settings_are_those_nearest_to_the_mission(self, run, project: Path, monkeypatch) -> None:
+        """From another folder too: those of the current folder were taken."""
+        nearest = project / "missions" / "pyproject.toml"
+        nearest.write_text('[tool.bisar-budget]\nmodel = "full"\nstrict = true\nsensors = ["../sensors"]\n')
+        commit(project)
+        nearest.write_text(nearest.read_text().replace("full", "published").replace("true", "false"))
+        for folder in (project, project.parent):
+            monkeypatch.chdir(folder)
+            code, document = self.diff(run, str(project / "missions" / "m.yaml"))
+            assert code == 1
+            assert [one["id"] for one in document["settings"]] == ["tool.bisar-budget.strict"]
+            loosened = document["missions"][0]["loosened"]
+            assert {"id": "allocation.model", "before": "full", "after": "published"} in loosened
+
+    def test_a_nearer_table_that_came_is_a_change(self, run, project: Path) -> None:
+        (project / "missions" / "pyproject.toml").write_text('[tool.bisar-budget]\nsensors = ["../sensors"]\n')
+        code, document = self.diff(run, "missions/m.yaml")
+        assert code == 1
+        assert [one["id"] for one in document["settings"]] == ["tool.bisar-budget.strict"]
+
+    def test_two_files_of_two_projects(self, run, project: Path) -> None:
+        """Each is judged by its own model, and a second project that is less strict loosens."""
+        (project / "other").mkdir()
+        other = project / "other" / "m.yaml"
+        other.write_text((project / "missions" / "m.yaml").read_text())
+        settings = project / "other" / "pyproject.toml"
+        settings.write_text('[tool.bisar-budget]\nstrict = true\nsensors = ["../sensors"]\n')
+        pair = ("diff", "missions/m.yaml", "other/m.yaml", "--fail-on-erosion", "10%")
+        assert run(*pair).exit_code == 0
+        settings.write_text(settings.read_text().replace("true", "false"))
+        assert run(*pair).exit_code == 1
+
     def test_what_is_let_through_is_said(self, run, project: Path) -> None:
         mission = project / "missions" / "m.yaml"
         mission.write_text(mission.read_text() + "autofocus: { n_pull: 1 }\n")

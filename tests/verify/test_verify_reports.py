@@ -12,10 +12,14 @@ from bisar_budget.budget.verdicts import with_verdicts
 from bisar_budget.cli import cli
 from bisar_budget.findings.images import Verdict, VerifiedMission
 from bisar_budget.findings.status import exit_code
+from bisar_budget.report import Style
+from bisar_budget.report.formats.verification import evidence
 from bisar_budget.verifier.limits import verify_mission
 from tests.conftest import TODAY, findings, mission_text
 from tests.conftest import row as row_of
 from tests.verify.test_verify import SECTION_V, verdicts
+
+SAID = "one sigma of 4000 time series"
 
 
 @pytest.fixture
@@ -366,3 +370,17 @@ def test_a_reason_of_the_refocused_image_says_that_it_is_about_it(run, tmp_path)
     text = " ".join(run("verify", path, "--only", "receiver.acceleration.x").stdout.split())
     assert re.search(r"receiver\.acceleration\.x \S+ \S+ [\d. ]+ confirmed", text)
     assert "receiver.acceleration.x, with autofocus: autofocus needs a patch of" in text
+
+
+def test_a_remark_of_many_rows_is_said_once() -> None:
+    """`one sigma of 4000 time series` stood in two lines for each of eight rows."""
+    rows = [
+        Verdict(
+            id=f"receiver.imu.{name}", model="full", boundary_error=1.0, unit="m", verdict="confirmed", reason=said
+        )
+        for name, said in (("attitude", SAID), ("gyro_bias", SAID), ("accelerometer_bias", "another"))
+    ]
+    lines = " ".join("\n".join(evidence(rows, Style())).split())
+    assert lines.count(SAID) == 1
+    assert f"receiver.imu.attitude, receiver.imu.gyro_bias: {SAID}" in lines
+    assert "receiver.imu.accelerometer_bias: another" in lines

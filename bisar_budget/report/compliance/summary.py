@@ -41,6 +41,7 @@ from bisar_budget.report.words.requirements import (
     kind_names,
     requirement_id,
     requirement_lines,
+    shifted_names,
     unjudged_effects,
     unseen,
     verdict,
@@ -126,7 +127,7 @@ def compliance(report: Report, style: Style) -> doc.Compliance:
     about += [("Date", report.day.isoformat())] if report.day else []
     about.append(("Tool", f"bisar-budget {report.version}"))
     sections = [_index(index)] if count > 1 else []
-    sections += [*missions, _made(report), _approval(), *annexes]
+    sections += [*missions, _made(report), _approval(report), *annexes]
     return doc.Compliance(report.version, subject, doc.Facts(about), margins, sections)
 
 
@@ -211,10 +212,22 @@ def _made(report: Report) -> doc.Chapter:
     return doc.Chapter("How this report was made", [doc.Paragraph(said), table], "made", level=2)
 
 
-def _approval() -> doc.Chapter:
+def _approval(report: Report) -> doc.Chapter:
+    """The table of signatures; above it what is signed although it is not what its source states."""
+    blocks: list[doc.Block] = []
+    shifted = [
+        (found.name, doc.Styled("id", doc.Name(one.key)), one.level, one.off)
+        for found in report.missions
+        if not isinstance(found, UnusableMission)
+        for one in found.kinds.shifted
+    ]
+    if shifted:
+        heads = doc.heads("Mission", "Key", "Level", "From")
+        blocks.append(doc.TextTable("Figures that a level shifts", "Figures off their data sheets", heads, shifted))
     columns = doc.heads("Role", "Name", "Date", "Signature")
     lines = [(role, "", "", "") for role in ("Prepared", "Reviewed", "Approved")]
-    return doc.Chapter("Approval", [doc.TextTable("", "Signatures", columns, lines, "approval")], "approval", level=2)
+    blocks.append(doc.TextTable("", "Signatures", columns, lines, "approval"))
+    return doc.Chapter("Approval", blocks, "approval", level=2)
 
 
 # ---------------------------------------------------------------------- one mission
@@ -271,6 +284,8 @@ def _verdict(page: Page) -> Iterator[doc.Block]:
     facts.append(("Declared", f"{len(found.kinds.declared)} of {found.kinds.in_all} kinds of error"))
     for name, kinds in (("Not declared", found.kinds.missing), ("Without source", found.kinds.without_source)):
         facts += [(name, ", ".join(kind_names(kinds)))] if kinds else []
+    if found.kinds.shifted:
+        facts.append(("Off the data sheet", ", ".join(shifted_names(found.kinds))))
     facts += [
         ("" if place else "Overrides", f"{one.name} {one.value} ({one.origin})")
         for place, one in enumerate(found.overrides)

@@ -160,6 +160,7 @@ def _mission(mission: MissionFindings) -> dict[str, Any]:
         "declared_kinds": mission.kinds.declared,
         "not_declared": mission.kinds.missing,
         "without_source": mission.kinds.without_source,
+        "shifted": [asdict(one) for one in mission.kinds.shifted],
         "overrides": [one._asdict() for one in mission.overrides],
         "summary": mission.summary,
         "rows": [_row(row) for row in mission.rows],

@@ -11,7 +11,7 @@ from bisar_budget import __version__
 from bisar_budget.design.offers import Offer, OfferedFigure
 from bisar_budget.faults import printable
 from bisar_budget.findings.requirement import NAMES
-from bisar_budget.findings.specification import Broken, Specification, SpecificationSheet
+from bisar_budget.findings.specification import LEAST_ROOM, Broken, Specification, SpecificationSheet
 from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.changes import parts_of
 from bisar_budget.report import Style
@@ -180,14 +180,18 @@ def _broken_words(one: Broken) -> list[str]:
     """Cells of a row in which there is no room."""
     if one.used is None:
         return [one.id, "-", percent(one.allowed), "over its limit: they leave no image"]
-    over = "over its limit" if one.used > 1 else "within its limit, but not with the reserve"
-    return [one.id, percent(one.used), percent(one.allowed), over]
+    if one.used > 1 + LEAST_ROOM:
+        return [one.id, percent(one.used), percent(one.allowed), "over its limit"]
+    is_full = one.used >= 1 - LEAST_ROOM
+    within = "at its limit" if is_full else "within its limit, but not with the reserve"
+    return [one.id, "100 %" if is_full else share_percent(one.used), percent(one.allowed), within]
 
 
 def _way_out(sheet: SpecificationSheet) -> str:
     """Remedies where other errors leave no room."""
     used = [math.inf if one.used is None else one.used for one in sheet.broken]
-    permille = math.ceil(1e3 * (1 - max(used))) - 1 if max(used) < 1 else -1  # strictly less than they leave
+    room = 1 - max(used) / (1 - LEAST_ROOM)
+    permille = math.ceil(1e3 * room) - 1 if room > 0 else -1  # strictly less than they leave
     if permille >= 0:
         return f"The other errors use that much by themselves. --reserve {permille / 10:g}% or less leaves room."
     return "The other errors, which are fixed, use that much by themselves: make them smaller, or specify them too."

@@ -74,14 +74,18 @@ def evidence(rows: Sequence[Verdict], style: Style) -> list[str]:
         lines += ["", "At the limit with autofocus, refocused:", ""]
         lines += table([("row", "limit", "budget", "residual", "loss", "verdict"), *refocused])
     lines = [_coloured(line, style) for line in lines]
-    reasons = [
-        f"{row.id}{which}: {reason}"
-        for row in rows
-        for which, reason in (("", row.reason), (", with autofocus", row.reason_autofocus))
-        if reason
-    ]
-    asides = [line for text in (*geometry_remarks(rows), *reasons) for line in wrapped(f"  {text}", "    ")]
+    asides = [line for text in (*geometry_remarks(rows), *reasons_of(rows)) for line in wrapped(f"  {text}", "    ")]
     return [*lines, "", *asides] if asides else lines
+
+
+def reasons_of(rows: Sequence[Verdict]) -> list[str]:
+    """Reasons of verdicts, each once, behind the rows that it is of."""
+    ids: dict[str, list[str]] = {}
+    for row in rows:
+        for which, reason in (("", row.reason), (", with autofocus", row.reason_autofocus)):
+            if reason:
+                ids.setdefault(reason, []).append(f"{row.id}{which}")
+    return [f"{', '.join(of_reason)}: {reason}" for reason, of_reason in ids.items()]
 
 
 def geometry_remarks(rows: Sequence[Verdict]) -> Iterator[str]:

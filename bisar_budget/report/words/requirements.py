@@ -216,13 +216,20 @@ def unseen(mission: MissionFindings) -> list[JudgedRequirement]:
 
 
 def declared_words(kinds: DeclaredKinds) -> str:
-    """Say how many kinds of error are declared, which are not, and how many declared ones have no source."""
+    """Say how many kinds of error are declared, which are not, and which have no source or are shifted off it."""
     text = f"Declared {len(kinds.declared)} of {kinds.in_all} kinds of error"
     if kinds.missing:
         text += f"; not declared: {', '.join(kind_names(kinds.missing))}"
     if kinds.without_source:
         text += f"; without source: {len(kinds.without_source)}"
+    if kinds.shifted:
+        text += f"; off the data sheet: {', '.join(shifted_names(kinds))}"
     return f"{text}."
+
+
+def shifted_names(kinds: DeclaredKinds) -> list[str]:
+    """Name the kinds of error that a level shifts off their source, each with its level."""
+    return [f"{''.join(kind_names([one.kind]))} {one.level}" for one in kinds.shifted]
 
 
 def kind_names(kinds: Sequence[str]) -> list[str]:
