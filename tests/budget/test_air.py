@@ -648,6 +648,26 @@ def test_explanations_can_be_repeated(model: str, needs: dict[str, str], changes
             assert said["allowable"] == pytest.approx(one.allowable, rel=1e-5)
 
 
+@pytest.mark.parametrize("model", ["published", "full"])
+@pytest.mark.parametrize("changes", [{}, ORBITS], ids=["flat", "orbits"])
+def test_explanations_of_air_that_changes_can_be_repeated(model: str, changes: dict[str, object]) -> None:
+    rules = {"model": model, "combine": "each", "coverage_factor": "2"}
+    air = CHANGING | {"zenith_electron_content": "0.1 TECU"}
+    mission = parse_mission(
+        mission_text(**changes, propagation=air, requirements={"islr": "-20 dB"}, allocation=rules)
+    )
+    found = check_mission(mission, TODAY)
+    for name in ("", "transmitter.", "receiver."):
+        one = row(found, f"propagation.{name}zenith_delay")
+        said = explain(mission, found, one.id)
+        assert "a = T/(2*τ_c)" in said
+        lines = sums(said)
+        for symbol, numbers, value in lines:
+            if "..." not in numbers:
+                assert evaluated(numbers) == pytest.approx(value, rel=2e-4, abs=1e-12), (one.id, symbol)
+        assert {symbol: value for symbol, _, value in lines}["allowable"] == pytest.approx(one.allowable, rel=1e-5)
+
+
 @pytest.mark.parametrize("suffix", ["html", "md", "json", "csv", "xml", "sarif"])
 def test_every_format_has_the_rows(run: Callable, tmp_path: Path, suffix: str) -> None:
     file, report = tmp_path / "m.yaml", tmp_path / f"report.{suffix}"
