@@ -34,7 +34,12 @@ DIGITS = {
 
 
 def checked(folder: Path, route: dict[str, Any], **more: Any) -> Any:
-    platform = {"trajectory": route, "motion_error": {"position": "2 cm", "velocity": "2 mm/s"}, **more}
+    """Findings of a mission that flies a smooth path through a log: steps of 1e-7 deg are 11 mm."""
+    platform = {
+        "trajectory": {**route, "processed": "smoothed"},
+        "motion_error": {"position": "2 cm", "velocity": "2 mm/s"},
+        **more,
+    }
     (folder / "m.yaml").write_text(aircraft(platforms__receiver=platform))
     return check_mission(load_mission(str(folder / "m.yaml")), TODAY)
 
@@ -178,4 +183,5 @@ def test_a_report_says_format_and_scale(run: Callable[..., Any], tmp_path: Path)
     report = json.loads(run("check", tmp_path / "m.yaml", "--format", "json").stdout)
     path = report["missions"][0]["geometry"]["receiver"]["path"]
     assert path["source"] == "RTKLIB solution (fix 490, float 11), 501 places over 10 s, UTC is GPS less 18 s"
-    assert path["samples"] == 101
+    assert path["stretch_s"] >= 2
+    assert path["samples"] == 2 * int(path["stretch_s"] / 2 * 50) + 1  # on both sides of the middle, and it
