@@ -471,7 +471,7 @@ class TestPreCommit:
         deleted = hook()
         assert deleted.returncode == 1
         assert "missions/survey.yaml" in deleted.stdout
-        git(design, "reset", "-q", "--hard", "HEAD~1")
+        git(design, "reset", "-q", "--hard", "HEAD")
 
         variables["PYTHONPATH"] = set_traps(design)["PYTHONPATH"]
         trapped = hook("missions/fine_survey.yaml")
