@@ -16,7 +16,7 @@ def confidence_of(case: Case) -> Note:
     terrain) take no part, and an error of 0 only where there is no other.
     """
     stated = list(_stated(case))
-    distributions = {name for name, is_more_than_0 in stated if is_more_than_0} or {name for name, _ in stated}
+    distributions = {name for name, is_nonzero in stated if is_nonzero} or {name for name, _ in stated}
     has_sigma, has_bounds = "normal" in distributions, bool(distributions - {"normal"})
     return phrases.confidence(case.mission.allocation.coverage_factor, has_sigma=has_sigma, has_bounds=has_bounds)
 
@@ -25,11 +25,11 @@ def _stated(case: Case) -> Iterator[tuple[str, bool]]:
     """Distribution of every declared error that has one, and whether its size is known and not 0."""
     for source in case.analysis.errors.stated:
         if source.is_covered:
-            yield distribution_of(case.mission, source), _is_more_than_0(case.number(source.declared))
+            yield distribution_of(case.mission, source), _is_nonzero(case.number(source.declared))
     for error in case.analysis.random:
         if error.is_covered and error.declared is not None and not error.counted_in:
-            yield "normal", _is_more_than_0(case.number(error.declared))
+            yield "normal", _is_nonzero(case.number(error.declared))
 
 
-def _is_more_than_0(size: float) -> bool:
+def _is_nonzero(size: float) -> bool:
     return size != 0 and not math.isnan(size)

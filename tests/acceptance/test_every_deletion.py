@@ -189,7 +189,7 @@ def is_noticed(before: Document, after: Document) -> bool:
 
 
 def grows(document: Document, after: Document) -> bool:
-    """Whether what a change leaves does as much as before: no requirement and no row is used less."""
+    """Whether no requirement and no row is used less after a change than before it."""
     found, changed = (found_in(json.dumps(one)) for one in (document, after))
     assert found is not None
     assert changed is not None

@@ -459,7 +459,7 @@ def test_a_delay_that_stays_in_a_long_aperture_is_in_doubt(air: dict, aperture_t
 
 
 def test_a_warning_of_air_that_stays_breaks_a_strict_gate_alone() -> None:
-    """What passes with it would spread -11 dB if it changed: a strict gate does not let it through."""
+    """A frozen delay passes where a changing one would spread -11 dB: a strict gate does not let it through."""
     needs = {"location_error": "1 km", "quadratic_phase_error": "360 deg"}
     found = findings(**LONG | {"requirements": needs}, propagation={"zenith_delay": "6 mm"})
     assert found.status == "warn"

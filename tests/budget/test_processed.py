@@ -1,4 +1,4 @@
-"""What a smooth path leaves of a log, and the steps of its fixes: `trajectory.processed` says whether they count."""
+"""The rest that a smooth path leaves of a log, and the steps of its fixes: `trajectory.processed` judges both."""
 
 import math
 from dataclasses import replace

@@ -161,7 +161,7 @@ def test_time_series_have_these_sigmas(text: str, figure: str, correlation_time:
 @pytest.mark.parametrize("figure", ["zenith_delay", CONTENT])
 @pytest.mark.parametrize("text", [SECTION_V, SQUINTED, TURNING], ids=["flat", "squint", "turn"])
 def test_a_long_correlation_time_is_a_delay_that_stays(text: str, figure: str, owner: str) -> None:
-    """What differs is a variance that falls as 1/τ_c: of two long times it is known, and nothing is left."""
+    """A frozen delay differs by a variance that falls as 1/τ_c: two long times give it, and nothing is left."""
     size = "1e17 1/m^2" if figure == CONTENT else "1 mm"
     found = []
     for time in ("", "1e7 s", "1e9 s"):
@@ -185,7 +185,7 @@ def test_a_long_correlation_time_is_a_delay_that_stays(text: str, figure: str, o
 
 
 def test_a_short_correlation_time_is_white_noise() -> None:
-    """Of a density 2·τ_c: σ²(QPE) = k²m²·(45/4)·2τ_c/T, and of what spreads all."""
+    """A short correlation time is white noise of density 2·τ_c: σ²(QPE) = k²m²·(45/4)·2τ_c/T; all of it spreads."""
     mission, errors = errors_of(SECTION_V, "{receiver: {zenith_delay: 1 mm, correlation_time: 1e-6 s}}")
     error, k = errors["receiver.zenith_delay"], 2 * math.pi / mission.radar.wavelength
     along = k / math.sin(math.radians(13.6))
