@@ -15,8 +15,8 @@ ROUNDING = 1e-12
 # weights between ±1.66955 cells, over all of it. Computed here, tested against direct transforms.
 MAINLOBE_ENERGY = {"uniform": 0.9028233335802807, "taylor": 0.9981912855769113}
 
-MIN_GROUND_GRADIENT = 0.02  # |u_t + u_r| on the ground; below, range says nothing about the ground
 MIN_GRADIENT_ANGLE_DEG = 1.0  # between range and Doppler gradients on the ground
+MIN_GROUND_GRADIENT = 0.02  # of the range on the ground, m per m; the published model has no image plane with less
 
 MAX_DRAWS_HERE = 10**9  # of a Monte Carlo on one machine: minutes, and a probability known to 3e-5
 MAX_DRAWS = 10**12  # shared out between many

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG, MIN_GROUND_GRADIENT, ROUNDING, SPEED_OF_LIGHT
+from bisar_budget.constants import ROUNDING, SPEED_OF_LIGHT
 
 Vector = tuple[float, float, float]
 Vectors = tuple[Any, Any, Any]  # three components, each an array or a float
@@ -341,38 +341,6 @@ class BistaticGeometry:
         """Peak to first null across φ_b on the ground, along a line of constant range: λ/(T|ṡ⊥|). [m]"""
         across = _hypot(*self.doppler_gradient) * _sin(self.gradient_angle)
         return wavelength_m / (aperture_time_s * across)
-
-    def spans_ground(self, margin: float = 1.0) -> tuple[Any, Any, Any]:
-        """Whether range changes over the ground, Doppler does, and they do along two lines, with a margin to spare.
-
-        No image is formed with |s| on the ground below 0.02 (forward scatter, or both platforms overhead) or range
-        and Doppler gradients within 1° of parallel (motion along the look direction only).
-        """
-        turning = sum(norm(path.velocity) / path.slant_range for path in self.both)
-        return (
-            _hypot(*self.range_gradient) >= margin * MIN_GROUND_GRADIENT,
-            _hypot(*self.doppler_gradient) > margin * 1e-9 * turning,
-            self.gradient_angle * (180 / math.pi) >= margin * MIN_GRADIENT_ANGLE_DEG,
-        )
-
-    def degeneracy(self) -> str:
-        """Say why no ground image can be formed of one case; empty where one can."""
-        range_changes, doppler_changes, is_plane = self.spans_ground()
-        if not range_changes:
-            length = _hypot(*self.range_gradient)
-            return (
-                f"range does not change over the ground: the look vectors cancel to {length:.2g} there, at least "
-                f"{MIN_GROUND_GRADIENT} is needed (bistatic angle {math.degrees(self.bistatic_angle):.1f} deg)"
-            )
-        if not doppler_changes:
-            return "Doppler does not change over the ground: neither line of sight turns during the aperture"
-        if not is_plane:
-            degrees = math.degrees(self.gradient_angle)
-            return (
-                f"range and Doppler gradients on the ground are {degrees:.2g} deg from parallel, at least "
-                f"{MIN_GRADIENT_ANGLE_DEG:g} deg is needed: no image plane"
-            )
-        return ""
 
 
 def angle_between_lines(a: tuple[Any, Any], b: tuple[Any, Any]) -> Any:

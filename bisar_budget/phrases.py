@@ -37,6 +37,11 @@ class Note(str):
             return self
         return Note("; ".join(filter(None, (self, *more))), self.code, (*self.values, *filter(None, more)))
 
+    def includes(self, other: "Note") -> bool:
+        """Whether it is another note, by its code and its values, or has it among what it adds."""
+        is_same = self.code == other.code and self.values[: len(other.values)] == other.values
+        return is_same or any(isinstance(value, Note) and value.includes(other) for value in self.values)
+
 
 NOTHING = Note("")
 CODES: dict[str, str] = {}  # of every sentence, with what it is said of
@@ -185,6 +190,61 @@ def effect_is_negligible(kind: str, total: float, keys: Sequence[str]) -> str:
     )
 
 
+_AIR_MAKES = {
+    "quadratic_phase_error": ("have a quadratic phase of", "rad"),
+    "cubic_phase_error": ("have a cubic phase of", "rad"),
+    "location_error": ("move the image by another", "m"),
+    "islr": ("spread", "dB"),
+}
+
+
+def _air_that_stays(aperture_time: float, correlation_time: float) -> str:
+    return (
+        f"without correlation_time the delays of propagation stay over {aperture_time:.4g} s, and say nothing of air "
+        f"that changes: in {correlation_time / 60:g} min it would"
+    )
+
+
+def _add_correlation_time(keys: Sequence[str]) -> str:
+    return f"add {' and '.join(keys)}, 1e9 s for a delay that stays"
+
+
+@phrase
+def air_stays(
+    aperture_time: float, correlation_time: float, key: str, size: float, use: float, keys: Sequence[str]
+) -> str:
+    """Said of a requirement that rests on delays of the air that stay in a long aperture. [s, s, rad or m or dB]"""
+    does, unit = _AIR_MAKES[key]
+    shown = _level(size) if unit == "dB" else _size(size, unit)
+    return (
+        f"{_air_that_stays(aperture_time, correlation_time)} {does} {shown}, {100 * use:.3g} % of what is allowed: "
+        f"{_add_correlation_time(keys)}"
+    )
+
+
+@phrase
+def air_stays_untaken(
+    aperture_time: float, correlation_time: float, kind: str, size: float, keys: Sequence[str], lines: Sequence[str]
+) -> str:
+    """Said of a delay that stays in a long aperture, where no requirement takes what it would do. [s, s, rad]"""
+    added = " or ".join(f"`{line}`" for line in lines)
+    return (
+        f"{_air_that_stays(aperture_time, correlation_time)} have {_effect(kind, size)}, which no requirement judges:"
+        f" {_add_correlation_time(keys)}, or {added} to requirements"
+    )
+
+
+@phrase
+def air_that_stays_is_negligible(
+    aperture_time: float, correlation_time: float, use: float, keys: Sequence[str]
+) -> str:
+    """Said of a mission with delays of the air that stay in a long aperture, where no verdict rests on it. [s, s]"""
+    return (
+        f"negligible: {_air_that_stays(aperture_time, correlation_time)} use {100 * use:.2g} % of a requirement at "
+        f"most ({' and '.join(keys)} states how fast it changes)"
+    )
+
+
 @phrase
 def nothing_judges(key: str) -> str:
     """Said of a requirement without a row that judges it."""
@@ -318,10 +378,16 @@ def _axes(names: Sequence[str]) -> str:
 
 
 # ---------------------------------------------------------------------- over the limit
+SHOWN_PART = 0.99  # of a phase of equal loss, below which its quadratic part is shown beside it
+
+
 @phrase
-def quadratic_phase_over(phase: float, limit: float, equation: str = "") -> str:
-    """Said of one error. [rad]"""
-    return _by(f"QPE {_against(phase, limit, 'rad')}", equation)
+def quadratic_phase_over(phase: float, limit: float, equation: str = "", quadratic: float | None = None) -> str:
+    """Said of one error, whose phase of equal loss may be more than its quadratic part. [rad]"""
+    text = _by(f"QPE {_against(phase, limit, 'rad')}", equation)
+    if quadratic is None or quadratic >= SHOWN_PART * phase:  # both are infinite where there is no image
+        return text
+    return f"{text}: the quadratic phase of equal loss, of which {quadratic:.3g} rad are quadratic"
 
 
 @phrase
@@ -378,6 +444,12 @@ def all_together_over(what: str, size: float, limit: float, unit: str) -> str:
 def edge_over() -> str:
     """Said of the scene's edge."""
     return "quadratic phase at the scene's edge and at its centre differ by more than the total budget"
+
+
+@phrase
+def no_autofocus_helps(hidden: float, limit: float) -> str:
+    """Said of an error whose loss is no quadratic phase that autofocus could correct. [rad]"""
+    return f"no autofocus helps: it leaves a loss of {_against(hidden, limit, 'rad')}"
 
 
 @phrase
@@ -616,6 +688,12 @@ def no_displacement(degrees: float) -> str:
         f"(25) has no displacement here: with the range held constant, range and Doppler gradients are "
         f"{degrees:.2g} deg from parallel"
     )
+
+
+@phrase
+def no_displacement_across(gradient: float) -> str:
+    """Said of look vectors that all but cancel on the ground at mid-aperture. [m/m]"""
+    return f"(25) has no displacement here: the look vectors cancel to {gradient:.2g} on the ground at mid-aperture"
 
 
 @phrase
@@ -1096,16 +1174,6 @@ def direct_path_is_the_clock() -> str:
     return (
         "the direct path is the clock: the full model takes ranges less the distance of the platforms, and "
         "timing errors have no effect; values of the published model are those without it"
-    )
-
-
-@phrase
-def range_cells_are_coarse(phase: float, shown_percent: float) -> str:
-    """Said of a collection. [rad]"""
-    return (
-        f"points a range cell apart differ by {phase:.3g} rad of quadratic phase: a defocused response spreads "
-        f"over range cells instead. An image shows about {shown_percent:.2g} % of the phase: the limits are "
-        "conservative"
     )
 
 

@@ -36,10 +36,7 @@ class Allocation(NamedTuple):
     @property
     def autofocus_gain(self) -> Any:
         """Factor on QPE limits: π·N_pull over the total, never below 1 (Section VI; 4·N_pull for π/4)."""
-        if self.n_pull is None:
-            return 1.0
-        gain = evaluators.autofocus_gain(self.n_pull, self.qpe_total)
-        return gain * (gain > 1) + 1.0 * (gain <= 1)  # the larger one, of arrays too
+        return _gain(self.n_pull, self.qpe_total)
 
     def qpe_limit(self, owner: str) -> float:
         """QPE that an owner may use, before autofocus. [rad]"""
@@ -53,9 +50,27 @@ class Allocation(NamedTuple):
         """Those of one of many cases, in plain numbers."""
         return Allocation._make(_plain(part, case) for part in self)
 
-    def passes_with(self, qpe: float, owner: str, mission: Mission) -> Note:
-        """Say from which N_pull a QPE of an owner would pass, or that no autofocus corrects it."""
-        return needed_sentence(qpe / (self.qpe.of(owner) * math.pi), caps(mission))
+    def passes_with(self, qpe: float, hidden: float, owner: str, mission: Mission) -> Note:
+        """Say from which N_pull a QPE of an owner would pass, or that no autofocus corrects it.
+
+        Autofocus corrects nothing of the `hidden` phase, what remains is for the quadratic one. [rad]
+        """
+        room = 1 - (hidden / self.qpe_limit(owner)) ** 2
+        if room <= 0:
+            return phrases.no_autofocus_helps(hidden, self.qpe_limit(owner))
+        return needed_sentence(qpe / math.sqrt(room) / (self.qpe.of(owner) * math.pi), caps(mission))
+
+
+def _gain(n_pull: Any, qpe_total: Any) -> Any:
+    if n_pull is None:
+        return 1.0
+    gain = evaluators.autofocus_gain(n_pull, qpe_total)
+    return gain * (gain > 1) + 1.0 * (gain <= 1)  # the larger one, of arrays too
+
+
+def autofocus_gain_of(mission: Mission) -> Any:
+    """Return the factor on QPE limits that the autofocus of a mission gives, however its budget is divided."""
+    return _gain(effective_n_pull(mission), mission.requirements.quadratic_phase_error)
 
 
 def _plain(part: Any, case: int) -> Any:
@@ -95,11 +110,11 @@ def allocate(mission: Mission, gates: Iterable[Together]) -> Allocation:
 
 
 def _balanced(gates: Sequence[Together]) -> Shares:
-    """Shares as the declared errors need them; by several models the larger phase of each error."""
+    """Shares as the declared errors need them; by several models the larger judged phase of each error."""
     weights = []
     for owner in ("transmitter", "receiver"):
-        by_model = zip(*(together.owed(EQUAL, owner) for together in gates), strict=True)
-        phases = [(of_one[0].row_id, _largest([one.qpe_rad for one in of_one])) for of_one in by_model]
+        by_model = zip(*(together.judged_parts(together.owed(EQUAL, owner)) for together in gates), strict=True)
+        phases = [(of_one[0][0], _largest([phase for _, phase in of_one])) for of_one in by_model]
         # An error that leaves no image has no finite phase: it takes all that it may.
         weights.append(np.minimum(gates[0].combined(phases), 1e300))
     total = weights[0] + weights[1]

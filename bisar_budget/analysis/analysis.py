@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bisar_budget.analysis.allocation import Allocation, allocate
+from bisar_budget.analysis.allocation import Allocation, allocate, autofocus_gain_of
 from bisar_budget.analysis.spread import Tone, tones
 from bisar_budget.analysis.together import Together
 from bisar_budget.analysis.tone_displacement import ToneDisplacement, tone_displacements
@@ -23,10 +23,11 @@ from bisar_budget.effects.random_errors import in_one_case, random_errors
 from bisar_budget.effects.sources import exact_ranges
 from bisar_budget.effects.vibration import DeclaredPhase, slow_phases
 from bisar_budget.geometry import BistaticGeometry, GroundVector
+from bisar_budget.image_plane import nodes_for
 from bisar_budget.mission.model import Mission, has_random_errors
 from bisar_budget.mission.stacked import picked
 from bisar_budget.phrases import Note
-from bisar_budget.ranges.exact_ranges import ExactRanges, nodes_for
+from bisar_budget.ranges.exact_ranges import ExactRanges
 
 __all__ = ["Analysis", "Case", "Model", "by_nodes"]
 
@@ -92,7 +93,15 @@ class Analysis:
     @cached_property
     def errors(self) -> DeclaredErrors:
         """Every error that the cases can have, declared or not, or those that are shown."""
-        return DeclaredErrors(self.mission, self.cases, self.geometry, self.exact, self.shown, is_whole=self.is_whole)
+        return DeclaredErrors(
+            self.mission,
+            self.cases,
+            self.geometry,
+            self.exact,
+            self.shown,
+            gain=autofocus_gain_of(self.mission),
+            is_whole=self.is_whole,
+        )
 
     @cached_property
     def sources(self) -> list[ErrorSource]:

@@ -23,15 +23,16 @@ import numpy as np
 
 from bisar_budget import phrases
 from bisar_budget.analysis.scene_random import RandomPhases
-from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG, MIN_GROUND_GRADIENT, UTILIZATION_TOLERANCE
+from bisar_budget.constants import UTILIZATION_TOLERANCE
 from bisar_budget.effects.combined import combined, combined_phase, correlated_errors
 from bisar_budget.effects.declared import DeclaredErrors
 from bisar_budget.effects.random_effect import RandomError
 from bisar_budget.geometry import BistaticGeometry, GroundVector
-from bisar_budget.mission.model import Shares
+from bisar_budget.image_plane import MIN_SINE, degeneracy
+from bisar_budget.mission.model import Mission, Shares
 from bisar_budget.phrases import NOTHING, Note
 from bisar_budget.ranges.exact_ranges import ExactRanges, Floats, Lanes, Places, SmallErrors, Truths
-from bisar_budget.ranges.point_paths import PointPaths
+from bisar_budget.ranges.point_paths import ROWS, PointPaths
 from bisar_budget.units import format_quantity
 
 RIM_POINTS = 16
@@ -40,7 +41,6 @@ LIKE_A_COSINE = 1e-4  # as near to the crest of a cosine; its azimuth is then ri
 ROUGH = 0.1  # by so much, of itself, a crest through points of the rim may be off
 CLIMBS = 5  # until then, each in a quarter of the arc before
 NARROW = 10.0  # of a place's clearances; below, it is looked at whatever its difference
-MIN_SINE = math.sin(math.radians(MIN_GRADIENT_ANGLE_DEG))
 NEAREST_M = 1.0  # of a platform to a place; nearer, no image
 FARTHEST = 0.5  # of the nearest slant range: the search for a radius ends there
 PRECISION = 1e-3  # of the radius
@@ -63,24 +63,23 @@ SizeAt = Callable[[Floats, Places], Floats]  # sizes at radii, of some cases
 class ScenePlaces:
     """Quadratic phase of each error or part at places, (errors, places); how far they are from the centre's. [rad]
 
-    There is an image where both `clearances`, (2, places), are above 1: the sine between range and Doppler gradient,
-    and the range gradient, over the least of each. The sine has the centre's sign: below zero, they are parallel on
-    the way.
+    There is an image where the `clearance`, (places,), is above 1: the sine of the angle between the directions that
+    band and aperture resolve, over the least. It has the centre's sign: below zero they are parallel on the way.
     """
 
     phases: Floats
     size: Floats
-    clearances: Floats
+    clearance: Floats
 
     @property
     def has_image(self) -> Truths:
         """Whether an image can be formed there."""
-        return np.asarray((self.clearances > 1).all(axis=0))
+        return np.asarray(self.clearance > 1)
 
     @property
     def heights(self) -> Floats:
-        """Heights that a search along circles climbs, (3, places): the clearances, negative, and the size."""
-        return np.array((*-self.clearances, self.size))
+        """Heights that a search along circles climbs, (2, places): the clearance, negative, and the size."""
+        return np.array((-self.clearance, self.size))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -151,7 +150,6 @@ class ScenePhases:
         for index, error in enumerate(self.members):
             self.is_large[index] = errors.is_large(error)
         self.nearest = errors.array(np.minimum(*(path.slant_range for path in errors.geometries.both)))
-        self.turn = np.copysign(1.0, self.exact.sine)
 
     def ranges_at(self, radius: Floats, azimuth: Floats, of: Places) -> ExactRanges:
         """Exact ranges of places."""
@@ -168,13 +166,12 @@ class ScenePhases:
         if self.members:
             small = there.quadratics_of(self.small.there(of)) * self.sizes.take(of, axis=1)
             phases = np.concatenate((small, phases))
-        clearances = np.array(
-            (self.turn.take(of) * there.sine / MIN_SINE, there.range_gradient / MIN_GROUND_GRADIENT)
-        )
-        is_nowhere = (there.nearest < NEAREST_M) | ~np.isfinite(phases.sum(axis=0) + clearances.sum(axis=0))
+        way = np.copysign(1.0, there.matrix.turned_from(self.exact.matrix, of))
+        clearance = way * there.sine / MIN_SINE
+        is_nowhere = (there.nearest < NEAREST_M) | ~np.isfinite(phases.sum(axis=0) + clearance)
         if is_nowhere.any():
-            phases, clearances = np.where(is_nowhere, centre, phases), np.where(is_nowhere, 0.0, clearances)
-        return ScenePlaces(phases, self.together(phases - centre, of), clearances)
+            phases, clearance = np.where(is_nowhere, centre, phases), np.where(is_nowhere, 0.0, clearance)
+        return ScenePlaces(phases, self.together(phases - centre, of), clearance)
 
     def together(self, phases: Floats, of: Places, indices: Sequence[int] | None = None) -> Floats:
         """Phases of the errors, or of some of them, combined; those of a covariance with their correlations. [rad]"""
@@ -222,8 +219,8 @@ class ScenePhases:
         way = np.array(there.way(lanes, none, (none, none)))
         paths = PointPaths(there, lanes, way, is_alike=self.errors.is_whole)
         paths.to(every, sizes)
-        known = paths.known(every, sizes).reshape(6, 2, count)
-        np.minimum.at(turns, place, np.nan_to_num(known[5]).min(axis=0))
+        known = paths.known(every, sizes).reshape(ROWS, 2, count)
+        np.minimum.at(turns, place, np.nan_to_num(known[-1]).min(axis=0))
         differs = np.abs(known[3] - self._by_sign[:, error, case])
         worst = np.where(np.isnan(differs), math.inf, differs).max(axis=0)
         found[error, place] = np.copysign(worst, found[error, place])
@@ -273,7 +270,7 @@ class ScenePhases:
             return self.places(radius[circle], azimuth, of[circle])
 
         even = look(np.repeat(2 * math.pi * np.arange(count) / count, of.size), np.tile(circles, count))
-        clear, tops = _tops(even.heights.reshape(3, count, of.size), lambda *where: look(*where).heights)
+        clear, tops = _tops(even.heights.reshape(2, count, of.size), lambda *where: look(*where).heights)
         nearest = clear.highest
         has_image = nearest.height < -1
         some, circle = np.nonzero((clear.height > -math.inf) & has_image)
@@ -299,20 +296,20 @@ def at(radius: Any, azimuth: Any) -> tuple[Any, Any]:
 
 # ---------------------------------------------------------------------- climbs
 def _tops(heights: Floats, look: Callable[[Floats, Places], Floats]) -> tuple[Heights, Heights]:
-    """Climb from each of the even points of circles, (3, points, circles), that is above its neighbours.
+    """Climb from each of the even points of circles, (2, points, circles), that is above its neighbours.
 
-    Heights are both clearances, less than nothing, and sizes, as `look` has them at azimuths of circles. Arrived at
-    are tops of the clearances, (2 points, circles), and of the sizes, (points, circles); minus infinity where none
-    climbed. Left out are clearances that do not seem to come below `NARROW`, and sizes that seem to stay below the
+    Heights are clearances, less than nothing, and sizes, as `look` has them at azimuths of circles. Arrived at are
+    tops of the clearances and of the sizes, (points, circles) each; minus infinity where none climbed. Left out are
+    clearances that do not seem to come below `NARROW`, and sizes that seem to stay below the
     highest by more than a crest may be off; a valley that is milder at the points may be the deeper between them.
     """
-    count, arc = heights.shape[1], 2 * math.pi / heights.shape[1]
+    arc = 2 * math.pi / heights.shape[1]
     before, after = np.roll(heights, 1, axis=1), np.roll(heights, -1, axis=1)
     _, crests = _crest(before, after, heights, arc)
-    most = crests[2] + ROUGH * np.abs(crests[2])
+    most = crests[1] + ROUGH * np.abs(crests[1])
     is_start = heights >= np.maximum(before, after)
-    is_start[:2] &= crests[:2] > -NARROW
-    is_start[2] &= (most >= heights[2].max(axis=0)) & (heights[:2] < -1).all(axis=(0, 1))
+    is_start[0] &= crests[0] > -NARROW
+    is_start[1] &= (most >= heights[1].max(axis=0)) & (heights[0] < -1).all(axis=0)
     kind, point, circle = np.nonzero(is_start)
     top = _climbed(
         lambda azimuth, some: look(azimuth, circle[some])[kind[some], np.arange(some.size)],
@@ -323,12 +320,12 @@ def _tops(heights: Floats, look: Callable[[Floats, Places], Floats]) -> tuple[He
     found = Heights(np.full(heights.shape, -math.inf), np.zeros(heights.shape))
     found.put(is_start, top)
     # As if they had been climbed one by one, from the highest crest on.
-    order = np.argsort(np.where(is_start[2], -crests[2], math.inf), axis=0, kind="stable")
-    climbed, seemed = (np.take_along_axis(one, order, axis=0) for one in (found.height[2], most))
+    order = np.argsort(np.where(is_start[1], -crests[1], math.inf), axis=0, kind="stable")
+    climbed, seemed = (np.take_along_axis(one, order, axis=0) for one in (found.height[1], most))
     is_low = seemed[1:] < np.maximum.accumulate(climbed, axis=0)[:-1]
     climbed[1:][is_low] = -math.inf
-    np.put_along_axis(found.height[2], order, climbed, axis=0)
-    return Heights(*(one[:2].reshape(2 * count, -1) for one in found)), found.of(2)
+    np.put_along_axis(found.height[1], order, climbed, axis=0)
+    return found.of(0), found.of(1)
 
 
 def _climbed(height_at: HeightAt, sides: tuple[Floats, Floats], start: Heights, arc: float) -> Heights:
@@ -723,13 +720,13 @@ class SceneEdge(NamedTuple):
     doubt: Note
 
     @classmethod
-    def of(cls, corrections: Corrections, geometry: BistaticGeometry, case: int = 0) -> "SceneEdge":
-        """That of one case, with its geometry."""
+    def of(cls, corrections: Corrections, mission: Mission, case: int = 0) -> "SceneEdge":
+        """That of one case, with its mission."""
         edges = corrections.edges
         (size, rim), (difference, azimuth) = (map(float, one.of(case)) for one in (edges.rim, edges.largest))
         radius, nowhere = float(edges.radius[case]), (math.nan, 0.0, None)
         if math.isinf(size):
-            reason = phrases.no_image_at_the_edge(math.degrees(rim), _degeneracy(geometry, at(radius, rim)))
+            reason = phrases.no_image_at_the_edge(math.degrees(rim), _degeneracy(mission, at(radius, rim)))
             return cls(radius, *nowhere, FARTHEST * float(edges.phases.nearest[case]), reason, NOTHING)
         searched = float(corrections.farthest[case])
         if math.isinf(difference):
@@ -756,9 +753,9 @@ class SceneEdge(NamedTuple):
         return f"out to {format_quantity(self.autofocus_radius, 'm', 3, 'down')}"
 
 
-def _degeneracy(geometry: BistaticGeometry, place: GroundVector) -> str:
+def _degeneracy(mission: Mission, place: GroundVector) -> str:
     """Why a place of the ground has no image."""
-    east, north = place
+    (east, north), geometry = place, mission.geometry
     transmitter, receiver = (
         replace(state, position=(state.position[0] - east, state.position[1] - north, state.position[2]))
         for state in (geometry.transmitter, geometry.receiver)
@@ -766,4 +763,5 @@ def _degeneracy(geometry: BistaticGeometry, place: GroundVector) -> str:
     there = BistaticGeometry(transmitter=transmitter, receiver=receiver)
     if min(there.transmitter.slant_range, there.receiver.slant_range) < NEAREST_M:
         return phrases.platform_at_the_edge(NEAREST_M)
-    return there.degeneracy() or phrases.gradients_become_parallel()
+    reason = degeneracy(there, mission.radar, mission.collection.aperture_time)
+    return reason or phrases.gradients_become_parallel()

@@ -19,7 +19,7 @@ What is stated by its effect alone is that all over the scene. Against exact ran
 `tests/simulate/test_random_at_scene_edge.py`. Derived here.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -38,7 +38,8 @@ from bisar_budget.effects.effect import PLATFORMS, Subject
 from bisar_budget.effects.random_effect import NODES, Moves, RandomError, SensorCases, factor
 from bisar_budget.effects.vibration import slow_moves
 from bisar_budget.geometry import Vectors
-from bisar_budget.ranges.exact_ranges import ExactRanges, Floats, Places, nodes
+from bisar_budget.image_plane import nodes
+from bisar_budget.ranges.exact_ranges import ExactRanges, Floats, Places
 
 _CLOCKS = ("oscillator", "synchronization")  # kinds of errors that move nothing
 
@@ -114,14 +115,22 @@ class _Clock(NamedTuple):
         """That of a covariance of phases and displacement at the centre by a unit, (4, 4, cases)."""
         known = covariance.reshape(4, 4, -1)[np.ix_((0, 2, 3), (0, 2, 3))]
         quadratic, east, north = np.moveaxis(factor(np.moveaxis(known, 2, 0)), 0, 2) * size
-        (a, b), (c, d) = exact.adjugate  # of Q, which takes a displacement to the terms
-        return cls(quadratic, d * east - b * north, a * north - c * east, np.array(exact.phases_per_term[0]))
+        (a, b), (c, d) = _terms(exact.place_weights, exact)  # what a unit of each term displaces
+        with np.errstate(all="ignore"):
+            scale = 1 / (a * d - b * c)
+        constant, linear = (d * east - b * north) * scale, (a * north - c * east) * scale
+        return cls(quadratic, constant, linear, _terms(exact.phase_weights, exact)[0])
 
     def there(self, there: ExactRanges, of: Places) -> Floats:
         """Quadratic phase of each part, (parts, places). [rad]"""
-        by_constant, by_linear = np.array(there.phases_per_term[0]) - self.at_centre[:, of]
+        by_constant, by_linear = _terms(there.phase_weights, there)[0] - self.at_centre[:, of]
         quadratic, constant, linear = (part[:, of] for part in self[:3])
         return np.asarray(quadratic + by_constant * constant + by_linear * linear)
+
+
+def _terms(weights: Iterable[Floats], exact: ExactRanges) -> Floats:
+    """Effects of a metre, and of a metre per second, of range error by weights at the nodes, (effects, 2, cases)."""
+    return np.array([[one.sum(axis=0), (one * exact.times).sum(axis=0)] for one in weights])
 
 
 class _Delay(NamedTuple):

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 CUBIC_POWER = 4 / 175  # of a cubic phase φ₃ at the edge: its Legendre part 2/5·φ₃, whose mean square is (4/25)/7·φ₃²
 SMALLEST_CUBIC_RAD = 1e-3  # a power of -76 dB, which no image shows
+SMALLEST_REST_RAD = 1e-3  # rms, a power of -60 dB
 
 
 class Tone(NamedTuple):
@@ -165,6 +166,25 @@ def noise(analysis: "Analysis", model: str) -> list[SpreadPhase]:
     return found
 
 
+def rests(analysis: "Analysis", model: str) -> list[SpreadPhase]:
+    """List what errors of motion and clocks leave beyond the cubic, at one sigma, where an image shows it.
+
+    Short apertures leave next to nothing, a quarter of a circle does. The published model knows none; where a line of
+    sight turns by more than a radian the phase of equal loss holds it.
+    """
+    if model == "published":
+        return []
+    found, errors = [], analysis.errors
+    factor = analysis.mission.allocation.coverage_factor
+    for error in errors.stated:
+        if error.is_motion:
+            rms = np.asarray(errors.does(model, error).rest) / (factor if error.is_covered else 1.0)
+            shows = (rms > SMALLEST_REST_RAD) & np.isfinite(rms) & ~errors.exact.is_turned
+            if shows.any():
+                found.append(SpreadPhase(error.id, error.owner, np.where(shows, rms**2, math.nan)))
+    return found
+
+
 def stated_powers(mission: Mission) -> list[StatedPower]:
     """List what errors from elsewhere spread that state their ISLR."""
     return [
@@ -177,12 +197,12 @@ def stated_powers(mission: Mission) -> list[StatedPower]:
 def powers_held_by_islr(analysis: "Analysis", owners: Iterable[str], model: str) -> list[list[SpreadPhase]]:
     """List the phases that count against ISLR, of each owner; against the mission's all do.
 
-    They are noise, the tones that no other requirement takes, and the power of the cubic where nothing else holds it:
-    that of an owner at one sigma, none where it is too small to show, or where an error has no image. A variance is
-    not a number where a case does not have the phase.
+    They are noise, what other errors leave beyond the cubic, the tones that no other requirement takes, and the power
+    of the cubic where nothing else holds it: that of an owner at one sigma, none where it is too small to show, or
+    where an error has no image. A variance is not a number where a case does not have the phase.
     """
     mission, split, together = analysis.mission, analysis.allocation.islr, analysis.together(model)
-    spreads = noise(analysis, model)
+    spreads = noise(analysis, model) + rests(analysis, model)
     if mission.requirements.pslr is None:
         for one in analysis.tones:
             variance = np.where(one.is_there, one.phase**2 / 2, math.nan)[()]

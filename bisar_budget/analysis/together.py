@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterable, Sequence
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from bisar_budget.effects.combined import (
     phase_parts,
 )
 from bisar_budget.effects.declared import DeclaredErrors
-from bisar_budget.effects.random_effect import RandomError
+from bisar_budget.effects.random_effect import RandomError, factor
 from bisar_budget.effects.vibration import DeclaredPhase
 from bisar_budget.geometry import GroundVector
 from bisar_budget.mission.model import Shares
@@ -69,9 +70,12 @@ class Together:
         found = [one._replace(qpe_rad=array(one.qpe_rad), cubic_rad=array(one.cubic_rad)) for one in self.slow]
         for error in self.random:
             if error.declared is not None:
-                quadratic, cubic = (array(part * error.declared) for part in error.effect(self.model)[:2])
-                coverage = error.coverage(self.errors.mission)
-                found.append(DeclaredPhase(error.subject.id, error.subject.owner, quadratic, cubic, coverage))
+                effect, coverage = error.effect(self.model), error.coverage(self.errors.mission)
+                quadratic, cubic, hidden = (
+                    array(part * error.declared) for part in (effect.quadratic, effect.cubic, effect.hidden)
+                )
+                phase = DeclaredPhase(error.subject.id, error.subject.owner, quadratic, cubic, coverage)
+                found.append(phase._replace(hidden_rad=hidden))
         return found
 
     @cached_property
@@ -81,12 +85,52 @@ class Together:
         for error in self.errors.stated:
             does, coverage = self.errors.does(self.model, error), factor if error.is_covered else 1.0
             cubic = does.cubic if error.is_motion else None
-            found.append(DeclaredPhase(error.subject.id, error.subject.owner, does.qpe, cubic, coverage))
+            phase = DeclaredPhase(error.subject.id, error.subject.owner, does.qpe, cubic, coverage)
+            found.append(phase._replace(hidden_rad=does.hidden))
         return [*found, *self.own]
 
     def owed(self, split: Shares, owner: str) -> list[DeclaredPhase]:
         """Those that count against the share of an owner; against the mission's all."""
         return [one for one in self.phases if split.includes(one.owner, owner)]
+
+    def judged_parts(self, members: Sequence[DeclaredPhase], rule: str = "", gain: Any = None) -> Phases:
+        """List the judged phases that a rule combines, with the mission's gain or another. [rad]
+
+        Under root-sum-square the six of a covariance are one, as their correlations make it.
+        """
+        gain, groups = self.errors.gain if gain is None else gain, self.groups
+        found = {member.row_id: member.judged(gain) for member in members}
+        if (rule or self.rule) == "rss":
+            quadratic = dict(quadratics(members))
+            for group in groups:
+                if found.keys() >= set(group.ids):
+                    size = group.phase([quadratic[row_id] for row_id in group.ids])
+                    for row_id in group.ids:
+                        del found[row_id]
+                    found[group.id] = np.hypot(size, gain * self._hidden_of(group))
+        return list(found.items())
+
+    def judged(self, members: Sequence[DeclaredPhase], rule: str = "", gain: Any = None) -> Floats:
+        """Combine the judged phases of errors by the mission's rule, or another. [rad]"""
+        return self.errors.array(combined_phase(self.judged_parts(members, rule, gain), rule or self.rule))
+
+    def _hidden_of(self, group: Correlated) -> Any:
+        """Hidden phase of the six errors of a covariance; none by the published model. [rad]
+
+        A root of their correlations makes independent errors of them, whose squares add up.
+        """
+        if self.model == "published":
+            return 0.0
+        errors = {error.subject.id: error for error in self.motion}
+        left = []
+        for row_id in group.ids:
+            block, place = self.errors.block_of(errors[row_id])
+            left.append(block.left_per_unit([place])[0] * np.nan_to_num(block.declared[place]))
+        correlation = np.array([[self.errors.array(rho) for rho in row] for row in group.correlation])
+        roots = factor(np.moveaxis(correlation, 2, 0))
+        independent = np.einsum("cij,inc->jnc", roots, np.array(left))
+        hidden, _ = self.errors.exact.unresolved(independent)
+        return np.sqrt(np.square(hidden).sum(axis=0))
 
     def combined(self, phases: Phases, rule: str = "") -> Floats:
         """Combine phases by the mission's rule, or another. [rad]"""

@@ -1,7 +1,7 @@
 """Declared errors together: phases of platforms and mission, cubic phase, location, autofocus pull-in, scene edge."""
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -11,17 +11,16 @@ import numpy as np
 from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Analysis, Case
 from bisar_budget.analysis.scene import Corrections, SceneEdge, SceneEdges
-from bisar_budget.analysis.spread import noise
+from bisar_budget.analysis.spread import noise, rests
 from bisar_budget.analysis.together import Together, cubics, quadratics
-from bisar_budget.budget.continued_masks import continuation_note, rests_on_masks
+from bisar_budget.budget.continued_masks import continuation_note, part_of, rests_on_masks
 from bisar_budget.budget.doubted_noise import doubted_noise_note, rests_on_doubted_noise
 from bisar_budget.budget.judged_requirements import (
     MAKES_UP,
-    SMALL_RAD,
     TAKEN_BY,
-    TENTH,
     UntakenEffect,
     first_highest,
+    negligible_rad,
 )
 from bisar_budget.budget.judged_rows import BOUND, CODE, FamilyRow, Judging, worded
 from bisar_budget.effects.combined import Phases, correlation_notes
@@ -63,27 +62,29 @@ class Aggregates:
 
     def _quadratic(self, mine: Together, theirs: Together, owner: str) -> "Aggregate":
         split, limit, gain = self.allocation.qpe, self.allocation.qpe_limit(owner), self.allocation.autofocus_gain
-        members = mine.owed(split, owner)
-        size, by_other = mine.combined(quadratics(members)), theirs.combined(quadratics(theirs.owed(split, owner)))
-        published, full = (size, by_other) if mine.model == "published" else (by_other, size)
-        return self._row(
+        members, of_other = mine.owed(split, owner), theirs.owed(split, owner)
+        size, by_other, equal_loss = mine.judged(members), theirs.judged(of_other), mine.judged(members, gain=1.0)
+        published, full = (members, of_other) if mine.model == "published" else (of_other, members)
+        of_full = self.together("full").combined(quadratics(full))
+        found = self._row(
             subject(owner, QUADRATIC),
             self._is_declared(members),
-            quadratics(members),
+            mine.judged_parts(members),
             size,
             limit * gain,
             theirs,
             by_other,
-            without_autofocus=size / limit,
+            without_autofocus=equal_loss / limit,
             continued=("quadratic", self._of_owners(split, owner)),
-            qpe_published_rad=published,
-            qpe_full_rad=np.where(np.isfinite(full), full, math.nan),
+            qpe_published_rad=self.together("published").combined(quadratics(published)),
+            qpe_full_rad=np.where(np.isfinite(of_full), of_full, math.nan),
         )
+        return found.of_equal_loss(equal_loss, self.together("full").judged(full, gain=1.0))
 
     def _largest_quadratic(self, mine: Together, theirs: Together) -> "Aggregate":
         """A warning where each error stands alone and all together exceed the total; else there is no row."""
-        what, phases = subject("mission", QUADRATIC), quadratics(mine.phases)
-        size, of_all = mine.combined(phases), mine.combined(phases, "rss")
+        what, phases = subject("mission", QUADRATIC), mine.judged_parts(mine.phases)
+        size, of_all = mine.judged(mine.phases), mine.judged(mine.phases, "rss")
         limit = self.allocation.qpe_total * self.allocation.autofocus_gain
         found = self._row(what, True, phases, size, limit, theirs, of_all=of_all)
         is_there = found.is_over_of_all & (found.judged.status == CODE["warn"])  # else its own row says what fails
@@ -225,9 +226,25 @@ class Aggregate(FamilyRow):
     continued: tuple[str, Sequence[RandomError]] = ("quadratic", ())
     is_in_doubt: Any = False  # the noise that it rests on
 
+    def of_equal_loss(self, equal_loss: Floats, of_full: Floats) -> "Aggregate":
+        """The row with the phase of equal loss as declared; of what autofocus does not correct it may be less.
+
+        What is allowed of it is declared over utilization, where anything is declared.
+        """
+        judged = self.judged
+        with np.errstate(all="ignore"):
+            scale = np.where(judged.declared > 0, equal_loss / judged.declared, 1.0)
+        scale = np.where(np.isfinite(scale), scale, 1.0)
+        judged = judged._replace(
+            declared=judged.declared * scale,
+            allowable=judged.allowable * scale,
+            equal_loss_qpe_rad=np.where(np.isfinite(of_full), of_full, math.nan),
+        )
+        return replace(self, judged=judged)
+
     def in_words(self, case: Case, model: str) -> Row:
         """The row of one case, by the model that judges it."""
-        mission, allocation, what = case.mission, case.allocation, self.judged.subject
+        mission, what = case.mission, self.judged.subject
         groups, combine, owner = case.analysis.groups, mission.allocation.combine, what.owner
         numbers = map(case.number, (self.judged.declared, self.judged.allowable))
         size, limit = (None if math.isnan(one) else one for one in numbers)
@@ -240,7 +257,7 @@ class Aggregate(FamilyRow):
             over = phrases.aggregate_over(said.what, size, limit, said.unit, *_largest(case, model, self))
         if what.kind == QUADRATIC:
             if over and size is not None and combine != "each":
-                over = over.then(allocation.passes_with(size, owner, mission))
+                over = over.then(self._passes_with(case, model))
         elif over and size is not None and what.kind != LOCATION:
             over = over.then(phrases.no_gain() if what.kind == CUBIC else phrases.one_total())
         doubt = over if what.kind == PULL_IN else NOTHING
@@ -263,6 +280,14 @@ class Aggregate(FamilyRow):
             remarks=notes,
         )
 
+    def _passes_with(self, case: Case, model: str) -> Note:
+        """Say from which N_pull the sum would pass, or that no autofocus corrects it."""
+        together, owner = case.analysis.together(model), self.judged.subject.owner
+        members = together.owed(case.allocation.qpe, owner)
+        quadratic = case.number(together.combined(quadratics(members)))
+        hidden = math.sqrt(max(case.number(together.judged(members, gain=1.0)) ** 2 - quadratic**2, 0.0))
+        return case.allocation.passes_with(quadratic, hidden, owner, case.mission)
+
 
 # ---------------------------------------------------------------------- totals of effects
 def effect_parts(analysis: Analysis, model: str) -> dict[str, Phases]:
@@ -270,19 +295,26 @@ def effect_parts(analysis: Analysis, model: str) -> dict[str, Phases]:
     array, together = analysis.errors.array, analysis.together(model)
     return {
         "cubic": cubics(together.phases),
-        "spread": [(one.row_id, np.sqrt(np.nan_to_num(array(one.variance)))) for one in noise(analysis, model)],
+        "spread": [
+            (phase.row_id, np.sqrt(np.nan_to_num(array(phase.variance))))
+            for phase in (*noise(analysis, model), *rests(analysis, model))
+        ],
         "tone": [(one.subject.id, array(one.is_there * one.phase)) for one in analysis.tones],
     }
 
 
-def untaken_effects(analysis: Analysis) -> list[UntakenEffect]:
+def untaken_effects(analysis: Analysis, instead: Sequence[RandomError] = ()) -> list[UntakenEffect]:
     """Find the effects that no requirement takes, and the rows that make them up where they are not negligible.
 
-    By several models that gate the larger of each counts.
+    By several models that gate the larger of each counts. `instead` are errors that count instead of those with their
+    ids.
     """
     needs = analysis.mission.requirements
-    level = np.minimum(TENTH * np.asarray(needs.quadratic_phase_error), SMALL_RAD)
-    by_model = [(analysis.together(model), effect_parts(analysis, model)) for model in analysis.gates]
+    level = negligible_rad(analysis.mission)
+    by_model = [
+        (analysis.together(model), _exchanged(effect_parts(analysis, model), instead, model))
+        for model in analysis.gates
+    ]
     found = []
     for kind, keys in TAKEN_BY.items():
         if any(getattr(needs, key) is not None for key in keys):
@@ -305,6 +337,16 @@ def untaken_effects(analysis: Analysis) -> list[UntakenEffect]:
         makers = {row_id: is_above & (size >= least) & (size > 0) for row_id, size in parts.items()}
         found.append(UntakenEffect(kind, total, (total > 0) & ~is_above, makers, least, parts))
     return found
+
+
+def _exchanged(parts: Mapping[str, Phases], errors: Sequence[RandomError], model: str) -> dict[str, Phases]:
+    """Parts of effects with those of random errors in place of the parts that have their ids. [rad]"""
+    ids = {error.id for error in errors}
+    exchanged = {kind: [part for part in phases if part[0] not in ids] for kind, phases in parts.items()}
+    for error in errors:
+        for kind in ("cubic", "spread"):
+            exchanged[kind].append((error.id, part_of(error.effect(model), kind) * np.asarray(error.declared)))
+    return dict(exchanged)
 
 
 # ---------------------------------------------------------------------- displacements that no row holds
@@ -395,7 +437,7 @@ class JudgedScene:
 
     def edge(self, case: Case) -> SceneEdge | None:
         """The edge of one case, with how far one autofocus correction serves."""
-        return None if self.corrections is None else SceneEdge.of(self.corrections, case.geometry, case.place)
+        return None if self.corrections is None else SceneEdge.of(self.corrections, case.mission, case.place)
 
     def row(self, judging: Judging, model: str) -> "SceneRow":
         """Judge the edges by a model; to the published one an error is the same all over the scene."""

@@ -17,7 +17,6 @@ import numpy as np
 
 from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Case
-from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.effect import MOTION_UNITS, PLATFORMS, Subject
 from bisar_budget.effects.navigation_errors import residual_subject
 from bisar_budget.findings.row import Row
@@ -376,8 +375,6 @@ def _difference(row: Row) -> float:
 
 # ---------------------------------------------------------------------- the collection
 _TURNING_RAD = 0.1  # half the turn of a line of sight; the quartic term is 1 % of the quadratic there
-COARSE_CELL_RAD = 1.0  # of phase between points a range cell apart; beyond, a response spreads over cells
-_ABSORBED_RAD = 6.1  # of the same, where the image shows half; measured, uniform window, 8 to 300 MHz
 
 
 def collection_notes(case: Case) -> Iterator[Note]:
@@ -396,12 +393,3 @@ def collection_notes(case: Case) -> Iterator[Note]:
         missing = [key for key in ("time_error", "frequency_error") if getattr(sync, key) is None]
         if missing:
             yield phrases.setting_is_perfect(missing)
-    cell = phase_across_a_cell(case)
-    if cell > COARSE_CELL_RAD:
-        yield phrases.range_cells_are_coarse(cell, 100 / (1 + (cell / _ABSORBED_RAD) ** 2))
-
-
-def phase_across_a_cell(case: Case) -> float:
-    """Quadratic phase between points of the ground a range cell c/B apart. [rad]"""
-    (by_constant, _), _ = case.analysis.exact.phases_per_term
-    return abs(case.number(by_constant)) * SPEED_OF_LIGHT / case.mission.radar.bandwidth

@@ -61,15 +61,17 @@ class ErrorRows:
             sources[0].subject,
             np.abs(block.declared),
             allowed.smallest,
-            doubt=errors.doubts(other, _is_over(theirs, held, block.is_motion)),
-            without_autofocus=np.where(self.gain > 1, np.abs(mine.qpe) / (limit / self.gain), 0.0),
+            doubt=errors.doubts(other, _is_over(theirs, self.gain, held, block.is_motion)),
+            without_autofocus=np.where(self.gain > 1, mine.equal_loss / (limit / self.gain), 0.0),
             is_info=is_again | (errors.mission.allocation.combine != "each"),
         )
         judged = judged._replace(
             binding=_BINDING[allowed.binding],
             qpe_published_rad=np.abs(published.qpe),
             cubic_rad=np.where(np.isfinite(mine.cubic), np.abs(mine.cubic), math.nan),
-            quadratic_use=np.abs(mine.qpe) / limit,
+            quadratic_use=mine.judged(self.gain) / limit,
+            equal_loss_qpe_rad=np.where(np.isfinite(full.qpe) & block.is_motion, full.equal_loss, math.nan),
+            rest_rad=np.where(np.isfinite(full.qpe) & block.is_motion, full.rest, math.nan),
         )
         if is_whole:
             by_other = block.allowed(other, (limit, None, None), is_whole=True)
@@ -87,10 +89,10 @@ class ErrorRows:
             yield ErrorRow(judged.at(row, source.subject), source, self.limits[source.owner])
 
 
-def _is_over(does: Declared, held: tuple[Floats, float | None, float | None], is_motion: Any) -> Any:
+def _is_over(does: Declared, gain: Any, held: tuple[Floats, float | None, float | None], is_motion: Any) -> Any:
     """Whether any effect of errors is over what it is held to."""
     limit, cubic, location = held
-    found = np.abs(does.qpe) / limit > BOUND
+    found = does.judged(gain) / limit > BOUND
     if cubic is not None:
         found |= is_motion & (np.abs(does.cubic) / cubic > BOUND)
     if location is not None:
@@ -113,10 +115,10 @@ class ErrorRow(FamilyRow):
         limit = case.number(self.limit)
         over = doubt = info = NOTHING
         notes, fields = source.notes, dict[str, Any]()
-        qpe = 0.0
+        equal_loss = 0.0
         if source.declared is not None:
             mine = case.does(model, source)
-            qpe = abs(mine.qpe)
+            equal_loss = float(mine.equal_loss)
             fields = {"displacement_m": mine.displacement}
             if mine.displacement is None and source.is_motion:
                 notes = (*notes, *filter(None, [case.degeneracy(gating)]))
@@ -138,7 +140,7 @@ class ErrorRow(FamilyRow):
             doubt=doubt,
             no_limit=model.no_limit(source),
             info=info,
-            without_autofocus=qpe / (limit / gain) if gain > 1 else 0.0,
+            without_autofocus=equal_loss / (limit / gain) if gain > 1 else 0.0,
             remarks=notes,
             evidence=source.evidence,
             is_independent=source.is_independent,
@@ -159,17 +161,17 @@ def _over(case: Case, model: Model, row: Judged, source: ErrorSource, mine: Decl
         moved = None if mine.farthest is None else math.hypot(*mine.farthest)
         by = "equation (25)" if model.is_published else "full model"
         return phrases.location_over(moved, requirements.location_error, by)
-    qpe = abs(mine.qpe)
-    over = phrases.quadratic_phase_over(qpe, limit, model.equation(source))
-    if not math.isfinite(qpe):
+    gain, hidden = case.allocation.autofocus_gain, float(mine.hidden)
+    over = phrases.quadratic_phase_over(float(mine.judged(gain)), limit, model.equation(source), abs(mine.qpe))
+    if not math.isfinite(mine.qpe):
         return over
-    return over.then(case.allocation.passes_with(qpe, source.owner, case.mission))
+    return over.then(case.allocation.passes_with(abs(mine.qpe), hidden, source.owner, case.mission))
 
 
 def _doubt(case: Case, other: Model, source: ErrorSource, limit: float) -> Note:
     """Say that the model that does not gate fails the declared error, and why it thinks otherwise; else nothing."""
     needs, theirs = case.mission.requirements, case.does(other, source)
-    held = [(abs(theirs.qpe), limit, QUADRATIC)]
+    held = [(float(theirs.judged(case.allocation.autofocus_gain)), limit, QUADRATIC)]
     if source.is_motion and needs.cubic_phase_error is not None:
         held.append((abs(theirs.cubic), needs.cubic_phase_error, CUBIC))
     if source.is_motion and needs.location_error is not None:

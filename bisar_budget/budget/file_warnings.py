@@ -4,11 +4,8 @@ Most change no verdict; what is in doubt is a warning at least. A finder gives a
 of; the line of the key is looked up here, once.
 """
 
-import math
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
-
-import numpy as np
 
 from bisar_budget.analysis.allocation import ROOM, caps, rounded_down
 from bisar_budget.analysis.analysis import Case
@@ -16,9 +13,7 @@ from bisar_budget.budget.declarations import swings_nothing
 from bisar_budget.budget.doubted_noise import noise_doubts
 from bisar_budget.budget.doubts import input_doubts
 from bisar_budget.budget.fit_noise import MOST_CHANGE, allowable_noise
-from bisar_budget.budget.judged_requirements import SMALL_RAD, TENTH
 from bisar_budget.constants import FASTEST_FLIGHT
-from bisar_budget.effects.air_delays import changing_air
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.oscillator_acceleration import is_unshaken
 from bisar_budget.effects.oscillators import clocks_without_oscillator
@@ -32,8 +27,6 @@ from bisar_budget.phrases import Note, phrase
 from bisar_budget.units import format_quantity
 
 _SENSITIVITY = "acceleration_sensitivity"
-_LONG_APERTURE_S = 60.0  # from which on the air is not the same from one end to the other
-_AIR_CHANGES_IN_S = 1200.0  # correlation time of what a model or a map leaves of the delay of the zenith
 
 
 class _Warned(NamedTuple):
@@ -73,7 +66,6 @@ def file_warnings(
         *_of_lever_arms(mission),
         *_of_calm_oscillators(mission),
         *_of_doubted_noise(mission, rows),
-        *_of_staying_air(mission),
         *_of_autofocus(mission, resolution),
         *_nothing_declared(rows),
     )
@@ -270,35 +262,11 @@ def nothing_shakes_the_oscillator(platform: str) -> str:
     )
 
 
-def _of_staying_air(mission: Mission) -> Iterator[_Warned]:
-    """Doubt delays that stay in a long aperture, where what they would do if they changed is not negligible."""
-    T = mission.collection.aperture_time
-    if mission.propagation is None or T < _LONG_APERTURE_S:
-        return
-    quadratic, left = 0.0, 0.0
-    for error in changing_air(mission, _AIR_CHANGES_IN_S):
-        phases = [float(np.ravel(phase * error.declared)[0]) for phase in error.full[:3]]
-        quadratic, left = math.hypot(quadratic, phases[0]), math.hypot(left, *phases[1:])
-    if max(quadratic, left) > min(SMALL_RAD, TENTH * mission.requirements.quadratic_phase_error):
-        yield _Warned(("propagation",), air_stays(T, _AIR_CHANGES_IN_S, quadratic), is_doubt=True)
-
-
-@phrase
-def air_stays(aperture_time: float, correlation_time: float, quadratic: float) -> str:
-    """Said of delays of the air that do not change in a long aperture. [s, s, rad]"""
-    return (
-        f"propagation: without correlation_time the delays stay as they are over {aperture_time:.4g} s, and say "
-        f"nothing of air that changes: with {correlation_time / 60:g} min it would have a quadratic phase of "
-        f"{quadratic:.3g} rad, coverage factor included, and spread. Add correlation_time; 1e9 s for a delay that "
-        "stays"
-    )
-
-
 def _of_doubted_noise(mission: Mission, rows: Sequence[Row]) -> Iterator[_Warned]:
     """Oscillators whose noise is in doubt, where no row says it: no requirement rests on it."""
     for name in PLATFORMS:
         for key, sentence in noise_doubts(mission, name):
-            if not any(sentence in (row.reason or "") for row in rows):
+            if not any(row.reason is not None and row.reason.includes(sentence) for row in rows):
                 yield _Warned(("platforms", name, "oscillator", key), sentence)
 
 

@@ -12,9 +12,10 @@ import numpy as np
 
 from bisar_budget.effects.effect import PLATFORMS, subject
 from bisar_budget.effects.sources import ErrorListing, exact_ranges
+from bisar_budget.image_plane import nodes_for
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import Platform
-from bisar_budget.ranges.exact_ranges import Floats, nodes_for
+from bisar_budget.ranges.exact_ranges import Floats
 
 MOST_CHANGE = 0.05  # of an allowable, that goes unsaid
 _MATTERS = 0.1  # of the largest effect per unit of a kind: what does less has an allowable that decides nothing

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.scene import SceneEdges, scene_edges
-from bisar_budget.analysis.spread import noise
+from bisar_budget.analysis.spread import noise, rests
 from bisar_budget.budget.aggregates import Aggregates, JudgedScene, unplaced, untaken_effects
 from bisar_budget.budget.declarations import DECLARATIONS, is_asked_for, missing_declarations
 from bisar_budget.budget.dispersion_row import dispersion_rows
@@ -27,11 +27,13 @@ from bisar_budget.budget.judged_requirements import (
     RequirementState,
     UntakenEffect,
     is_as_high,
+    negligible_rad,
     requirement_states,
 )
 from bisar_budget.budget.judged_rows import CODE, REQUIREMENTS, Codes, FamilyRow, Judged, Judging, Why
 from bisar_budget.budget.log_rows import log_rows
 from bisar_budget.budget.random_rows import RandomRows
+from bisar_budget.budget.staying_air import StayingAir, staying_air
 from bisar_budget.budget.tone_rows import accelerated_rows, pslr_row, spur_rows
 from bisar_budget.budget.vibration_rows import Vibrations
 from bisar_budget.budget.waivers import holding_place
@@ -65,6 +67,7 @@ class JudgedMission:
     requirements: tuple[RequirementState, ...]
     untaken: Sequence[UntakenEffect]
     unplaced: Mapping[str, Truths]
+    air: StayingAir
     scene: JudgedScene | None
     floor: Codes  # the best status that each case can have
     waivers: NDArray[np.intp]  # of each row, by its place in the file, (rows, n); -1: none
@@ -134,8 +137,11 @@ class _Judgement:
         paths = [is_doubtful for (_, kind), is_doubtful in self._in_doubt.items() if kind != RESIDUAL]
         is_misplaced = np.any([nowhere, is_unknown, *drifting.values(), *paths], axis=0)
         has_noise = self._has_noise()
+        air = staying_air(analysis, rows)
+        of_all.doubt_air(air.doubted_rows())
         own = of_all.status.copy()
         of_all.judge_effects(untaken)
+        of_all.doubt_air(air.untaken_rows())
         of_all.judge_place(is_misplaced)
         of_all.judge_spread(has_noise)
         before = of_all.status
@@ -154,6 +160,7 @@ class _Judgement:
             in_doubt=self._doubted_rows(rows),
             has_noise=has_noise,
             is_misplaced=is_misplaced,
+            rests_on_air=air.doubted_requirements(),
         )
         return JudgedMission(
             analysis=analysis,
@@ -163,6 +170,7 @@ class _Judgement:
             requirements=tuple(states),
             untaken=untaken,
             unplaced=drifting,
+            air=air,
             scene=self._scene,
             floor=np.min([self._floor(), *(one.status for one in states)], axis=0),
             waivers=waivers,
@@ -262,9 +270,14 @@ class _Judgement:
         return (Judged.of_none(one, self.cases) for row_id, one in wanted.items() if row_id not in there)
 
     def _has_noise(self) -> Truths:
-        """Cases that declare something that spreads, or a tone that ISLR holds."""
-        spreads = (one.variance for model in self.analysis.gates for one in noise(self.analysis, model))
-        found = [~np.isnan(self.judging.array(one)) for one in spreads]
+        """Cases that declare something that spreads, or a tone that ISLR holds.
+
+        What an error of motion leaves beyond the cubic spreads where it is more than negligible.
+        """
+        array, gates = self.judging.array, self.analysis.gates
+        level = negligible_rad(self.mission)
+        found = [~np.isnan(array(one.variance)) for model in gates for one in noise(self.analysis, model)]
+        found += [np.sqrt(array(one.variance)) >= level for model in gates for one in rests(self.analysis, model)]
         if self.mission.requirements.pslr is None:
             found += [np.broadcast_to(one.is_there, (self.cases,)) for one in self.analysis.tones]
         return np.asarray(np.any([np.zeros(self.cases, bool), *found], axis=0))
@@ -332,6 +345,14 @@ class RowStatuses:
                 owed = [is_in_doubt(what, name, self.mission, kind) for what in self.subjects]
                 self._settle(owed, is_doubtful & (self.status != CODE["fail"]), Why.INPUT_IN_DOUBT)
 
+    def doubt_air(self, doubted: Mapping[str, Truths]) -> None:
+        """Rows, by their ids, that rest on air that stays are not evaluated."""
+        for row_id, is_doubted in doubted.items():
+            if is_doubted.any():
+                which = [what.id == row_id for what in self.subjects]
+                is_new = self.why != Why.EFFECT_NOT_TAKEN  # which names the requirement to add
+                self._settle(which, is_doubted & self._is_open & is_new, Why.AIR_STAYS)
+
     def judge_effects(self, untaken: Sequence[UntakenEffect]) -> None:
         """Rows that make up an effect that no requirement takes are not evaluated.
 
@@ -362,7 +383,8 @@ class RowStatuses:
         """ISLR is not evaluated where nothing but a cubic phase makes it."""
         if not has_noise.all():
             which = [what.kind == "islr" for what in self.subjects]
-            self._settle(which, ~has_noise & self._is_open & (self.why != Why.INPUT_IN_DOUBT), Why.NOTHING_SPREADS)
+            is_new = ~np.isin(self.why, (Why.INPUT_IN_DOUBT, Why.AIR_STAYS))
+            self._settle(which, ~has_noise & self._is_open & is_new, Why.NOTHING_SPREADS)
 
     @property
     def _is_open(self) -> Truths:

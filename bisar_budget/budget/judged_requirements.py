@@ -31,6 +31,8 @@ MAKES_UP = 0.1
 # Requirements that take an effect, in the order in which one is suggested.
 TAKEN_BY = {"cubic": (CUBIC, "islr"), "spread": ("islr",), "tone": ("pslr", "islr")}
 
+EXAMPLES = {CUBIC: "22.5 deg", "islr": "-20 dB", "pslr": "-30 dB"}  # of lines to add
+
 _NONE = np.int8(len(STATUS))  # of a row that judges nothing
 IS_JUDGED = np.array([one.is_judged for one in STATUS.values()])
 # Whether a status leaves a requirement met, with or without a warning; the last is that of `_NONE`.
@@ -79,6 +81,11 @@ def is_as_high(uses: Any, others: Any) -> Truths:
         return np.asarray((uses >= others - ALIKE * np.abs(others)) | (uses == others))
 
 
+def negligible_rad(mission: Mission) -> Any:
+    """Total of an effect that no requirement takes, below which it is negligible. [rad]"""
+    return np.minimum(TENTH * np.asarray(mission.requirements.quadratic_phase_error), SMALL_RAD)
+
+
 def required_keys(mission: Mission) -> tuple[str, ...]:
     """Keys of the requirements that a mission has, the default of the quadratic phase included."""
     needs = mission.requirements
@@ -97,6 +104,7 @@ def requirement_states(
     in_doubt: Truths,
     has_noise: Any,
     is_misplaced: Any,
+    rests_on_air: Mapping[str, Truths],
 ) -> list[RequirementState]:
     """Say how every requirement stands.
 
@@ -122,6 +130,8 @@ def requirement_states(
         Whether something that spreads, or a tone that ISLR holds, is declared: without it ISLR is not judged.
     is_misplaced : (n,) bool
         Whether a declared error displaces the image by an amount that no row holds.
+    rests_on_air : mapping of str to (n,) bool
+        Keys of the requirements that rest on air that stays in a long aperture, and in which cases.
     """
     uses, found = np.nan_to_num(utilization, nan=0.0, posinf=np.inf), []
     is_open = before == RANK["not_evaluated"]
@@ -158,6 +168,7 @@ def requirement_states(
             is_unjudged = is_unjudged | ~np.asarray(has_noise)
         if key == LOCATION:
             is_unjudged = is_unjudged | np.asarray(is_misplaced)
+        is_unjudged = is_unjudged | rests_on_air.get(key, False)
         status = np.where(is_unjudged & (worst != RANK["fail"]), RANK["not_evaluated"], worst)
         is_unknown = (is_unknown & (worst == RANK["waived"])) | (status == RANK["not_evaluated"])
         if waived.get(key):

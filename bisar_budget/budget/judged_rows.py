@@ -39,6 +39,8 @@ NUMBERS = (
     "cubic_rad",
     *WHOLE[:3],
     "islr_db",
+    "equal_loss_qpe_rad",
+    "rest_rad",
 )  # of columns
 _columns_of_numbers = attrgetter(*NUMBERS)
 IN_UNIT = ("declared", "allowable", "allowable_published", "allowable_full")  # columns in the unit of their row
@@ -58,6 +60,7 @@ class Why(IntEnum):
     EFFECT_NOT_TAKEN = 3
     NO_PLACE = 4
     NOTHING_SPREADS = 5
+    AIR_STAYS = 6
 
 
 class Judged(NamedTuple):
@@ -81,6 +84,8 @@ class Judged(NamedTuple):
     allowable_full: Floats
     qpe_full_rad: Floats
     islr_db: Floats
+    equal_loss_qpe_rad: Floats
+    rest_rad: Floats
     metric: str = QUADRATIC
     is_of_ranges: bool = False  # `qpe_full_rad` is that of exact ranges
 
@@ -95,7 +100,7 @@ class Judged(NamedTuple):
         cls, what: Subject, status: Codes, declared: Floats, allowable: Floats, utilization: Floats
     ) -> "Judged":
         none, zero = np.full(status.shape, math.nan), np.zeros(status.shape, dtype=np.int8)
-        return cls(what, status, declared, allowable, utilization, zero - 1, zero, zero, *(none,) * 7)
+        return cls(what, status, declared, allowable, utilization, zero - 1, zero, zero, *(none,) * 9)
 
     def _of_columns(self, of_one: Callable[[Any], Any], names: Sequence[str]) -> "Judged":
         columns: dict[str, Any] = {name: of_one(getattr(self, name)) for name in names}

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget import phrases
-from bisar_budget.analysis.allocation import Allocation
+from bisar_budget.analysis.allocation import Allocation, autofocus_gain_of
 from bisar_budget.analysis.analysis import Analysis, Case
 from bisar_budget.analysis.spread import (
     CUBIC_POWER,
@@ -69,11 +69,13 @@ def limits_for(mission: Mission, allocation: Allocation, owner: str, model: str,
     return Limits(allocation.qpe_limit(owner) * gain, needs.cubic_phase_error, spread, needs.location_error)
 
 
-def held_effect(mission: Mission, effect: RandomEffect, coverage: Any) -> RandomEffect:
+def held_effect(mission: Mission, effect: RandomEffect, coverage: Any, gain: Any = 1.0) -> RandomEffect:
     """An effect as requirements hold it: a cubic phase that none takes is power that ISLR holds, at one sigma.
 
-    `coverage` is the coverage factor that it has in it.
+    Its quadratic phase is the judged one, with the `gain` of autofocus. `coverage` is the coverage factor that it has
+    in it.
     """
+    effect = effect._replace(quadratic=effect.judged(gain))
     if mission.requirements.cubic_phase_error is not None:
         return effect
     cubic = effect.cubic / coverage
@@ -105,8 +107,11 @@ class RandomRows:
 
     def _effects(self, model: str) -> RandomEffect:
         """Effects of a unit of each error, (errors, cases)."""
-        columns = zip(*(error.effect(model)[:5] for error in self.errors), strict=True)
-        return RandomEffect(*map(self._table, columns))
+        effects = [error.effect(model) for error in self.errors]
+        quadratic, cubic, spread, east, north, hidden = (
+            self._table(column) for column in zip(*((*effect[:5], effect.hidden) for effect in effects), strict=True)
+        )
+        return RandomEffect(quadratic, cubic, spread, east, north, hidden=hidden)
 
     def _sizes(self, model: str, effects: RandomEffect) -> Floats:
         """Size at which each error reaches each requirement, (requirements, errors, cases). [unit]"""
@@ -116,7 +121,7 @@ class RandomRows:
         limits = Limits(*(None if column[0] is None else self._table(column) for column in columns))
         sizes = np.full((len(HELD), len(owners), self.judging.cases), math.inf)
         coverage = self._table([error.coverage(self.mission) for error in self.errors])
-        held = held_effect(self.mission, effects, coverage)
+        held = held_effect(self.mission, effects, coverage, gain)
         for row, size in zip(sizes, sizes_at(held, limits), strict=True):
             row[:] = size
         return sizes
@@ -135,8 +140,11 @@ class RandomRows:
         is_limited = np.isfinite(smallest) & ~is_open
         binds = np.where(is_open, HELD.index(ISLR), np.where(is_limited, sizes.argmin(axis=0), -1))
         allowable = np.where(is_limited, smallest, math.nan)
-        qpe, limit = mine.quadratic * declared, self._table([allocation.qpe_limit(one.owner) for one in self.errors])
-        within = np.where(binds == 0, declared / allowable * gain, qpe / limit)
+        qpe, limit = (
+            mine.judged(1.0) * declared,
+            self._table([allocation.qpe_limit(one.owner) for one in self.errors]),
+        )
+        within = qpe / limit
         without_autofocus = np.where((gain > 1) & (qpe > 0) & is_limited, within, 0.0)
         is_over_other = declared > sizes_of_other.min(axis=0) * BOUND
         published, full = (mine, theirs) if model == "published" else (theirs, mine)
@@ -158,17 +166,20 @@ class RandomRows:
             qpe_published_rad=published.quadratic * declared,
             cubic_rad=mine.cubic * declared,
             # Beside an aggregate, which holds it, a row that cannot be judged breaks no quadratic requirement.
-            quadratic_use=np.where(is_open & (combine != "each"), math.nan, qpe / (limit * gain)),
+            quadratic_use=np.where(
+                is_open & (combine != "each"), math.nan, mine.judged(gain) * declared / (limit * gain)
+            ),
         )
         judged = judged._replace(utilization=np.where(is_open, math.nan, judged.utilization))
         if self.judging.is_whole:
             by_published, by_full = (
-                np.where(one.quadratic > 0, limit * gain / one.quadratic, math.nan) for one in (published, full)
+                np.where(one.judged(gain) > 0, limit * gain / one.judged(gain), math.nan) for one in (published, full)
             )
             judged = judged._replace(
                 allowable_published=by_published,
                 allowable_full=by_full,
                 qpe_full_rad=full.quadratic * declared,
+                equal_loss_qpe_rad=full.judged(1.0) * declared,
                 islr_db=islr_of(self.mission, (mine.spread * declared) ** 2),
             )
         columns = (is_over_other, sizes_of_other.argmin(axis=0), without_autofocus)
@@ -516,8 +527,9 @@ def no_effect(mission: Mission, error: RandomError) -> Note:
 
 
 def _over(mission: Mission, error: RandomError, model: str, binding: str | None, allocation: Allocation) -> Note:
-    effect, size = held_effect(mission, error.effect(model), error.coverage(mission)), error.declared
-    limits = limits_for(mission, allocation, error.owner, model, allocation.autofocus_gain)
+    gain, size = allocation.autofocus_gain, error.declared
+    effect = held_effect(mission, error.effect(model), error.coverage(mission), gain)
+    limits = limits_for(mission, allocation, error.owner, model, gain)
     if binding == CUBIC:
         return phrases.cubic_phase_over(effect.cubic * size, limits.cubic)
     if binding == LOCATION:
@@ -526,9 +538,10 @@ def _over(mission: Mission, error: RandomError, model: str, binding: str | None,
     if binding == ISLR:
         level = _levels(mission, model)
         return phrases.spreads_too_much(level(effect.spread * size), level(limits.spread))
-    qpe = effect.quadratic * size
-    over = phrases.quadratic_phase_over(qpe, limits.quadratic)
-    return over.then(allocation.passes_with(qpe, error.owner, mission))
+    own = error.effect(model)
+    qpe, hidden = own.quadratic * size, own.hidden * size
+    over = phrases.quadratic_phase_over(effect.quadratic * size, limits.quadratic, quadratic=qpe)
+    return over.then(allocation.passes_with(qpe, hidden, error.owner, mission))
 
 
 def _continuation(case: Case, error: RandomError, model: str) -> Note:
@@ -549,7 +562,7 @@ def _continuation(case: Case, error: RandomError, model: str) -> Note:
 def _doubt(mission: Mission, error: RandomError, gating: str, binding: str, limit: float) -> Note:
     """Say by which requirement the model that does not gate fails a declared error."""
     other, size = OTHER_MODEL[gating], error.declared
-    effect = held_effect(mission, error.effect(other), error.coverage(mission))
+    effect = held_effect(mission, error.effect(other), error.coverage(mission), autofocus_gain_of(mission))
     if binding == ISLR:
         return phrases.other_model_spreads(other, _levels(mission, other)(effect.spread * size))
     per_unit = {QUADRATIC: effect.quadratic, CUBIC: effect.cubic, LOCATION: effect.displacement}[binding]

@@ -9,7 +9,6 @@ import numpy as np
 from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Case
 from bisar_budget.analysis.spread import islr_db, mainlobe_energy, spread_limit
-from bisar_budget.analysis.together import quadratics
 from bisar_budget.analysis.vibration_limits import level_of, tone_limits
 from bisar_budget.budget.aggregates import PULL_IN
 from bisar_budget.budget.declarations import (
@@ -22,19 +21,18 @@ from bisar_budget.budget.declarations import (
 from bisar_budget.budget.doubts import RESIDUAL, input_doubts, is_in_doubt
 from bisar_budget.budget.judged_mission import JudgedMission
 from bisar_budget.budget.judged_requirements import (
+    EXAMPLES,
     TAKEN_BY,
     UNITS,
     RequirementState,
 )
 from bisar_budget.budget.judged_rows import FamilyRow, Judged, Why, statuses
 from bisar_budget.budget.waivers import Waived
-from bisar_budget.effects.declared import CUBIC, LOCATION, MODELS, QUADRATIC
+from bisar_budget.effects.declared import LOCATION, MODELS, QUADRATIC
 from bisar_budget.effects.oscillators import clocks_without_oscillator
 from bisar_budget.findings.requirement import DecidingShare, JudgedRequirement
 from bisar_budget.findings.row import DECLARE, AppliedWaiver, Row, holding, in_order
 from bisar_budget.phrases import NOTHING, Note
-
-_EXAMPLES = {CUBIC: "22.5 deg", "islr": "-20 dB", "pslr": "-30 dB"}
 
 
 # ---------------------------------------------------------------------- rows
@@ -103,12 +101,14 @@ def _why(judged: JudgedMission, case: Case, one: Judged, row: Row) -> Note:
         return said[0].then(*said[1:])
     if why is Why.NO_PLACE:
         return unknown_place(judged, case)
+    if why is Why.AIR_STAYS:
+        return judged.air.reason(case, row.id)
     if why is Why.NOTHING_SPREADS:
         return phrases.nothing_judges("islr")
     said = [row.reason] if row.status == "fail" and row.reason else []  # it is broken, and more of it not judged
     for each in judged.untaken:
         if row.id in each.makers and each.makers[row.id][case.place]:
-            lines = [f"{key}: {_EXAMPLES[key]}" for key in TAKEN_BY[each.kind]]
+            lines = [f"{key}: {EXAMPLES[key]}" for key in TAKEN_BY[each.kind]]
             parts = case.number(each.parts[row.id]), case.number(each.total)
             said.append(phrases.effect_is_not_judged(each.kind, *parts, lines))
     return said[0].then(*said[1:])
@@ -131,6 +131,7 @@ def negligible_effects(judged: JudgedMission, case: Case) -> Iterator[Note]:
     for one in judged.untaken:
         if one.is_negligible[case.place]:
             yield phrases.effect_is_negligible(one.kind, case.number(one.total), list(TAKEN_BY[one.kind]))
+    yield from judged.air.note(case)
 
 
 # ---------------------------------------------------------------------- requirements
@@ -154,7 +155,9 @@ def _entry(
     use = utilization if has_use and not is_open else None
     reason: Note | None = None
     if is_open and (decider is None or not decider.is_unjudged):
-        reason = (unknown_place(judged, case) if key == LOCATION else NOTHING) or phrases.nothing_judges(key)
+        reason = (unknown_place(judged, case) if key == LOCATION else NOTHING) or (
+            judged.air.reason_of_requirement(case, key) or phrases.nothing_judges(key)
+        )
     elif decider is not None and status not in ("pass", "info"):
         reason = decider.reason
     judges = [row for row, is_one in zip(rows, state.judges[:, case.place], strict=True) if row and is_one]
@@ -195,7 +198,7 @@ def _total(key: str, judged: JudgedMission, case: Case, rows: Sequence[Row | Non
     if key != QUADRATIC:
         return None
     totals = [
-        together.combined(quadratics(together.phases)) for together in map(judged.analysis.together, judged.families)
+        together.judged(together.phases, gain=1.0) for together in map(judged.analysis.together, judged.families)
     ]
     largest = case.number(np.max(totals, axis=0))
     return largest if math.isfinite(largest) else None
@@ -223,7 +226,9 @@ def _sizes(row: Row, key: str, case: Case) -> tuple[float | None, float | None]:
     """Share of a requirement that the owner of a row has, without gain, and what the row reaches of it."""
     mission, allocation = case.mission, case.allocation
     if key == QUADRATIC:
-        qpe = row.qpe_full_rad if row.model == "full" else row.qpe_published_rad
+        qpe = row.qpe_published_rad
+        if row.model == "full":
+            qpe = row.qpe_full_rad if row.equal_loss_qpe_rad is None else row.equal_loss_qpe_rad
         return allocation.qpe_limit(row.owner), None if qpe is None else abs(qpe)
     if row.unit == "dB" and (row.subject.kind == key or key == "pslr"):
         return row.allowable, row.declared

@@ -370,7 +370,7 @@ def _slow_row(case: Case, one: VibrationRow, error: MotionError, model: str) -> 
         limit = allocation.qpe_allowed(what.owner)
         over = phrases.slow_quadratic_phase_over(qpe, limit)
         if qpe > limit:
-            over = over.then(allocation.passes_with(qpe, what.owner, mission))
+            over = over.then(allocation.passes_with(qpe, 0.0, what.owner, mission))
     entry = what.entry or 0
     return worded(
         case,

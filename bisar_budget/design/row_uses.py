@@ -16,6 +16,7 @@ from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.budget.judged_mission import JudgedMission, judged_mission
 from bisar_budget.budget.judged_requirements import SMALL_RAD, TENTH
 from bisar_budget.budget.judged_rows import CODE, REQUIREMENTS, Why
+from bisar_budget.budget.random_rows import ISLR
 from bisar_budget.design.geometric_program import Rows
 from bisar_budget.design.specified import specified_errors
 from bisar_budget.design.table import Variation
@@ -35,6 +36,7 @@ _NOTHING = 1e-13  # of a row: what rounding leaves of it
 # What the ids of rows begin with that have no requirement: effects that none takes, and what a file may state.
 NEGLIGIBLE, ACCEPTED = "negligible", "accepted"
 _WARN_ONLY = ("autofocus_pull_in",)  # kinds of rows that warn and never fail
+_HAVE_THEIR_OWN_ROW = (Why.EFFECT_NOT_TAKEN, Why.AIR_STAYS)  # below: why rows that have no number are not judged
 _AS_COMBINED = (
     QUADRATIC,
     CUBIC,
@@ -152,7 +154,9 @@ class SpecifiedMission:
             if not is_judged.any():
                 continue
             is_lost = np.isin(row.status, (CODE["fail"], CODE["not_evaluated"])) & np.isnan(row.utilization)
-            is_lost &= (row.why != Why.EFFECT_NOT_TAKEN) & (row.subject.id not in self.unjudged)
+            is_lost &= ~np.isin(row.why, (Why.EFFECT_NOT_TAKEN, Why.AIR_STAYS)) & (
+                row.subject.id not in self.unjudged
+            )
             is_heeded = self.reserve > 0 or row.subject.kind not in _WARN_ONLY
             use = np.nan_to_num(row.utilization, nan=0.0, posinf=math.inf) * is_heeded
             use = np.where(is_lost, math.inf, use)
@@ -160,9 +164,14 @@ class SpecifiedMission:
             requirement = row.metric if binding < 0 or binding >= len(REQUIREMENTS) - 1 else REQUIREMENTS[binding]
             found.append((row.subject.id, requirement, self._power(row.subject.kind), use))
         level = min(TENTH * float(np.max(self.stated.requirements.quadratic_phase_error)), SMALL_RAD)
-        for one in judged.untaken:
+        for air in judged.air.uses.values():
+            power = self._power(air.key if air.key != ISLR else "")
+            found.append((f"{NEGLIGIBLE}.{air.row_id}", air.key, power, judged.air.is_long * air.use / TENTH))
+        untaken = [(one.kind, one) for one in judged.untaken]
+        untaken += [(f"air.{one.kind}", one) for one in judged.air.untaken]
+        for name, one in untaken:
             use = np.broadcast_to(one.total, sizes.shape[1:]) / level
-            found.append((f"{NEGLIGIBLE}.{one.kind}", None, 1.0 if self.combine == "sum" else 2.0, use))
+            found.append((f"{NEGLIGIBLE}.{name}", None, 1.0 if self.combine == "sum" else 2.0, use))
         for name, limits in ((END_OF_IMAGE, self.ends), (ACCEPTED, self.most)):
             for place in np.flatnonzero(np.isfinite(limits)).tolist():
                 found.append((f"{name}.{self.specified[place].key}", None, 2.0, sizes[place] / limits[place]))

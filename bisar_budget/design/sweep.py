@@ -56,6 +56,8 @@ _FIELDS = {
     "qpe_exact_rad": "Quadratic phase of {0} by exact ranges.",
     "cubic_rad": "Cubic phase of {0}.",
     "islr_db": "ISLR that {0} adds.",
+    "equal_loss_qpe_rad": "Quadratic phase of as much loss of the peak as {0} by the full model.",
+    "rest_rad": "Rms phase of {0} beyond the cubic.",
 }
 _UNITS = {"rad": "rad", "db": "dB"}  # by what a field's name ends with
 

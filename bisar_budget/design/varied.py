@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from bisar_budget import units
 from bisar_budget.effects.effect import MOTION, PLATFORMS
 from bisar_budget.geometry import STILL, BistaticGeometry, norm
+from bisar_budget.image_plane import MIN_SINE, spans_ground
 from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.covariance import EIGENVALUE_TOLERANCE
 from bisar_budget.mission.instruments import RISE, STEEPEST
@@ -112,8 +113,8 @@ def is_image(mission: Mission, geometries: BistaticGeometry, cases: int) -> NDAr
         if np.ndim(platform.speed):
             is_one &= np.asarray(platform.speed) != 0
     is_one &= ~np.asarray(still)
-    for spans in geometries.spans_ground(SAFE):
-        is_one &= spans
+    turns, sine = spans_ground(geometries, mission.radar, 2 * half, cases)
+    is_one &= turns & (sine >= SAFE * MIN_SINE)
     if mission.propagation is not None:
         legs = dict(zip(PLATFORMS, geometries.both, strict=True))
         for _, _, degrees in least_elevations(mission.propagation, legs, mission.collection.aperture_time):

@@ -214,15 +214,17 @@ def _changing(
     # What spreads is a mean power, which has no coverage factor.
     published = RandomEffect(quadratic, cubic, left / seen.factor, *seen.moved(along.constant, along.linear))
     found = changing_effects(seen.exact, group, half / correlation_time, is_phase_advanced=delay == CONTENT)
-    (quadratic, cubic, east, north), covariance = sigmas(found.covariance, found.sizes)
+    (quadratic, cubic, east, north, hidden), covariance = sigmas(found.covariance, found.sizes)
     spread = k * np.sqrt(found.left) / seen.factor
-    return published, RandomEffect(quadratic, cubic, spread, east, north, covariance)
+    return published, RandomEffect(quadratic, cubic, spread, east, north, covariance, hidden)
 
 
-def changing_air(mission: Mission, correlation_time: float) -> list[RandomError]:
+def changing_air(
+    mission: Mission, geometry: BistaticGeometry, cases: int, correlation_time: float
+) -> list[RandomError]:
     """Declared delays that stay within the aperture, as if they changed in a correlation time. [s]
 
-    Each counts once: of one air both legs together.
+    Each counts once: of one air both legs together. `geometry` is that of the cases.
     """
     propagation = mission.propagation
     staying = [name for name in PLATFORMS if correlation_time_of(mission, name) is None]
@@ -232,7 +234,7 @@ def changing_air(mission: Mission, correlation_time: float) -> list[RandomError]
     owners = ("mission",) if propagation.is_one_air else staying
     return [
         error
-        for error in delay_errors(SensorCases(changed, mission.geometry, 1))
+        for error in delay_errors(SensorCases(changed, geometry, cases))
         if error.declared is not None and error.owner in owners
     ]
 

@@ -15,19 +15,19 @@ from typing import NamedTuple
 
 import numpy as np
 
+from bisar_budget.image_plane import LEADING
 from bisar_budget.ranges.exact_ranges import ExactRanges, Floats
 
 _ORDERS = 4  # Legendre orders 0 to 3, which displace and defocus
 _OCTAVES = 44  # of lags below an aperture: half of it over the shortest correlation time that a file can state
 _NODES_PER_OCTAVE = 20  # follow the correlation within an octave of lags to 1e-10
-_LEADING = np.array((1.0, 1.0, 1.5, 2.5))  # of Pₙ: what a weight of the sampling has beside the coefficient of Pₙ
 _POWER = 1 / (2 * np.arange(_ORDERS) + 1)  # mean square of Pₙ over the aperture
 
 
 class ChangingEffects(NamedTuple):
-    """Effects of a unit: covariance (4, 4, cases) of phases [rad] and displacement [m], and mean square left. [m²]
+    """Effects of a unit: covariance (8, 8, cases) of what `SensorCases.weights` weigh, and mean square left. [m²]
 
-    `sizes` (4, cases) are squares of sums of magnitudes, against which a rest of cancelling terms is rounding.
+    `sizes` (8, cases) are squares of sums of magnitudes, against which a rest of cancelling terms is rounding.
     """
 
     covariance: Floats
@@ -51,13 +51,13 @@ def changing_effects(exact: ExactRanges, delay: Floats, ratio: Floats, *, is_pha
         counts, and everything else with the other sign.
     """
     delay = delay + np.zeros_like(exact.times)
-    weights = np.array((*exact.phase_weights, *exact.place_weights))  # (4, nodes, cases)
+    weights = np.array((*exact.phase_weights, *exact.place_weights, *exact.hidden_weights))  # (8, nodes, cases)
     mean: Floats = exact.fit[0]
     sign = 1.0
     if is_phase_advanced:
         sign = -1.0
         weights = 2 * weights.sum(axis=1, keepdims=True) * mean[:, None] - weights
-    coefficients = exact.fit / _LEADING[:, None]
+    coefficients = exact.fit / LEADING[:, None]
     slopes = np.array(exact.slopes)  # east and north, (2, nodes, cases)
     places = np.polynomial.legendre.legvander(exact.sampling.places, _ORDERS - 1)
     bends = slopes - np.einsum("no,om,amc->anc", places, coefficients, slopes)
@@ -67,8 +67,8 @@ def changing_effects(exact: ExactRanges, delay: Floats, ratio: Floats, *, is_pha
     integrals = np.concatenate((weights, of_orders, of_bends)) * delay
     staying = integrals.sum(axis=1)
     departing = _departing(integrals, ratio)
-    covariance = np.einsum("fc,gc->fgc", staying[:4], staying[:4]) + departing[:4, :4]
-    sizes = np.square(np.abs(integrals[:4]).sum(axis=1))
+    covariance = np.einsum("fc,gc->fgc", staying[:8], staying[:8]) + departing[:8, :8]
+    sizes = np.square(np.abs(integrals[:8]).sum(axis=1))
     left = _left(delay, np.asarray(places, float), bends, mean, staying, departing, sign)
     return ChangingEffects(covariance, sizes, left)
 
@@ -81,7 +81,7 @@ def _left(
     The departure of the correlation is 0 at no lag: of its power beyond order 3 only the parts up to it are known,
     with the other sign.
     """
-    east_north, orders, products = slice(2, 4), slice(4, 8), slice(8, 10)
+    east_north, orders, products = slice(2, 4), slice(8, 12), slice(12, 14)
     own = delay - places @ staying[orders]
     rest = sign * own + np.einsum("anc,ac->nc", bends, staying[east_north])
     of_bends = np.einsum("n,anc,bnc->abc", mean, bends, bends)

@@ -18,14 +18,24 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bisar_budget import evaluators, phrases
-from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG
+from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG, MIN_GROUND_GRADIENT
 from bisar_budget.effects.effect import PLATFORMS, ErrorSource, plain
 from bisar_budget.effects.sources import ErrorListing
 from bisar_budget.geometry import BistaticGeometry, GroundVector, angle_between_lines, norm
 from bisar_budget.mission.model import Mission
 from bisar_budget.phrases import NOTHING, Note
-from bisar_budget.ranges.exact_ranges import Effect, ExactEffect, ExactRanges, Floats, Lanes, Places, Truths
-from bisar_budget.ranges.point_paths import Held, PointPaths, is_few
+from bisar_budget.ranges.exact_ranges import (
+    QUADRATIC_OF_VARIANCE,
+    Effect,
+    ExactEffect,
+    ExactRanges,
+    Floats,
+    FullEffect,
+    Lanes,
+    Places,
+    Truths,
+)
+from bisar_budget.ranges.point_paths import ROWS, Held, PointPaths, is_few
 
 QUADRATIC, CUBIC, LOCATION = "quadratic_phase_error", "cubic_phase_error", "location_error"
 HELD = (QUADRATIC, CUBIC, LOCATION)  # what an error is held to
@@ -48,13 +58,29 @@ class Declared(NamedTuple):
     Quadratic and cubic phase at the aperture edge, of the worse sign, signed like the first order of the declared
     one [rad]; displacement east and north by the declared sign, and by the opposite one [m]. Displacements are NaN
     where there is none, in one case None: a plane without an inverse, or no ground point that has the range history,
-    which makes phases infinite.
+    which makes phases infinite. The `hidden` phase is that which band and turn do not resolve, as the judged one has
+    it; `rest` is the rms beyond the cubic, of the worse sign. [rad]
     """
 
     qpe: Any
     cubic: Any
     displacement: Any
     opposite: Any
+    hidden: Any = 0.0
+    rest: Any = 0.0
+
+    def judged(self, gain: Any) -> Any:
+        """Magnitude of the phase that is held to a limit with the gain of autofocus in it. [rad]
+
+        Autofocus corrects the quadratic phase and none of what is hidden: √(φ² − φ₂² + (φ₂/gain)²)·gain, with φ the
+        phase of equal loss and φ₂ the quadratic one.
+        """
+        return np.hypot(self.qpe, gain * self.hidden)
+
+    @property
+    def equal_loss(self) -> Any:
+        """Quadratic phase of as much loss of the peak as quadratic and hidden phase together. [rad]"""
+        return np.hypot(self.qpe, self.hidden)
 
     @property
     def farthest(self) -> Any:
@@ -69,12 +95,14 @@ class Declared(NamedTuple):
     def of(self, some: Any) -> "Declared":
         """The same of some of the errors."""
         (x, y), (u, v) = self.displacement, self.opposite
-        return Declared(self.qpe[some], self.cubic[some], (x[some], y[some]), (u[some], v[some]))
+        phases = self.qpe[some], self.cubic[some]
+        return Declared(*phases, (x[some], y[some]), (u[some], v[some]), self.hidden[some], self.rest[some])
 
     def in_one_case(self, case: int = 0) -> "Declared":
         """The same with plain numbers in the place of arrays, those of a case."""
         moved, opposite = point(self.displacement, case), point(self.opposite, case)
-        return Declared(plain(self.qpe, case), plain(self.cubic, case), moved, opposite)
+        qpe, cubic, hidden, rest = (plain(part, case) for part in (self.qpe, self.cubic, self.hidden, self.rest))
+        return Declared(qpe, cubic, moved, opposite, hidden, rest)
 
 
 def point(place: tuple[Any, Any], case: int = 0) -> GroundVector | None:
@@ -116,7 +144,8 @@ class ImagePlane(NamedTuple):
 def published_planes(geometry: BistaticGeometry) -> tuple[ImagePlane, Any]:
     """Invert Q with the range held constant, (19) and (30); and the angle between its gradients. [deg]
 
-    That Q can be singular where the true gradients are not: its second row is v/R, theirs v⊥/R.
+    That Q can be singular where the true gradients are not: its second row is v/R, theirs v⊥/R. Where the look
+    vectors all but cancel on the ground, of which it knows those of mid-aperture alone, it has none either.
     """
     ground: list[Any] = []
     for path in geometry.both:
@@ -124,7 +153,18 @@ def published_planes(geometry: BistaticGeometry) -> tuple[ImagePlane, Any]:
     first, second, (determinant,) = evaluators.published_ground_inverse(*ground)
     # (30): the first column holds (-rate_y, rate_x), the second (s_y, -s_x).
     degrees = np.degrees(angle_between_lines((-second[1], first[1]), (second[0], -first[0])))
-    return ImagePlane((first, second), determinant, degrees < MIN_GRADIENT_ANGLE_DEG), degrees
+    is_short = np.hypot(second[0], second[1]) < MIN_GROUND_GRADIENT
+    return ImagePlane((first, second), determinant, is_short | (degrees < MIN_GRADIENT_ANGLE_DEG)), degrees
+
+
+class OwnPlane(NamedTuple):
+    """Displacement by effects that hold their own, as those of the full model do."""
+
+    is_singular: Any = False
+
+    def displacement(self, effect: FullEffect, size: Any) -> tuple[Floats, Floats]:
+        """Displacement on the ground, east and north. [m]"""
+        return effect.east * size + 0.0, effect.north * size + 0.0
 
 
 class ErrorBlock:
@@ -154,7 +194,7 @@ class ErrorBlock:
             self.edge[place] = table.edge_of(source)
             for part, numbers in enumerate(zip(source.effect, source.full, strict=True)):
                 published[part, place], full[part, place] = numbers
-        self.effects = {"published": Effect(*published), "full": Effect(*full)}
+        self.effects: dict[str, Any] = {"published": Effect(*published), "full": FullEffect(*full)}
         self.is_motion = np.array([[source.is_motion] for source in sources])
         self.moves = [place for place, source in enumerate(sources) if source.displaces]
         self._per_unit: dict[str, Floats] = {}
@@ -162,15 +202,55 @@ class ErrorBlock:
 
     # ---------------------------------------------------------------- small errors
     def per_unit(self, model: str) -> Floats:
-        """Magnitudes of both phases [rad], and of the displacement [m], by a small unit; (3, errors, cases)."""
+        """Magnitudes of the judged phase and the cubic [rad], and of the displacement [m], by a small unit.
+
+        (3, errors, cases).
+        """
         if model not in self._per_unit:
             effect = self.effects[model]
             moved = np.hypot(*self.table.planes[model].displacement(effect, 1.0))
             moved = np.where(self.is_motion & ~np.isnan(moved), moved, 0.0)
-            self._per_unit[model] = np.array([np.abs(effect.qpe), np.abs(effect.cubic), moved])
+            hidden = self.hidden_per_unit[0] if model == "full" else 0.0
+            judged = np.hypot(effect.qpe, self.table.gain * hidden)
+            self._per_unit[model] = np.array([judged, np.abs(effect.cubic), moved])
         return self._per_unit[model]
 
-    def grows(self, size: Floats) -> Floats:
+    @cached_property
+    def hidden_per_unit(self) -> Floats:
+        """Hidden phase, and rms beyond the cubic, by a small unit of each error, (2, errors, cases). [rad]"""
+        found = np.zeros((2, *self.declared.shape))
+        if self.moves:
+            left = self.left_per_unit(self.moves)
+            found[:, self.moves] = self.exact.unresolved(left)
+        return found
+
+    def left_per_unit(self, places: Sequence[int]) -> Floats:
+        """Range error at the nodes that a small unit of some errors leaves, (errors, nodes, cases). [m]"""
+        table, full, sources = self.table, self.effects["full"], [self.sources[place] for place in places]
+        if self.cases == 1:
+            range_error = self.exact.range_error(table.lanes(*sources)).T[..., None]
+        else:
+            range_error = np.stack([self.exact.range_error(table.lanes(source)) for source in sources])
+        return self.exact.left_of_small(range_error, (full.east[places], full.north[places]))
+
+    def adds(self, size: Floats) -> Floats:
+        """Bounds of judged phase, cubic [rad] and displacement [m] that the second order adds, (3, errors, cases)."""
+        strays = self._strays(size)
+        return self.table.per_metre * self._grows(size, strays) + self.table.per_stray * strays
+
+    def _strays(self, size: Floats) -> Floats:
+        """Bound of the displacement by the phase that is left, in metres.
+
+        A platform that is moved within the aperture sees the ground in another direction, by r̃/R. Where that turns
+        as the phase does, V is less beside the point: by H⁻¹⟨r̃/R, ρ⟩.
+        """
+        full, exact = self.effects["full"], self.exact
+        hidden, rest = self.hidden_per_unit
+        left_rad = np.sqrt(4 / 45 * (full.qpe**2 + hidden**2) + 4 / 175 * full.cubic**2 + rest**2)
+        turns = np.abs(size) * self.edge / exact.nearest_node
+        return np.asarray(turns * np.abs(size) * left_rad / exact.k * (1 + exact.band) / exact.matrix.least)
+
+    def _grows(self, size: Floats, strays: Floats) -> Floats:
         """Bound of the range error that the second order of errors adds, in metres.
 
         Of two platforms it is −Σ|P⊥(r̃ − x̂)|²/2R, at most |r̃ − x̂|²/R of the nearer one. With a direct path that of
@@ -178,7 +258,7 @@ class ErrorBlock:
         |P⊥r̃|²/2D, has the other sign: no more than the larger is added.
         """
         exact = self.exact
-        own, moved = size * self.edge, size * self.per_unit("full")[2]
+        own, moved = size * self.edge, size * self.per_unit("full")[2] + strays
         reach = own + moved
         square = reach * reach
         found = square / exact.nearest_node
@@ -194,9 +274,9 @@ class ErrorBlock:
     def is_large(self, size: Floats) -> Truths:
         """Where effects of errors are not proportional to their size, as far as anybody can see."""
         size = np.abs(size)
-        grown, found = self.grows(size), np.zeros(size.shape, dtype=bool)
-        for per_metre, per_unit, floor in zip(self.table.per_metre, self.per_unit("full"), _FLOORS, strict=True):
-            found |= per_metre * grown > np.maximum(floor, SHARE * per_unit * size)
+        found = np.zeros(size.shape, dtype=bool)
+        for added, per_unit, floor in zip(self.adds(size), self.per_unit("full"), _FLOORS, strict=True):
+            found |= added > np.maximum(floor, SHARE * per_unit * size)
         return found & (size > 0) & self._is_moving
 
     @cached_property
@@ -217,7 +297,10 @@ class ErrorBlock:
         qpe, cubic = effect.qpe * size + 0.0, effect.cubic * size + 0.0
         moved = self.table.planes[model].displacement(effect, size)
         east, north = (np.where(self.is_motion, part, math.nan) for part in moved)
-        found = Declared(qpe, cubic, (east, north), (0.0 - east, 0.0 - north))
+        hidden = rest = np.zeros(size.shape)
+        if model == "full":
+            hidden, rest = self.hidden_per_unit * np.abs(size)
+        found = Declared(qpe, cubic, (east, north), (0.0 - east, 0.0 - north), hidden, rest)
         if model == "full":
             is_large = self.is_large(size)
             if is_large.any():
@@ -230,18 +313,24 @@ class ErrorBlock:
         known = self.followed(is_large, np.abs(sizes))
         ahead, back = (np.where(sizes > 0, *pair) for pair in (known, known[::-1]))
         is_gone = np.isnan(ahead[0]) | np.isnan(back[0])  # no ground point: phases are infinite, none moves
-        for kept, row in ((found.qpe, 3), (found.cubic, 4)):
+        for kept, row in ((found.qpe, 3), (found.cubic, 4), (found.rest, 6)):
             largest = np.copysign(np.maximum(np.abs(ahead[row]), np.abs(back[row])), kept[is_large])
             kept[is_large] = np.where(is_gone, math.inf, largest)
+        # The larger of the judged phases, of which the larger quadratic phase may be of the other sign.
+        gain = np.broadcast_to(self.table.gain, size.shape)[is_large]
+        judged = np.maximum(*(np.hypot(one[3], gain * one[5]) for one in (ahead, back)))
+        with np.errstate(invalid="ignore"):
+            hidden = np.sqrt(np.maximum(judged**2 - found.qpe[is_large] ** 2, 0.0)) / gain
+        found.hidden[is_large] = np.where(is_gone, 0.0, hidden)
         for place, one in ((found.displacement, ahead), (found.opposite, back)):
             place[0][is_large], place[1][is_large] = one[1:3]
 
     def followed(self, some: Truths, sizes: Floats) -> Floats:
-        """Rows of known points of some errors by sizes, of the positive sign and of the other, (2, 6, some)."""
+        """Rows of known points of some errors by sizes, of the positive sign and of the other, (2, ROWS, some)."""
         lanes = np.concatenate(self._lanes_of(some))
         both = np.tile(sizes, 2)
         self.paths.to(lanes, both)
-        return self.paths.known(lanes, both).reshape(6, 2, -1).swapaxes(0, 1)
+        return self.paths.known(lanes, both).reshape(ROWS, 2, -1).swapaxes(0, 1)
 
     @cached_property
     def _lane(self) -> Places:
@@ -260,7 +349,7 @@ class ErrorBlock:
         if self._follows is None:
             table, full = self.table, self.effects["full"]
             lanes = table.lanes(*(self.sources[place] for place in self.moves), signs=(1.0, -1.0))
-            of_moving = Effect._make(part[self.moves] for part in full)
+            of_moving = FullEffect._make(part[self.moves] for part in full)
             moved = np.array(table.planes["full"].displacement(of_moving, 1.0))  # (2, moving, cases)
             per_unit = np.stack((moved, -moved), axis=2).reshape(2, -1)
             self._follows = PointPaths(self.exact, lanes, per_unit, is_alike=table.is_whole)
@@ -325,10 +414,13 @@ class ErrorBlock:
         return Allowed(smallest, quadratic if is_whole else smallest, binding)
 
     def ends_image(self, size: Floats) -> Truths:
-        """Whether allowables, as found, are where the image ends: the search stopped there short of its limit."""
+        """Whether allowables, as found, are where the image ends: range and Doppler have become parallel there."""
         found = np.zeros(size.shape, dtype=bool)
         if self._follows is not None:
-            ends = self._follows.end.reshape(-1, 2, self.cases) == size[self.moves][:, None]
+            both = np.repeat(size[self.moves][:, None], 2, axis=1)
+            ends = self._follows.end.reshape(both.shape) == both
+            lanes = np.flatnonzero(np.isfinite(both) & ~ends)
+            ends.reshape(-1)[lanes] = self._follows.is_parallel(lanes, both.reshape(-1)[lanes])
             found[self.moves] = ends.any(axis=1) & np.isfinite(size[self.moves])
         return found
 
@@ -347,24 +439,24 @@ class ErrorBlock:
         """
         most = np.fmax(self.farthest, np.abs(self.declared))
         found = np.full(small.shape, math.inf)
-        slopes = np.array([self.effects["full"].qpe, self.effects["full"].cubic, self.per_unit("full")[2]])
-        per_metre, searches = np.array(self.table.per_metre), list[Held]()
+        searches = list[Held]()
         # Few are all searched for together.
         is_together = is_few(2 * len(held) * self.declared.size, self.table.is_whole)
         for turn in np.array(held)[np.argsort(small[held], axis=0, kind="stable")]:
-            of, first, slope = (np.take_along_axis(one, turn[None], axis=0)[0] for one in (limit, small, slopes))
+            of, first = (np.take_along_axis(sizes, turn[None], axis=0)[0] for sizes in (limit, small))
             is_alone = (turn == 0) & is_whole
             upto = np.minimum(most, np.where(is_alone, math.inf, found.min(axis=0)))
             with np.errstate(all="ignore"):
-                adds = per_metre[turn, np.arange(self.cases)] * self.grows(np.minimum(first, upto))
+                adds = np.take_along_axis(self.adds(np.minimum(first, upto)), turn[None], axis=0)[0]
                 some = self._is_moving & (adds > SHARE * of)
             at_once = np.where((first <= upto) & ~some, first, math.inf)
             np.put_along_axis(found, turn[None], at_once[None], axis=0)
             if not some.any():
                 continue
-            numbers = of[some], slope[some], first[some], upto[some], np.flatnonzero(some), is_alone[some]
-            for lane, sign in zip(self._lanes_of(some), (1.0, -1.0), strict=True):
-                searches.append(Held(lane, turn[some], *numbers).turned(sign))
+            gain = np.broadcast_to(self.table.gain, some.shape)[some]
+            numbers = of[some], gain, first[some], upto[some], np.flatnonzero(some), is_alone[some]
+            for lane in self._lanes_of(some):
+                searches.append(Held(lane, turn[some], *numbers))
                 if not is_together:
                     self.paths.first_reaching(searches.pop(), found.reshape(3, -1))
         if searches:
@@ -387,6 +479,8 @@ class DeclaredErrors:
         Of the cases.
     shown : container of str, optional
         Ids of rows: of what is not declared, nothing else is listed; omitted: everything is.
+    gain : float or (cases,)
+        Factor by which autofocus lets quadratic phases be larger; none of the hidden ones.
     is_whole : bool
         All of each row is asked for, and alike whatever the number of cases.
 
@@ -404,25 +498,22 @@ class DeclaredErrors:
         exact: ExactRanges,
         shown: Container[str] | None = None,
         *,
+        gain: Any = 1.0,
         is_whole: bool = False,
     ) -> None:
         self.mission, self.cases, self.geometries, self.exact = mission, cases, geometries, exact
-        self.is_whole = is_whole
+        self.gain, self.is_whole = gain, is_whole
         self.has_direct_path = mission.has_direct_path
         self.each = np.arange(cases)
         published, self.published_angle_deg = published_planes(geometries)
-        self.planes = {"published": published, "full": ImagePlane(exact.adjugate, exact.determinant)}
+        self.planes: dict[str, Any] = {"published": published, "full": OwnPlane()}
         half = exact.half
-        (a, b), (c, d) = ([element / exact.determinant for element in row] for row in exact.adjugate)
-        (q_0, q_1), (c_0, c_1) = exact.phases_per_term
         self.edge: dict[str, Any] = {"m": 1.0, "m/s": half, "m/s^2": half**2 / 2}
-        # A range error of a metre at most, whatever its course: its fit has a value of 1 at most, a slope of 1.5, a
-        # quadratic and a cubic of 2.5 and 4 at most; so much phase and displacement follow.
-        self.per_metre: list[Floats] = [
-            2.5 * exact.k + np.abs(q_0) + 1.5 / half * np.abs(q_1),
-            4 * exact.k + np.abs(c_0) + 1.5 / half * np.abs(c_1),
-            np.hypot(a, c) + 1.5 / half * np.hypot(b, d),
-        ]
+        quadratic, cubic, hidden, moved = exact.most_per_metre
+        self.per_metre = np.array((quadratic + self.gain * hidden, cubic, moved))[:, None]
+        quadratic, cubic = exact.k * np.hypot(*(np.abs(gradient[2:]) for gradient in exact.gradient))
+        hidden = QUADRATIC_OF_VARIANCE * exact.k * np.sqrt(exact.matrix.least)
+        self.per_stray = np.array((quadratic + self.gain * hidden, cubic, np.ones(cases)))[:, None]
         self.listed = list(ErrorListing(mission, geometries, exact, shown).listed())
         self.stated = [error for error in self.listed if error.declared is not None and error.is_independent]
         size = max(1, _TOGETHER // (2 * cases))
@@ -519,10 +610,12 @@ class DeclaredErrors:
 
     def degeneracy(self, model: str, case: int = 0) -> Note:
         """Why a model has no displacement in a case; nothing where it has one."""
-        degrees = plain(self.published_angle_deg, case)
-        if model == "full" or degrees >= MIN_GRADIENT_ANGLE_DEG:
+        if model == "full" or not plain(self.planes[model].is_singular, case):
             return NOTHING
-        return phrases.no_displacement(degrees)
+        degrees = plain(self.published_angle_deg, case)
+        if degrees < MIN_GRADIENT_ANGLE_DEG:
+            return phrases.no_displacement(degrees)
+        return phrases.no_displacement_across(plain(np.hypot(*self.geometries.range_gradient), case))
 
 
 class Model:
@@ -534,11 +627,11 @@ class Model:
         self.is_blind = self.is_published and errors.has_direct_path  # to what the collection has
         self.plane, self.degeneracy = errors.planes[name], errors.degeneracy(name)
 
-    def effect(self, source: ErrorSource) -> Effect:
+    def effect(self, source: ErrorSource) -> Effect | FullEffect:
         """Effect of a unit of an error; by the full model of one too small for a second order."""
         return source.effect if self.is_published else source.full
 
-    def displacement(self, effect: Effect, size: float) -> GroundVector | None:
+    def displacement(self, effect: Effect | FullEffect, size: float) -> GroundVector | None:
         """Displacement on the ground by (25) with the Q of the model; None where that has no inverse. [m]"""
         return point(self.plane.displacement(effect, size))
 
@@ -584,6 +677,11 @@ class Model:
         per_unit = float(block.per_unit(self.name)[HELD.index(requirement), place, 0])
         return limit / per_unit if per_unit else math.inf
 
+    def hidden_per_unit(self, source: ErrorSource) -> float:
+        """Hidden phase of a small unit of an error; to the published model there is none. [rad/unit]"""
+        block, place = self.errors.block_of(source)
+        return 0.0 if self.is_published else float(block.hidden_per_unit[0, place, 0])
+
     def ends_image(self, source: ErrorSource, size: float) -> bool:
         """Whether an allowable, as found, is where the image ends; to a linear model none does."""
         block, place = self.errors.block_of(source)
@@ -596,7 +694,7 @@ class Model:
         per_unit = block.per_unit(self.name)[which]
         with np.errstate(all="ignore"):
             first = np.minimum(np.where(per_unit > 0, limit / per_unit, math.inf), block.farthest)
-            adds = self.errors.per_metre[which] * block.grows(first)
+            adds = block.adds(first)[which]
         return self.is_published or not source.displaces or bool(adds[place, 0] <= SHARE * limit)
 
     # ---------------------------------------------------------------- by exact ranges
@@ -611,8 +709,8 @@ class Model:
         some = np.zeros(block.declared.shape, dtype=bool)
         some[place] = True
         known = block.followed(some, np.array([abs(size)]))[0 if size > 0 else 1]
-        _, east, north, quadratic, cubic, _ = known[:, 0].tolist()
-        return None if math.isnan(east) else ExactEffect((east, north), quadratic, cubic)
+        _, east, north, *phases, _ = known[:, 0].tolist()
+        return None if math.isnan(east) else ExactEffect((east, north), *phases)
 
     def largest_range_error(self, source: ErrorSource) -> float:
         """Largest range error at the nodes of a small unit of an error, before it displaces anything. [m/unit]"""

@@ -15,7 +15,7 @@ from bisar_budget import evaluators, phrases
 from bisar_budget.faults import KeyPath
 from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState, Vector
 from bisar_budget.phrases import Note
-from bisar_budget.ranges.exact_ranges import Effect
+from bisar_budget.ranges.exact_ranges import Effect, FullEffect
 
 if TYPE_CHECKING:
     from bisar_budget.mission.instruments import Overridden
@@ -103,7 +103,7 @@ class ErrorSource(NamedTuple):
     declared: Any
     path: KeyPath
     effect: Effect
-    full: Effect
+    full: FullEffect
     direction: Any
     equation: str
     no_limit: Note
@@ -120,7 +120,7 @@ class ErrorSource(NamedTuple):
 
     def in_one_case(self) -> "ErrorSource":
         """The same with plain numbers in the place of arrays of one case."""
-        effect, full = (Effect._make(map(plain, one)) for one in (self.effect, self.full))
+        effect, full = Effect._make(map(plain, self.effect)), FullEffect._make(map(plain, self.full))
         declared = None if self.declared is None else plain(self.declared)
         clock = self.clock and tuple(map(plain, self.clock))
         direction, of_receiver = (one and tuple(map(_plain_way, one)) for one in (self.direction, self.of_receiver))

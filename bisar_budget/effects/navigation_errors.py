@@ -38,6 +38,7 @@ from bisar_budget.effects.random_effect import (
 from bisar_budget.effects.spectra import gauss_markov
 from bisar_budget.faults import KeyPath
 from bisar_budget.geometry import PlatformState, Vector, cross, unit, without_rounding
+from bisar_budget.image_plane import nodes
 from bisar_budget.mission.instruments import IMU_KINDS, GaussMarkov, LeverArm
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import RAW, CommonMotionError, FlownPath, LogNoise, MotionError
@@ -142,9 +143,9 @@ def inertial_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
         if arm is not None and kind in TILTS:
             published, full = _with_arm(seen, place, kind, directions, about, arm)
         else:
-            (quadratic, cubic, east, north), covariance = _over_aperture(seen, place, kind, directions)
+            (quadratic, cubic, east, north, hidden), covariance = _over_aperture(seen, place, kind, directions)
             published = RandomEffect(row[0], row[1], row[2] / seen.factor, *_moved_by_imu(seen, kind, along))
-            full = RandomEffect(quadratic, cubic, heard[2] / seen.factor, east, north, covariance)
+            full = RandomEffect(quadratic, cubic, heard[2] / seen.factor, east, north, covariance, hidden)
         yield RandomError(
             subject=subject(name, "imu", kind),
             unit=unit_of_figure,
@@ -187,7 +188,7 @@ def _moved_by_imu(seen: SensorCases, kind: str, along: Floats) -> list[Any]:
     return seen.moved(constant * scale, linear * scale)
 
 
-def _over_aperture(seen: SensorCases, place: int, kind: str, directions: Floats) -> tuple[Floats, Floats]:
+def _over_aperture(seen: SensorCases, place: int, kind: str, directions: Floats) -> tuple[Sequence[Floats], Floats]:
     """Sigmas by a unit over the exact paths: of quadratic and cubic phase [rad], of displacement east and north. [m]
 
     And their covariance, (4, 4, cases). That over the aperture is that over an aperture of 2 s, times a power of half
@@ -206,7 +207,7 @@ def _covariance_at_nodes(kind: str) -> Floats:
 
     The error is zero at mid-aperture.
     """
-    times = evaluators.LEGENDRE_FITS[NODES][0]
+    times = nodes(NODES).places
     if not kind.endswith("random_walk"):
         order = 3 if kind == "gyro_bias" else 2
         history = np.array(times) ** order / math.factorial(order)
@@ -221,7 +222,7 @@ def _courses(kind: str) -> Floats:
     if kind.endswith("random_walk"):
         return factor(_covariance_at_nodes(kind)).T
     order = 3 if kind == "gyro_bias" else 2
-    return np.array([evaluators.LEGENDRE_FITS[NODES][0]]) ** order / math.factorial(order)
+    return nodes(NODES).places[None] ** order / math.factorial(order)
 
 
 def _velocity_walk(early: float, late: float) -> float:
@@ -322,12 +323,12 @@ def _with_arm(
         orders = orders + scale * np.diagonal(fit @ walk.at_nodes @ fit.T)[:, None] * (held[i] * held[j]).sum(axis=0)
         left = left + scale * walk.left * (held[i] * held[j]).sum(axis=0)
         left_heard = left_heard + scale * walk.left * (heard[i] * heard[j]).sum(axis=0)
-    (quadratic, cubic, east, north), covariance = sigmas(np.asarray(whole), np.asarray(sizes))
+    (quadratic, cubic, east, north, hidden), covariance = sigmas(np.asarray(whole), np.asarray(sizes))
     constant, linear, own, own_cubic = np.maximum(orders, 0.0)
     # What spreads is a mean power, which has no coverage factor.
     spread, spread_heard = (k * np.sqrt(np.maximum(one, 0.0)) / seen.factor for one in (left, left_heard))
     published = RandomEffect(k * np.sqrt(own), k * np.sqrt(own_cubic), spread, *seen.moved(constant, linear))
-    return published, RandomEffect(quadratic, cubic, spread_heard, east, north, covariance)
+    return published, RandomEffect(quadratic, cubic, spread_heard, east, north, covariance, hidden)
 
 
 class _Walks(NamedTuple):
@@ -357,7 +358,7 @@ def _walks(first: int, second: int) -> _Walks:
     both = np.einsum("is,js,s->ij", order_of(first), order_of(second), weight)
     both = both * (1 + (-1.0) ** np.add.outer(number, number))  # that of the other side is as large
     mean = 1 / ((first + second + 2) * (first + second + 1) * math.factorial(first) * math.factorial(second))
-    at_nodes = _legendre(np.array(evaluators.LEGENDRE_FITS[NODES][0]))
+    at_nodes = _legendre(nodes(NODES).places)
     return _Walks(at_nodes @ both @ at_nodes.T, mean - float((np.diagonal(both) / (2 * number + 1))[:4].sum()))
 
 
@@ -470,7 +471,7 @@ def _noise(seen: SensorCases, process: _Process, axes: Mapping[str, Floats], pat
         moved.append(seen.range_errors(place, directions[:, :, None]))
         moves.append(Moves(place, directions[:, :, None], courses))
     along, along_heard = (np.sqrt(np.square(sum(one)).sum(axis=0)) for one in (sighted, heard))
-    (own, own_cubic, east, north), covariance = seen.of_orders(found.covariance, sum(moved))
+    (own, own_cubic, east, north, hidden), covariance = seen.of_orders(found.covariance, sum(moved))
     quadratic, cubic, left = (np.sqrt(one) for one in found[:3])
     return RandomError(
         subject=process.subject,
@@ -483,7 +484,7 @@ def _noise(seen: SensorCases, process: _Process, axes: Mapping[str, Floats], pat
             k * along * left / seen.factor,
             *seen.moved(found.constant * along**2, found.linear * along**2),
         ),
-        full=RandomEffect(own, own_cubic, k * along_heard * left / seen.factor, east, north, covariance),
+        full=RandomEffect(own, own_cubic, k * along_heard * left / seen.factor, east, north, covariance, hidden),
         spreads=process.spreads,
         moves=tuple(moves),
     )

@@ -220,7 +220,7 @@ def _together(one: RandomEffect, other: RandomEffect) -> RandomEffect:
     quadratic, cubic, spread, east, north = (np.hypot(*both) for both in zip(one[:5], other[:5], strict=True))
     is_known = one.covariance is not None and other.covariance is not None
     covariance = one.covariance + other.covariance if is_known else None
-    return RandomEffect(quadratic, cubic, spread, east, north, covariance)
+    return RandomEffect(quadratic, cubic, spread, east, north, covariance, np.hypot(one.hidden, other.hidden))
 
 
 def pieces_by_acceleration(mission: Mission, name: str) -> tuple[PowerLawPiece, ...]:

@@ -259,12 +259,13 @@ def _of_clock(seen: SensorCases, found: Parts, tones: Parts) -> tuple[RandomEffe
         np.where(is_placed, one, nothing) for one in seen.moved(known.constant, known.linear, known.constant_linear)
     )
     published = RandomEffect(quadratic, cubic, spread, east, north)
-    (*phases, east, north), whole = seen.of_orders(known.covariance)
+    (*phases, east, north, hidden), whole = seen.of_orders(known.covariance)
     own = np.where(is_placed, whole, 0.0)
     own[0, 0], own[1, 1] = quadratic**2, cubic**2
     quadratic, cubic = (np.where(counts, *both) for both in zip(phases, (quadratic, cubic), strict=True))
     east, north = (np.where(is_placed, one, nothing) for one in (east, north))
-    return published, RandomEffect(quadratic, cubic, spread, east, north, np.where(counts, whole, own))
+    hidden = np.where(counts, hidden, 0.0)
+    return published, RandomEffect(quadratic, cubic, spread, east, north, np.where(counts, whole, own), hidden)
 
 
 def _left_at_1_hz(seen: SensorCases, name: str, oscillator: Oscillator, *, is_below_mask: bool = False) -> Floats:

@@ -22,6 +22,7 @@ from bisar_budget.effects.sources import exact_ranges
 from bisar_budget.effects.spectra import Parts
 from bisar_budget.faults import KeyPath
 from bisar_budget.geometry import BistaticGeometry, PlatformState
+from bisar_budget.image_plane import LEADING
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
 from bisar_budget.phrases import NOTHING, Note
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
 
 NODES = 16  # a walk has a covariance with an edge, which fewer nodes miss by a percent
 _CANCELS = ROUNDING * 1e-2  # of a square: below it, its root is rounding
-_LEADING = (1.0, 1.0, 1.5, 2.5)  # coefficient of xⁿ in the Legendre polynomial Pₙ: the order's value at the edge
 
 
 class RandomEffect(NamedTuple):
@@ -41,7 +41,8 @@ class RandomEffect(NamedTuple):
     `spread` is what is left of the phase after the cubic; it is a mean power, and no coverage factor is in it. `east`
     and `north` are the sigmas of the displacement [m/unit], not a number where it is not known, as of a free
     oscillator. `covariance` (4, 4, ...) is that of quadratic and cubic phase and displacement east and north, in the
-    units of their products; no matrix where the published model has only their sizes.
+    units of their products; no matrix where the published model has only their sizes. `hidden` is the quadratic phase
+    of as much loss as band and turn do not resolve, `ranges.exact_ranges`. [rad/unit]
     """
 
     quadratic: Any
@@ -50,6 +51,11 @@ class RandomEffect(NamedTuple):
     east: Any
     north: Any
     covariance: Any = None
+    hidden: Any = 0.0
+
+    def judged(self, gain: Any) -> Any:
+        """Phase that is held to a limit with the gain of autofocus in it: `Declared.judged`. [rad/unit]"""
+        return np.hypot(self.quadratic, gain * self.hidden)
 
     @property
     def displacement(self) -> Any:
@@ -61,7 +67,8 @@ class RandomEffect(NamedTuple):
         covariance = self.covariance
         if covariance is not None:
             covariance = covariance[..., case if covariance.shape[-1] > 1 else 0]
-        return RandomEffect._make((*(plain(size, case) for size in self[:5]), covariance))
+        quadratic, cubic, spread, east, north = (plain(size, case) for size in self[:5])
+        return RandomEffect(quadratic, cubic, spread, east, north, covariance, plain(self.hidden, case))
 
     def times(self, factor: Any) -> "RandomEffect":
         """The same with phases and displacement of a coverage factor."""
@@ -72,6 +79,7 @@ class RandomEffect(NamedTuple):
             self.east * factor,
             self.north * factor,
             None if self.covariance is None else self.covariance * factor**2,
+            self.hidden * factor,
         )
 
 
@@ -191,8 +199,12 @@ class SensorCases:
 
     @cached_property
     def weights(self) -> Floats:
-        """Effects of a metre of range error at each node, (4, nodes, cases): two phases [rad], east and north. [m]"""
-        return np.array((*self.exact.phase_weights, *self.exact.place_weights))
+        """Effects of a metre of range error at each node, (8, nodes, cases).
+
+        Quadratic and cubic phase [rad], displacement east and north [m], and four parts of the hidden phase. [rad]
+        """
+        exact = self.exact
+        return np.array((*exact.phase_weights, *exact.place_weights, *exact.hidden_weights))
 
     @cached_property
     def plane(self) -> ImagePlane:
@@ -220,8 +232,8 @@ class SensorCases:
         published = RandomEffect(k * quadratic, k * cubic, 0.0 * k, *moved)
         weighted = self.weights[:, None] * courses
         effects, sizes = weighted.sum(axis=2), np.square(np.abs(weighted).sum(axis=2)).sum(axis=1)
-        (qpe, edge, east, north), covariance = sigmas(np.einsum("fec,gec->fgc", effects, effects), sizes)
-        return published, RandomEffect(qpe, edge, 0.0 * k, east, north, covariance)
+        (qpe, edge, east, north, hidden), covariance = sigmas(np.einsum("fec,gec->fgc", effects, effects), sizes)
+        return published, RandomEffect(qpe, edge, 0.0 * k, east, north, covariance, hidden)
 
     def of_motion(self, place: int, moved: Floats) -> tuple["RandomEffect", "RandomEffect"]:
         """The same of independent position errors of a platform, (errors, 3, nodes, cases). [m/unit]"""
@@ -248,10 +260,10 @@ class SensorCases:
 
     @cached_property
     def orders(self) -> Floats:
-        """Orders 0 to 3 at the nodes, by their values at the aperture edge as `_LEADING` has them, (nodes, 4)."""
+        """Orders 0 to 3 at the nodes, by their values at the aperture edge as `LEADING` has them, (nodes, 4)."""
         return orders_at(self.exact.sampling.places)
 
-    def of_orders(self, covariance: Floats, along: Any = 1.0) -> tuple[Floats, Floats]:
+    def of_orders(self, covariance: Floats, along: Any = 1.0) -> tuple[Sequence[Floats], Floats]:
         """`sigmas` of phases and displacement by orders 0 to 3 of independent range errors.
 
         `covariance` (4, 4, ...) is that of each at the aperture edge [m²], `along` (errors, nodes, cases) what a
@@ -275,8 +287,8 @@ class SensorCases:
         k = 2 * math.pi / np.asarray(self.mission.radar.wavelength)
         quadratic, cubic, left = (k * np.sqrt(part) for part in found[:3])
         published = RandomEffect(quadratic, cubic, left, *self.moved(found.constant, found.linear))
-        (quadratic, cubic, east, north), covariance = self.of_orders(found.times(np.square(along)).covariance)
-        return published, RandomEffect(quadratic, cubic, left * along, east, north, covariance)
+        (quadratic, cubic, east, north, hidden), covariance = self.of_orders(found.times(np.square(along)).covariance)
+        return published, RandomEffect(quadratic, cubic, left * along, east, north, covariance, hidden)
 
     def alike(self, value: Any) -> Iterator[tuple[Any, NDArray[np.intp]]]:
         """Tell apart cases in which a value, or what is in it, differs: the value of each group, and its cases."""
@@ -291,7 +303,7 @@ class SensorCases:
 
 def orders_at(places: Floats) -> Floats:
     """Orders 0 to 3 at places of the aperture, (places, 4), of a size of 1 at its edge as `Parts` has them."""
-    return np.asarray(np.polynomial.legendre.legvander(places, len(_LEADING) - 1) / _LEADING)
+    return np.asarray(np.polynomial.legendre.legvander(places, LEADING.size - 1) / LEADING)
 
 
 def _arrays_in(value: Any) -> Iterator[Floats]:
@@ -316,15 +328,18 @@ def parts_of_largest(values: Floats) -> tuple[Floats, Floats]:
     return largest, np.divide(values, largest, out=np.ones_like(values), where=largest > 0)
 
 
-def sigmas(covariance: Floats, sizes: Floats) -> tuple[Floats, Floats]:
-    """Roots of the diagonal of a covariance (4, 4, cases), and that covariance.
+def sigmas(covariance: Floats, sizes: Floats) -> tuple[Sequence[Floats], Floats]:
+    """Roots of the diagonal of a covariance (8, 8, cases) of what `SensorCases.weights` weigh, and its first (4, 4).
 
-    What is left of terms that cancel exactly, of squares of so large `sizes` (4, cases), is rounding, and would make
+    Those of quadratic and cubic phase, of east and north, and of the hidden phase, whose four parts add as squares.
+    What is left of terms that cancel exactly, of squares of so large `sizes` (8, cases), is rounding, and would make
     a limit out of nothing.
     """
     squares = np.einsum("ffc->fc", covariance)
     is_real = squares > _CANCELS * sizes
-    return np.sqrt(np.where(is_real, squares, 0.0)), np.where(is_real & is_real[:, None], covariance, 0.0)
+    squares, is_held = np.where(is_real, squares, 0.0), is_real[:4]
+    hidden = np.sqrt(squares[4:].sum(axis=0))
+    return [*np.sqrt(squares[:4]), hidden], np.where(is_held & is_held[:, None], covariance[:4, :4], 0.0)
 
 
 def factor(covariance: Floats) -> Floats:

@@ -6,7 +6,7 @@ allowable. A sweep lists those that are declared, and those of which something i
 
 from collections.abc import Container, Iterator, Sequence
 from functools import cache, cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -25,16 +25,19 @@ from bisar_budget.effects.effect import (
 )
 from bisar_budget.faults import KeyPath
 from bisar_budget.geometry import FRAME_AXES, BistaticGeometry, PlatformState, Vectors
+from bisar_budget.image_plane import nodes_for
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
 from bisar_budget.phrases import NOTHING, Note
-from bisar_budget.ranges.exact_ranges import Effect, ExactRanges, nodes_for
+from bisar_budget.ranges.exact_ranges import Effect, ExactRanges, FullEffect
 
 if TYPE_CHECKING:
     from bisar_budget.mission.covariance import Covariance
 
+AnyEffect = TypeVar("AnyEffect", Effect, FullEffect)
 _AXES: tuple[Vectors, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-_UNIT = Effect(constant=0.0, linear=0.0, qpe=1.0, cubic=0.0)  # of what only is a phase
+_PUBLISHED_UNIT = Effect(constant=0.0, linear=0.0, qpe=1.0, cubic=0.0)  # of what only is a phase
+_FULL_UNIT = FullEffect(east=0.0, north=0.0, qpe=1.0, cubic=0.0)
 
 
 def exact_ranges(
@@ -43,7 +46,7 @@ def exact_ranges(
     """Exact ranges of cases of a mission at their scene centres, at as many nodes as it needs, or a given number."""
     T, is_heard = mission.collection.aperture_time, mission.has_direct_path
     count = count or nodes_for(geometry, T, has_direct_path=is_heard)
-    return ExactRanges.of(geometry.both, mission.radar.wavelength, T, count, cases, has_direct_path=is_heard)
+    return ExactRanges.of(geometry.both, mission.radar, T, count, cases, has_direct_path=is_heard)
 
 
 def distribution_of(mission: Mission, source: ErrorSource) -> str:
@@ -66,7 +69,7 @@ class ErrorListing:
     ) -> None:
         self.mission, self.geometry, self.exact, self.shown = mission, geometry, exact, shown
         self.factor = mission.allocation.coverage_factor
-        self._legs: dict[tuple[int, str], tuple[list[Effect], list[Effect]]] = {}
+        self._legs: dict[tuple[int, str], tuple[list[Effect], list[FullEffect]]] = {}
 
     def listed(self) -> Iterator[ErrorSource]:
         """Every position, velocity, acceleration, clock and other error, in the order of the contract."""
@@ -90,14 +93,14 @@ class ErrorListing:
             for path in self.geometry.both
         ]
 
-    def legs(self, place: int, kind: str) -> tuple[list[Effect], list[Effect]]:
+    def legs(self, place: int, kind: str) -> tuple[list[Effect], list[FullEffect]]:
         """Effects of a unit of a kind of error of one platform along x, y, z, by Tables I and II and in full."""
         if (place, kind) not in self._legs:
             first = 3 * list(MOTION_UNITS).index(kind)
             published = [Effect._make(row) for row in self._published[place][first : first + 3]]
             along = np.stack([self.exact.along(place, axis) for axis in _AXES])
             found = self.exact.effect(along * self.exact.powers[MOTION_UNITS[kind]])
-            full = [Effect._make(one) for one in zip(*found, strict=True)]
+            full = [FullEffect._make(row) for row in zip(*found, strict=True)]
             self._legs[place, kind] = published, full
         return self._legs[place, kind]
 
@@ -281,13 +284,9 @@ class ErrorListing:
                 if not self._is_listed(what, values):
                     continue
                 ways = [frame[axis] for frame in frames]
-                published, full = (
-                    _sum([
-                        legs[axis] if in_scene else _along(legs, ways[place])
-                        for place, legs in enumerate(self.legs(place, kind)[model] for place in (0, 1))
-                    ])
-                    for model in (0, 1)
-                )  # fmt: skip
+                both = [self.legs(place, kind) for place in (0, 1)]
+                published = self._of_both([legs for legs, _ in both], axis, None if in_scene else ways)
+                full = self._of_both([legs for _, legs in both], axis, None if in_scene else ways)
                 if kind == "position" and name in ("x", "y"):
                     # A horizontal shift of both platforms is a shift of the scene: x̂ is the error itself, and β̃ₙ and
                     # ½s̈·x̂ cancel. What a sum of rounded numbers leaves would be a limit out of nothing.
@@ -310,6 +309,13 @@ class ErrorListing:
                     notes=(phrases.held_to_the_total("both platforms"),),
                     of_receiver=None if in_scene else ways[1],
                 )
+
+    @staticmethod
+    def _of_both(legs: Sequence[Sequence[AnyEffect]], axis: int, ways: Sequence[Vectors] | None) -> AnyEffect:
+        """Effect of one error of both platforms along an axis of the scene, or along the way of each."""
+        if ways is None:
+            return _sum([effects[axis] for effects in legs])
+        return _sum([_along(effects, way) for effects, way in zip(legs, ways, strict=True)])
 
     def _of_time_tags(self) -> Iterator[ErrorSource]:
         """Time of the navigation against that of the radar: each platform's, and that of one clock for both.
@@ -364,10 +370,8 @@ class ErrorListing:
         height = self.mission.scene.height_error
         if height is None:
             return
-        published, full = (
-            Effect._make(map(sum, zip(*(self.legs(place, "position")[model][2] for place in (0, 1)), strict=True)))
-            for model in (0, 1)
-        )
+        both = [self.legs(place, "position") for place in (0, 1)]
+        published, full = _sum([legs[2] for legs, _ in both]), _sum([legs[2] for _, legs in both])
         yield ErrorSource(
             subject=subject("mission", "terrain"),
             unit="m",
@@ -390,8 +394,8 @@ class ErrorListing:
                 unit="rad",
                 declared=other.quadratic_phase_error,
                 path=("other_errors", index, "quadratic_phase_error"),
-                effect=_UNIT,
-                full=_UNIT,
+                effect=_PUBLISHED_UNIT,
+                full=_FULL_UNIT,
                 direction=NOWHERE,
                 equation="as declared",
                 no_limit=NOTHING,
@@ -433,14 +437,14 @@ def _along_covariance(covariance: "Covariance", kind: str, direction: Sequence[A
     return np.sqrt(squared(covariance.block(kind), parts))
 
 
-def _along(effects: Sequence[Effect], direction: Vectors) -> Effect:
+def _along(effects: Sequence[AnyEffect], direction: Vectors) -> AnyEffect:
     """Effect of a unit error along a direction: the projection of the three scene effects."""
     terms = [[part * way for part, way in zip(parts, direction, strict=True)] for parts in zip(*effects, strict=True)]
-    return Effect._make(map(_total, terms))
+    return type(effects[0])(*map(_total, terms))
 
 
-def _sum(effects: Sequence[Effect]) -> Effect:
-    return Effect._make(map(_total, zip(*effects, strict=True)))
+def _sum(effects: Sequence[AnyEffect]) -> AnyEffect:
+    return type(effects[0])(*map(_total, zip(*effects, strict=True)))
 
 
 def _total(terms: Sequence[Any]) -> Any:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget import evaluators
+from bisar_budget.image_plane import nodes
 from bisar_budget.ranges.exact_ranges import Floats
 
 SLOW = 0.5  # angle, or ratio, below which terms cancel and a series is exact to 1e-8
@@ -113,8 +114,8 @@ _FALLS = 6.0  # powers of e by which a steep piece falls from edge to edge
 
 # Nodes and weights of Gauss and Legendre on 0 … 1.
 _NODES, _WEIGHTS = (
-    (0.5 + 0.5 * np.array(evaluators.LEGENDRE_FITS[6][0]))[:, None],
-    np.array(evaluators.LEGENDRE_FITS[6][1])[:, None],
+    (0.5 + 0.5 * nodes(6).places)[:, None],
+    nodes(6).fit[0][:, None],
 )
 _MOST = 4096  # panels that are integrated at once
 

@@ -268,7 +268,8 @@ class DeclaredPhase(NamedTuple):
     """Phases of one declared error, which sums count: row id, owner, quadratic and cubic phase. [rad]
 
     What is a quadratic phase and nothing else has no cubic one: None. A vibration is there, and its phases are not
-    0, only in the cases in which it is slow. `coverage` is the coverage factor that both phases have in them.
+    0, only in the cases in which it is slow. `coverage` is the coverage factor that both phases have in them. The
+    `hidden` phase is what band and turn do not resolve of a loss, which counts with the quadratic one. [rad]
     """
 
     row_id: str
@@ -277,6 +278,11 @@ class DeclaredPhase(NamedTuple):
     cubic_rad: Any
     coverage: Any = 1.0
     is_there: Any = True
+    hidden_rad: Any = 0.0
+
+    def judged(self, gain: Any) -> Any:
+        """Magnitude of the phase that is held to a limit with autofocus' gain in it: `Declared.judged`. [rad]"""
+        return np.hypot(self.qpe_rad, gain * self.hidden_rad)
 
 
 def slow_phases(mission: Mission, geometry: Any = None) -> list[DeclaredPhase]:

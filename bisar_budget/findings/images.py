@@ -35,6 +35,8 @@ class Verdict(NamedTuple):
     full_qpe_rad: float | None = None
     predicted_qpe_rad: float | None = None
     measured_qpe_rad: float | None = None
+    equal_loss_qpe_rad: float | None = None
+    measured_equal_loss_qpe_rad: float | None = None
     measured_inside_rad: float | None = None
     measured_beyond_rad: float | None = None
     predicted_cubic_rad: float | None = None

@@ -52,9 +52,10 @@ class Row(NamedTuple):
     error stated in another frame is shown again, but not counted again. `qpe_exact_rad` is `qpe_full_rad`, which is
     that of exact ranges; `published_margin_db` how far the published rule of a vibration stays inside first
     principles. `binding_requirement` is the requirement that sets `allowable`, `cubic_rad` the magnitude of the
-    declared error's cubic phase at the aperture edge, `islr_db` the ISLR that a declared random error adds, `model`
-    the one whose numbers these are. `waivers` name the row while it fails, valid or expired; `refuted` says by which
-    images its limit does not hold.
+    declared error's cubic phase at the aperture edge, `islr_db` the ISLR that a declared random error adds.
+    `equal_loss_qpe_rad` is the quadratic phase of as much loss of the peak as `qpe_full_rad` and what band and turn
+    do not resolve, `rest_rad` the rms phase beyond the cubic, `model` the one whose numbers these are. `waivers` name
+    the row while it fails, valid or expired; `refuted` says by which images its limit does not hold.
     """
 
     subject: Subject
@@ -82,6 +83,8 @@ class Row(NamedTuple):
     binding_requirement: str | None = None
     cubic_rad: float | None = None
     islr_db: float | None = None
+    equal_loss_qpe_rad: float | None = None
+    rest_rad: float | None = None
     model: str | None = None
     waivers: tuple[AppliedWaiver, ...] = ()
     refuted: tuple[Note, ...] = ()

@@ -530,6 +530,7 @@ class Mission(NamedTuple):
                 yield from too_low(propagation, platforms, collection.aperture_time)
             yield from without_image(
                 platforms,
+                values.get("radar"),
                 collection and collection.aperture_time,
                 values.get("common_motion_error"),
                 has_direct_path=synchronization is not None and synchronization.is_direct_path,

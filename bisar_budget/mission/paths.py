@@ -161,7 +161,9 @@ def with_paths(mission: Mission, read: Beside, report: Report) -> Any:
     if not is_valid:
         return INVALID
     aperture_time, common = mission.collection.aperture_time, mission.common_motion_error
-    problems = list(without_image(platforms, aperture_time, common, has_direct_path=mission.has_direct_path))
+    problems = list(
+        without_image(platforms, mission.radar, aperture_time, common, has_direct_path=mission.has_direct_path)
+    )
     if mission.propagation is not None:
         problems += too_low(mission.propagation, platforms, aperture_time)
     for problem in problems:

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from bisar_budget.geometry import (
     norm,
     state_from_angles,
 )
+from bisar_budget.image_plane import degeneracy
 from bisar_budget.mission.covariance import COVARIANCE, Covariance, misplaced_axes
 from bisar_budget.mission.instruments import (
     IMU,
@@ -65,6 +66,9 @@ from bisar_budget.mission.readers import (
 from bisar_budget.mission.vibrations import Vibration
 from bisar_budget.paths.accuracy import Matrix, StatedAccuracy
 from bisar_budget.paths.instant import SCALES, parse_instant
+
+if TYPE_CHECKING:
+    from bisar_budget.mission.model import Radar
 
 LEAST_BASELINE = 1.0  # m, between platforms of which one hears the other
 FARTHEST_BY = 3  # times the least baseline, that they move by in half an aperture: so far a fit of 16 nodes is true
@@ -580,6 +584,7 @@ class Platforms(NamedTuple):
 
 def without_image(
     platforms: Platforms,
+    radar: "Radar | None",
     aperture_time_s: float | None,
     common: CommonMotionError | None = None,
     *,
@@ -587,7 +592,7 @@ def without_image(
 ) -> Iterator[Problem]:
     """Say what keeps paths from forming an image, and errors from having axes; no aperture is wrong by itself."""
     geometry = platforms.geometry
-    yield from _no_image(geometry)
+    yield from _no_image(geometry, radar, aperture_time_s)
     if common is not None:
         yield from _no_common_frame(platforms, common.frame)
     if aperture_time_s is not None:
@@ -597,11 +602,11 @@ def without_image(
             yield from _no_baseline(geometry.apart, aperture_time_s / 2)
 
 
-def _no_image(geometry: BistaticGeometry) -> Iterator[Problem]:
+def _no_image(geometry: BistaticGeometry, radar: "Radar | None", aperture_time_s: float | None) -> Iterator[Problem]:
     if all(norm(platform.velocity) < STILL for platform in geometry.both):
         yield Problem("both platforms are still: no aperture", at=("platforms",))
-    elif degeneracy := geometry.degeneracy():
-        yield Problem(degeneracy, at=("platforms",))
+    elif radar and aperture_time_s and (reason := degeneracy(geometry, radar, aperture_time_s)):
+        yield Problem(reason, at=("platforms",))
 
 
 def _no_common_frame(platforms: Platforms, frame: str) -> Iterator[Problem]:

@@ -1,9 +1,22 @@
 """Effects of errors of any size by exact ranges, in many cases at once: no expansion.
 
-The data hold the ranges of the true path; the processor subtracts those of the measured one. What is left is fitted
-over the whole aperture by Legendre polynomials Pₙ, at the nodes of Gauss-Legendre quadrature (`LEGENDRE_FITS`). The
-response sits at the ground point for which nothing is left of P₀ and P₁; what then is left of P₂ and P₃ defocuses.
-Of errors so small that their effects are proportional to them, `effect` says the same. Derived here.
+The data hold the ranges of the true path; the processor subtracts those of the measured one. For a ground point x the
+range error ρ(τ; x) is the recorded range less the expected one. The phase over band and aperture is 2πfρ/c, and to
+second order in that phase the image peaks where the phase has the least variance, a constant phase being free:
+
+    V(x) = Var_τ(ρ) + b²⟨ρ²⟩,    b² = B²/(12 f₀²),
+
+for a band of width B, evenly filled, about f₀; ⟨ ⟩ is the mean over the aperture. With the product that belongs to V,
+⟨a, c⟩ = (1 + b²)⟨ac⟩ − ⟨a⟩⟨c⟩, the point obeys ⟨∂ρ/∂x, ρ⟩ = 0. Where b is much larger than the square of the turn
+of the line of sight, ρ then has no part along the Legendre polynomials P₀ and P₁ of the aperture; a narrow band or a
+wide turn leaves some of both.
+
+Fitted over the aperture at the nodes of Gauss-Legendre quadrature, the P₂ and P₃ parts of ρ at that point are the
+quadratic and the cubic phase, and the rest beyond P₃ spreads. The hidden phase is the quadratic phase of as much loss
+of the peak as all of V that is neither quadratic, nor cubic, nor rest: what the band and the turn do not resolve.
+
+For errors so small that their effects are proportional to them, `effect` gives the same. Derived here; held to images
+by direct sums in `tests/theory/test_image_point.py`.
 
 A receiver that hears the transmitter takes the direct path as its clock: the data then hold R_t + R_r less the actual
 distance of the platforms, and the processor subtracts ranges less the measured one. No ground point changes that
@@ -16,57 +29,45 @@ of one case. A single case serves any number of lanes as it stands.
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, cached_property, reduce
-from typing import Any, NamedTuple
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget.constants import ROUNDING, SPEED_OF_LIGHT
-from bisar_budget.evaluators import LEGENDRE_FITS, full_ground_inverse
-from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState, Vectors, dot, norm
+from bisar_budget.geometry import GroundVector, PlatformState, Vectors, dot, norm
+from bisar_budget.image_plane import FEWEST_NODES, LEADING, GroundMatrix, Sampling, band_variance, nodes
+
+if TYPE_CHECKING:
+    from bisar_budget.mission.model import Radar
 
 Floats = NDArray[np.float64]
 Places = NDArray[np.intp]
 Truths = NDArray[np.bool_]
 
-# Way of a platform in half an aperture, over its slant range, up to which so many nodes change phases by less than
-# 1e-6 of themselves; beyond the last, 16 nodes are right to 1e-3 at 1.25.
-NODES = ((0.1, 6), (0.5, 10), (math.inf, 16))
 FINE = 24  # nodes of courses that are not as smooth as those of (22)
 ITERATIONS = 40
-MEASURED, WORKED_ON = 8, 15  # arrays of all samples that hold measured paths; and these with what is worked on
+MEASURED, WORKED_ON = 8, 16  # arrays of all samples that hold measured paths; and these with what is worked on
 TOGETHER = 1 << 16  # samples of lanes: what is made of them stays in a cache
-STEPS = 8  # in which a point is followed by errors of any course
+FOLDED = 0.2  # of the area that gradients of V span at the centre; with less, a way is near a fold or beyond one
+ENDS_RAD = math.pi  # of hidden phase, where the way is folded: no point has the range history
+STEPS = (8, 40)  # in which a point is followed by errors of any course; more where it is lost
 MEETS = 1e-5  # of the nearest range; of a platform that is nearer, rounding decides in which direction it is seen
-NEAR = 0.003  # of the nearest slant range; a point so near to the centre has slopes that differ by no more
-SKEWED = 0.01  # the same over the sine between the gradients, where they are near to parallel
-BENT = 0.05  # of what Doppler turns by at the centre: velocity errors turn it by less, or its slopes are others
-FEW = 4
 SHRINKS = 0.5  # square of each step of the search over that of the one before; else it does not settle
 EPSILON = 2e-15  # of a range sum: what rounding of a few operations leaves
+BOWL = 0.05  # of the determinant of H; where V bends less, it is no bowl around the point
 AT_FOLD = 0.1  # of what gradients span at the centre: with less, what they span changes much in a small step
 OF_UNSEEN = 1e-4  # of the square of a last step elsewhere, that is left of the last one there
+FOLDED = 0.2  # of what gradients span at the centre; with less, the way of a point is near a fold or beyond one
+ENDS_RAD = math.pi  # of hidden phase, where the way is folded: no point has the range history
 UNSEEN_RAD = 3e-5  # what the last step of the search may change a phase by beyond the part counted linearly
 
 STILL = [np.zeros((1, 1))] * 3  # a platform that no error moves
 
-
-class Sampling(NamedTuple):
-    """When a history is sampled: slow times over −1 … 1, in half apertures, (samples,); and the weights that fit it.
-
-    The weights (4, samples) are those of `LEGENDRE_FITS`: value, slope, quadratic and cubic at the edge.
-    """
-
-    places: Floats
-    fit: Floats
-
-
-@cache
-def nodes(count: int) -> Sampling:
-    """Sampling at so many nodes of Gauss-Legendre quadrature."""
-    places, *fit = LEGENDRE_FITS[count]
-    return Sampling(np.array(places), np.array(fit))
+# A quadratic phase φ at the aperture edge leaves the phase with a variance of 4φ²/45.
+QUADRATIC_OF_VARIANCE = math.sqrt(45 / 4)
+MAX_TURN_RAD = 1.0  # of a line of sight over the aperture, up to which its orders have a meaning
 
 
 def aperture_nodes(aperture_time_s: float) -> Floats:
@@ -74,27 +75,28 @@ def aperture_nodes(aperture_time_s: float) -> Floats:
     return nodes(FINE).places * (aperture_time_s / 2)
 
 
-def nodes_for(geometry: BistaticGeometry, aperture_time_s: Any, *, has_direct_path: bool = False) -> Any:
-    """Number of nodes that cases need: of the lines of sight, and of the direct path where that counts."""
-    half = aperture_time_s / 2
-    turning = (*geometry.both, *((geometry.apart,) if has_direct_path else ()))
-    way = reduce(np.maximum, [path.travelled(half) / path.slant_range for path in turning])
-    limits, counts = zip(*NODES, strict=True)
-    found = np.array(counts)[np.searchsorted(limits, way)]
-    return found if np.ndim(way) else int(found)
-
-
 class Effect(NamedTuple):
-    """Effect of one unit of an error, signed like the range error; numbers, or arrays of cases.
+    """Effect of one unit of an error by the published model, signed like the range error; numbers, or arrays.
 
-    Constant [m/unit] and linear [(m/s)/unit] term of the range error; quadratic and cubic phase at the
-    aperture edge [rad/unit]. By the published model they are coefficients at the aperture midpoint. By the full
-    model they are fitted over the aperture, of an error too small for a second order, and its phases hold what the
-    displacement of the image adds.
+    Constant [m/unit] and linear [(m/s)/unit] term of the range error at the aperture midpoint; quadratic and cubic
+    phase at the aperture edge. [rad/unit]
     """
 
     constant: Any
     linear: Any
+    qpe: Any
+    cubic: Any
+
+
+class FullEffect(NamedTuple):
+    """Effect of one unit of a small error by the full model; numbers, or arrays of cases.
+
+    Displacement east and north [m/unit]; quadratic and cubic phase at the aperture edge, signed like the range error
+    that is left at the displaced point. [rad/unit]
+    """
+
+    east: Any
+    north: Any
     qpe: Any
     cubic: Any
 
@@ -135,16 +137,6 @@ class Lanes:
     def turns(self) -> bool:
         """Whether any direction turns within the aperture."""
         return any(np.ndim(part) > 1 for direction in self.directions for part in direction)
-
-    def turned(self) -> Any:
-        """Half of what directions change by from the first node to the last, of both platforms. [m/unit]"""
-        if not self.turns:
-            return 0.0
-        found: Any = 0.0
-        for weight, direction in zip(self.moves, self.directions, strict=True):
-            x, y, z = (part[-1] - part[0] if np.ndim(part) > 1 else 0.0 * part for part in direction)
-            found = found + weight * norm((x, y, z)) / 2
-        return found
 
     @property
     def platforms(self) -> list[int]:
@@ -221,8 +213,8 @@ class SmallErrors(NamedTuple):
 class Found(NamedTuple):
     """Effects of errors by exact ranges; `is_found` where they are certain at once.
 
-    Displacement east, north [m]; quadratic and cubic phase at the aperture edge, signed like β̃ [rad]. `turn` is what
-    range and Doppler gradients span there, over what they span at the centre.
+    Displacement east, north [m]; quadratic and cubic phase at the aperture edge, signed like β̃; the `hidden` phase,
+    and the rms beyond the cubic. [rad] `turn` is the area that the gradients of V span there, over the centre's.
     """
 
     is_found: Truths
@@ -230,6 +222,8 @@ class Found(NamedTuple):
     north: Floats
     quadratic: Floats
     cubic: Floats
+    hidden: Floats
+    rest: Floats
     turn: Floats
 
 
@@ -237,12 +231,20 @@ class Found(NamedTuple):
 class ExactEffect:
     """Effect of one error by exact ranges, in plain numbers.
 
-    Displacement (east, north) [m]; phases at the aperture edge, signed like the range error [rad].
+    Displacement (east, north) [m]; quadratic and cubic phase at the aperture edge, signed like the range error; the
+    phase that band and turn hide, and the rms beyond the cubic. [rad]
     """
 
     displacement: GroundVector
     quadratic: float
     cubic: float
+    hidden: float = 0.0
+    rest: float = 0.0
+
+    @property
+    def equal_loss(self) -> float:
+        """Quadratic phase of as much loss of the peak as quadratic and hidden phase together. [rad]"""
+        return math.hypot(self.quadratic, self.hidden)
 
     def moved(self, by: GroundVector) -> GroundVector:
         """The displacement and another one together."""
@@ -255,7 +257,9 @@ class ExactRanges:
     Parameters
     ----------
     half, k : (n,)
-        Half the aperture time [s], and 2π over the wavelength. [rad/m]
+        Half the aperture time [s], and 2π over the wavelength of the band's centre. [rad/m]
+    band : (n,)
+        b², the variance of the frequency over the band, over the square of its centre.
     sampling : Sampling
         When the paths are sampled, at nodes or anywhere.
     tracks : sequence of Vectors
@@ -264,36 +268,38 @@ class ExactRanges:
         The same at the middle of the aperture, (n,). [m]
     has_direct_path : bool
         Whether the direct path is the clock.
+
+    Attributes
+    ----------
+    gradient : two of (4, n)
+        Mean, P₁ part at the edge, quadratic and cubic part of what a metre east, and north, adds to the range error.
     """
 
     def __init__(
         self,
         half: Floats,
         k: Floats,
+        band: Floats,
         sampling: Sampling,
         tracks: Sequence[Vectors],
         positions: Sequence[Vectors],
         *,
         has_direct_path: bool = False,
     ) -> None:
-        self.half, self.k, self.sampling, self.tracks, self.positions = half, k, sampling, tracks, positions
+        self.half, self.k, self.band, self.sampling = half, k, band, sampling
+        self.tracks, self.positions = tracks, positions
         self.has_direct_path = has_direct_path
         self.fit = sampling.fit
+        self.mean = self.fit[0][:, None]
         self.ranges = [norm(track) for track in tracks]
-        self.gradient = [self.fit @ one for one in self.slopes]
-        (s_x, rate_x, *_), (s_y, rate_y, *_) = self.gradient
-        self.determinant: Any
-        with np.errstate(all="ignore"):
-            first, second, (self.determinant,) = full_ground_inverse(s_x, s_y, rate_x / half, rate_y / half)
-            self.adjugate = (first, second)
-            self.range_gradient = np.hypot(s_x, s_y)
-            self.sine = (s_x * rate_y - s_y * rate_x) / (self.range_gradient * np.hypot(rate_x, rate_y))
+        self.gradient = [self.fit @ slope for slope in self.slopes]
+        self.matrix = GroundMatrix.of(self.slopes, self.fit, band)
 
     @classmethod
     def of(
         cls,
         paths: Sequence[PlatformState],
-        wavelength: Any,
+        radar: "Radar",
         aperture_time: Any,
         count: int,
         cases: int = 1,
@@ -301,8 +307,15 @@ class ExactRanges:
         has_direct_path: bool = False,
     ) -> "ExactRanges":
         """Exact ranges of collections, at their scene centres: of transmitter and receiver."""
-        half: Floats = np.array(np.broadcast_to(np.asarray(aperture_time, dtype=float) / 2, (cases,)))
-        k: Floats = np.array(np.broadcast_to(2 * math.pi / np.asarray(wavelength, dtype=float), (cases,)))
+
+        def of_each(value: Any) -> Floats:
+            return np.array(np.broadcast_to(np.asarray(value, dtype=float), (cases,)))
+
+        half, k, band = (
+            of_each(aperture_time) / 2,
+            2 * math.pi / of_each(radar.wavelength),
+            of_each(band_variance(radar)),
+        )
         sampling = nodes(count)
         times = sampling.places[:, None] * half
         middles = []
@@ -310,15 +323,14 @@ class ExactRanges:
             x, y, z = (np.broadcast_to(part, (cases,)) for part in path.position)
             middles.append((x, y, z))
         tracks = [path.place(times) for path in paths]
-        return cls(half, k, sampling, tracks, middles, has_direct_path=has_direct_path)
+        return cls(half, k, band, sampling, tracks, middles, has_direct_path=has_direct_path)
 
     def at(self, east: Floats, north: Floats, case: Places) -> "ExactRanges":
         """Exact ranges of cases at points of the ground, (case,), in place of the centre. [m]"""
         tracks = [(x - east, y - north, z) for x, y, z in (_of([*track], case) for track in self.tracks)]
         positions = [(x[case] - east, y[case] - north, z[case]) for x, y, z in self.positions]
-        return ExactRanges(
-            self.half[case], self.k[case], self.sampling, tracks, positions, has_direct_path=self.has_direct_path
-        )
+        half, k, band = self.half[case], self.k[case], self.band[case]
+        return ExactRanges(half, k, band, self.sampling, tracks, positions, has_direct_path=self.has_direct_path)
 
     @cached_property
     def times(self) -> Floats:
@@ -333,15 +345,20 @@ class ExactRanges:
         return [p[axis] / R + q[axis] / S for axis in (0, 1)]
 
     @cached_property
-    def phases_per_term(self) -> Any:
-        """Quadratic phase, and cubic, that the displacement by a unit of the constant and of the linear part adds."""
-        (_, _, q_x, c_x), (_, _, q_y, c_y) = self.gradient
-        (a, b), (c, d) = self.adjugate
-        scale = self.k / self.determinant
-        return (
-            ((q_x * a + q_y * c) * scale, (q_x * b + q_y * d) * scale),
-            ((c_x * a + c_y * c) * scale, (c_x * b + c_y * d) * scale),
-        )
+    def sine(self) -> Floats:
+        """Sine of the angle between the directions that band and turn resolve at the centre."""
+        return self.matrix.sine
+
+    @cached_property
+    def is_turned(self) -> Truths:
+        """Whether a line of sight turns by more than `MAX_TURN_RAD` between two nodes of the aperture, (n,)."""
+        least = np.full(self.half.shape, math.inf)
+        if self.fit.shape[1] > FEWEST_NODES:  # with fewer nodes no platform gets so far
+            for track, ranges in zip(self.tracks, self.ranges, strict=True):
+                looks = np.stack(np.broadcast_arrays(*(part / ranges for part in track)))
+                for later in looks.swapaxes(0, 1):
+                    least = np.minimum(least, np.einsum("an,amn->mn", later, looks).min(axis=0))
+        return np.asarray(least < math.cos(MAX_TURN_RAD))
 
     @cached_property
     def nearest_node(self) -> Floats:
@@ -377,16 +394,6 @@ class ExactRanges:
         """Unit vectors along the direct path at the nodes, from the other platform to each."""
         x, y, z = (part / self.baselines for part in self._between)
         return ((x, y, z), (-x, -y, -z))
-
-    @cached_property
-    def reach(self) -> Floats:
-        """Distance from the centre up to which its slopes find a point. [m]"""
-        return np.asarray(np.minimum(NEAR, SKEWED * np.abs(self.sine)) * self.nearest)
-
-    @cached_property
-    def bend(self) -> Floats:
-        """Way of both platforms by velocity errors within half an aperture up to which they do. [m]"""
-        return np.asarray(BENT * np.abs(self.determinant) * self.half / self.range_gradient * self.nearest)
 
     # ------------------------------------------------------------------ small errors
     @cached_property
@@ -431,42 +438,80 @@ class ExactRanges:
         return np.where(np.abs(phase) > ROUNDING * seen, phase, 0.0)
 
     @cached_property
-    def phase_weights(self) -> tuple[Floats, Floats]:
-        """Quadratic and cubic phase per metre at each node, that of the displacement included. [rad/m]"""
-        value, slope, *phases = (weights[:, None] for weights in self.fit)
-        quadratic, cubic = (
-            self.k * own + by_value * value + by_slope / self.half * slope
-            for own, (by_value, by_slope) in zip(phases, self.phases_per_term, strict=True)
-        )
-        return quadratic, cubic
-
-    @cached_property
     def place_weights(self) -> tuple[Floats, Floats]:
         """Displacement east and north per metre of range error at each node. [m/m]"""
-        value, slope = (weights[:, None] for weights in self.fit[:2])
-        east, north = (
-            (by_value * value + by_slope / self.half * slope) / self.determinant
-            for by_value, by_slope in self.adjugate
-        )
-        return east, north
+        return self.matrix.place_weights
 
-    def effect(self, range_error: Floats) -> Effect:
-        """Effect of range errors at the nodes, (..., nodes, cases), that of the displacement included."""
-        constant, linear, own, own_cubic = np.moveaxis(self.fit @ range_error, -2, 0)
-        linear = linear / self.half
-        own, own_cubic = own * self.k, own_cubic * self.k
-        size = np.abs(range_error).max(axis=-2) * self.k
-        (q_0, q_1), (c_0, c_1) = self.phases_per_term
-        qpe, cubic = own + (q_0 * constant + q_1 * linear), own_cubic + (c_0 * constant + c_1 * linear)
-        seen = size + np.abs(q_0 * constant) + np.abs(q_1 * linear)
-        seen_cubic = size + np.abs(c_0 * constant) + np.abs(c_1 * linear)
-        # What is left of terms that cancel exactly is rounding, and would make a limit out of nothing.
-        return Effect(
-            constant,
-            np.where(np.abs(linear) * self.half <= ROUNDING * size / self.k, 0.0, linear),
-            np.where(np.abs(qpe) <= ROUNDING * seen, 0.0, qpe),
-            np.where(np.abs(cubic) <= ROUNDING * seen_cubic, 0.0, cubic),
+    @cached_property
+    def order_weights(self) -> Floats:
+        """Orders 0 to 3 left at the displaced point per metre of range error at each node, (4, nodes, n). [m/m]"""
+        (by_east, by_north), (east, north) = self.gradient, self.place_weights
+        return np.asarray(self.fit[..., None] + by_east[:, None] * east + by_north[:, None] * north)
+
+    @cached_property
+    def phase_weights(self) -> Floats:
+        """Quadratic and cubic phase per metre at each node, displacement included, (2, nodes, n). [rad/m]"""
+        return np.asarray(self.k * self.order_weights[2:])
+
+    @cached_property
+    def hidden_weights(self) -> Floats:
+        """Parts of the hidden phase per metre at each node, whose squares add up, (4, nodes, n). [rad/m]
+
+        By orders 0 to 3; what lies beyond counts with the small b² alone, and where the aperture turns with all.
+        """
+        of_orders = np.array([self.band, (1 + self.band) / 3, self.band / 5 / 1.5**2, self.band / 7 / 2.5**2])
+        of_orders[3] += self.is_turned / (7 * 2.5**2)
+        return np.asarray(QUADRATIC_OF_VARIANCE * self.k * np.sqrt(of_orders)[:, None] * self.order_weights)
+
+    @cached_property
+    def most_per_metre(self) -> Floats:
+        """Bounds of effects of a range error of a metre at most, whatever its course, (4, n).
+
+        Quadratic, cubic and hidden phase [rad], and displacement. [m]
+        """
+        mean, slope, quadratic, cubic = np.abs(self.order_weights).sum(axis=1)
+        # Displaced, nothing has a larger V than before: 1 + b² at most, of which the variance is a part.
+        hidden = QUADRATIC_OF_VARIANCE * np.sqrt(self.band * (1 + self.band + mean**2) + slope**2 / 3)
+        hidden = np.where(self.is_turned, QUADRATIC_OF_VARIANCE * np.sqrt(1 + self.band), hidden)
+        east, north = (np.abs(weights).sum(axis=0) for weights in self.place_weights)
+        return np.array((self.k * quadratic, self.k * cubic, self.k * hidden, np.hypot(east, north)))
+
+    def effect(self, range_error: Floats) -> FullEffect:
+        """Effect of small range errors at the nodes, (..., nodes, cases), that of the displacement included."""
+        size = np.abs(range_error)
+        (east, seen_east), (north, seen_north) = (
+            ((weights * range_error).sum(axis=-2), (np.abs(weights) * size).sum(axis=-2))
+            for weights in self.place_weights
         )
+        own, most = np.moveaxis(self.fit[2:] @ range_error, -2, 0), size.max(axis=-2)
+        phases = []
+        for part, by_east, by_north in zip(own, *(one[2:] for one in self.gradient), strict=True):
+            phase = part + by_east * east + by_north * north
+            seen = most + np.abs(by_east) * seen_east + np.abs(by_north) * seen_north
+            phases.append(self.k * _unless_rounding(phase, seen))
+        # What is left of terms that cancel exactly is rounding, and would make a limit out of nothing.
+        return FullEffect(_unless_rounding(east, seen_east), _unless_rounding(north, seen_north), *phases)
+
+    def left_of_small(self, range_error: Floats, moved: tuple[Any, Any]) -> Floats:
+        """Range error that small errors (..., nodes, cases) leave where they move the point, (..., cases). [m]"""
+        (by_east, by_north), (east, north) = self.slopes, (np.asarray(part)[..., None, :] for part in moved)
+        return np.asarray(range_error + by_east * east + by_north * north)
+
+    def unresolved(self, left: Floats) -> tuple[Floats, Floats]:
+        """Hidden phase, and rms beyond the cubic, of range errors left at the nodes, (..., nodes, cases). [rad]"""
+        orders = self.fit @ left
+        squares = self.mean_squares(left, orders)
+        return _unresolved(np.moveaxis(orders, -2, 0), squares, self.k, self.band, self.is_turned)
+
+    def mean_squares(self, left: Floats, orders: Floats) -> tuple[Floats, Floats]:
+        """Mean squares of range errors left at the nodes, and of what they have beyond orders 0 to 3. [m²]"""
+        beyond = left - self._legendre @ orders
+        return (self.mean * left * left).sum(axis=-2), (self.mean * beyond * beyond).sum(axis=-2)
+
+    @cached_property
+    def _legendre(self) -> Floats:
+        """Orders 0 to 3 that are 1 at the edge by their leading terms, at the nodes, (nodes, 4)."""
+        return np.asarray(np.polynomial.legendre.legvander(self.sampling.places, 3) / LEADING)
 
     # ------------------------------------------------------------------ errors of any size
     def phases(self, lanes: Lanes, size: Floats, near: tuple[Any, Any]) -> Found:
@@ -476,13 +521,7 @@ class ExactRanges:
         does not, and what lies beyond a line on which range and Doppler gradients are parallel: no error leads there
         from nothing.
         """
-        shifts = lanes.shifts(size)
-        clock = lanes.clock(size)
-        bend = np.abs(size) * np.where(lanes.order == 1, lanes.moves[0] + lanes.moves[1], 0.0)
-        if lanes.turns:
-            (half,) = _of([self.half], lanes.case)
-            bend = bend + np.abs(size) * lanes.turned() / half
-        return self.settled(clock, shifts, near, bend, lanes.case)
+        return self.settled(lanes.clock(size), lanes.shifts(size), near, lanes.case)
 
     def left_over(self, lanes: Lanes, size: Floats, place: tuple[Any, Any]) -> Floats:
         """Range error at the nodes that errors leave at ground points, (nodes, lanes). [m]"""
@@ -498,20 +537,33 @@ class ExactRanges:
         return np.asarray(grown / (baseline + np.sqrt(np.abs(baseline * baseline + grown))))
 
     def way(self, lanes: Lanes, size: Floats, place: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
-        """Where points go with larger errors, at the places that errors of sizes move them to. [m/unit]"""
+        """Where points go with larger errors, at the places that errors of sizes move them to. [m/unit]
+
+        As the least of V does: by its second derivative, and by what a larger error changes of its slope.
+        """
         course = lanes.at_nodes
         east, north = place
         change = lanes.clock(1.0)
         by_east, by_north = np.zeros_like(course), np.zeros_like(course)
+        turns_east, turns_north = by_east, by_north
+        platforms = []
         for track, weight, shift, (x, y, z) in zip(
             self.tracks, lanes.moves, lanes.shifts(size), lanes.directions, strict=True
         ):
             a, b, c = (one + moved for one, moved in zip(_of([*track], lanes.case), shift, strict=True))
             a, b = a - east, b - north
             R = np.sqrt(a * a + b * b + c * c)
-            by_east, by_north = by_east + a / R, by_north + b / R
+            a, b, c = a / R, b / R, c / R
+            by_east, by_north = by_east + a, by_north + b
+            platforms.append((a, b, R))
             if np.any(weight):
-                change = change - weight * course * (a * x + b * y + c * z) / R
+                step = weight * course
+                along = a * x + b * y + c * z
+                change = change - step * along
+                turns_east, turns_north = (
+                    turns_east + step * (x - a * along) / R,
+                    turns_north + step * (y - b * along) / R,
+                )
         if self.has_direct_path:
             ahead, back = lanes.moves
             x, y, z = (ahead * one - back * other for one, other in zip(*lanes.directions, strict=True))
@@ -519,38 +571,37 @@ class ExactRanges:
             a, b, c = a + size * course * x, b + size * course * y, c + size * course * z
             apart = np.sqrt(a * a + b * b + c * c)
             change = change + np.where(apart > 0, course * (a * x + b * y + c * z) / apart, 0.0)
-        (a, c), (b, d), (constant, linear) = (self.fit[:2] @ one for one in (by_east, by_north, change))
-        determinant = a * d - b * c
-        return (b * linear - d * constant) / determinant, (c * constant - a * linear) / determinant
+        (band,) = _of([self.band], lanes.case)
+        matrix = GroundMatrix.of((by_east, by_north), self.fit, band)
+        weights = matrix.projected(self.left_over(lanes, size, place))
+        slope_east, slope_north = (
+            (own * change).sum(axis=0) + (weights * turns).sum(axis=0)
+            for own, turns in zip(matrix.projection, (turns_east, turns_north), strict=True)
+        )
+        return _against(matrix, weights, platforms, slope_east, slope_north)
 
-    def settled(self, clock: Floats, shifts: Sequence[Any], near: Any, bend: Any, case: Places) -> Found:
-        """Newton's method for the point; with the slopes of the centre where it stays within reach of that.
+    def settled(self, clock: Floats, shifts: Sequence[Any], near: Any, case: Places) -> Found:
+        """Newton's method for the least of V.
 
         Range errors by clocks (nodes, lanes) [m], three shifts of each platform there [m], where the search starts
-        [m], the velocity errors of both platforms [m/s], and the cases of the lanes.
+        [m], and the cases of the lanes.
         """
         lanes = clock.shape[1]
         size = max(1, min(lanes, TOGETHER // self.fit.shape[1]))
-        found = Found(np.zeros(lanes, dtype=bool), *(np.full(lanes, math.nan) for _ in range(5)))
+        found = Found(np.zeros(lanes, dtype=bool), *(np.full(lanes, math.nan) for _ in range(7)))
         start = [np.broadcast_to(np.asarray(one, dtype=float), (lanes,)) for one in near]
         with np.errstate(all="ignore"):
-            half, most, reach = _of([self.half, self.bend, self.reach], case)
-            is_close = np.hypot(*start) < np.where(bend * half < most, reach, 0.0)
             room = self._room(size)
             for first in range(0, lanes, size):
                 some = slice(first, first + size)
                 here = Found._make(one[some] for one in found)
                 moved = [[along if along.shape[-1] == 1 else along[:, some] for along in one] for one in shifts]
                 measured = self._measured(clock[:, some], moved, case[some], room)
-                given = [case[some], *(one[some] for one in start), *measured]
-                for settle, is_for in ((_PointSearch.near, is_close[some]), (_PointSearch.anywhere, np.True_)):
-                    alive = np.flatnonzero(is_for & ~here.is_found)
-                    if alive.size:
-                        kept: list[Any] = given if alive.size == here.east.size else _some(given, alive)
-                        of, east, north, *left = kept
-                        settle(
-                            _PointSearch(self, here, alive, of, east, north, left, room[MEASURED:, :, : alive.size])
-                        )
+                places = np.arange(here.east.size)
+                near_by = start[0][some], start[1][some]
+                _PointSearch(
+                    self, here, places, case[some], *near_by, measured, room[MEASURED:, :, : places.size]
+                ).run()
         return found
 
     def _room(self, lanes: int) -> Floats:
@@ -608,36 +659,22 @@ class _PointSearch:
         self.exact, self.found, self.alive, self.of = exact, found, alive, of
         self.east, self.north, self.measured, self.room = east, north, measured, room
 
-    def near(self) -> None:
-        """Search with the slopes of the centre: a third of the work, where it settles in a few steps."""
-        exact, gradient = self.exact, _of(self.exact.gradient, self.of)
-        for _ in range(FEW):
-            left = exact.fit @ _left(self.measured, self.east, self.north, self.room)
-            _, step_east, step_north, phases = _newton_step(left, *gradient)
-            self.east, self.north = self.east + step_east, self.north + step_north
-            (k,) = _of([exact.k], self.of)
-            is_done = k * (np.abs(step_east) + np.abs(step_north)) < UNSEEN_RAD / NEAR
-            self._keep(is_done, phases, np.ones(self.alive.size))
-            going = np.flatnonzero(~is_done)
-            if not going.size:
-                return
-            self._go_on(going)
-            gradient = _some(gradient, going)
-
-    def anywhere(self) -> None:
+    def run(self) -> None:
         """Search with the slopes of each point."""
         exact, before = self.exact, np.full(self.alive.size, math.inf)
         for _ in range(ITERATIONS):
-            seen, nearest = _seen(self.measured, self.east, self.north, self.room)
-            determinant, step_east, step_north, phases = _newton_step(*np.matmul(exact.fit, seen))
+            k, meets, band = _of([exact.k, exact.nearest, exact.band], self.of)
+            left, platforms, nearest = _seen(self.measured, self.east, self.north, self.room)
+            slopes = [platforms[0][axis] + platforms[1][axis] for axis in (0, 1)]
+            matrix = GroundMatrix.of(slopes, exact.fit, band)
+            step_east, step_north = _newton_step(matrix, left, platforms)
             self.east, self.north = self.east + step_east, self.north + step_north
             step = step_east * step_east + step_north * step_north
-            k, meets, at_centre, half = _of([exact.k, exact.nearest, exact.determinant, exact.half], self.of)
             is_apart = nearest >= MEETS * meets
-            turn = determinant / (at_centre * half)
+            turn = matrix.turned_from(exact.matrix, self.of)
             unseen = np.where(np.abs(turn) < AT_FOLD, OF_UNSEEN * UNSEEN_RAD, UNSEEN_RAD)
             is_done = is_apart & (k * step < unseen * nearest)
-            self._keep(is_done & (determinant * at_centre > 0), phases, turn)
+            self._keep(is_done & (turn > 0), left, slopes, (step_east, step_north), turn)
             going = np.flatnonzero(~is_done & (step < SHRINKS * before) & is_apart)
             if not going.size:
                 return
@@ -652,33 +689,72 @@ class _PointSearch:
         self.east, self.north = self.east[going], self.north[going]
         self.measured, self.room = _some(self.measured, going), self.room[..., : going.size]
 
-    def _keep(self, is_done: Truths, phases: tuple[Floats, Floats], turn: Floats) -> None:
-        """Note the lanes that have settled, phases in metres; what is less than rounding leaves is none."""
-        found, places = self.found, self.alive[is_done]
+    def _keep(
+        self, is_done: Truths, left: Floats, slopes: Sequence[Floats], step: tuple[Floats, Floats], turn: Floats
+    ) -> None:
+        """Note the lanes that have settled; what is less than rounding leaves is none.
+
+        Their range error is that which was `left` before the last step, and what the step adds to it.
+        """
+        done = np.flatnonzero(is_done)
+        if not done.size:
+            return
+        exact, found, places = self.exact, self.found, self.alive[done]
+        by_east, by_north, left = _some([*slopes, left], done)
+        left = left + by_east * step[0][done] + by_north * step[1][done]
+        orders = exact.fit @ left
+        k, band, rounding = _of([exact.k, exact.band, exact.rounding], self.of[done])
+        is_turned = exact.is_turned if exact.is_turned.size == 1 else exact.is_turned[self.of[done]]
+        hidden, rest = _unresolved(orders, exact.mean_squares(left, orders), k, band, is_turned)
         found.is_found[places] = True
-        for kept, one in ((found.east, self.east), (found.north, self.north), (found.turn, turn)):
-            kept[places] = one[is_done]
-        k, rounding = _of([self.exact.k, self.exact.rounding], self.of[is_done])
-        for kept, phase in zip((found.quadratic, found.cubic), phases, strict=True):
-            one = k * phase[is_done]
-            kept[places] = np.where(np.abs(one) > rounding, one, 0.0)
+        for kept, value in ((found.east, self.east), (found.north, self.north), (found.turn, turn)):
+            kept[places] = value[done]
+        phases = (k * orders[2], k * orders[3], hidden, rest)
+        for kept, phase in zip((found.quadratic, found.cubic, found.hidden, found.rest), phases, strict=True):
+            kept[places] = np.where(np.abs(phase) > rounding, phase, 0.0)
 
 
-def _newton_step(
-    left: Floats, by_east: Floats, by_north: Floats
-) -> tuple[Floats, Floats, Floats, tuple[Floats, Floats]]:
-    """Step east and north after which nothing is left of the constant and the linear part, to first order. [m]
+def _newton_step(matrix: GroundMatrix, left: Floats, platforms: Sequence[Sequence[Floats]]) -> tuple[Floats, Floats]:
+    """Step east and north to where V is least, by its slope and how that changes. [m]
 
-    Parts of what is left (4, lanes) [m], and what a step of a metre adds to them. With the step the determinant of
-    its equations, and the quadratic and cubic part after it. [m]
+    Range errors left at the nodes [m], and from each platform what it sees: the components of its line of sight
+    over the ground, and its range. [m]
     """
-    constant, linear, quadratic, cubic = left
-    (a, c, quadratic_east, cubic_east), (b, d, quadratic_north, cubic_north) = by_east, by_north
-    determinant = a * d - b * c
-    east = (b * linear - d * constant) / determinant
-    north = (c * constant - a * linear) / determinant
-    quadratic = quadratic + quadratic_east * east + quadratic_north * north
-    return determinant, east, north, (quadratic, cubic + cubic_east * east + cubic_north * north)
+    weights = matrix.projected(left)
+    x, y = ((weights * slope).sum(axis=0) for slope in matrix.slopes)
+    return _against(matrix, weights, platforms, x, y)
+
+
+def _against(
+    matrix: GroundMatrix, weights: Floats, platforms: Sequence[Sequence[Floats]], x: Floats, y: Floats
+) -> tuple[Floats, Floats]:
+    """Step that takes away half a slope of V (x, y), by how that changes; where V is no bowl, by H alone. [m]"""
+    xx, xy, yy = of_matrix = matrix.xx, matrix.xy, matrix.yy
+    for to_east, to_north, distance in platforms:
+        bends = weights / distance
+        xx = xx - (bends * (1 - to_east * to_east)).sum(axis=0)
+        xy = xy + (bends * to_east * to_north).sum(axis=0)
+        yy = yy - (bends * (1 - to_north * to_north)).sum(axis=0)
+    determinant = xx * yy - xy * xy
+    is_bowl = (determinant > BOWL * matrix.determinant) & (xx > 0)
+    xx, xy, yy = (np.where(is_bowl, *both) for both in zip((xx, xy, yy), of_matrix, strict=True))
+    determinant = np.where(is_bowl, determinant, matrix.determinant)
+    return (xy * y - yy * x) / determinant, (xy * x - xx * y) / determinant
+
+
+def _unresolved(
+    orders: Floats, squares: tuple[Floats, Floats], k: Floats, band: Floats, is_turned: Truths
+) -> tuple[Floats, Floats]:
+    """Hidden phase, and rms beyond the cubic, by orders 0 to 3 at the edge [m] and mean squares. [m²], [rad]"""
+    _, slope, _, cubic = orders
+    square, rest = squares
+    of_cubic = (cubic / 2.5) ** 2 / 7
+    hidden = band * square + slope * slope / 3 + np.where(is_turned, of_cubic + rest, 0.0)
+    return QUADRATIC_OF_VARIANCE * k * np.sqrt(hidden), k * np.sqrt(rest)
+
+
+def _unless_rounding(value: Floats, seen: Floats) -> Floats:
+    return np.where(np.abs(value) <= ROUNDING * seen, 0.0, value)
 
 
 def _weighted(along: Sequence[Any], weight: Any) -> Sequence[Any]:
@@ -713,18 +789,27 @@ def _left(measured: Sequence[Floats], east: Any, north: Any, room: Floats) -> Fl
     return left
 
 
-def _seen(measured: Sequence[Floats], east: Floats, north: Floats, room: Floats) -> tuple[Floats, Floats]:
-    """The same, what a metre east, and north, adds to it, (3, nodes, lanes); the least range there, (lanes,). [m]"""
-    clock, seen, other, distance, nearest = measured[0], room[:3], room[3:6], room[6], math.inf
-    for platform, out in ((measured[1:6], seen), (measured[6:], other)):
-        _grow(platform, east, north, out, distance)
+def _seen(
+    measured: Sequence[Floats], east: Floats, north: Floats, room: Floats
+) -> tuple[Floats, Sequence[Sequence[Floats]], Floats]:
+    """Range error at the nodes that is left at points; what each platform sees; the least range there, (lanes,). [m]
+
+    From each platform: components east and north of its line of sight, and its range, (nodes, lanes).
+    """
+    platforms: list[Any] = []
+    grown: list[Floats] = []
+    nearest = np.asarray(math.inf)
+    for place, platform in enumerate((measured[1:6], measured[6:])):
+        out = room[4 * place : 4 * place + 4]
+        _grow(platform, east, north, out, out[3])
         np.subtract(platform[0], east, out=out[1])
         np.subtract(platform[1], north, out=out[2])
-        out[1:] /= distance
-        nearest = np.minimum(nearest, distance.min(axis=0))
-    seen += other
-    np.subtract(clock, seen[0], out=seen[0])
-    return seen, np.asarray(nearest)
+        out[1:3] /= out[3]
+        nearest = np.minimum(nearest, out[3].min(axis=0))
+        grown.append(out[0])
+        platforms.append(out[1:])
+    left = np.add(grown[0], grown[1], out=grown[0])
+    return np.subtract(measured[0], left, out=left), platforms, nearest
 
 
 def followed(exact: ExactRanges, clock: Floats, shifts: Sequence[Any], case: Places) -> Found:
@@ -745,20 +830,33 @@ def followed(exact: ExactRanges, clock: Floats, shifts: Sequence[Any], case: Pla
     -------
     Found
         NaN where no ground point has the recorded history, or only one to which no error leads from nothing.
+        As on a way of `point_paths`, none has it where half a cycle is hidden and gradients of V span little.
     """
-    found = exact.settled(clock, shifts, (0.0, 0.0), math.inf, case)
-    missed = np.flatnonzero(~found.is_found)
-    if missed.size:
-        (clock,), shifts = _some([clock], missed), [_some(one, missed) for one in shifts]
+    found = _within_ends(exact.settled(clock, shifts, (0.0, 0.0), case))
+    for steps in STEPS:
+        missed = np.flatnonzero(~found.is_found)
+        if not missed.size:
+            break
+        (noise,), moved = _some([clock], missed), [_some(shift, missed) for shift in shifts]
         near = np.zeros((2, missed.size))
-        for step in range(STEPS):
-            part = (step + 1) / STEPS
-            ahead = [[part * along for along in one] for one in shifts]
-            there = exact.settled(part * clock, ahead, near, math.inf, case[missed])
+        for step in range(steps):
+            part = (step + 1) / steps
+            ahead = [[part * along for along in shift] for shift in moved]
+            there = _within_ends(exact.settled(part * noise, ahead, near, case[missed]))
             near = np.array((there.east, there.north)) * ((step + 2) / (step + 1))  # NaN from the first lost one on
         for whole, later in zip(found, there, strict=True):
             whole[missed] = later
+    has_ended = (np.abs(found.turn) < FOLDED) & (found.hidden > ENDS_RAD)
+    found.is_found[has_ended] = False
+    for values in found[1:]:
+        values[has_ended] = math.nan
     return found
+
+
+def _within_ends(found: Found) -> Found:
+    """The same without points beyond the end of the image."""
+    is_gone = (np.abs(found.turn) < FOLDED) & (found.hidden > ENDS_RAD)
+    return Found(found.is_found & ~is_gone, *(np.where(is_gone, math.nan, part) for part in found[1:]))
 
 
 def _some(arrays: Sequence[Floats], some: Places) -> list[Floats]:

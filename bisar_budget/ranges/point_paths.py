@@ -1,9 +1,10 @@
 """Where errors take the image of a point as they grow, and the first size at which each reaches a limit.
 
-The point is followed from no error on. Where range and Doppler gradients become parallel there, its way ends:
-they span less than 2 % of what they span at the centre. No larger error has an image of the point, which counts as a
-limit reached. All lanes take each step together, and of a few lanes several points; a search looks at what is known
-after each step and says where to look next.
+The point is followed from no error on. Its way ends where half a cycle is hidden and the gradients of V span less
+than a fifth of the area that they span at the centre: no ground point has the range history of a larger error, which
+counts as a limit reached. Where a way only comes near to a fold, nothing is hidden, and the way goes on. All lanes
+take each step together, and of a few lanes several points; a search looks at what is known after each step and says
+where to look next.
 """
 
 import math
@@ -12,20 +13,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bisar_budget.constants import ROUNDING
-from bisar_budget.ranges.exact_ranges import ExactRanges, Floats, Lanes, Places, Truths
+from bisar_budget.ranges.exact_ranges import ENDS_RAD, FOLDED, ExactRanges, Floats, Lanes, Places, Truths
 
-# Of what range and Doppler gradients span at the centre: with less a point has no image, they are parallel there.
-PARALLEL = 0.02
+PARALLEL = 0.02  # of the area that gradients span at the centre; with less they are parallel
 STRAY = 0.15  # of a step; farther from where it led, a point is not the one that was followed
 STRAIGHT = 0.1  # of a displacement, by which it may be off a straight way
 FLOOR_M = 1e-3
-LEAST_STEP = 1e-3  # of the size: allowables are right to 1 %
 FINEST_STEP = 1e-6  # where the gradients stay apart, the way only turns
 OF_FOLD = 0.8  # of the way to where the gradients seem to become parallel, that one step makes
 SHORT = 0.1  # of the last step, below which that step says little of the way left
-FOLDS = 0.1  # of what the gradients span at the centre; a way that ends at more of it does not end in a fold
-NEAR_FOLD = 0.03  # likewise; nearer, the square of what they span is nearly a straight line
-BESIDE_FOLD = 1e-6  # of the size: so near to both sides of a fold it is one, to 1e-9
+BESIDE_END = 1e-6  # of the size: so near to both sides of an end it is one, to 1e-9
 CLOSE = 1e-5  # of a limit, where a search ends
 ALMOST = 0.002  # of a limit, from where a curve leads to it
 BENDS = 0.1  # of a slope: what changes more within an interval is bent, and a curve through its ends misses more
@@ -44,22 +41,22 @@ EARLY = 0.125  # of a size, at which the way tells how it bends from no error on
 PARTS = np.array((0.25, 0.5, 1.2, 2.0, 4.0))  # of a step that are tried too
 
 QUADRATIC, CUBIC, WAY = range(3)  # what is held to a limit: a phase, or the way to the point
-# Rows of a known point: size, east, north, quadratic, cubic, turn.
-_PHASES = 3
-_NO_ERROR = np.array((0.0, 0.0, 0.0, 0.0, 0.0, 1.0))
+ROWS, HIDDEN = 8, 5  # of a known point: its size, and what `Found` has of it
+_NO_ERROR = np.array((0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0))
 
 
 class Held(NamedTuple):
     """Searches for the first size at which what is held in lanes reaches a limit, (searches,).
 
-    `row` is QUADRATIC, CUBIC or WAY, `slope` the effect of a small unit on it, signed. Each looks at `first` first,
-    and ends at `most` or where another of its `group` has found a smaller size; where `is_alone`, of its own row.
+    `row` is QUADRATIC, CUBIC or WAY, and `gain` the factor by which autofocus lets quadratic phases be larger, which
+    the hidden phase is not allowed. Each looks at `first` first, where a small error would reach its limit, and ends
+    at `most` or where another of its `group` has found a smaller size; where `is_alone`, of its own row.
     """
 
     lane: Places
     row: Places
     limit: Floats
-    slope: Floats
+    gain: Floats
     first: Floats
     most: Floats
     group: Places
@@ -69,17 +66,16 @@ class Held(NamedTuple):
         """Some of the searches."""
         return Held(*(part[some] for part in self))
 
-    def turned(self, sign: float) -> "Held":
-        """The same of errors of a sign, whose slope changes with it; a way has none."""
-        return self._replace(slope=np.where(self.row == WAY, 1.0, sign) * self.slope)
+    def square(self, known: Floats) -> Floats:
+        """Square of the value over the limit at known points, (ROWS, searches, points): smooth, where a value is not.
 
-    def value(self, known: Floats) -> Floats:
-        """Value over the limit at known points, (6, searches, points): of a phase, signed, or of a way."""
-        row = self.row[:, None]
-        found = np.where(row == QUADRATIC, known[_PHASES + QUADRATIC], known[_PHASES + CUBIC])
-        if (self.row == WAY).any():
-            found = np.where(row == WAY, np.hypot(known[1], known[2]), found)
-        return np.asarray(found / self.limit[:, None])
+        That of a phase or of a way.
+        """
+        row, gain = self.row[:, None], self.gain[:, None]
+        _, east, north, quadratic, cubic, hidden, _, _ = known
+        found = np.where(row == QUADRATIC, quadratic**2 + (gain * hidden) ** 2, cubic**2)
+        found = np.where(row == WAY, east**2 + north**2, found)
+        return np.asarray(found / self.limit[:, None] ** 2)
 
 
 def is_few(lanes: int, is_alike: bool) -> bool:
@@ -113,22 +109,30 @@ class PointPaths:
         count = lanes.case.size
         self.end = np.full(count, math.inf)
         self._way = per_unit
-        self._known = np.full((6, count, 2), math.inf)  # by size; infinite where there is none
+        self._known = np.full((ROWS, count, 2), math.inf)  # by size; infinite where there is none
         self._known[:, :, 0] = _NO_ERROR[:, None]
         self._step = np.full(count, math.inf)  # the longest that is tried
         self._step_from = np.zeros(count)  # where: from sizes that are no smaller
         self._is_lost = np.zeros(count, dtype=bool)  # whether the last one led nowhere
+        self._turns = np.zeros(count, dtype=bool)  # whether any one did: how the way begins no longer leads on
 
     def _at(self, index: Places, some: Places) -> Floats:
-        """Known points by their places, (6, some)."""
+        """Known points by their places, (ROWS, some)."""
         found: Floats = self._known[:, some, index]
         return found
 
     def known(self, some: Places, size: Floats) -> Floats:
-        """Known points by errors of sizes that `to` was asked for, (6, some); not a number where the way ended."""
+        """Known points by errors of sizes that `to` was asked for, (ROWS, some); not a number where the way ended."""
         found = self._at((self._known[0, some] <= size[:, None]).sum(axis=1) - 1, some)
         found[:, (found[0] != size) | (size >= self.end[some])] = math.nan
         return found
+
+    def is_parallel(self, some: Places, size: Floats) -> Truths:
+        """Whether gradients are parallel at a known point next to a size, in some lanes."""
+        above = (self._known[0, some] < size[:, None]).sum(axis=1)
+        last = self._known.shape[2] - 1
+        turns = (np.abs(self._at(np.clip(above - back, 0, last), some)[-1]) for back in (1, 0))
+        return np.asarray(np.minimum(*turns) < PARALLEL)
 
     # ---------------------------------------------------------------- one step
     @np.errstate(all="ignore")
@@ -175,7 +179,7 @@ class PointPaths:
             one, two = point[:, later - 1], np.where(begins[later - 1], last[:, later], point[:, later - 2])
             earlier = np.where(begins[later - 1], self._at(np.maximum(index - 1, 0), some)[:, later], last[:, later])
             is_on[later] = _is_on_the_way(one, point[:, later], _through(earlier, two, one, size[later]))
-        is_end = is_on & (np.abs(point[5]) < PARALLEL)
+        is_end = is_on & (np.abs(point[-1]) < FOLDED) & (point[HIDDEN] > ENDS_RAD)
 
         # Of several steps from one known point those count that come before the first that leads nowhere.
         is_bad = ~is_on | is_end
@@ -193,16 +197,15 @@ class PointPaths:
 
     def _stop(self, some: Places, point: Floats, before: Floats, went: Floats, fold: Floats, is_end: Truths) -> None:
         """Note ends of ways where a step led nowhere, or go on in shorter ones from the known points before."""
-        end = _parallel_between(before, point)
+        end = _end_between(before, point)
         step = np.where(is_end, 0.9 * (end - before[0]), np.maximum((point[0] - before[0]) / 2, went))
-        is_fold = (np.abs(before[5]) < FOLDS) & (fold < LEAST_STEP * point[0])
         apart = (end - before[0]) * (point[0] - end)  # what a straight line is off by grows with that
-        is_nearing = is_end & (np.abs(before[5]) < NEAR_FOLD)
-        is_near = is_nearing & (apart < (BESIDE_FOLD * point[0]) ** 2)
-        is_over = ~is_nearing & ((is_fold & ~is_end) | (step < FINEST_STEP * point[0]))
+        is_near = is_end & (apart < (BESIDE_END * point[0]) ** 2)
+        is_over = ~is_end & (step < FINEST_STEP * point[0])
         self.end[some[is_near]] = end[is_near]
         self.end[some[is_over]] = (before[0] + np.minimum(step, fold))[is_over]
-        self._step[some], self._step_from[some], self._is_lost[some] = step, before[0], True
+        self._step[some], self._step_from[some] = step, before[0]
+        self._is_lost[some] = self._turns[some] = True
 
     def _insert(self, some: Places, point: Floats) -> None:
         """Note known points, by lane and size."""
@@ -212,7 +215,7 @@ class PointPaths:
         before = np.isfinite(self._known[0, lane]).sum(axis=1)
         width, needed = self._known.shape[2], int((before + count).max())
         if needed > width:  # the first needs few, most need one
-            more = np.full((6, self.end.size, max(width, needed - width)), math.inf)
+            more = np.full((ROWS, self.end.size, max(width, needed - width)), math.inf)
             self._known = np.concatenate((self._known, more), axis=2)
         self._known[:, some, np.repeat(before - first, count) + np.arange(some.size)] = point
         if (point[0, first] < self._known[0, lane, before - 1]).any():
@@ -224,9 +227,9 @@ class PointPaths:
         """Way left to where the square of what gradients span is nothing by a parabola; infinite where nowhere."""
         before, earlier = (self._at(np.maximum(index - back, 0), some) for back in (1, 2))
         step, step_before = last[0] - before[0], before[0] - earlier[0]
-        square, square_before = last[5] ** 2, before[5] ** 2
+        square, square_before = last[-1] ** 2, before[-1] ** 2
         falls = (square_before - square) / step
-        bend = ((earlier[5] ** 2 - square_before) / step_before - falls) / (step + step_before)
+        bend = ((earlier[-1] ** 2 - square_before) / step_before - falls) / (step + step_before)
         bend = np.where(index > 1, bend, 0.0)
         falls = falls - bend * step
         fold = 2 * square / (falls + np.sqrt(np.maximum(falls * falls - 4 * bend * square, 0.0)))
@@ -246,7 +249,7 @@ class PointPaths:
             half = size[fresh] / (2 * EARLY)
             east[fresh] += half * (way[0] - to_east)
             north[fresh] += half * (way[1] - to_north)
-        bends = np.flatnonzero(~is_straight | (self._is_lost[some] & (index > 0)))
+        bends = np.flatnonzero(~is_straight | (self._turns[some] & (index > 0)))
         if bends.size:
             east[bends], north[bends] = self._ahead(index[bends], some[bends], last[:, bends], size[bends])
         return (east, north)
@@ -317,14 +320,14 @@ class _SearchState:
         width = max(2, int(self.count.max()))
         known, is_known = known[:, :, :width], is_known[:, :width]
         self.size = np.where(is_known, known[0], math.nan)
-        self.value = np.where(is_known, held.value(known), math.nan)
-        reaches = np.abs(self.value) >= 1 - CLOSE
+        self.square = np.where(is_known, held.square(known), math.nan)
+        reaches = self.square >= 1 - 2 * CLOSE
         self.is_between: Truths = np.asarray(reaches.any(axis=1))
         stop = np.where(self.is_between, reaches.argmax(axis=1), self.count)
         self._slopes(every)
         self.doubtful = self._doubtful(stop)
         low = stop - 1
-        self.low, self.turn = self.size[every, low], known[5, every, low]
+        self.low, self.turn = self.size[every, low], known[-1, every, low]
         self.between, is_close = self._between(every, stop)
         self.ahead, is_ahead = self._ahead(every, low)
         is_past, ends = self.low >= upto, np.isfinite(end)
@@ -336,9 +339,9 @@ class _SearchState:
     def _slopes(self, every: Places) -> None:
         """Slopes at known points of the parabola through each and its neighbours; at the last of the one before."""
         self.width = self.size[:, 1:] - self.size[:, :-1]
-        chord = (self.value[:, 1:] - self.value[:, :-1]) / self.width
+        chord = (self.square[:, 1:] - self.square[:, :-1]) / self.width
         self.slope = np.empty(self.size.shape)
-        self.slope[:, 0] = self.held.slope / self.held.limit
+        self.slope[:, 0] = 0.0  # a square begins without a slope
         before, after = self.width[:, :-1], self.width[:, 1:]
         self.slope[:, 1:-1] = (chord[:, :-1] * after + chord[:, 1:] * before) / (before + after)
         last = np.maximum(self.count - 1, 1)
@@ -347,13 +350,15 @@ class _SearchState:
     def _doubtful(self, stop: Places) -> Floats:
         """Size to look at within each interval whose ends are below the limit; not a number: what lies between is."""
         low, width = self.size[:, :-1], self.width
-        a, b = self.value[:, :-1], self.value[:, 1:]
+        a, b = self.square[:, :-1], self.square[:, 1:]
         rise, begins, ends = b - a, self.slope[:, :-1] * width, self.slope[:, 1:] * width
+        expected = begins.copy()
+        expected[:, 0] = (width[:, 0] / self.held.first) ** 2  # as it would be of a small error
         is_wide = width > COARSE * self.size[:, 1:]
-        near = np.where(is_wide, 1 - CREST, 1.0)
-        found = np.where(is_wide & (np.abs(rise - begins) > DEPARTS), low + width / 2, math.nan)
+        near = np.where(is_wide, (1 - CREST) ** 2, 1.0)
+        found = np.where(is_wide & (np.abs(rise - expected) > DEPARTS), low + width / 2, math.nan)
         for part in reversed(_crests(begins, rise, ends)):
-            is_above = (part > 0.02) & (part < 0.98) & (np.abs(_on_cubic(part, a, rise, begins, ends)) >= near)
+            is_above = (part > 0.02) & (part < 0.98) & (_on_cubic(part, a, rise, begins, ends) >= near)
             found = np.where(is_above, low + part * width, found)
         is_before = np.arange(1, self.size.shape[1]) < stop[:, None]
         return np.where(is_before & (low < self.upto[:, None]), found, math.nan)
@@ -363,9 +368,8 @@ class _SearchState:
         high = np.minimum(stop, self.size.shape[1] - 1)
         low = high - 1
         width, top = self.width[every, low], self.size[every, high]
-        sign = np.sign(self.value[every, high])
-        a, b = sign * self.value[every, low], sign * self.value[every, high]
-        begins, ends = (sign * self.slope[every, one] * width for one in (low, high))
+        a, b = self.square[every, low], self.square[every, high]
+        begins, ends = (self.slope[every, point] * width for point in (low, high))
         part = chord = (1 - a) / (b - a)
         for _ in range(NEWTON):
             steep = begins + part * (2 * (3 * (b - a) - 2 * begins - ends) + 3 * part * (begins + ends - 2 * (b - a)))
@@ -373,9 +377,11 @@ class _SearchState:
             part = np.where((part >= 0) & (part <= 1), part, chord)
         self.top, found = top, top - (1 - part) * width
         is_narrow = width <= CLOSE * top
-        almost = np.where(np.abs(ends - begins) > BENDS * (b - a), ALMOST_BENT, ALMOST)
-        is_close = (b - 1 < almost) & (top - found < 2 * almost * top)
-        is_close |= (1 - a < almost) & (found - (top - width) < 2 * almost * top)
+        rise = np.sqrt(b) - np.sqrt(a)  # of the value itself, whose slopes a straight line would keep
+        bends = np.where(a > 0, begins / (2 * np.sqrt(a)), rise) - ends / (2 * np.sqrt(b))
+        almost = np.where(np.abs(bends) > BENDS * np.abs(rise), ALMOST_BENT, ALMOST)
+        is_close = (b - 1 < 2 * almost) & (top - found < 2 * almost * top)
+        is_close |= (1 - a < 2 * almost) & (found - (top - width) < 2 * almost * top)
         self.inside = top - (1 - np.where(self.tries % 4 == 3, 0.5, np.minimum(np.maximum(part, 0.01), 0.99))) * width
         return np.where(is_narrow, top - width, found), is_close | is_narrow
 
@@ -384,14 +390,14 @@ class _SearchState:
         before = np.maximum(last - 1, 0)
         slope = self.slope[every, last]
         bend = np.where(last > 0, (slope - self.slope[every, before]) / self.width[every, before], 0.0)
-        value = self.value[every, last]
-        sign = np.where(value == 0, np.sign(slope), np.sign(value))
-        slope, bend, left = sign * slope, sign * bend, 1 - np.abs(value)
+        left = 1 - self.square[every, last]
         root = slope * slope + 2 * bend * left
         steep = slope + np.sqrt(np.maximum(root, 0.0))
         ahead = np.where((root >= 0) & (steep > 0), self.low + 2 * left / steep, math.inf)
-        almost = np.where(np.abs(bend) * self.width[every, before] > BENDS * np.abs(slope), ALMOST_BENT, ALMOST)
-        is_sure = (left < almost) & (ahead < (1 + 1.5 * almost) * self.low) & (self.turn > 0.5)
+        value, value_before = np.sqrt(self.square[every, last]), np.sqrt(self.square[every, before])
+        rise, led = value - value_before, slope / (2 * value) * self.width[every, before]
+        almost = np.where(np.abs(led - rise) > BENDS / 2 * np.abs(rise), ALMOST_BENT, ALMOST)
+        is_sure = (left < 2 * almost) & (ahead < (1 + 1.5 * almost) * self.low) & (self.turn > 0.5)
         return ahead, is_sure
 
     def next(self, going: Places, *, is_few: bool) -> tuple[Places, Floats]:
@@ -447,10 +453,15 @@ def _through(a: Floats, b: Floats, c: Floats, size: Floats) -> tuple[Floats, Flo
     return east, north
 
 
-def _parallel_between(before: Floats, beyond: Floats) -> Floats:
-    """Size between two at which gradients count as parallel; the square of what they span is linear."""
-    square, less = before[5] ** 2, beyond[5] ** 2
-    found: Floats = before[0] + (beyond[0] - before[0]) * (square - PARALLEL**2) / (square - less)
+def _end_between(before: Floats, beyond: Floats) -> Floats:
+    """Size between two at which the image ends: from there on the way is folded, and half a cycle is hidden.
+
+    The square of what gradients span is linear near a fold, and what is hidden beyond one.
+    """
+    low, high, square, less = before[HIDDEN], beyond[HIDDEN], before[-1] ** 2, beyond[-1] ** 2
+    hides = np.where(low < ENDS_RAD, (ENDS_RAD - low) / (high - low), 0.0)
+    narrows = np.where(square > FOLDED**2, (square - FOLDED**2) / (square - less), 0.0)
+    found: Floats = before[0] + (beyond[0] - before[0]) * np.maximum(hides, narrows)
     return found
 
 

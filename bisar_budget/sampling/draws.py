@@ -57,13 +57,17 @@ class Variable(NamedTuple):
 
 
 class HeldSum(NamedTuple):
-    """A requirement before the draws: the sum of whose errors, in which effects, is held to which limit."""
+    """A requirement before the draws: the sum of whose errors, in which effects, is held to which limit.
+
+    The limit of a quadratic phase has the gain of autofocus in it, which corrects nothing of the hidden phase.
+    """
 
     id: str
     unit: str
     limit: float
     owners: tuple[str, ...]
     columns: tuple[int, ...]  # of the effects: one phase, or east and north
+    gain: float = 1.0
 
 
 class DrawsPiece(NamedTuple):
@@ -257,7 +261,8 @@ class Sums:
             self._exact[owners] = self._by_exact_ranges(owners)
         found, alone = self._exact[owners], _sum(self.alone, owners, np.zeros((4, 1)))
         by_ranges = (found.quadratic, found.cubic, found.east, found.north)
-        return np.asarray(sum((by_ranges[column] + alone[column]) ** 2 for column in judged.columns))
+        square = np.asarray(sum((by_ranges[column] + alone[column]) ** 2 for column in judged.columns))
+        return square + (judged.gain * found.hidden) ** 2 if judged.columns == (0,) else square
 
     def _by_exact_ranges(self, owners: tuple[str, ...]) -> Found:
         times = self.exact.times[:, 0]
@@ -337,7 +342,10 @@ class Drawer:
 
 
 def _needs_exact_ranges(drawing: Drawing) -> bool:
-    """Whether exact ranges differ from the linear model in a sample of draws, by more than a part of a limit."""
+    """Whether exact ranges differ from the linear model in a sample of draws, by more than a part of a limit.
+
+    The linear model has no hidden phase: where band and turn hide more than that part, draws need exact ranges.
+    """
     sums = Sums(drawing, _SAMPLE, adds=True, keeps_motion=True)
     drawn = np.empty(_SAMPLE)
     for variable in drawing.variables:

@@ -162,7 +162,7 @@ def _requirements(
     for name, owners in wanted.items():
         if present.intersection(owners):
             limit = allocation.qpe_allowed("clock" if name == "timing" else name)
-            yield HeldSum(f"{name}.quadratic_phase_error", "rad", limit, owners, (0,))
+            yield HeldSum(f"{name}.quadratic_phase_error", "rad", limit, owners, (0,), allocation.autofocus_gain)
     cubic, location = mission.requirements.cubic_phase_error, mission.requirements.location_error
     moves = any(source.is_motion for variable in variables for source, _ in variable.parts)
     displaces = moves or any(variable.effects[2] or variable.effects[3] for variable in variables)

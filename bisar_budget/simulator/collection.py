@@ -282,7 +282,7 @@ class PointCollection:
         """
         flight = self.flight(errors.slow(), self._nodes)
         transmitter, receiver = (one.seen_from(seen_from) for one in flight.paths)
-        return exact_effect(self._nodes, transmitter, receiver, flight.seen, self.wavelength, self.aperture_time)
+        return exact_effect(self._nodes, transmitter, receiver, flight.seen, self.radar, self.aperture_time)
 
     def range_lines(self, errors: Errors) -> RangeLines:
         """Lines of equal range by the measured paths, vibration left out: what a processor lays its grid by."""

@@ -254,6 +254,14 @@ def row_of_peak(image: Complexes, window: tuple[slice, slice] = _WHOLE) -> float
     return row
 
 
+def place_of_peak(image: Complexes) -> tuple[float, float]:
+    """Row and column of the peak of an image (nx, ny)."""
+    row = row_of_peak(image)
+    power = np.abs(upsampled(line_at(image, row), _UPSAMPLING)) ** 2
+    top = int(np.argmax(power))
+    return row, (top + min(max(_vertex(power, top), -1.0), 1.0)) / _UPSAMPLING
+
+
 def highest(chip: Complexes) -> float:
     """Largest magnitude of the interpolation of a chip (nx, ny)."""
     columns = upsampled(chip, _CHIP_UPSAMPLING).T

@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState, Vectors
-from bisar_budget.ranges.exact_ranges import ExactEffect, ExactRanges, Sampling, followed
+from bisar_budget.image_plane import LEADING, Sampling, band_variance
+from bisar_budget.mission.model import Radar
+from bisar_budget.ranges.exact_ranges import ExactEffect, ExactRanges, followed
 
 _HELD = 1 << 18  # complex numbers held at once
 _NO_SIGHT = 1e-20  # square of what a metre of a platform changes; less is rounding
@@ -444,7 +446,7 @@ def exact_effect(
     transmitter: Path,
     receiver: Path,
     clock_error: Floats | float,
-    wavelength_m: float,
+    radar: Radar,
     aperture_time_s: float,
 ) -> ExactEffect:
     """Effect of one error, its paths sampled anywhere over the aperture: see `ranges.exact_ranges`.
@@ -457,7 +459,8 @@ def exact_effect(
     half, paths = aperture_time_s / 2, (transmitter, receiver)
     exact = ExactRanges(
         np.array([half]),
-        np.array([2 * math.pi / wavelength_m]),
+        np.array([2 * math.pi / radar.wavelength]),
+        np.array([band_variance(radar)]),
         _sampling(slow_time / half),
         [_columns(one.actual) for one in paths],
         [_columns(one.actual[slow_time.size // 2]) for one in paths],
@@ -467,8 +470,8 @@ def exact_effect(
     found = followed(exact, clock, shifts, np.zeros(1, dtype=int))
     if not found.is_found[0]:
         raise NoGroundPointError("no ground point has the recorded range history")
-    east, north, quadratic, cubic = (float(one[0]) for one in found[1:5])
-    return ExactEffect((east, north), quadratic, cubic)
+    east, north, *phases = (float(one[0]) for one in found[1:-1])
+    return ExactEffect((east, north), *phases)
 
 
 def _columns(positions: Floats) -> Vectors:
@@ -480,5 +483,4 @@ def _columns(positions: Floats) -> Vectors:
 def _sampling(places: Floats) -> Sampling:
     """Samples anywhere in −1 … 1, fitted by the polynomial through them."""
     legendre = np.polynomial.legendre.legvander(places, min(_ORDER, max(3, places.size // 4)))
-    at_edge = np.array([1.0, 1.0, 1.5, 2.5])[:, None]  # of P₂ and P₃, see `LEGENDRE_FITS`
-    return Sampling(places, at_edge * np.linalg.pinv(legendre)[:4])
+    return Sampling(places, LEADING[:, None] * np.linalg.pinv(legendre)[:4])

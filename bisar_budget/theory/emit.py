@@ -35,7 +35,6 @@ from bisar_budget.theory.symbols import (
     wavelength,
 )
 
-NODES = (6, 10, 16, 24)  # of a fit over the aperture: the longer the way of the platforms, the more
 SYMPY_VERSION: str = sympy.__version__
 TIMES = r" \, "  # between factors of LaTeX, where a number may come to stand for each
 
@@ -342,24 +341,9 @@ def _function(evaluator: Evaluator) -> str:
     return "".join(lines)
 
 
-def _legendre_fits() -> str:
-    """Write the nodes and weights of a fit over the aperture."""
-    lines = [
-        "\n\n# Nodes over -1 … 1, in half apertures, and the weights that fit a history sampled there: value P₀,",
-        "# slope P₁, quadratic at the edge (3/2 of P₂), cubic at the edge (5/2 of P₃); by the number of nodes.",
-        "LEGENDRE_FITS: dict[int, tuple[tuple[float, ...], ...]] = {",
-    ]
-    for count in NODES:
-        lines.append(f"    {count}: (")
-        for row in full.legendre_fit(count):
-            lines.append(f"        ({', '.join(repr(float(value)) for value in row)}),")
-        lines.append("    ),")
-    return "\n".join([*lines, "}"]) + "\n"
-
-
 def evaluators_module() -> str:
     """Return the text of `evaluators.py` as the derivation gives it today."""
-    return _EVALUATORS + "".join(_function(evaluator) for evaluator in evaluators()) + _legendre_fits()
+    return _EVALUATORS + "".join(_function(evaluator) for evaluator in evaluators())
 
 
 # ---------------------------------------------------------------------- formulas for a reader

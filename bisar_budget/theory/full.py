@@ -5,8 +5,9 @@ does: with u(τ) the unit vector to a platform, a position error r̃(τ) changes
 order. Constant and linear terms move the response to x̂, where a point has a history of its own; what defocuses is
 the rest. Derived here; nothing of it is in the paper.
 
-Numbers come from `range_error_at` at the nodes of `legendre_fit`, as `ranges` has it, whatever the length of the
-aperture. The series about its middle is what a reader compares with Table I: over a short aperture both are the same.
+Numbers come from `range_error_at` at the nodes of Gauss-Legendre quadrature, as `ranges` has it, whatever the length
+of the aperture. The series about its middle is what a reader compares with Table I: over a short aperture both are
+the same.
 """
 
 from collections.abc import Sequence
@@ -31,7 +32,6 @@ from sympy import (
     solve,
     sqrt,
 )
-from sympy.integrals.quadrature import gauss_legendre
 
 from bisar_budget.theory import differential_range as dr
 from bisar_budget.theory import published
@@ -116,22 +116,6 @@ def direct_sight(platform: PlatformSymbols) -> Matrix:
     """Decrease of the range per metre of each error where the direct path is the clock: u_t − b or u_r + b."""
     own = dict(zip(platform.position, platform.slant_range * platform.look[0], strict=True))
     return Matrix([-direct_range_error(platform).coeff(e).subs(own) for e in dr.error_track(platform)])
-
-
-def legendre_fit(count: int) -> tuple[tuple[Expr, ...], ...]:
-    """Gauss-Legendre nodes of a history over −1 … 1, and the weights that fit it there, (5, count).
-
-    The fit of a history f is its projection on Legendre polynomials, (2n + 1)/2 ∫ f·Pₙ. Rows: nodes; value P₀;
-    slope P₁; quadratic at the edge, 3/2 of P₂ = (3x² - 1)/2; cubic at the edge, 5/2 of P₃ = (5x³ - 3x)/2.
-    """
-    x, digits = real("x"), 17
-    nodes, weights = gauss_legendre(count, digits + 5)
-    rows = []
-    for n, leading in enumerate((1, 1, Rational(3, 2), Rational(5, 2))):
-        factor = leading * Rational(2 * n + 1, 2)
-        at_nodes = zip(nodes, weights, strict=True)
-        rows.append(tuple((factor * w * legendre(n, x).subs(x, at)).evalf(digits) for at, w in at_nodes))
-    return (tuple(at.evalf(digits) for at in nodes), *rows)
 
 
 def ground_history() -> tuple[Matrix, ...]:

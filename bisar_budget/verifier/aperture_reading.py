@@ -29,6 +29,7 @@ from bisar_budget.simulator.collection import (
     pulses_for,
 )
 from bisar_budget.simulator.image_formation import taylor_window
+from bisar_budget.simulator.impulse_response import place_of_peak
 from bisar_budget.simulator.phase_history import Complexes, Errors, Floats, cell_centres
 
 READ_CELLS = 1  # of range that a chip needs around the middle line, beside what a response walks
@@ -323,13 +324,14 @@ class Shift:
 def measured_shift(chip: Chip, reference: Chip, reading: ApertureReading | None = None) -> Shift:
     """Displacement of a response against an error-free one on the same grid, and the line of its smear.
 
+    The displacement is where the image peaks. A response that is smeared so much that it has no one peak says it by a
+    `reading` of its aperture: by the slope of the phase along y′, and by the centre of gravity along x′ less what the
+    other parts of the phase move that by.
+
     Each part of the aperture sees the point at a place of its own, as (26) to (28) of Rigling & Moses have it for
     three parts. In the spectrum of the image that place is the gradient of the phase against an error-free response:
-    its mean is the displacement of the centre of gravity, its spread the smear. That holds for a smear far smaller
-    than a resolution cell, where the outline of the response shows nothing yet.
-
-    A `reading` of the aperture says better where the response is: a cubic phase moves the centre of gravity along y′,
-    a quadratic one along x′, neither what is displaced.
+    its spread is the smear. That holds for a smear far smaller than a resolution cell, where the outline of the
+    response shows nothing yet.
 
     Raises
     ------
@@ -349,9 +351,11 @@ def measured_shift(chip: Chip, reference: Chip, reading: ApertureReading | None 
     # A shift by d turns the spectrum by −2π·d/extent from one frequency to the next.
     pixels = np.stack([-step * count / (2 * math.pi) for step, count in zip(steps, product.shape, strict=True)])
     ground = _pixel_vectors(reference.grid) @ pixels
-    middle = np.average(pixels, axis=1, weights=weights)
-    if reading is not None:
-        middle = np.array([middle[0] - reading.walked_pixels, reading.across_pixels])
+    if reading is None:
+        middle = np.subtract(place_of_peak(chip.image), place_of_peak(reference.image))
+    else:
+        centre_of_gravity = np.average(pixels[0], weights=weights)
+        middle = np.array([centre_of_gravity - reading.walked_pixels, reading.across_pixels])
     mean = _pixel_vectors(reference.grid) @ middle
     spread = np.cov(ground, aweights=weights)
     east, north = np.linalg.eigh(spread)[1][:, -1]

@@ -144,8 +144,9 @@ def image_moves(moved: float, allowed: float) -> str:
 
 @phrase
 def places_differ(rule: str, along: float, across: float) -> str:
-    """Said of a displacement by a rule and in the image. [pixels]"""
-    return f"{rule} and the image differ by {along:.2g} and {across:.2g} pixels along x' and y'"
+    """Said of a displacement by a rule and in the image. [m]"""
+    sizes = [format_quantity(size, "m", 2) for size in (along, across)]
+    return f"{rule} and the image differ by {sizes[0]} along x' and {sizes[1]} along y'"
 
 
 @phrase
@@ -173,15 +174,6 @@ def phase_does_not_grow(phases: Sequence[tuple[float, str]]) -> str:
 def smear_leaves_the_patch(part: float) -> str:
     """Said of an image that holds a part of the aperture."""
     return f"the smear leaves the patch, which holds {100 * part:.0f} % of the aperture"
-
-
-@phrase
-def range_cells_absorb_phase(phase: float) -> str:
-    """Said of a collection whose points differ by a phase from one range cell to the next. [rad]"""
-    return (
-        f"range cells are coarse: points a cell apart differ by {phase:.3g} rad, so that the response also moves "
-        "along range. The phase is that at the displaced point"
-    )
 
 
 @phrase

@@ -27,9 +27,10 @@ from bisar_budget.effects.oscillator_tones import spurs_of
 from bisar_budget.effects.random_effect import RandomError
 from bisar_budget.effects.vibration import SLOWEST, Line, lines_of, near_lines, sight_of, unit_of_line, worst_phases
 from bisar_budget.findings.images import Verdict
+from bisar_budget.image_plane import nodes
 from bisar_budget.mission.model import Simulation
 from bisar_budget.phrases import Note
-from bisar_budget.ranges.exact_ranges import FINE, Found, aperture_nodes, nodes
+from bisar_budget.ranges.exact_ranges import FINE, Found, aperture_nodes
 from bisar_budget.simulator.collection import CELLS, PointCollection
 from bisar_budget.simulator.impulse_response import upsampled
 from bisar_budget.simulator.phase_history import (
@@ -56,7 +57,6 @@ from bisar_budget.simulator.realisations import (
     zenith_delays,
 )
 from bisar_budget.verifier import reasons
-from bisar_budget.verifier.aperture_reading import measured_shift
 from bisar_budget.verifier.phase_cases import TOLERANCE, compare
 from bisar_budget.verifier.study import Study
 
@@ -381,7 +381,7 @@ def _place(study: Study, blank: Verdict, error: RandomError, rng: np.random.Gene
     try:
         for errors in _series(study, error, rng):
             images = study.images(errors)
-            shift = measured_shift(images.chip, images.reference, study.read(images))
+            shift = study.shift(images, study.read(images))
             drawn += images.effect.displacement
             seen += images.effect.moved(shift.displacement)
     except ValueError as fault:

@@ -2,25 +2,38 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from bisar_budget.analysis.analysis import Analysis, Model
+from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.declared import QUADRATIC
 from bisar_budget.effects.effect import PLATFORMS, ErrorSource, Subject
 from bisar_budget.effects.sources import exact_ranges
 from bisar_budget.findings.images import Verdict
 from bisar_budget.mission.model import Mission
-from bisar_budget.ranges.exact_ranges import FINE, STILL, ExactEffect, Found, followed
+from bisar_budget.ranges.exact_ranges import FINE, QUADRATIC_OF_VARIANCE, STILL, ExactEffect, Found, followed
 from bisar_budget.simulator.autofocus import ALGORITHMS
 from bisar_budget.simulator.collection import CELLS, MAX_CELLS, OVERSAMPLING, RANGE_CELLS, Chip, PointCollection
-from bisar_budget.simulator.phase_history import Errors, Floats, PathError, look_sum, superposed
-from bisar_budget.verifier.aperture_reading import READ_CELLS, ApertureReading, read_aperture, refocused
+from bisar_budget.simulator.impulse_response import highest
+from bisar_budget.simulator.phase_history import Errors, Floats, PathError, cell_centres, look_sum, superposed
+from bisar_budget.verifier.aperture_reading import (
+    READ_CELLS,
+    ApertureReading,
+    Shift,
+    measured_shift,
+    read_aperture,
+    refocused,
+)
 
 Sizes = Sequence[tuple[ErrorSource, float]]  # errors and how large each is, signed
 _SHARED_RAD = 0.5  # of phase by which lines on which one phase is estimated may differ
 _SCALED, _SCALINGS = 1e-4, 40  # of a budget; steps at most
+_HIDDEN = 0.1  # of the equal-loss phase: less than that is hidden, and a phase is measured better than a loss
+_ONE_PEAK = math.log(2)  # variance of a phase that takes half the peak's power [rad²]
+_SUMMED = 256  # pulses, and frequencies, of a direct sum
 _SLOWEST = 0.02  # of the fastest turn of Doppler: slower, a part of the aperture is not followed
 
 
@@ -74,9 +87,22 @@ class Study:
         """Declared errors that count against an owner's budget."""
         return [s for s in self.declared if self.allocation.qpe.includes(s.owner, owner)]
 
-    def boundary(self, source: ErrorSource, limit: float) -> float | None:
-        """Smallest size at which a gating model has an error reach a quadratic phase [rad]; None without one."""
-        sizes = (model.allowable(source, QUADRATIC, limit) for model in self.models)
+    @cached_property
+    def unfocused_models(self) -> tuple[Model, ...]:
+        """Models that gate, of the mission without autofocus: the phases that they judge have no gain in them."""
+        if self.allocation.autofocus_gain == 1:
+            return self.models
+        unfocused = self.mission._replace(autofocus=self.mission.autofocus._replace(n_pull=None))
+        analysis = Analysis(unfocused)
+        return tuple(getattr(analysis, name) for name in analysis.gates)
+
+    def boundary(self, source: ErrorSource, limit: float, *, is_focused: bool = False) -> float | None:
+        """Smallest size at which a gating model has an error reach a quadratic phase [rad]; None without one.
+
+        With autofocus the limit has its gain in it.
+        """
+        models = self.models if is_focused else self.unfocused_models
+        sizes = (model.allowable(source, QUADRATIC, limit) for model in models)
         return min((size for size in sizes if size is not None), default=None)
 
     def allowed(self, source: ErrorSource) -> tuple[float | None, str | None]:
@@ -123,7 +149,7 @@ class Study:
         return followed(exact, clock, shifts, np.zeros(draws, dtype=int))
 
     def worse_sign(self, sizes: Sizes) -> float:
-        """The sign that leaves more quadratic phase, 1 or -1: a limit has two signs.
+        """The sign whose quadratic phase of equal loss is larger, 1 or -1: a limit has two signs.
 
         Raises
         ------
@@ -133,7 +159,7 @@ class Study:
         phases = {}
         for sign in (1.0, -1.0):
             try:
-                phases[sign] = abs(self.effect(sizes, sign).quadratic)
+                phases[sign] = self.effect(sizes, sign).equal_loss
             except ValueError as error:
                 none = error
         if not phases:
@@ -169,9 +195,9 @@ class Study:
         ]
 
     def _worst(self, model: Model, source: ErrorSource, size: float) -> float:
-        """Quadratic phase of the worse sign of an error, with the sign of a small one. [rad]"""
-        found = model.does(source, size).qpe
-        return found if math.isfinite(found) else math.inf
+        """Quadratic phase of equal loss, of the worse sign of an error, signed like that of a small one. [rad]"""
+        found = model.does(source, size)
+        return math.copysign(found.equal_loss, found.qpe) if math.isfinite(found.qpe) else math.inf
 
     def at_limit(self, of: Subject, limit: float, room: float = 1.0) -> Responses:
         """Images at a limit of a row of quadratic phase, as its verdict reads them."""
@@ -208,6 +234,41 @@ class Study:
             None if is_focused else images.effect,
         )
 
+    def equal_loss(self, images: Responses, reading: ApertureReading) -> float:
+        """Quadratic phase of as much loss of the peak as an image shows, its cubic phase and rest aside. [rad]
+
+        Where little is hidden the phase over the aperture says it best, else the loss of the peak does. That is
+        compared with what a direct sum by exact ranges loses under the same window, for a loss is the variance of
+        the phase to second order only, and of another one under each window. Beyond some 3 dB an image has no one
+        peak: then what exact ranges say is hidden is added to the measured phase.
+        """
+        effect = images.effect
+        variance, others = _phase_variances(effect)
+        if effect.hidden <= _HIDDEN * effect.equal_loss or variance + others > _ONE_PEAK:
+            return math.hypot(reading.quadratic, effect.hidden)
+        with_error, without = (highest(one.image) for one in (images.chip, images.reference))
+        loss = 2 * math.log(without / with_error)
+        measured = loss * (variance + others) / self._expected_loss(images) - others
+        return QUADRATIC_OF_VARIANCE * math.sqrt(max(measured, 0.0))
+
+    def shift(self, images: Responses, reading: ApertureReading) -> Shift:
+        """Displacement of a response from where exact ranges put it, and the line of its smear.
+
+        It is where the image peaks, up to some 3 dB of loss.
+        """
+        variance, others = _phase_variances(images.effect)
+        return measured_shift(images.chip, images.reference, reading if variance + others > _ONE_PEAK else None)
+
+    def _expected_loss(self, images: Responses) -> float:
+        """Minus the logarithm of the peak's power by exact ranges, under the window: a direct sum over the pulses."""
+        collection = self.collection
+        times = cell_centres(collection.aperture_time, _SUMMED)
+        left = collection.flight(images.errors.slow(), times).range_error((0.0, 0.0), images.effect.displacement)
+        frequency = collection.radar.center_frequency + cell_centres(collection.radar.bandwidth, _SUMMED)
+        weights = collection.window(_SUMMED)
+        phases = np.exp(2j * math.pi / SPEED_OF_LIGHT * np.outer(left, frequency))
+        return -2 * math.log(abs(weights @ phases @ weights) / weights.sum() ** 2)
+
     def focused(self, images: Responses) -> Responses:
         """Refocus a response by the mission's algorithm, its phase estimated on lines that share it.
 
@@ -221,9 +282,12 @@ class Study:
 
     def shared_lines(self, spread: Spread) -> int:
         """Lines on either side of the middle one that share its quadratic phase, or that the response walks over."""
-        (by_constant, _), _ = self.analysis.exact.phases_per_term
-        per_line = float(abs(by_constant[0])) * self.collection.range_cell / OVERSAMPLING
-        shared = int(min(_SHARED_RAD / per_line if per_line else 1e6, 1e6))
+        exact = self.analysis.exact
+        (a, c, east, _), (b, d, north, _) = (gradient[:, 0] for gradient in exact.gradient)
+        # A metre of range along equal Doppler leads by (d, −c) over the determinant.
+        area, bends = abs(a * d - b * c), abs(float(exact.k[0]) * (d * east - c * north))
+        per_line = bends * self.collection.range_cell / OVERSAMPLING
+        shared = int(min(_SHARED_RAD * area / per_line if per_line else 1e6, 1e6))
         return max(shared, round(spread.walk * OVERSAMPLING / 2))
 
     def spread(self, errors: Errors, effect: ExactEffect) -> Spread:
@@ -250,3 +314,8 @@ class Study:
             2 * math.ceil(min(float(np.abs(places).max()) / cells[1], 1e6)),
             2 * math.ceil(min(float(np.abs(walk).max()) / self.collection.range_cell - 0.25, 64)),
         )
+
+
+def _phase_variances(effect: ExactEffect) -> tuple[float, float]:
+    """Variance of a quadratic phase of equal loss, and that of the cubic phase and the rest. [rad²]"""
+    return (effect.equal_loss / QUADRATIC_OF_VARIANCE) ** 2, 4 / 175 * effect.cubic**2 + effect.rest**2

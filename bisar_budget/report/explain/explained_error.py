@@ -1,7 +1,10 @@
 """The first half of an explanation: one error, from its line in the file to its phase, displacement and share."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cached_property
+
+import numpy as np
 
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis
@@ -11,6 +14,7 @@ from bisar_budget.effects.effect import CLOCK_UNITS, MOTION_UNITS, PLATFORMS, Er
 from bisar_budget.faults import KeyPath, printable
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import FRAME_AXES, GroundVector, PlatformState
+from bisar_budget.image_plane import LEADING
 from bisar_budget.mission.model import Mission
 from bisar_budget.ranges.exact_ranges import ExactRanges
 from bisar_budget.report.explain import notation
@@ -348,8 +352,9 @@ def as_written(mission: Mission, path: KeyPath) -> str:
 
 
 RATES = ("m", "m/s", "m/s²", "m/s³")  # units of the range error's coefficients
-_, _, _QUADRATIC, _CUBIC = range(4)  # rows of a fit
+_SLOPE, _QUADRATIC, _CUBIC = 1, 2, 3  # rows of a fit
 _ALIKE = 1e-6  # of a phase: by less, rounding decides which sign leaves more
+_SHOWN_REST_RAD = 1e-6  # rms beyond the cubic; less is rounding
 
 
 class Left:
@@ -358,7 +363,8 @@ class Left:
     def __init__(self, analysis: Analysis, source: ErrorSource, size: float) -> None:
         full = analysis.full
         self.exact: ExactRanges = analysis.exact
-        self.wavelength, self.size = analysis.mission.radar.wavelength, size
+        self.radar, self.size = analysis.mission.radar, size
+        self.gain = float(analysis.allocation.autofocus_gain)
         self.place: GroundVector | None = full.displacement(source.full, size)
         self.is_small = not source.is_motion or full.is_small(source, abs(size))
         if self.is_small:
@@ -373,17 +379,127 @@ class Left:
         self.place = (east, north)
         self.ranges = _without_rounding(full.left_over(source, size, found.displacement), whole)
 
+    @cached_property
+    def orders(self) -> list[float]:
+        """Mean, and orders 1 to 3 at the aperture edge, signed. [m]"""
+        return [
+            math.fsum(w * m for w, m in zip(weights, self.ranges, strict=True)) for weights in self.exact.fit.tolist()
+        ]
+
+    @cached_property
+    def beyond(self) -> list[float]:
+        """Range error at the nodes less orders 0 to 3. [m]"""
+        of_orders = np.polynomial.legendre.legvander(self.exact.sampling.places, _CUBIC) @ (self.orders / LEADING)
+        return _without_rounding((np.array(self.ranges) - of_orders).tolist(), self.rms(self.ranges))
+
+    def rms(self, values: Sequence[float]) -> float:
+        """Root of the mean square over the aperture of values at the nodes. [m]"""
+        return math.sqrt(math.fsum(w * m * m for w, m in zip(self.exact.fit[0].tolist(), values, strict=True)))
+
+    @property
+    def k(self) -> float:
+        """2π over the wavelength. [rad/m]"""
+        return float(self.exact.k[0])
+
+    @property
+    def is_turned(self) -> bool:
+        """Whether orders have no meaning: a line of sight turns by more than a radian."""
+        return bool(self.exact.is_turned[0])
+
     def phase(self, which: int) -> float:
         """Quadratic or cubic phase at the aperture edge, signed. [rad]"""
-        weights = self.exact.fit[which].tolist()
-        return float(self.exact.k[0]) * math.fsum(w * m for w, m in zip(weights, self.ranges, strict=True))
+        return self.k * self.orders[which]
+
+    @property
+    def rest(self) -> float:
+        """Rms beyond the cubic. [rad]"""
+        return self.k * self.rms(self.beyond)
+
+    @property
+    def hidden(self) -> float:
+        """Quadratic phase of as much loss as what band and turn do not resolve. [rad]"""
+        square = float(self.exact.band[0]) * self.rms(self.ranges) ** 2 + self.orders[_SLOPE] ** 2 / 3
+        if self.is_turned:
+            square += 4 * self.orders[_CUBIC] ** 2 / 175 + self.rms(self.beyond) ** 2
+        return self.k * math.sqrt(45 / 4 * square)
+
+    @property
+    def judged(self) -> float:
+        """The phase that is held to a limit with the gain of autofocus in it. [rad]"""
+        return math.hypot(self.phase(_QUADRATIC), self.gain * self.hidden)
 
     def sum(self, symbol: str, which: int) -> Sum:
         """The sum that gives a phase."""
-        terms = " + ".join(
-            f"{number(w)}*{number(m)}" for w, m in zip(self.exact.fit[which].tolist(), self.ranges, strict=True)
+        terms = self._terms(which)
+        return Sum(
+            f"{symbol} = 2*π/{number(self.radar.wavelength)}*({terms}) = {with_unit(self.phase(which), 'rad')}"
         )
-        return Sum(f"{symbol} = 2*π/{number(self.wavelength)}*({terms}) = {with_unit(self.phase(which), 'rad')}")
+
+    def steps(self, mark: str = "full") -> Iterator[Step]:
+        """From the range error left to the phase that is judged."""
+        values = {"B": self.radar.bandwidth, "f_0": self.radar.center_frequency}
+        b = math.sqrt(float(self.exact.band[0]))
+        orders: list[WorkedEquation | str] = [
+            WorkedEquation("b", "B/(sqrt(12)*f_0)", values, b, ""),
+            self._squares("ρ_rms", self.ranges),
+            Sum(f"ρ_1 = {self._terms(_SLOPE)} = {with_unit(self.orders[_SLOPE], 'm')}"),
+        ]
+        formula, of_turn = "b^2*ρ_rms^2 + ρ_1^2/3", ""
+        values = {"λ": self.radar.wavelength, "b": b, "ρ_rms": self.rms(self.ranges), "ρ_1": self.orders[_SLOPE]}
+        if self.is_turned:
+            orders += [
+                Sum(f"ρ_3 = {self._terms(_CUBIC)} = {with_unit(self.orders[_CUBIC], 'm')}"),
+                self._squares("ρ_rest", self.beyond),
+            ]
+            formula += " + 4*ρ_3^2/175 + ρ_rest^2"
+            values |= {"ρ_3": self.orders[_CUBIC], "ρ_rest": self.rms(self.beyond)}
+            of_turn = "; a line of sight turns by more than a radian, so that cubic and rest are in it too"
+        yield step(
+            "Rms of what is left, ρ_1 its slope at the aperture edge (P₁): what the band and the turn leave of them",
+            *orders,
+        )
+        symbol = f"hidden_{mark}"
+        hidden = WorkedEquation(symbol, f"2*π/λ*sqrt(45/4*({formula}))", values, self.hidden, "rad")
+        yield step(f"Hidden phase: a quadratic one that costs the peak as much{of_turn}", hidden)
+        values = {f"QPE_{mark}": self.phase(_QUADRATIC), symbol: self.hidden}
+        equal_loss = math.hypot(self.phase(_QUADRATIC), self.hidden)
+        yield step(
+            "Quadratic phase of equal loss" + ("" if self.gain > 1 else ", which is judged"),
+            WorkedEquation(f"equal_{mark}", f"sqrt(QPE_{mark}^2 + {symbol}^2)", values, equal_loss, "rad"),
+        )
+        if self.gain > 1:
+            worked = WorkedEquation(
+                f"judged_{mark}",
+                f"sqrt(QPE_{mark}^2 + (gain*{symbol})^2)",
+                {**values, "gain": self.gain},
+                self.judged,
+                "rad",
+            )
+            yield step("Judged, against a limit that holds the gain: autofocus corrects no hidden phase", worked)
+
+    def listed(self, values: Sequence[float]) -> list[str]:
+        """Values at the nodes, with their times."""
+        times = self.exact.times[:, 0].tolist()
+        return [f"{time:+.6g} s: {metres:.6g} m" for time, metres in zip(times, values, strict=True)]
+
+    def rest_steps(self) -> Iterator[Step]:
+        """Range error left beyond the cubic, and its rms."""
+        yield step("Beyond P₃ there", *self.listed(self.beyond))
+        terms = self._products(self.beyond)
+        wavelength = number(self.radar.wavelength)
+        worked = Sum(f"rest_full = 2*π/{wavelength}*sqrt({terms}) = {with_unit(self.rest, 'rad')}")
+        yield step("Rms phase of it, which spreads", worked)
+
+    def _terms(self, which: int) -> str:
+        pairs = zip(self.exact.fit[which].tolist(), self.ranges, strict=True)
+        return " + ".join(f"{number(w)}*{number(m)}" for w, m in pairs)
+
+    def _products(self, values: Sequence[float]) -> str:
+        pairs = zip(self.exact.fit[0].tolist(), values, strict=True)
+        return " + ".join(f"{number(w)}*{number(m)}^2" for w, m in pairs)
+
+    def _squares(self, symbol: str, values: Sequence[float]) -> Sum:
+        return Sum(f"{symbol} = sqrt({self._products(values)}) = {with_unit(self.rms(values), 'm')}")
 
 
 def _without_rounding(values: Sequence[float], whole: float) -> list[float]:
@@ -391,12 +507,24 @@ def _without_rounding(values: Sequence[float], whole: float) -> list[float]:
     return [value if abs(value) > ROUNDING * whole else 0.0 for value in values]
 
 
-def worse(analysis: Analysis, source: ErrorSource, size: float, which: int = _QUADRATIC) -> Left:
-    """The range error that is left by the sign that leaves more."""
+def _judged(left: Left) -> float:
+    return left.judged
+
+
+def _of_order(which: int) -> Callable[[Left], float]:
+    return lambda left: abs(left.phase(which))
+
+
+def _rest(left: Left) -> float:
+    return left.rest
+
+
+def worse(analysis: Analysis, source: ErrorSource, size: float, of: Callable[[Left], float] = _judged) -> Left:
+    """The range error that is left by the sign that leaves more of a phase."""
     signs = [Left(analysis, source, signed) for signed in (size, -size)]
     if signs[0].is_small or not signs[1].ranges:
         return signs[0]
-    stated, other = (abs(left.phase(which)) if left.ranges else math.inf for left in signs)
+    stated, other = (of(left) if left.ranges else math.inf for left in signs)
     return signs[other > stated * (1 + _ALIKE)]
 
 
@@ -415,21 +543,28 @@ def full_chain(analysis: Analysis, source: ErrorSource, size: float, each: str) 
         return
     sign = "" if left.is_small or left.size == size else ", with the other sign, which leaves more"
     yield step(
-        f"Full model{each}{sign}: the ground point at which nothing is left of P₀ and P₁ over the aperture",
+        f"Full model{each}{sign}: the ground point at which V = Var(ρ) + b²·⟨ρ²⟩ is least, ρ the range error that is "
+        "left, ⟨ ⟩ its mean over the aperture, b² the variance of the frequency over the band in units of f_0²",
         *_placed(left),
     )
-    times = analysis.exact.times[:, 0].tolist()
     yield step(
-        f"Range error left there, {_left_of(analysis.exact)}, at the nodes of the fit",
-        *(f"{time:+.6g} s: {metres:.6g} m" for time, metres in zip(times, left.ranges, strict=True)),
+        f"ρ there, {_left_of(analysis.exact)}, at the nodes of the fit",
+        *left.listed(left.ranges),
     )
     yield step(
         "Quadratic phase at the aperture edge, 3/2 of P₂: weights of the fit times what is left",
         left.sum("QPE_full", _QUADRATIC),
     )
+    yield from left.steps()
+    by_quadratic = worse(analysis, source, size, _of_order(_QUADRATIC))
+    if by_quadratic.size != left.size:
+        yield step("Quadratic phase by the other sign, which is larger", by_quadratic.sum("QPE_full", _QUADRATIC))
     if source.is_motion and analysis.mission.requirements.cubic_phase_error is not None:
-        by_cubic = worse(analysis, source, size, _CUBIC)
+        by_cubic = worse(analysis, source, size, _of_order(_CUBIC))
         yield step("Cubic phase there, 5/2 of P₃", by_cubic.sum("cubic_full", _CUBIC))
+    by_rest = worse(analysis, source, size, _rest)
+    if by_rest.rest > max(_SHOWN_REST_RAD, float(by_rest.exact.rounding[0])):
+        yield from by_rest.rest_steps()
 
 
 def _left_of(exact: ExactRanges) -> str:
@@ -440,7 +575,7 @@ def _left_of(exact: ExactRanges) -> str:
 
 def for_comparison(analysis: Analysis, source: ErrorSource, size: float, each: str) -> Iterator[Step]:
     """The result of the full model for an error that the published one judges."""
-    left = worse(analysis, source, size)
+    left = worse(analysis, source, size, _of_order(_QUADRATIC))
     if not left.ranges:
         yield step(f"Full model{each}, for comparison: no ground point has the range history")
         return
@@ -457,16 +592,22 @@ def at_the_allowable(
     sizes = [Left(analysis, source, signed) for signed in (allowable, -allowable)]
     if not all(left.ranges for left in sizes):
         return
-    if requirement == LOCATION:
-        left = max(sizes, key=lambda one: math.hypot(*(one.place or (0.0, 0.0))))
-        x, y = left.place or (0.0, 0.0)
-        moved = Sum(f"moved = sqrt({number(x)}^2 + {number(y)}^2) = {with_unit(math.hypot(x, y), 'm')}")
-    else:
-        which, symbol = (_CUBIC, "cubic_there") if requirement == CUBIC else (_QUADRATIC, "QPE_there")
-        left = max(sizes, key=lambda one: abs(one.phase(which)))
-        moved = left.sum(symbol, which)
+    reached = {LOCATION: _moved, CUBIC: _of_order(_CUBIC), QUADRATIC: _judged}[requirement]
+    left = max(sizes, key=reached)
     size = f"{number(left.size)} {source.unit.replace('^2', '²')}"
-    yield step(f"At {size}, the smallest size of either sign that reaches the limit, exact ranges give", moved)
+    title = f"At {size}, the smallest size of either sign that reaches the limit, exact ranges give"
+    if requirement == LOCATION:
+        x, y = left.place or (0.0, 0.0)
+        yield step(title, Sum(f"moved = sqrt({number(x)}^2 + {number(y)}^2) = {with_unit(math.hypot(x, y), 'm')}"))
+    elif requirement == CUBIC:
+        yield step(title, left.sum("cubic_there", _CUBIC))
+    else:
+        yield step(title, left.sum("QPE_there", _QUADRATIC))
+        yield from left.steps("there")
+
+
+def _moved(left: Left) -> float:
+    return math.hypot(*(left.place or (0.0, 0.0)))
 
 
 def end_of_the_image(size: float, unit: str) -> Iterator[Step]:

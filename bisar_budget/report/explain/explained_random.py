@@ -589,7 +589,7 @@ def _phases(mission: Mission, error: RandomError, model: str) -> Iterator[Step]:
     if error.declared is None:
         return
     other = "full" if model == "published" else "published"
-    is_same = error.published[:5] == error.full[:5]
+    is_same = error.published[:5] == error.full[:5] and not error.full.hidden
     is_left_same = error.published.spread == error.full.spread
     for name in (model,) if is_same else (model, other):
         effect, k = error.effect(name), _covered(mission, error)
@@ -607,6 +607,14 @@ def _phases(mission: Mission, error: RandomError, model: str) -> Iterator[Step]:
             lines.append(WorkedEquation(marked, formula, values, result, "rad"))
             if symbol == "QPE" and is_same:
                 lines.append(WorkedEquation("QPE_full", "QPE", {"QPE": result}, result, "rad"))
+        if effect.hidden:
+            hidden, qpe = effect.hidden * error.declared, effect.quadratic * error.declared
+            values = {"hidden/unit": effect.hidden, "declared": error.declared}
+            lines.append(WorkedEquation("hidden", "hidden/unit*declared", values, hidden, "rad"))
+            values = {"QPE": qpe, "hidden": hidden}
+            lines.append(
+                WorkedEquation("equal_full", "sqrt(QPE^2 + hidden^2)", values, math.hypot(qpe, hidden), "rad")
+            )
         by = "both models" if is_same else f"the {name} model{'' if name == model else ', for comparison'}"
         if effect.displacement > 0:
             values = {"moved/unit": effect.displacement, "declared": error.declared}
@@ -626,7 +634,7 @@ def _allowable(mission: Mission, allocation: Allocation, error: RandomError, row
         yield step("Allowable: not known", row.reason)
         return
     effect = error.effect(model)
-    held = held_effect(mission, effect, error.coverage(mission))
+    held = held_effect(mission, effect, error.coverage(mission), allocation.autofocus_gain)
     limit = allocation.qpe_allowed(error.owner)
     if error.is_covered:  # an effect from elsewhere has no quadratic phase here
         yield from limit_steps(allocation, error.owner, limit)
@@ -638,8 +646,16 @@ def _allowable(mission: Mission, allocation: Allocation, error: RandomError, row
         values = {"limit": allowed, part: per_unit}
         return step(title, WorkedEquation(name, f"limit/({part})", values, sizes[name], _unit(error)))
 
-    if effect.quadratic:
-        yield by("by_QPE", "QPE/unit", limit, effect.quadratic, "Allowable by the quadratic phase")
+    part = "QPE/unit"
+    if effect.hidden:
+        part, gain = "judged/unit", allocation.autofocus_gain
+        values = {"QPE/unit": effect.quadratic, "hidden/unit": effect.hidden, "gain": gain}
+        worked = WorkedEquation(
+            part, "sqrt((QPE/unit)^2 + (gain*hidden/unit)^2)", values, held.quadratic, f"rad per {_unit(error)}"
+        )
+        yield step("With what band and turn hide, of which autofocus corrects nothing", worked)
+    if held.quadratic:
+        yield by("by_QPE", part, limit, held.quadratic, "Allowable by the quadratic phase")
     if effect.cubic and required.cubic_phase_error is not None:
         title = f"Allowable by requirements.{CUBIC}, without share and gain"
         yield by("by_cubic", "cubic/unit", required.cubic_phase_error, effect.cubic, title)

@@ -1,7 +1,8 @@
 """How a row, or a requirement, comes to its status: from its line in the file by the equations to the verdict."""
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -205,10 +206,13 @@ def _budget(analysis: Analysis, source: ErrorSource, row: Row) -> Iterator[Step]
         if row.model == "full" and source.is_motion and not analysis.full.is_linear_at(source, QUADRATIC, limit):
             yield from at_the_allowable(analysis, source, by_quadratic)
         else:
-            values = {"limit": limit, "QPE/unit": abs(model.effect(source).qpe)}
+            values, formula = {"limit": limit, "QPE/unit": abs(model.effect(source).qpe)}, "limit/(QPE/unit)"
+            hidden = model.hidden_per_unit(source)
+            if hidden:
+                values |= {"hidden/unit": hidden, "gain": allocation.autofocus_gain}
+                formula = "limit/sqrt((QPE/unit)^2 + (gain*hidden/unit)^2)"
             yield step(
-                "Allowable by the quadratic phase",
-                WorkedEquation("by_QPE", "limit/(QPE/unit)", values, by_quadratic, row.unit),
+                "Allowable by the quadratic phase", WorkedEquation("by_QPE", formula, values, by_quadratic, row.unit)
             )
     others = (
         (CUBIC, "by_cubic", requirements.cubic_phase_error, "rad"),
@@ -426,16 +430,39 @@ def _near_lines(mission: Mission, platform: str, index: int, total: float) -> It
 
 
 def _phase_aggregate(together: Together, found: MissionFindings, row: Row) -> Iterator[Step]:
-    owner, is_pull_in = row.owner, row.subject.kind == "autofocus_pull_in"
-    rule = "sum" if is_pull_in else found.combine
-    parts = together.phase_parts(quadratics(together.owed(found.allocation.qpe, owner)), rule)
-    yield from combined("QPE of the declared errors", rule, parts, row.declared)
+    owner, is_pull_in, allocation = row.owner, row.subject.kind == "autofocus_pull_in", found.allocation
+    members = together.owed(allocation.qpe, owner)
     if is_pull_in:
-        values = {"N_pull": found.allocation.n_pull or 0.0}
+        parts = together.phase_parts(quadratics(members), "sum")
+        yield from combined("QPE of the declared errors", "sum", parts, row.declared)
+        values = {"N_pull": allocation.n_pull or 0.0}
         worked = WorkedEquation("allowable", "π*N_pull", values, row.allowable or 0.0, "rad")
         yield step("What autofocus corrects, Section VI", worked)
-    else:
-        yield from limit_steps(found.allocation, owner, row.allowable or 0.0)
+        return
+    rule, gain = found.combine, allocation.autofocus_gain
+    title = (
+        "Quadratic phase of equal loss of the declared errors"
+        if row.model == "full"
+        else "QPE of the declared errors"
+    )
+    if gain == 1 or rule == "each" or row.model != "full":
+        parts = together.phase_parts(together.judged_parts(members), rule)
+        yield from combined(title, rule, parts, row.declared)
+        yield from limit_steps(allocation, owner, row.allowable or 0.0)
+        return
+    yield from combined(
+        title, rule, together.phase_parts(together.judged_parts(members, gain=1.0), rule), row.declared
+    )
+    judged, limit = float(together.judged(members)[0]), allocation.qpe_allowed(owner)
+    title = "Judged, hidden phases times the gain: autofocus corrects none of them"
+    yield from combined(
+        title, rule, together.phase_parts(together.judged_parts(members), rule), judged, symbol="judged"
+    )
+    yield from limit_steps(allocation, owner, limit)
+    if row.declared and row.allowable is not None:
+        values = {"limit": limit, "combined": row.declared, "judged": judged}
+        worked = WorkedEquation("allowable", "limit*combined/judged", values, row.allowable, "rad")
+        yield step("Of the phase of equal loss so much is allowed as reaches the limit", worked)
 
 
 def _cubic_aggregate(together: Together, found: MissionFindings, row: Row) -> Iterator[Step]:
@@ -566,10 +593,21 @@ def not_judged(found: MissionFindings, row: Row) -> Iterator[Step]:
         yield from _path_in_doubt(mission, row)
     elif code == "clocks-are-not-set":
         yield from _displacing(analysis, row)
+    elif code == "air-stays":
+        yield _air_that_changes(reason)
     else:
         for one in untaken_effects(analysis):
             if row.id in one.makers and one.makers[row.id][0]:
                 yield from _untaken(analysis, row, one)
+
+
+def _air_that_changes(reason: Note) -> Step:
+    """Effect of delays that stay, as if they changed, and its share of what is allowed."""
+    values: Sequence[Any] = reason.values
+    _, correlation_time, key, size, use, _ = values
+    unit = {"islr": "dB", LOCATION: "m"}.get(key, "rad")
+    title = f"The declared delays of the air, as if they changed in {with_unit(correlation_time, 's')}"
+    return step(title, f"{key} = {with_unit(size, unit)}", f"use = {number(use)}, {TENTH:g} may go unsaid")
 
 
 def _reason(found: MissionFindings, row: Row) -> Note | None:

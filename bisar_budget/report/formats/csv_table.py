@@ -58,6 +58,8 @@ COLUMNS = (
     "share_reached",
     "autofocus_gain",
     "confidence",
+    "equal_loss_qpe_rad",
+    "rest_rad",
 )
 
 

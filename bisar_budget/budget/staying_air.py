@@ -1,0 +1,227 @@
+"""Delays of the air that stay in a long aperture, because the file does not say how fast they change.
+
+From a minute on the air is not the same at both ends of an aperture. A delay without `correlation_time` moves the
+image and bends its phase with the elevation alone: that is half of what air does. So delays are also taken as if they
+changed in ten minutes. A requirement is not evaluated where they would use more than a tenth of it, or would break it
+together with what is declared. What no requirement takes of them follows the rule of `UntakenEffect`.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from bisar_budget import phrases
+from bisar_budget.analysis.analysis import Analysis, Case
+from bisar_budget.analysis.spread import islr_db, mainlobe_energy, spread_limit
+from bisar_budget.budget.aggregates import untaken_effects
+from bisar_budget.budget.judged_requirements import EXAMPLES, TAKEN_BY, TENTH, UntakenEffect
+from bisar_budget.budget.judged_rows import BOUND, Judged
+from bisar_budget.budget.random_rows import HELD, ISLR, held_effect
+from bisar_budget.effects.air_delays import changing_air
+from bisar_budget.effects.combined import combined
+from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
+from bisar_budget.effects.effect import PLATFORMS, subject
+from bisar_budget.effects.random_effect import RandomError
+from bisar_budget.mission.model import Mission
+from bisar_budget.phrases import Note
+from bisar_budget.ranges.exact_ranges import Floats, Truths
+
+LONG_APERTURE_S = 60.0  # from which on the air is not the same at both ends
+AIR_CHANGES_IN_S = 600.0  # correlation time of what a model or a map leaves of the delay of the zenith
+
+
+class AirUse(NamedTuple):
+    """Size of what delays would do to a row if they changed, and its share of what the row may have, (cases,).
+
+    The size is a phase, an rms phase or a displacement. [rad] or [m] `is_doubted` says where no verdict may rest on
+    the delays staying.
+    """
+
+    row_id: str
+    key: str  # of the requirement that holds the row
+    size: Floats
+    use: Floats
+    is_doubted: Truths
+    model: str
+
+
+@dataclass(frozen=True, eq=False)
+class StayingAir:
+    """Delays that stay in long apertures: by row, the use that they would make of it if they changed.
+
+    `untaken` are effects that no requirement takes, with those of the delays in them. Both are empty where no case
+    has such a delay.
+    """
+
+    errors: Sequence[RandomError] = ()
+    is_long: Truths = field(default_factory=lambda: np.zeros(1, dtype=bool))
+    uses: Mapping[str, AirUse] = field(default_factory=dict)
+    untaken: Sequence[UntakenEffect] = ()
+
+    @property
+    def _delays(self) -> frozenset[str]:
+        """Ids of the delays' own rows, which the quadratic requirement holds with `combine: each`.
+
+        Such a row may have the limit of another requirement, so that its status does not say how this one stands.
+        """
+        return frozenset(error.id for error in self.errors)
+
+    def doubted_rows(self) -> dict[str, Truths]:
+        """Rows of sums that are not evaluated, by their ids, and in which cases."""
+        return {row_id: use.is_doubted for row_id, use in self.uses.items() if row_id not in self._delays}
+
+    def doubted_requirements(self) -> dict[str, Truths]:
+        """Requirements that are not evaluated as a whole, and in which cases: a platform's share is a row's alone."""
+        doubted: dict[str, Truths] = {}
+        for use in self.uses.values():
+            if use.row_id in self._delays or use.row_id == subject("mission", use.key).id:
+                doubted[use.key] = doubted.get(use.key, np.False_) | use.is_doubted
+        return doubted
+
+    def untaken_rows(self) -> dict[str, Truths]:
+        """Rows of delays that would make up an effect which no requirement takes, and in which cases."""
+        return {
+            error.id: np.any([effect.makers.get(error.id, False) & self.is_long for effect in self.untaken], axis=0)
+            for error in self.errors
+            if self.untaken
+        }
+
+    def reason(self, case: Case, row_id: str) -> Note:
+        """Say what the delays would do to a row of one case, and what to add to the file."""
+        use = self.uses.get(row_id)
+        if use is not None:
+            return self._says(case, use)
+        return self._says_of_untaken(case, row_id)
+
+    def reason_of_requirement(self, case: Case, key: str) -> Note:
+        """Say what the delays would do to a requirement as a whole; nothing where it does not rest on them."""
+        doubted = [use for use in self.uses.values() if use.key == key and case.number(use.is_doubted)]
+        return self._says(case, max(doubted, key=lambda use: case.number(use.use))) if doubted else phrases.NOTHING
+
+    def note(self, case: Case) -> Iterator[Note]:
+        """Say that delays stay where no verdict rests on it."""
+        uses = [case.number(use.use) for use in self.uses.values()]
+        is_open = any(case.number(use.is_doubted) for use in self.uses.values())
+        is_open = is_open or any(case.number(is_made) for is_made in self.untaken_rows().values())
+        if case.number(self.is_long) and not is_open and any(use > 0 for use in uses):
+            yield phrases.air_that_stays_is_negligible(
+                case.mission.collection.aperture_time, AIR_CHANGES_IN_S, max(uses), _keys(case.mission)
+            )
+
+    def _says(self, case: Case, use: AirUse) -> Note:
+        size = case.number(use.size)
+        if use.key == ISLR:
+            size = float(islr_db(size**2, use.model, mainlobe_energy(case.mission)))
+        return phrases.air_stays(
+            case.mission.collection.aperture_time,
+            AIR_CHANGES_IN_S,
+            use.key,
+            size,
+            case.number(use.use),
+            _keys(case.mission),
+        )
+
+    def _says_of_untaken(self, case: Case, row_id: str) -> Note:
+        notes = [
+            phrases.air_stays_untaken(
+                case.mission.collection.aperture_time,
+                AIR_CHANGES_IN_S,
+                effect.kind,
+                case.number(effect.parts[row_id]),
+                _keys(case.mission),
+                [f"{key}: {EXAMPLES[key]}" for key in TAKEN_BY[effect.kind]],
+            )
+            for effect in self.untaken
+            if row_id in effect.makers and effect.makers[row_id][case.place]
+        ]
+        return notes[0].then(*notes[1:])
+
+
+def staying_air(analysis: Analysis, rows: Sequence[Judged]) -> StayingAir:
+    """Delays that stay in the long apertures of some cases, and the use that they would make of each row."""
+    mission, cases = analysis.mission, analysis.cases
+    is_long = np.broadcast_to(np.asarray(mission.collection.aperture_time) >= LONG_APERTURE_S, (cases,))
+    if mission.propagation is None or not is_long.any():
+        return StayingAir()
+    errors = changing_air(mission, analysis.geometry, cases, AIR_CHANGES_IN_S)
+    if not errors:
+        return StayingAir()
+    utilization = {row.subject.id: row.utilization for row in rows}
+    uses: dict[str, AirUse] = {}
+    for model in analysis.gates:
+        for use in _uses(analysis, errors, model):
+            beside = np.nan_to_num(utilization.get(use.row_id, np.zeros(cases)), nan=0.0, posinf=0.0)
+            use = use._replace(is_doubted=is_long & _rests_on(mission, use, beside))
+            other = uses.get(use.row_id)
+            if other is None or np.max(use.use) > np.max(other.use):
+                is_either = use.is_doubted if other is None else use.is_doubted | other.is_doubted
+                uses[use.row_id] = use._replace(is_doubted=is_either)
+            else:
+                uses[use.row_id] = other._replace(is_doubted=use.is_doubted | other.is_doubted)
+    return StayingAir(errors, is_long, uses, untaken_effects(analysis, errors))
+
+
+def _rests_on(mission: Mission, use: AirUse, beside: Floats) -> Truths:
+    """Whether delays would use more than a tenth, or break a requirement together with what is declared."""
+    rule = "rss" if use.key == ISLR else mission.allocation.combine
+    together = combined((use.use, beside), rule)
+    return np.asarray((use.use > TENTH) | ((use.use > 0) & (together > BOUND)))
+
+
+def _uses(analysis: Analysis, errors: Sequence[RandomError], model: str) -> Iterator[AirUse]:
+    """Use of each row that a requirement holds, by delays that change, by one model."""
+    mission, allocation = analysis.mission, analysis.allocation
+    rule = mission.allocation.combine
+    for key in HELD:
+        sizes = [(error, _size(analysis, error, model, key)) for error in errors]
+        if key == QUADRATIC and rule == "each":
+            for error, size in sizes:
+                yield _use(analysis, error.id, key, size, allocation.qpe_allowed(error.owner), model)
+        elif key in (QUADRATIC, ISLR):
+            split = allocation.qpe if key == QUADRATIC else allocation.islr
+            for owner in (*PLATFORMS, *(("clock",) if split.clock is not None else ()), "mission"):
+                size = combined(
+                    [size for error, size in sizes if split.includes(error.owner, owner)],
+                    "rss" if key == ISLR else rule,
+                )
+                limit = allocation.qpe_allowed(owner)
+                if key == ISLR:
+                    limit = spread_limit(mission, allocation, owner, model)
+                if limit is not None:
+                    yield _use(analysis, subject(owner, key).id, key, size, limit, model)
+        elif getattr(mission.requirements, key) is not None:
+            size = combined([size for _, size in sizes], rule)
+            yield _use(analysis, subject("mission", key).id, key, size, getattr(mission.requirements, key), model)
+
+
+def _use(analysis: Analysis, row_id: str, key: str, size: Any, limit: Any, model: str) -> AirUse:
+    sizes = np.broadcast_to(np.asarray(size, dtype=float), (analysis.cases,))
+    return AirUse(row_id, key, sizes, sizes / limit, np.zeros(analysis.cases, dtype=bool), model)
+
+
+def _size(analysis: Analysis, error: RandomError, model: str, key: str) -> Any:
+    """Size of a delay's effect on a requirement, as that holds it, with the gain of autofocus. [rad] or [m]
+
+    Of a displacement it is what the delay adds by changing: the image moves by as much as before, and farther.
+    """
+    effect = error.effect(model)
+    held = held_effect(analysis.mission, effect, error.coverage(analysis.mission), analysis.allocation.autofocus_gain)
+    if key == LOCATION:
+        stays = next(other for other in analysis.random if other.id == error.id).effect(model)
+        added = np.square(effect.displacement) - np.square(stays.displacement)
+        return np.sqrt(np.maximum(added, 0.0)) * error.declared
+    return {QUADRATIC: held.quadratic, CUBIC: held.cubic, ISLR: held.spread}[key] * np.asarray(error.declared)
+
+
+def _keys(mission: Mission) -> list[str]:
+    """Keys to add: that of one air or of both legs, or of the leg that has none."""
+    propagation = mission.propagation
+    if propagation is None:
+        return []
+    legs = {name: leg for name in PLATFORMS if (leg := propagation.leg(name)) is not None}
+    staying = [name for name, leg in legs.items() if leg.correlation_time is None]
+    if propagation.is_one_air or len(staying) == len(legs):
+        return ["propagation.correlation_time"]
+    return [f"propagation.{name}.correlation_time" for name in staying]

@@ -1,0 +1,230 @@
+"""Which points of the ground an aperture and a band tell apart: the matrix of the gradients of the range over both.
+
+A ground point a step x away has another range, by g(τ)·x with g the sum of both lines of sight over the ground. Over
+aperture and band the phase then varies, a constant phase being free, by xᵀHx of its wavenumber squared, with
+
+    H = Cov_τ(g) + b²⟨g gᵀ⟩,    b² = B²/(12 f₀²),
+
+for a band of width B, evenly filled, about f₀; ⟨ ⟩ is the mean over the aperture. Where H is singular, points along a
+line look alike: there is no image plane. Derived here; `ranges.exact_ranges` finds the image point by it.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache, reduce
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bisar_budget.constants import MIN_GRADIENT_ANGLE_DEG
+from bisar_budget.geometry import BistaticGeometry
+
+Floats = NDArray[np.float64]
+
+# Way of a platform in half an aperture, over its slant range, up to which so many nodes change phases by less than
+# 1e-6 of themselves up to 0.5, and by less than 1e-4 beyond.
+NODES = ((0.1, 6), (0.5, 10), (1.0, 16), (2.0, 32), (math.inf, 64))
+FEWEST_NODES = NODES[0][1]
+OWN_AREA = (
+    0.5  # of the determinant of H, which mean gradient and mean Doppler gradient span where they tell sides apart
+)
+MIN_SINE = math.sin(math.radians(MIN_GRADIENT_ANGLE_DEG))
+STANDS = 1e-9  # of what both lines of sight turn by alone: by less their sum does not turn
+
+
+class Band(Protocol):
+    """A radar, by its band. [Hz]"""
+
+    @property
+    def center_frequency(self) -> Any:
+        """Centre of the band."""
+
+    @property
+    def bandwidth(self) -> Any:
+        """Width of the band, evenly filled."""
+
+
+class Sampling(NamedTuple):
+    """When a history is sampled: slow times over −1 … 1, in half apertures, (samples,); and the weights that fit it.
+
+    The weights (4, samples) give the mean, which is the P₀ part, the P₁ part at the edge, and the quadratic and the
+    cubic part at the edge: 3/2 of P₂ and 5/2 of P₃.
+    """
+
+    places: Floats
+    fit: Floats
+
+
+LEADING = np.array((1.0, 1.0, 1.5, 2.5))  # coefficient of xⁿ in the Legendre polynomial Pₙ
+
+
+@cache
+def nodes(count: int) -> Sampling:
+    """Sampling at the nodes of Gauss-Legendre quadrature: the projection (2n + 1)/2 ∫ρPₙ of each order n."""
+    places, weights = np.polynomial.legendre.leggauss(count)
+    orders = np.polynomial.legendre.legvander(places, 3)
+    return Sampling(places, ((np.arange(4) + 0.5) * LEADING)[:, None] * orders.T * weights)
+
+
+def nodes_for(geometry: BistaticGeometry, aperture_time_s: Any, *, has_direct_path: bool = False) -> Any:
+    """Number of nodes that cases need: of the lines of sight, and of the direct path where that counts."""
+    half = aperture_time_s / 2
+    turning = (*geometry.both, *((geometry.apart,) if has_direct_path else ()))
+    way = reduce(np.maximum, [path.travelled(half) / path.slant_range for path in turning])
+    limits, counts = zip(*NODES, strict=True)
+    found = np.array(counts)[np.searchsorted(limits, way)]
+    return found if np.ndim(way) else int(found)
+
+
+def band_variance(radar: Band) -> Any:
+    """b² of a band, evenly filled: the variance of its frequencies over the square of its centre."""
+    return (radar.bandwidth / radar.center_frequency) ** 2 / 12
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GroundMatrix:
+    """The matrix H of V over the ground, half its second derivative for what leaves nothing, (cases,); its product.
+
+    With g the gradient of the range error over the ground at the nodes, H = ⟨g, gᵀ⟩ in the product of V. `projection`
+    (2, nodes, cases) takes range errors at the nodes to ⟨g, ρ⟩.
+    """
+
+    slopes: Sequence[Floats]
+    fit: Floats
+    band: Floats
+    projection: Floats
+    xx: Floats
+    xy: Floats
+    yy: Floats
+
+    @classmethod
+    def of(cls, slopes: Sequence[Floats], fit: Floats, band: Floats) -> "GroundMatrix":
+        """Matrix of what a metre east, and north, adds to the range error at the nodes, (nodes, cases) each."""
+        mean = fit[0][:, None]
+        projection = np.empty((2, *np.broadcast_shapes(slopes[0].shape, slopes[1].shape)))
+        for axis, slope in enumerate(slopes):
+            projection[axis] = _projected(slope, mean, band)
+        xx, xy, yy = _covariances(slopes, mean)
+        east, north = ((mean * slope).sum(axis=0) for slope in slopes)
+        xx, xy, yy = (
+            (1 + band) * xx + band * east * east,
+            (1 + band) * xy + band * east * north,
+            (1 + band) * yy + band * north * north,
+        )
+        return cls(slopes, fit, band, projection, xx, xy, yy)
+
+    @property
+    def determinant(self) -> Floats:
+        """Determinant of H, the square of the area that the gradients span."""
+        return np.asarray(self.xx * self.yy - self.xy * self.xy)
+
+    @property
+    def least(self) -> Floats:
+        """The smaller eigenvalue of H: how fast V grows along the direction that is resolved worst."""
+        half, apart = (self.xx + self.yy) / 2, np.hypot((self.xx - self.yy) / 2, self.xy)
+        return np.asarray(self.determinant / (half + apart))
+
+    @property
+    def place_weights(self) -> tuple[Floats, Floats]:
+        """Displacement east and north per metre of range error at the nodes, −H⁻¹⟨g, ·⟩, (nodes, cases). [m/m]"""
+        (x, y), determinant = self.projection, self.determinant
+        with np.errstate(all="ignore"):
+            return (self.xy * y - self.yy * x) / determinant, (self.xy * x - self.xx * y) / determinant
+
+    @property
+    def range_gradient(self) -> tuple[Floats, Floats]:
+        """Mean gradient of the range over the ground, east and north. [m/m]"""
+        east, north = (self.fit[0] @ slope for slope in self.slopes)
+        return east, north
+
+    @property
+    def sine(self) -> Floats:
+        """Sine of the angle between the directions that band and turn resolve.
+
+        Mean gradient and covariance of the gradient over the aperture, each with a trace of one, add to a matrix with
+        the eigenvalues 1 ± cos θ: for a short aperture θ is the angle between range and Doppler gradient. Its
+        condition is cot²(θ/2).
+        """
+        x, y = self.range_gradient
+        square = x * x + y * y
+        xx, xy, yy = _covariances(self.slopes, self.fit[0][:, None])
+        with np.errstate(all="ignore"):
+            is_seen = square > 0
+            trace, square = xx + yy, np.where(is_seen, square, 1.0)
+            a, b, c = xx / trace + x * x / square, xy / trace + x * y / square, yy / trace + y * y / square
+            return np.sqrt(np.maximum(a * c - b * b, 0.0)) * np.where(is_seen, 1.0, 2.0)
+
+    @property
+    def turning(self) -> Floats:
+        """Edge of the P₁ part of the gradient across the mean gradient, as the variance there has it. [m/m]"""
+        x, y = self.range_gradient
+        along = self.xx * x * x + 2 * self.xy * x * y + self.yy * y * y
+        with np.errstate(all="ignore"):
+            return np.sqrt(np.maximum(3 * self.determinant * (x * x + y * y) / along, 0.0))
+
+    @property
+    def orientation(self) -> Floats:
+        """Area between mean gradient and mean Doppler gradient, signed; 0 where the aperture resolves more."""
+        (x, y), (by_x, by_y) = self.range_gradient, (self.fit[1] @ slope for slope in self.slopes)
+        area = x * by_y - y * by_x
+        own = self.band * (1 + self.band) / 3 * area * area
+        return np.where(own >= OWN_AREA * self.determinant, area, 0.0)
+
+    def projected(self, values: Floats) -> Floats:
+        """Weights of the product of V with values at the nodes, (nodes, cases)."""
+        return _projected(values, self.fit[0][:, None], self.band)
+
+    def turned_from(self, centre: "GroundMatrix", case: NDArray[np.intp]) -> Floats:
+        """Area that gradients span, over that of the centre's of some cases; below 0 where they are turned around."""
+        determinant, orientation = centre.determinant, centre.orientation
+        if determinant.size > 1:
+            determinant, orientation = determinant[case], orientation[case]
+        area = np.sqrt(np.maximum(self.determinant, 0.0) / determinant)
+        return np.where(orientation * self.orientation < 0, -area, area)
+
+
+def spans_ground(geometry: BistaticGeometry, radar: Band, aperture_time_s: Any, cases: int = 1) -> tuple[Any, Any]:
+    """Whether lines of sight turn within the aperture, and the sine that `GroundMatrix.sine` is, (cases,).
+
+    Full circles, and apertures that pass through a moment at which range and Doppler gradient are parallel, have an
+    image plane; what has none is within a degree of parallel over the whole aperture.
+    """
+    half = np.array(np.broadcast_to(np.asarray(aperture_time_s, dtype=float) / 2, (cases,)))
+    places, fit = nodes(int(np.max(nodes_for(geometry, 2 * half), initial=FEWEST_NODES)))
+    slopes, turning = [np.zeros((places.size, cases)), np.zeros((places.size, cases))], np.zeros(cases)
+    for path in geometry.both:
+        x, y, z = path.place(places[:, None] * half)
+        distance = np.sqrt(x * x + y * y + z * z)
+        slopes = [slopes[0] + x / distance, slopes[1] + y / distance]
+        turning = turning + path.travelled(half) / path.slant_range
+    matrix = GroundMatrix.of(slopes, fit, band_variance(radar) * np.ones(cases))
+    spread = sum(np.ptp(slope, axis=0) for slope in slopes)
+    return spread > STANDS * turning, matrix.sine
+
+
+def degeneracy(geometry: BistaticGeometry, radar: Band, aperture_time_s: float) -> str:
+    """Say why one collection has no image plane; empty where it has one."""
+    turns, sine = spans_ground(geometry, radar, aperture_time_s)
+    if not turns[0]:
+        return "both look vectors have a sum that never turns, so that Doppler does not change over the ground"
+    if sine[0] >= MIN_SINE:
+        return ""
+    degrees = math.degrees(math.asin(sine[0]))
+    return (
+        f"range and Doppler gradients on the ground are {degrees:.2g} deg from parallel over the aperture, at least "
+        f"{MIN_GRADIENT_ANGLE_DEG:g} deg is needed: no image plane"
+    )
+
+
+def _covariances(slopes: Sequence[Floats], mean: Floats) -> tuple[Floats, Floats, Floats]:
+    """Covariance of the gradient over the aperture, (cases,), of what each sample is off the mean."""
+    x, y = (slope - (mean * slope).sum(axis=0) for slope in slopes)
+    return (mean * x * x).sum(axis=0), (mean * x * y).sum(axis=0), (mean * y * y).sum(axis=0)
+
+
+def _projected(values: Floats, mean: Floats, band: Any) -> Floats:
+    """Weights of the product of V with values at the nodes, (nodes, cases): their sum with others is the product."""
+    average = (mean * values).sum(axis=0)
+    return np.asarray(mean * ((1 + band) * (values - average) + band * average))
