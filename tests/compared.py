@@ -84,16 +84,18 @@ def _allowables(
     """At the allowable the worse sign is at a limit, at no smaller size above one; none, where none is reached."""
     required = mission.requirements
     is_full = mission.gating_model == "full"
-    limits = _limits(found, errors)
+    limits, gain = _limits(found, errors), found.allocation.autofocus_gain
     caps = np.array([error.cap for error in errors])
     of_phase = np.array([_number(rows[error.id].allowable_full) for error in errors])
     of_all = np.array([_number(rows[error.id].allowable) if is_full else math.nan for error in errors])
+    is_end = _ends(found, errors, of_phase)
     ends = np.where(np.isfinite(of_phase), np.minimum(1.01 * of_phase, 1.02 * caps), caps)
     marks = np.stack([of_phase * 0.99, of_phase, of_all * 0.99, of_all, of_all * 1.01], axis=1)
     grid, responses = reference.scanned(mission, errors, ends, marks, steps, limits)
-    by_phase = _excess(responses.qpe, limits[:, None], FLOOR_RAD)
+    by_phase = _excess(responses.judged(gain), limits[:, None], FLOOR_RAD)
     for index, error in enumerate(errors):
-        yield _allowable("allowable_full", error, rows[error.id].allowable_full, grid[index], by_phase[index])
+        size = rows[error.id].allowable_full
+        yield _allowable("allowable_full", error, size, grid[index], by_phase[index], is_end[index])
     if not is_full:
         return
     over = by_phase
@@ -102,7 +104,22 @@ def _allowables(
     if required.location_error is not None:
         over = np.maximum(over, _excess(responses.moved, required.location_error, FLOOR_M))
     for index, error in enumerate(errors):
-        yield _allowable("allowable", error, rows[error.id].allowable, grid[index], over[index])
+        yield _allowable("allowable", error, rows[error.id].allowable, grid[index], over[index], is_end[index])
+
+
+def _ends(found: MissionFindings, errors: Sequence[Error], sizes: Array) -> Array:
+    """Whether allowables are where an image ends, (L,): then none is too large that is reached without a limit.
+
+    At a fold the way of a point has a corner or an end, over which the reference may step, to another minimum of V
+    too. `tests.effects.test_end_of_image` holds what lies beyond.
+    """
+    analysis = found.analysed()
+    sources = {source.id: source for source in analysis.sources}
+    ends = [
+        np.isfinite(size) and analysis.full.ends_image(sources[error.id], float(size))
+        for error, size in zip(errors, sizes, strict=True)
+    ]
+    return np.array(ends)
 
 
 def _limits(found: MissionFindings, errors: Sequence[Error]) -> Array:
@@ -122,7 +139,9 @@ def _excess(values: Array, limit: Array | float, floor: float) -> Array:
     return excess
 
 
-def _allowable(quantity: str, error: Error, found: float | None, sizes: Array, excess: Array) -> Compared:
+def _allowable(
+    quantity: str, error: Error, found: float | None, sizes: Array, excess: Array, is_end: bool
+) -> Compared:
     """Hold one allowable to the excess (S,) over its limit at ascending sizes (S,)."""
     first = int(np.argmax(excess > 0)) if (excess > 0).any() else None
     want = None if first is None or sizes[first] > error.cap else _crossing(sizes, excess, first)
@@ -131,8 +150,8 @@ def _allowable(quantity: str, error: Error, found: float | None, sizes: Array, e
         return Compared(quantity, error.id, found, want, math.inf)
     before = float(excess[sizes < end * (1 - SHARE) * (1 + 1e-12)].max(initial=-math.inf))
     reached = float(excess[sizes <= end * (1 + SHARE) * (1 + 1e-12)].max(initial=-math.inf))
-    off = max(before, 0.0) if found is None else max(before, -reached, 0.0)
-    if found is not None and off <= 1:  # say how far off the phase there is, not only that it agrees
+    off = max(before, 0.0) if found is None or is_end else max(before, -reached, 0.0)
+    if found is not None and off <= 1 and not is_end:  # say how far off the phase there is, not only that it agrees
         off = max(off, min(1.0, abs(float(excess[np.searchsorted(sizes, found)]))))
     return Compared(quantity, error.id, found, want, off)
 
@@ -158,21 +177,37 @@ def _of_the_declared(
     is_full = mission.gating_model == "full"
     responses = reference.at_declared(mission, declared)
     qpe, cubic = (np.abs(of).max(axis=0) for of in (responses.qpe, responses.cubic))
+    equal_loss, rest = _equal_loss(responses, found.allocation.autofocus_gain), responses.rest.max(axis=0)
     for index, error in enumerate(declared):
         row = rows[error.id]
         size = abs(error.declared or 0.0)
         off = abs((row.declared or 0.0) - size) / (1e-9 * size) if size else 0.0
         yield Compared("declared", error.id, row.declared, size, off)
         yield _against("qpe_full_rad", error.id, _magnitude(row.qpe_full_rad), float(qpe[index]), FLOOR_RAD)
+        equal_loss_rad = _magnitude(row.equal_loss_qpe_rad)
+        yield _against("equal_loss_qpe_rad", error.id, equal_loss_rad, float(equal_loss[index]), FLOOR_RAD)
         if is_full:
             yield _against("cubic_rad", error.id, row.cubic_rad, float(cubic[index]), FLOOR_RAD)
+            # It counts by its power, 2 % are 0.2 dB; the proof of the first order is one of phase and place.
+            room = max(FLOOR_RAD, 2 * SHARE * float(rest[index]))
+            yield _against("rest_rad", error.id, row.rest_rad, float(rest[index]), room)
             if error.owner != "clock" or row.displacement_m is not None:
                 yield _displaced(row, responses.place[0, index])
     stated = [index for index, error in enumerate(declared) if error.is_stated]
     members = [declared[index] for index in stated]
-    chosen = Responses(responses.qpe[:, stated], responses.cubic[:, stated], responses.place[:, stated])
+    chosen = Responses(*(part[:, stated] for part in responses))
     if members and np.isfinite(chosen.qpe).all():  # of an error without a ground point nothing is summed
         yield from _together(mission, found, rows, members, chosen)
+
+
+def _equal_loss(responses: Responses, gain: float) -> Array:
+    """Quadratic phase of equal loss, of the sign whose phase is worse in the requirement's eyes, (L,). [rad]
+
+    The hidden phase is what the judged one has beside the larger of both quadratic phases.
+    """
+    qpe, judged = np.abs(responses.qpe).max(axis=0), responses.judged(gain).max(axis=0)
+    equal_loss: Array = np.sqrt(qpe**2 + (judged**2 - qpe**2) / gain**2)
+    return equal_loss
 
 
 def _magnitude(value: float | None) -> float | None:
@@ -201,11 +236,14 @@ def _together(
     rule, allocation = mission.allocation.combine, found.allocation
     owners = [error.owner for error in members]
     is_full = mission.gating_model == "full"
+    gain = allocation.autofocus_gain
     qpe, cubic = (np.abs(of).max(axis=0) for of in (responses.qpe, responses.cubic))
+    equal_loss = _equal_loss(responses, gain)
     if is_full and mission.allocation.split == "balanced":
+        judged = np.hypot(qpe, gain * np.sqrt(equal_loss**2 - qpe**2))
         weights = [
             reference.combined(
-                qpe[[(owner == "transmitter") == is_first and owner != "mission" for owner in owners]], rule
+                judged[[(owner == "transmitter") == is_first and owner != "mission" for owner in owners]], rule
             )
             for is_first in (True, False)
         ]
@@ -220,9 +258,13 @@ def _together(
             if row_id in rows and any(parts):
                 want = reference.combined(qpe[parts], rule)
                 yield _against("qpe_full_rad", row_id, rows[row_id].qpe_full_rad, want, FLOOR_RAD)
+                want = reference.combined(equal_loss[parts], rule)
+                yield _against("equal_loss_qpe_rad", row_id, rows[row_id].equal_loss_qpe_rad, want, FLOOR_RAD)
         row = rows["mission.quadratic_phase_error"]
         everything = reference.combined(np.concatenate([qpe, others]), rule)
         yield _against("qpe_full_rad", row.id, row.qpe_full_rad, everything, FLOOR_RAD)
+        everything = reference.combined(np.concatenate([equal_loss, others]), rule)
+        yield _against("equal_loss_qpe_rad", row.id, row.equal_loss_qpe_rad, everything, FLOOR_RAD)
     if is_full:
         row = rows["mission.cubic_phase_error"]
         yield _against("cubic_rad", row.id, row.declared, reference.combined(cubic, rule), FLOOR_RAD)

@@ -34,9 +34,14 @@ def no_error(times: Floats) -> Floats:
     return np.zeros((len(times), 3))
 
 
-def flight(position: tuple[float, float, float], velocity: tuple[float, float, float]) -> Path:
-    """A straight path, or an error that is constant and grows. [m, m/s]"""
-    return lambda times: np.add.outer(0 * times, position) + np.outer(times, velocity)
+Vector = tuple[float, float, float]
+
+
+def flight(position: Vector, velocity: Vector, acceleration: Vector = (0.0, 0.0, 0.0)) -> Path:
+    """A path of constant acceleration, or an error that is constant and grows. [m, m/s, m/s²]"""
+    return lambda times: (
+        np.add.outer(0 * times, position) + np.outer(times, velocity) + np.outer(times**2 / 2, acceleration)
+    )
 
 
 def circle(radius: float, height: float, rate: float, azimuth: float) -> Path:

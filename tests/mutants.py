@@ -255,8 +255,8 @@ MUTANTS = (
     Mutant(
         "verify: refocused against twice the budget",
         _PHASES,
-        "is_met = residual <= budget * (1 + TOLERANCE)",
-        "is_met = residual <= 2 * budget * (1 + TOLERANCE)",
+        "is_met = left <= budget * (1 + TOLERANCE)",
+        "is_met = left <= 2 * budget * (1 + TOLERANCE)",
         (f"{_BORDERS}TestRefocused",),
     ),
     Mutant(
@@ -334,8 +334,8 @@ MUTANTS = (
     Mutant(
         "verify: what autofocus leaves is met within 20 %",
         _PHASES,
-        "is_met = residual <= budget * (1 + TOLERANCE)",
-        "is_met = residual <= budget * (1 + 4 * TOLERANCE)",
+        "is_met = left <= budget * (1 + TOLERANCE)",
+        "is_met = left <= budget * (1 + 4 * TOLERANCE)",
         (f"{_BORDERS}TestRefocused",),
     ),
     Mutant(

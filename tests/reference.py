@@ -5,11 +5,14 @@ of axes and the speed of light, and has its own quadrature (24 Gauss-Legendre no
 
 Recorded are the ranges of the true paths to the scene centre, and c·t̃(τ). Predicted are those of the measured paths,
 path + error, to a point x of the ground plane. With a direct path both are less the distance of the platforms, by
-the true and by the measured paths, and there is no clock error. The response stands at the x for which recorded −
-predicted has no P₀ and no P₁ part over the aperture. It is followed from the scene centre while the error grows from
-nothing, in short steps along its tangent, so that it is the response and no other solution. Then QPE = (2π/λ)·3/2·
-(coefficient of P₂) and cubic = (2π/λ)·5/2·(that of P₃), both at the aperture edge. Where the followed solution ends,
-no ground point has that range history.
+the true and by the measured paths, and there is no clock error. With ρ = recorded − predicted, the response peaks at
+the x of the least V = (1 + b²)⟨ρ²⟩ − ⟨ρ⟩², ⟨ ⟩ over the aperture and b² = B²/(12 f₀²). It is followed from the scene
+centre while the error grows from nothing, in short steps along its tangent, so that it is the response and no other
+minimum. Then QPE = (2π/λ)·3/2·(coefficient of P₂) and cubic = (2π/λ)·5/2·(that of P₃), both at the aperture edge; the
+rest is the root mean square beyond P₃; and what V has beside those three is hidden: as much as a quadratic phase of
+(2π/λ)·√(45/4·that) would lose. Where a line of sight turns by more than a radian, cubic and rest are hidden as well.
+The image ends where the gradients of V span less than a fifth of the area that they span without error, and half a
+cycle is hidden: no ground point has that range history.
 """
 
 import math
@@ -33,11 +36,15 @@ FAR = 0.1  # of a slant range; an error that takes a platform farther is none of
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)  # over -1 … 1
 _BASIS = np.array([np.polynomial.legendre.Legendre.basis(n)(_NODES) for n in range(4)])
 _PROJECT = (_BASIS * _WEIGHTS * (np.arange(4)[:, None] + 0.5)).T  # (24, 4): values at the nodes to P₀ … P₃
+_MEAN = _WEIGHTS / 2
 _STEP_M, _STEP = 1e-5, 1e-6  # that Newton's last step may make, besides of the distance; the next is its square
-_NEWTON = 8
+_NEWTON = 40
 _CORRECTION, _TRIFLE_M = 0.3, 1e-4  # of the tangent's way that Newton may add; what is no way to speak of
-PARALLEL = 0.02  # of the slopes' determinant without error
-_CHANGE = 0.25  # of the slopes' determinant, within one step
+FOLDED = 0.2  # of the area that gradients span without error
+HIDDEN_END_RAD = math.pi  # beyond which an image has ended, where gradients span little
+TURN_RAD = 1.0  # of a line of sight; beyond, orders of the aperture have no meaning
+_CHANGE = 0.5  # of the area that gradients span, within one step
+_NEAR_FOLD = 0.3  # of that area without error; below, it may change by any factor
 _SMALLEST = 2.0**-16  # of the way to the next size; where no step of that is found, the solution ends
 
 
@@ -128,11 +135,21 @@ def _along(sizes: Array, parts: Array, is_scene: bool, distribution: str) -> flo
 
 
 class Responses(NamedTuple):
-    """Signed QPE and cubic phase [rad] and place on the ground (…, 2) [m]; NaN where there is no ground point."""
+    """Signed QPE and cubic phase [rad] and place on the ground (…, 2) [m]; NaN where there is no ground point.
+
+    With them the hidden phase, and the rms beyond the cubic. [rad]
+    """
 
     qpe: Array
     cubic: Array
     place: Array
+    hidden: Array
+    rest: Array
+
+    def judged(self, gain: float) -> Array:
+        """Phase that is held to a limit with the gain of autofocus in it, which helps nothing hidden. [rad]"""
+        judged: Array = np.hypot(self.qpe, gain * self.hidden)
+        return judged
 
     @property
     def moved(self) -> Array:
@@ -173,11 +190,20 @@ class Lanes:
         self.apart, self.parted = self.true[:, 0] - self.true[:, 1], self.error[:, 0] - self.error[:, 1]
         clock = np.array([e.clock for e in errors])
         self.clock = SPEED_OF_LIGHT * clock @ np.array([tau**order for order in range(4)])  # (L, n)
+        self.band = (mission.radar.bandwidth / mission.radar.center_frequency) ** 2 / 12
+        looks = self.true / self.recorded[..., None]
+        cosines = np.einsum("lknf,lkmf->lknm", looks, looks).min(axis=(1, 2, 3))
+        self.is_turned = np.broadcast_to(cosines < math.cos(TURN_RAD), (len(errors),))
         count = len(errors)
         self.at_rest = self._tangent(np.zeros(count), np.zeros((count, 2)), slice(None))[1]  # (L,)
 
-    def _left(self, size: Array, place: Array, lanes: Any) -> tuple[Array, Array]:
-        """Recorded − predicted as P₀ … P₃ (L, 4), and the slopes of P₀ and P₁ over the ground (L, 2, 2)."""
+    def _product(self, one: Array, other: Array) -> Array:
+        """(1 + b²)⟨ac⟩ − ⟨a⟩⟨c⟩ of (L, n, f) and (L, n, g), (L, f, g)."""
+        means = np.einsum("n,lnf->lf", _MEAN, one)[:, :, None] * np.einsum("n,lng->lg", _MEAN, other)[:, None]
+        return (1 + self.band) * np.einsum("n,lnf,lng->lfg", _MEAN, one, other) - means
+
+    def _seen(self, size: Array, place: Array, lanes: Any) -> tuple[Array, Array, Array]:
+        """ρ (L, n), unit vectors from the point to the measured platforms (L, 2, n, 3), and distances (L, 2, n)."""
         at = lanes if len(self.true) > 1 else slice(None)
         true, recorded = self.true[at], self.recorded[at]
         off = size[:, None, None, None] * self.error[lanes]
@@ -191,49 +217,72 @@ class Lanes:
             apart, more = self.apart[at], size[:, None, None] * self.parted[lanes]
             lengths = np.linalg.norm(apart + more, axis=-1) + np.linalg.norm(apart, axis=-1)
             total += np.einsum("lnf,lnf->ln", more, 2 * apart + more) / lengths
-        look = (measured[..., :2] / predicted[..., None]).sum(axis=1)  # (L, n, 2)
-        slopes = np.einsum("lnf,no->lof", look, _PROJECT[:, :2])
-        return total @ _PROJECT, slopes
+        return total, measured / predicted[..., None], predicted
+
+    def _slopes(self, left: Array, look: Array, distance: Array) -> tuple[Array, Array, Array]:
+        """Half the slope of V over the ground (L, 2), half its second derivative, and that without the bend of ρ."""
+        ground = look[..., :2]
+        gradient = ground.sum(axis=1)
+        across = (np.eye(2) - ground[..., :, None] * ground[..., None, :]) / distance[..., None, None]
+        bend = -across.sum(axis=1).reshape(*left.shape, 4)
+        slope, flat = self._product(gradient, left[..., None])[..., 0], self._product(gradient, gradient)
+        return slope, flat + self._product(bend, left[..., None]).reshape(-1, 2, 2), flat
 
     def _tangent(self, size: Array, place: Array, lanes: Any) -> tuple[Array, Array]:
-        """How fast the place moves with size (L, 2), and the determinant of the slopes there (L,)."""
-        at = lanes if len(self.true) > 1 else slice(None)
-        measured = self.true[at] + size[:, None, None, None] * self.error[lanes]
-        measured[..., :2] -= place[:, None, None, :]
-        look = measured / np.linalg.norm(measured, axis=-1)[..., None]
-        grown = self.clock[lanes] - np.einsum("lknf,lknf->ln", look, self.error[lanes])
+        """How fast the place moves with size (L, 2), and the area that the gradients span there (L,)."""
+        left, look, distance = self._seen(size, place, lanes)
+        error = self.error[lanes]
+        towards = np.einsum("lknf,lknf->lkn", look, error)
+        grown = self.clock[lanes] - towards.sum(axis=1)
         if self.is_heard:
             parted = self.parted[lanes]
-            apart = self.apart[at] + size[:, None, None] * parted
-            grown += np.einsum("lnf,lnf->ln", apart, parted) / np.linalg.norm(apart, axis=-1)
-        slopes = np.einsum("lnf,no->lof", look[..., :2].sum(axis=1), _PROJECT[:, :2])
-        return _against(slopes, grown @ _PROJECT[:, :2]), _determinant(slopes)
+            apart = self.apart[lanes if len(self.true) > 1 else slice(None)] + size[:, None, None] * parted
+            grown = grown + np.einsum("lnf,lnf->ln", apart, parted) / np.linalg.norm(apart, axis=-1)
+        turned = ((error - look * towards[..., None]) / distance[..., None])[..., :2].sum(axis=1)
+        _, whole, flat = self._slopes(left, look, distance)
+        gradient = look[..., :2].sum(axis=1)
+        change = self._product(turned, left[..., None])[..., 0] + self._product(gradient, grown[..., None])[..., 0]
+        return _against(whole, change), np.sqrt(np.maximum(_determinant(flat), 0.0))
+
+    def _phases(self, size: Array, place: Array, lanes: Any) -> tuple[Array, Array, Array, Array]:
+        """QPE, cubic, hidden phase and rest at places. [rad]"""
+        left, _, _ = self._seen(size, place, lanes)
+        parts = left @ _PROJECT
+        rest = ((left - parts @ _BASIS) ** 2) @ _MEAN
+        whole = self._product(left[..., None], left[..., None])[:, 0, 0]
+        cubic = parts[:, 3] ** 2 / 7
+        hidden = whole - parts[:, 2] ** 2 / 5 - np.where(self.is_turned[lanes], 0.0, cubic + rest)
+        hidden = math.sqrt(45 / 4) * np.sqrt(np.maximum(hidden, 0.0))
+        k = self.wavenumber
+        return 1.5 * k * parts[:, 2], 2.5 * k * parts[:, 3], k * hidden, k * np.sqrt(rest)
 
     def _advanced(self, at: "_Reached", size: Array, lanes: Any) -> tuple["_Reached", Flags]:
-        """Solution of P₀ = P₁ = 0 at other sizes, by Newton's steps from along the tangent.
+        """Minimum of V at other sizes, by Newton's steps from along the tangent.
 
-        The flags tell where it is one, on the same branch: Newton had to correct the tangent's way by less than a
-        third of it, and the determinant of the slopes has kept its sign and much of its size. Below a fiftieth of it
-        without error the gradients count as parallel.
+        The flags tell where it is one, on the same way: Newton had to correct the tangent's way by less than a third
+        of it, and the area that the gradients span has kept much of its size, or is small. Where it is below a
+        fiftieth of that without error the image has ended as soon as half a cycle is hidden.
         """
         start = at.place + at.tangent * (size - at.size)[:, None]
         place, done = start.copy(), np.zeros(len(start), bool)
         with np.errstate(all="ignore"):
             for _ in range(_NEWTON):
-                left, slopes = self._left(size, place, lanes)
-                step = _against(slopes, left[:, :2])
+                slope, whole, flat = self._slopes(*self._seen(size, place, lanes))
+                is_bowl = (_determinant(whole) > 0.05 * _determinant(flat)) & (whole[:, 0, 0] > 0)
+                step = _against(np.where(is_bowl[:, None, None], whole, flat), slope)
                 moves = np.hypot(step[:, 0], step[:, 1])
                 sound = np.isfinite(moves) & (moves < 1e9)
                 place = np.where(sound[:, None], place + step, place)
                 done = sound & (moves <= _STEP_M + _STEP * np.hypot(place[:, 0], place[:, 1]))
                 if done.all():
                     break
-            tangent, determinant = self._tangent(size, place, lanes)
+            tangent, area = self._tangent(size, place, lanes)
             corrected = np.linalg.norm(place - start, axis=1) / (_TRIFLE_M + np.linalg.norm(start - at.place, axis=1))
-            change = determinant / at.determinant
-            found = done & (corrected < _CORRECTION) & (change > _CHANGE) & (change < 1 / _CHANGE)
-            found &= determinant / self.at_rest[lanes] > PARALLEL
-        return _Reached(size, place, tangent, determinant), found
+            change, part = area / at.area, area / self.at_rest[lanes]
+            found = done & (corrected < _CORRECTION)
+            found &= ((change > _CHANGE) & (change < 1 / _CHANGE)) | (part < _NEAR_FOLD)
+            found &= (part > FOLDED) | (self._phases(size, place, lanes)[2] < HIDDEN_END_RAD)
+        return _Reached(size, place, tangent, area), found
 
     def follow(self, sizes: Array, all_or_none: bool = False) -> Responses:
         """Follow each error through its sizes.
@@ -251,7 +300,7 @@ class Lanes:
             (L, S) each.
         """
         lanes, steps = sizes.shape
-        places, qpe, cubic = (np.full(shape, np.nan) for shape in ((lanes, steps, 2), (lanes, steps), (lanes, steps)))
+        places, phases = np.full((lanes, steps, 2), np.nan), np.full((4, lanes, steps), np.nan)
         none, nowhere = np.zeros(lanes), np.zeros((lanes, 2))
         reached = _Reached(none, nowhere, *self._tangent(none, nowhere, slice(None)))
         alive = np.arange(lanes)
@@ -263,13 +312,11 @@ class Lanes:
                 for whole, part in zip(arrived, one, strict=True):
                     whole[index] = part[0]
             if all_or_none and not found.all():
-                return Responses(qpe * np.nan, cubic * np.nan, places * np.nan)
+                return _responses(phases * np.nan, places * np.nan)
             alive, reached = alive[found], arrived.only(found)
-            left, _ = self._left(reached.size, reached.place, alive)
             places[alive, step] = reached.place
-            qpe[alive, step] = 1.5 * self.wavenumber * left[:, 2]
-            cubic[alive, step] = 2.5 * self.wavenumber * left[:, 3]
-        return Responses(qpe, cubic, places)
+            phases[:, alive, step] = self._phases(reached.size, reached.place, alive)
+        return _responses(phases, places)
 
     def _crept(self, lane: int, at: "_Reached", end: float) -> tuple["_Reached", bool]:
         """Follow one lane in steps as small as it takes; False where the solution ends."""
@@ -289,13 +336,18 @@ class Lanes:
         return at, True
 
 
+def _responses(phases: Array, places: Array) -> Responses:
+    qpe, cubic, hidden, rest = phases
+    return Responses(qpe, cubic, places, hidden, rest)
+
+
 class _Reached(NamedTuple):
-    """Where the lanes are: size (L,), place (L, 2), how that moves with size (L, 2), determinant of slopes (L,)."""
+    """Where the lanes are: size (L,), place (L, 2), how that moves with size (L, 2), area of gradients (L,)."""
 
     size: Array
     place: Array
     tangent: Array
-    determinant: Array
+    area: Array
 
     def only(self, lanes: Any) -> "_Reached":
         """Some of them; of a number that one."""
@@ -304,7 +356,7 @@ class _Reached(NamedTuple):
 
 
 def _against(slopes: Array, residual: Array) -> Array:
-    """Step (L, 2) on the ground that takes a residual of P₀ and P₁ (L, 2) away, to first order."""
+    """Step (L, 2) on the ground that takes a residual (L, 2) away, to first order."""
     determinant = _determinant(slopes)
     return -np.stack(
         [
@@ -332,11 +384,7 @@ def at_declared(mission: Mission, errors: Sequence[Error], points: Array | None 
     twice = None if points is None else np.concatenate([points, points])
     found = Lanes(mission, [*errors, *errors], twice).follow(sizes, all_or_none=points is not None)
     count = len(errors)
-    return Responses(
-        found.qpe[:, -1].reshape(2, count),
-        found.cubic[:, -1].reshape(2, count),
-        found.place[:, -1].reshape(2, count, 2),
-    )
+    return Responses(*(part[:, -1].reshape(2, count, *part.shape[2:]) for part in found))
 
 
 def scanned(
@@ -373,8 +421,7 @@ def scanned(
     marks = np.where(np.isfinite(marks) & (marks > 0) & (marks <= ends[:, None]), marks, ends[:, None])
     grid = np.sort(np.concatenate([grid, marks], axis=1), axis=1)
     found = lanes.follow(signs[:, None] * np.concatenate([grid, grid]))
-    shape = (2, *grid.shape)
-    return grid, Responses(found.qpe.reshape(shape), found.cubic.reshape(shape), found.place.reshape(*shape, 2))
+    return grid, Responses(*(part.reshape(2, *grid.shape, *part.shape[2:]) for part in found))
 
 
 def _beginning(lanes: Lanes, signs: Array, ends: Array, bound: Array) -> Array:
@@ -384,7 +431,7 @@ def _beginning(lanes: Lanes, signs: Array, ends: Array, bound: Array) -> Array:
     for _ in range(4):
         probe = signs[:, None] * np.concatenate([begin, begin])[:, None] * np.array([0.25, 0.5, 1.0])
         found = lanes.follow(probe)
-        qpe = np.where(np.isfinite(found.qpe), found.qpe, np.inf)
+        qpe = np.where(np.isfinite(found.qpe), np.hypot(found.qpe, found.hidden), np.inf)
         largest = np.abs(qpe).max(axis=1).reshape(2, count).max(axis=0)
         large = largest > 0.02 * bound
         if not large.any():

@@ -128,11 +128,30 @@ def with_errors(vibration: Document, **beside: Any) -> Document:
     return document
 
 
+def long_aperture(correlation_time: str, zenith_delay: str) -> Document:
+    """A receiver that hardly moves for 80 s, with next to no noise: the time in which the air changes decides."""
+    document = copy.deepcopy(WHOLE)
+    for key in ("common_motion_error", "other_errors", "scene"):
+        del document[key]
+    random = [{"name": "GNSS", "sigma": "1 um", "correlation_time": "1.5 s", "source": "test"}]
+    document["platforms"]["receiver"] |= {"velocity": ["0 m/s", "1 m/s", "0 m/s"], "motion_error": {"random": random}}
+    document["collection"] = {"aperture_time": "80 s"}
+    document["propagation"] = {"zenith_delay": zenith_delay, "correlation_time": correlation_time, "source": "model"}
+    document["requirements"] = {
+        "quadratic_phase_error": "360 deg",
+        "islr": "-20 dB",
+        "location_error": "50 m",
+        "declare": ["receiver.random", "propagation"],
+    }
+    return document
+
+
 LEGS = {"propagation": {"transmitter": AIR, "receiver": AIR}}
 DOCUMENTS = {
     "holdover": with_errors(MOTION["vibration"], synchronization=HOLDOVER),
     "exchanged": with_errors(WIDEBAND, synchronization=EXCHANGED, **LEGS),
     "terms": with_errors(WIDEBAND, timing_error=TERMS),
+    "long": long_aperture("10 min", "2 mm"),
 }
 OMITTED_IS_WIDEST = "distribution"  # normal; bounds along other axes than the file's add, sigmas do not
 SECTIONS = ("common_motion_error", "propagation", "other_errors", "synchronization", "timing_error")
@@ -152,8 +171,10 @@ def keys_below(value: Any, path: Key) -> Iterator[Key]:
 def error_keys(document: Document) -> list[Key]:
     """Keys that state an error, those of the receiver for both platforms."""
     of_platform = document["platforms"]["receiver"]
-    keys = [("scene", "height_error")]
+    keys: list[Key] = [("scene", "height_error")] if "scene" in document else []
     for section in ("motion_error", "oscillator"):
+        if section not in of_platform:
+            continue
         place = ("platforms", "receiver", section)
         keys += [place, *keys_below(of_platform[section], place)]
     for section in SECTIONS:
@@ -215,6 +236,19 @@ def test_a_deleted_key_is_missed_refused_or_makes_no_error_smaller(name: str) ->
         if not is_noticed(document, after) and not grows(document, after):
             lost.append(".".join(map(str, key)))
     assert lost == []
+
+
+@pytest.mark.parametrize(("correlation_time", "size"), [("10 min", "5 mm"), ("1 h", "12 mm"), ("30 s", "2 mm")])
+def test_a_mission_that_fails_by_air_that_changes_does_not_pass_without_its_time(
+    correlation_time: str, size: str
+) -> None:
+    document = long_aperture(correlation_time, size)
+    found, left = (
+        found_in(json.dumps(each)) for each in (document, without(document, ("propagation", "correlation_time")))
+    )
+    assert found is not None
+    assert left is not None
+    assert (found.status, left.status) == ("fail", "not_evaluated")
 
 
 def test_the_files_state_every_key_of_the_error_sections() -> None:

@@ -212,9 +212,13 @@ class TestAutofocus:
         exact = math.pi / 4 * 0.005 * 30e3 * T**2 / (LAMBDA * R_T) / (math.pi / 2)
         assert found.reason.endswith(f"n_pull {math.ceil(exact * 100) / 100:g}")
 
-    @pytest.mark.parametrize(("n_pull", "status"), [(2.94, "fail"), (2.95, "pass_with_autofocus")])
+    @pytest.mark.parametrize(("n_pull", "status"), [(2.94, "fail"), (2.95, "warn"), (3, "pass_with_autofocus")])
     def test_the_named_n_pull_is_the_least(self, n_pull: float, status: str) -> None:
-        """The paper's ranges: 31 km at 6 km height."""
+        """The paper's ranges: 31 km at 6 km height.
+
+        By 2.95 the full model warns: by it the band of 300 MHz does not resolve as much as 0.045 rad, which autofocus
+        does not correct, and √(4.63² + (11.8·0.045)²) rad are more than 4.634 rad.
+        """
         found = findings(
             autofocus__n_pull=n_pull,
             platforms__transmitter__position=["30.414 km", 0, "6 km"],

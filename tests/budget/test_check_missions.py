@@ -46,12 +46,16 @@ def variants(mission: Mission) -> list[Mission]:
 
 
 def assert_alike(one: Any, other: Any, where: str) -> None:
-    """Words and statuses are the same, and numbers but for what a search leaves: 1e-5 of a limit."""
+    """Words and statuses are the same, and numbers but for what a search leaves: 1e-5 of a limit.
+
+    A size moves by more than its phase where the phase grows slowly, below a crest.
+    """
     if one == other:
         return
     if isinstance(one, float) and isinstance(other, float):
         # A phase of 1e-10 rad is what terms cancel to.
-        assert other == pytest.approx(one, rel=2 * CLOSE, abs=1e-9, nan_ok=True), where
+        room = (100 if "allowable" in where else 2) * CLOSE
+        assert other == pytest.approx(one, rel=room, abs=1e-9, nan_ok=True), where
     elif isinstance(one, DecidingShare) and isinstance(other, DecidingShare):
         assert_alike(astuple(one), astuple(other), where)
     elif isinstance(one, tuple) and isinstance(other, tuple):

@@ -177,7 +177,7 @@ class TestCommon:
         found = of(common_motion_error=common, allocation__combine="rss")
         assert row(found, "receiver.quadratic_phase_error").declared is None
         parts = [row(found, row_id) for row_id in ("common.time_tag", "common.random.GNSS")]
-        total = math.hypot(*(one.qpe_full_rad for one in parts))
+        total = math.hypot(*(one.equal_loss_qpe_rad for one in parts))
         assert row(found, "mission.quadratic_phase_error").declared == pytest.approx(total)
         assert row(found, "mission.location_error").declared == pytest.approx(
             math.hypot(*(math.hypot(*one.displacement_m) for one in parts))

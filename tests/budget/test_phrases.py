@@ -93,3 +93,13 @@ def test_a_note_comes_back_from_another_process() -> None:
     note = pickle.loads(pickle.dumps(phrases.passes_from(2.0)))
     assert isinstance(note, Note)
     assert (note, note.code, note.values) == ("passes with autofocus from n_pull 2", "passes-from", (2.0,))
+
+
+def test_a_note_includes_another_by_code_and_values_whatever_its_words() -> None:
+    first, second = phrases.no_power_law_fits("platforms.receiver.oscillator", 0.4), phrases.nothing_judges("islr")
+    both = second.then(first, phrases.no_gain())
+    assert all(both.includes(note) for note in (first, second, phrases.no_gain()))
+    assert not both.includes(phrases.no_power_law_fits("platforms.transmitter.oscillator", 0.4))
+    assert not both.includes(phrases.nothing_judges("pslr"))
+    assert not Note(str(first)).includes(first)
+    assert phrases.NOTHING.then(first).includes(first) is False

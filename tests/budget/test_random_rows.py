@@ -288,12 +288,14 @@ class TestSums:
     @pytest.mark.parametrize("rule", ["sum", "rss"])
     def test_phases_enter_the_aggregates(self, rule: str) -> None:
         found = with_error(self.ERRORS, allocation={"combine": rule, "model": "full"}, autofocus={"n_pull": 1})
-        phases = [abs(one.qpe_full_rad) for one in found.rows if one.owner == "receiver" and one.metric != "islr"
-                  and one.is_independent and one.declared and one.subject.kind != QUADRATIC]  # fmt: skip
+        rows = [one for one in found.rows if one.owner == "receiver" and one.metric != "islr"
+                and one.is_independent and one.declared and one.subject.kind != QUADRATIC]  # fmt: skip
+        phases = [one.equal_loss_qpe_rad for one in rows]
         assert len(phases) == 9
         total = math.fsum(phases) if rule == "sum" else math.hypot(*phases)
         assert row(found, "receiver.quadratic_phase_error").declared == pytest.approx(total)
-        assert row(found, "mission.autofocus_pull_in").declared == pytest.approx(math.fsum(phases))
+        quadratic = math.fsum(abs(one.qpe_full_rad) for one in rows)  # what autofocus corrects
+        assert row(found, "mission.autofocus_pull_in").declared == pytest.approx(quadratic)
         cubics = [one.cubic_rad for one in found.rows if one.cubic_rad and one.subject.kind != "cubic_phase_error"]
         combined = math.fsum(cubics) if rule == "sum" else math.hypot(*cubics)
         assert row(found, "mission.cubic_phase_error").declared == pytest.approx(combined)

@@ -117,7 +117,7 @@ def test_a_row_that_another_requirement_binds_judges_the_quadratic_one_too() -> 
     quadratic = requirement(found, "quadratic_phase_error")
     binding = row(found, str(quadratic.row))
     assert (quadratic.status, binding.binding_requirement) == ("pass", "location_error")
-    assert quadratic.utilization == pytest.approx(abs(binding.qpe_full_rad) / (math.pi / 8), rel=1e-9)
+    assert quadratic.utilization == pytest.approx(binding.equal_loss_qpe_rad / (math.pi / 8), rel=1e-9)
     assert quadratic.utilization < binding.utilization
 
 

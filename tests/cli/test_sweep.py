@@ -77,17 +77,30 @@ def test_the_summary_counts_what_check_exits_with_0_on(run) -> None:
 
 
 def test_cases_without_a_mission_are_rows(run, tmp_path: Path) -> None:
-    """Both platforms opposite to each other have no range gradient on the ground; -1 s is no time."""
-    table = tmp_path / "cases.csv"
-    table.write_text(f"platforms.receiver.azimuth [deg],{TIME} [s]\n45,1\n180,1\n45,-1\n")
-    found = run("sweep", SECTION_V, "--cases", str(table))
+    """Both platforms in one vertical plane, and flying in it, have one gradient on the ground; -1 s is no time."""
+    mission, table = tmp_path / "m.yaml", tmp_path / "cases.csv"
+    text = Path(SECTION_V).read_text(encoding="utf-8")
+    mission.write_text(text.replace("velocity: [0 m/s, 150 m/s, 0 m/s]", "velocity: [-150 m/s, 0 m/s, 0 m/s]"))
+    angles = "platforms.receiver.azimuth [deg],platforms.receiver.motion_azimuth [deg]"
+    table.write_text(f"{angles},{TIME} [s]\n45,135,1\n0,180,1\n45,135,-1\n")
+    found = run("sweep", mission, "--cases", str(table))
     assert [case["status"] for case in rows(found.stdout)] == ["pass", "error", "error"]
     reasons = [case["reason"] for case in rows(found.stdout)]
     assert reasons[0] == ""
-    assert "look vectors cancel" in reasons[1]
+    assert "no image plane" in reasons[1]
     assert "greater than 0" in reasons[2]
     assert "2 without a mission" in found.stderr
     assert found.exit_code == 0
+
+
+def test_look_vectors_that_cancel_are_a_mission_where_band_and_turn_resolve_the_ground(run, tmp_path: Path) -> None:
+    """Opposite platforms at 11.16 and 13.61 deg: |s| = cos 11.16° - cos 13.61° = 0.0092, a cell of c/(B|s|)."""
+    table = tmp_path / "cases.csv"
+    table.write_text(f"platforms.receiver.azimuth [deg],{TIME} [s]\n180,1\n")
+    (case,) = rows(run("sweep", SECTION_V, "--cases", str(table)).stdout)
+    assert case["status"] == "pass"
+    ground = 30.414 / math.hypot(30.414, 6) - math.cos(math.radians(13.609))
+    assert float(case["range_resolution [m]"]) == pytest.approx(299_792_458 / 300e6 / ground, rel=1e-6)
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".parquet", ".nc"])

@@ -21,6 +21,7 @@ from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.mission.model import flies_on_earth
 from bisar_budget.mission.quantities import QuestionError, number_of, tree_of
 from bisar_budget.mission.tree import read_tree
+from bisar_budget.ranges.point_paths import CLOSE
 from tests.conftest import ROOT, mission_text, row
 from tests.families import FAMILIES
 from tests.families import mission_text as of_family
@@ -88,7 +89,9 @@ def assert_as_checked(mission, cases, whole, columns=(), model=None, near=NEAR) 
                 # ISLR holds cubic phases: exact ranges know them to 4e-10 rad, the smallest that counts is 1e-3.
                 holds_cubic = ".islr." in name and case.requirements.cubic_phase_error is None
                 within = 1e-6 if holds_cubic else NEAR
-                assert got[name] == pytest.approx(want, rel=within, nan_ok=True), (values, name)
+                # Between centre and rim two phases differ: of some radians, whose rounding is left.
+                floor = 1e-14 if name == "mission.spatial_variance.declared" else 0.0
+                assert got[name] == pytest.approx(want, rel=within, abs=floor, nan_ok=True), (values, name)
 
 
 COLUMNS = (
@@ -183,11 +186,15 @@ def test_every_case_is_that_of_check(data, family, seed) -> None:
 
 
 def test_where_an_image_ends_is_found_to_rounding() -> None:
-    """Gradients become parallel at 1.4533 s, and a limit is reached shortly before at 2.9066 s: 4e-8 and 2e-6 off."""
+    """Half a cycle is hidden behind a fold at 1.4533 s; at 2.9066 s a phase reaches its limit shortly before one.
+
+    Searches for an end agree to rounding; of a phase each ends within 1e-5 of the limit (`point_paths.CLOSE`).
+    """
     noise = SetValue("platforms.receiver.motion_error.random", _RULES["platforms.receiver.motion_error.random"][0])
     mission = parse_mission(of_family("satellite_fixed", 21), "m.yaml", changes=[noise])
-    cases = grid(mission, collection__aperture_time=[1.4533, 2.9066])
-    assert_as_checked(mission, cases, swept(mission, cases))
+    for aperture_time, near in ((1.4533, NEAR), (2.9066, CLOSE)):
+        cases = grid(mission, collection__aperture_time=[aperture_time])
+        assert_as_checked(mission, cases, swept(mission, cases), near=near)
 
 
 EXAMPLES = [
@@ -345,13 +352,16 @@ def test_vibrations_may_be_slow(needs, rule) -> None:
 
 
 def test_the_end_of_the_image_binds() -> None:
-    """A transmitter of 30 m of doubt along the line of sight, of which the image ends at 10.8 m."""
+    """A transmitter of 30 m of doubt along the line of sight, of which the image ends at 10.8 m.
+
+    Near the fold what is hidden reaches its limit: each search for that ends within 1e-5 of it.
+    """
     mission = parse_mission(of_family("aircraft", 3), "m.yaml", "full")
     T = mission.collection.aperture_time
     cases = grid(mission, collection__aperture_time=[0.9 * T, T, 1.1 * T])
     whole = swept(mission, cases, model="full")
     assert list(whole["binding_requirement"]) == ["end_of_image"] * 3
-    assert_as_checked(mission, cases, whole, model="full")
+    assert_as_checked(mission, cases, whole, model="full", near=CLOSE)
 
 
 def test_what_decides_more_than_itself_is_read_and_judged_together() -> None:
@@ -598,7 +608,7 @@ def test_a_waiver_holds_until_its_day() -> None:
 def test_an_error_without_an_image_makes_no_sum_of_what_spreads() -> None:
     """Its endless cubic phase was no power of the sum, and yet made a row of the platform's vibration alone."""
     wideband = {"wideband": {"rms": "1 mm"}}
-    error = {"position": "20 km", "acceleration": [0, "1 mm/s^2", 0], "vibration": wideband}
+    error = {"position": "40 km", "acceleration": [0, "1 mm/s^2", 0], "vibration": wideband}
     changes = {"allocation": {"model": "strictest"}, "requirements": {"islr": "-20 dB"}}
     mission = parse_mission(mission_text(platforms__transmitter__motion_error=error, **changes), "m.yaml")
     found = check_mission(mission, DAY)
@@ -819,8 +829,8 @@ class TestWords:
             np.testing.assert_array_equal(values, shared[name])
 
     def test_words_that_make_a_mission_with_some_numbers(self) -> None:
-        """Opposite to each other the platforms resolve nothing, by whatever model."""
-        texts = ["allocation.model=published,full", "platforms.receiver.azimuth=45,180deg"]
+        """A band of more than twice its centre is none, by whatever model."""
+        texts = ["allocation.model=published,full", "radar.bandwidth=0.3,21GHz"]
         whole = self.as_checked("rigling_moses_section_v", texts)
         assert (whole["status"] == "error").tolist() == [False, True, False, True]
 

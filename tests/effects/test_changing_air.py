@@ -1,8 +1,8 @@
 """Delays of the air that change within the aperture, against time series, a limit, and what is printed.
 
 The time series are drawn moment by moment as an autoregression. Each pulse has its own mapping from the zenith, the
-point is moved by exact slopes until nothing of orders 0 and 1 is left, and what is left has its Legendre parts: none
-of it is the code that is tested.
+point is moved by exact slopes to where the phase over band and aperture has the least variance, and what is left has
+its Legendre parts: none of it is the code that is tested.
 """
 
 import math
@@ -96,13 +96,17 @@ def effects(mission: Mission, figure: str, legs: Sequence[str], at_zenith: np.nd
     group = sum(mapping(figure, tracks[name], middles[name]) for name in legs)
     if figure == CONTENT:
         group = group * 40.308 / mission.radar.center_frequency**2
-    seen = group * at_zenith
-    if figure == CONTENT:  # the envelope is late, the carrier early
-        seen = 2 * seen.mean(axis=1, keepdims=True) - seen
+    late = group * at_zenith  # of the envelope
+    seen = -late if figure == CONTENT else late  # of the carrier, which free electrons make early
     legendre = np.polynomial.legendre.legvander(place, 3)
     fit = np.linalg.pinv(legendre)
     away = sum(tracks[name][:2] / np.linalg.norm(tracks[name], axis=0) for name in PLATFORMS)
-    moved = -np.linalg.solve(fit[:2] @ away.T, fit[:2] @ seen.T)  # nothing of orders 0 and 1 is left there
+    # A frequency f₀ + δf₀ has the phase k(ρ + δ·ρ_envelope). Over the aperture and an even band, ⟨δ⟩ = 0 and
+    # ⟨δ²⟩ = b², its variance is Var(ρ) + b²⟨ρ_envelope²⟩, which is least where both slopes of it vanish.
+    b2 = (mission.radar.bandwidth / mission.radar.center_frequency) ** 2 / 12
+    turns = away - away.mean(axis=1, keepdims=True)
+    bends = turns @ turns.T + b2 * away @ away.T
+    moved = -np.linalg.solve(bends, turns @ seen.T + b2 * away @ late.T)
     left = seen + moved.T @ away
     orders = left @ fit.T
     rest = left - orders @ legendre.T
@@ -175,7 +179,12 @@ def test_a_long_correlation_time_is_a_delay_that_stays(text: str, figure: str, o
     sizes = np.sqrt(np.diagonal(long.covariance))
     limit = (1e9 * longest.covariance - 1e7 * long.covariance) / (1e9 - 1e7)
     known = stays.covariance != 0
-    assert limit[known] == pytest.approx(stays.covariance[known], rel=1e-6)
+    # What falls as 1/τ_c² is left of the two: its share T²/(τ₁τ₂) of what a delay does to a phase, or a place. The
+    # cubic phase of a delay that stays is small, because that delay is smooth, so that it has the quadratic's share.
+    does = np.sqrt(np.diagonal(stays.covariance))[[0, 0, 2, 3]]
+    falls = mission.collection.aperture_time**2 / (1e7 * 1e9) * np.outer(does, does)
+    away = np.abs(limit - stays.covariance)
+    assert np.all((away <= 1e-6 * np.abs(stays.covariance) + falls)[known])
     assert np.all(np.diagonal(limit)[~np.diagonal(known)] < 1e-6)  # of a cubic that passes for rounding
     assert longest.displacement == pytest.approx(stays.displacement, rel=1e-3)
     left = math.sqrt(max((1e9 * longest.spread**2 - 1e7 * long.spread**2) / (1e9 - 1e7), 0.0))
@@ -234,7 +243,9 @@ def test_20_minutes_of_a_geosynchronous_aperture_lose_11_5_db() -> None:
         "propagation: {zenith_delay: 6 mm, correlation_time: 20 min}",
     ):
         found = check_mission(parse_mission(f"{NEAR_ZENITH.strip()}\n{air}\n"), TODAY)
-        levels.append((row(found, "mission.islr").islr_db, found.status))
+        level = row(found, "mission.islr")
+        levels.append((level.islr_db, level.status))
     assert levels[0][0] == pytest.approx(-19.8, abs=0.01)
-    assert levels[1] == (pytest.approx(-19.8, abs=0.01), "warn")  # and the warning says that nothing is said of it
+    # Without a time the delay stays, so that nothing of it spreads; no verdict rests on that over 20 minutes.
+    assert levels[1] == (pytest.approx(-19.8, abs=0.01), "not_evaluated")
     assert levels[2] == (pytest.approx(-8.3, abs=0.2), "fail")

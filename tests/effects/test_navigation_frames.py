@@ -70,7 +70,7 @@ def arm(times: np.ndarray) -> np.ndarray:
 
 def through(mission: Mission, receiver: np.ndarray | None, transmitter: np.ndarray | None = None) -> Found:
     """Effects of histories of position errors, (draws, nodes, 3) each."""
-    exact = ExactRanges.of(mission.geometry.both, mission.radar.wavelength, T, FINE)
+    exact = ExactRanges.of(mission.geometry.both, mission.radar, T, FINE)
     draws = len(receiver if receiver is not None else transmitter)
     shifts = [STILL if one is None else np.ascontiguousarray(one.T) for one in (transmitter, receiver)]
     return followed(exact, np.zeros((FINE, draws)), shifts, np.zeros(draws, dtype=int))
@@ -428,7 +428,7 @@ class TestCourses:
         # Of t² − t³/5 over ±2 s: P₂ of t² has 4·2/3, at the edge 3/2 of it; P₃ of t³/5 has 8/5·2/5, 5/2 of it.
         assert published.quadratic == pytest.approx(4 * k)
         assert published.cubic == pytest.approx(8 / 5 * k)
-        fine = ExactRanges.of(mission.geometry.both, mission.radar.wavelength, T, FINE)
+        fine = ExactRanges.of(mission.geometry.both, mission.radar, T, FINE)
         x = TIMES[:, None]
         every = np.stack([1 + 0 * x, x, x**2 - x**3 / 5], axis=1)[..., 0] * 1e-4 * (1 + 0.05 * x)
         found = followed(fine, every, (STILL, STILL), np.zeros(3, dtype=int))
@@ -485,7 +485,7 @@ class TestOtherPlaces:
         link = "synchronization: {method: direct_path, error: 1 deg}"
         mission = mission_of(common=f"common_motion_error: {{{said}}}\n{link}")
         analysis = Analysis(mission)
-        exact = ExactRanges.of(mission.geometry.both, mission.radar.wavelength, T, FINE, has_direct_path=True)
+        exact = ExactRanges.of(mission.geometry.both, mission.radar, T, FINE, has_direct_path=True)
         frame = said.split(",")[0].removeprefix("frame: ")
         for index, source in enumerate(analysis.stated):
             if "time_tag" in said:

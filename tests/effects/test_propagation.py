@@ -55,7 +55,7 @@ def through_exact_ranges(mission: Mission, range_error: Callable[[np.ndarray], n
     """Effect of a range error over the aperture [m], to any order."""
     T = mission.collection.aperture_time
     heard = mission.has_direct_path
-    exact = ExactRanges.of(mission.geometry.both, mission.radar.wavelength, T, FINE, has_direct_path=heard)
+    exact = ExactRanges.of(mission.geometry.both, mission.radar, T, FINE, has_direct_path=heard)
     return followed(exact, range_error(aperture_nodes(T))[:, None], (STILL, STILL), np.zeros(1, dtype=int))
 
 

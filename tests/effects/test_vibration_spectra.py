@@ -218,7 +218,7 @@ def series(density, T: float, rng: np.random.Generator) -> np.ndarray:
 def flown(found: Mission, metres: np.ndarray, *, is_path: bool) -> Found:
     """Range errors at the nodes, (draws, nodes) [m]: of the receiver along its line of sight, or of the clock."""
     T, paths = found.collection.aperture_time, found.geometry.both
-    exact = ExactRanges.of(paths, found.radar.wavelength, T, FINE)
+    exact = ExactRanges.of(paths, found.radar, T, FINE)
     draws, none = len(metres), np.zeros(len(metres), dtype=int)
     if not is_path:
         return followed(exact, metres.T, (STILL, STILL), none)

@@ -8,7 +8,9 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from bisar_budget import geometry as g
-from bisar_budget.ranges.exact_ranges import nodes_for
+from bisar_budget.effects.declared import published_planes
+from bisar_budget.image_plane import MIN_SINE, degeneracy, nodes_for, spans_ground
+from bisar_budget.mission.model import Radar
 
 
 def state(position, velocity=(0.0, 100.0, 0.0)) -> g.PlatformState:
@@ -129,6 +131,9 @@ def test_frames_that_do_not_exist(platform: g.PlatformState, frame: str) -> None
         platform.frame(frame)
 
 
+X_BAND = Radar(center_frequency=10e9, bandwidth=300e6)
+
+
 @pytest.mark.parametrize(("degrees", "is_degenerate"), [(0.9, True), (1.1, False), (30, False)])
 def test_gradients_within_a_degree_of_parallel_are_refused(degrees: float, is_degenerate: bool) -> None:
     """A receiver overhead leaves s = u_t; a transmitter at azimuth 0 turns s by its own cross motion only.
@@ -140,19 +145,36 @@ def test_gradients_within_a_degree_of_parallel_are_refused(degrees: float, is_de
     receiver = state((0, 0, 4e3), (100 * math.cos(turn), 100 * math.sin(turn), 0))
     pair = both(state((9e3, 0, 0), (0, 0, 0)), receiver)
     assert math.degrees(pair.gradient_angle) == pytest.approx(degrees)
-    assert bool(pair.degeneracy()) == is_degenerate
+    reason = degeneracy(pair, X_BAND, 1.0)
+    assert bool(reason) == is_degenerate
+    assert not is_degenerate or f"{degrees:.2g} deg from parallel" in reason
 
 
-@pytest.mark.parametrize(("ground", "is_degenerate"), [(0.019, True), (0.021, False)])
-def test_a_short_range_gradient_is_refused(ground: float, is_degenerate: bool) -> None:
+@pytest.mark.parametrize(("ground", "is_singular"), [(0.019, True), (0.021, False)])
+def test_a_short_range_gradient_is_no_plane_for_the_published_model_alone(ground: float, is_singular: bool) -> None:
+    """Range along x, Doppler along y: the band tells points along x apart, with a cell of c/(B|s|)."""
     up = math.sqrt(1 - ground**2)
     pair = both(state((1e4 * ground, 0, 1e4 * up), (0, 100, 0)), state((0, 0, 5e3), (0, 80, 0)))
-    assert bool(pair.degeneracy()) == is_degenerate
+    assert bool(published_planes(pair)[0].is_singular) == is_singular
+    assert degeneracy(pair, X_BAND, 1.0) == ""
 
 
-def test_doppler_gradients_that_cancel_are_refused() -> None:
+@pytest.mark.parametrize(
+    "pair",
+    [
+        both(state((5e3, 0, 2e3), (0, 100, 0)), state((-5e3, 0, 2e3), (0, -100, 0))),  # opposite: the sum is 0
+        both(state((9e3, 0, 4e3), (0, 0, 0)), state((3e3, 3e3, 4e3), (-30, -30, -40))),  # towards the scene
+    ],
+    ids=["opposite", "head on"],
+)
+def test_lines_of_sight_whose_sum_does_not_turn_are_refused(pair: g.BistaticGeometry) -> None:
+    assert "Doppler does not change" in degeneracy(pair, X_BAND, 1.0)
+
+
+def test_doppler_gradients_that_cancel_leave_range_alone() -> None:
+    """Both look vectors stay along x but for the square of the turn, which changes them along x."""
     pair = both(state((5e3, 0, 0), (0, 100, 0)), state((5e3, 1e-9, 0), (0, -100, 0)))
-    assert "Doppler does not change" in pair.degeneracy()
+    assert "from parallel" in degeneracy(pair, X_BAND, 1.0)
 
 
 @given(st.lists(st.tuples(*[st.tuples(coordinate, coordinate, st.floats(10, 1e4))] * 5), min_size=1, max_size=4))
@@ -203,7 +225,11 @@ def test_a_case_spans_the_ground_as_said_of_it_alone(margin: float) -> None:
     angles = np.radians(turns)
     receiver = state((0.0, 0.0, 4e3), (100 * np.cos(angles), 100 * np.sin(angles), 0.0))
     pair = both(state((9e3, 0.0, 0.0), (0.0, 0.0, 0.0)), receiver)
-    assert np.all(pair.spans_ground(margin)[2] == (turns > margin))
-    for gradient, spans in ((0.0199, False), (0.0201, margin == 1.0), (0.0221, True)):
-        overhead = state((gradient * 9e3, 0.0, math.sqrt(1 - gradient**2) * 9e3))
-        assert both(overhead, state((0.0, 0.0, 4e3))).spans_ground(margin)[0] is spans
+    does_turn, sine = spans_ground(pair, X_BAND, 1.0, len(turns))
+    assert does_turn.all()
+    assert np.all((sine >= margin * MIN_SINE) == (turns > margin))
+    # The receiver flies 12.5 mrad in the half aperture, of which the square is what no angle at its middle knows.
+    assert sine == pytest.approx(np.sin(angles), rel=0.0125**2)
+    gradients = np.array([0.0199, 0.0201])
+    overhead = state((gradients * 9e3, 0.0, np.sqrt(1 - gradients**2) * 9e3))
+    assert published_planes(both(overhead, state((0.0, 0.0, 4e3))))[0].is_singular.tolist() == [True, False]

@@ -28,6 +28,7 @@ FLOORS = [
         "workers",
     },
     {"geometry"},
+    {"image_plane"},
     {"theory", "evaluators", "catalogue"},
     {"paths"},
     {"mission"},

@@ -31,9 +31,10 @@ _BLOCK = 1 << 18  # contributions of pulses to points formed at once
 class Aperture(NamedTuple):
     """Phase of a point's pulses over the aperture, as the data have it.
 
-    `place` (2,) is the point of the plane whose range error has no mean and no slope over the aperture [m]: no P₀ and
-    no P₁ of Legendre. `quadratic` and `cubic` are what P₂ and P₃ make at the end of the aperture, signed like the
-    range error: the signal's phase is −2π/λ times it. `left` is the rms of the phase beyond the polynomial. [rad]
+    `place` (2,) is the point of the plane at which the phase varies least over aperture and band [m], a constant
+    phase being free: it loses least of its peak. `quadratic` and `cubic` are what P₂ and P₃ make at the end of the
+    aperture, signed like the range error: the signal's phase is −2π/λ times it. `left` is the rms of the phase beyond
+    the polynomial. [rad]
     """
 
     place: np.ndarray
@@ -119,13 +120,19 @@ class Collection:
         return coarse - np.angle(moved @ self.over_band) * self.wavelength / (2 * np.pi)
 
     def aperture(self) -> Aperture:
-        """Find the point that the pulses have in common, and the phase that is left there."""
+        """Find the point at which the phase varies least, and the phase that is left there.
+
+        The variance of 2πfρ/c over aperture and band is that of the range error ρ over the pulses and, for a band
+        that is even, B²/(12 f₀²) of its mean square. It is least by Gauss and Newton.
+        """
+        band = (float(np.ptp(self.frequency[0])) / self.centre) ** 2 / 12
+        weights = (1 + band) * np.diag(self.over_time) - np.outer(self.over_time, self.over_time)
         point, step = np.zeros(2), 0.1
-        for _ in range(8):
-            fit = legendre.legfit(self.place, self.range_errors(point), _ORDER)
+        for _ in range(40):
+            error = self.range_errors(point)
             sums = self.farther(point + np.vstack((np.zeros(2), step * np.eye(2))))
-            beside = legendre.legfit(self.place, sums, _ORDER)
-            move = np.linalg.solve((beside[:2, 1:] - beside[:2, :1]) / step, fit[:2])
+            beside = (sums[:, 1:] - sums[:, :1]) / step
+            move = np.linalg.solve(beside.T @ weights @ beside, beside.T @ weights @ error)
             point = point + move
             if np.abs(move).max() < _SETTLED:
                 break

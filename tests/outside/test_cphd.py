@@ -200,6 +200,10 @@ def verified(tmp_path_factory: pytest.TempPathFactory) -> Quantities:
             found[f"displacement {of}"].append(Beside(name, moved + off, moved, tolerance, "m"))
         for of, here in (("by exact ranges", row.predicted_qpe_rad), ("in images", row.measured_qpe_rad)):
             tolerance = OF_PHASE * here + ROUNDING
+            if of == "in images":  # a hidden phase changes from the middle of the band to its end
+                radar = bb.load(file_of(name)).radar
+                hidden = math.sqrt(max(row.equal_loss_qpe_rad**2 - row.predicted_qpe_rad**2, 0.0))
+                tolerance += hidden * radar.bandwidth / (2 * radar.center_frequency)
             found[f"quadratic phase {of}"].append(Beside(name, abs(seen.quadratic), here, tolerance, "rad"))
         here = row.predicted_cubic_rad
         found["cubic phase"].append(Beside(name, abs(seen.cubic), here, OF_PHASE * here + ROUNDING, "rad"))

@@ -73,12 +73,15 @@ def python_of_latex(text: str) -> str:
 
 
 def rounding_of(equation: WorkedEquation) -> float:
-    """Error at most by rounding each number to six digits, where the formula is a difference; else 0."""
-    if equation.symbol != "det Q":
+    """Error at most by rounding each number to six digits, where terms of a formula may cancel; else 0."""
+    # Look vectors nearly cancel in forward scatter.
+    is_sum_of_looks = "sin(" in equation.formula and " + " in equation.formula
+    if equation.symbol != "det Q" and not is_sum_of_looks:
         return 0.0
-    formula = equation.formula.replace("^", "**")
-    exact = eval(formula, {}, dict(equation.values))
-    moved = (eval(formula, {}, {**equation.values, key: one * (1 + 5e-6)}) for key, one in equation.values.items())
+    formula, functions = equation.formula.replace("^", "**"), {"sin": math.sin, "cos": math.cos, "atan2": math.atan2}
+    values = dict(equation.values)
+    exact = eval(formula, functions, values)
+    moved = (eval(formula, functions, {**values, key: one * (1 + 5e-6)}) for key, one in values.items())
     return math.fsum(abs(one - exact) for one in moved)
 
 

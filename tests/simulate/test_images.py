@@ -242,7 +242,7 @@ class TestImpulseResponse:
 
 class TestExactEffect:
     def effect(self, c: Collection, **errors: PathError):
-        return exact_effect(c.slow_time, *c.paths(**errors), 0.0, c.wavelength, c.aperture_time)
+        return exact_effect(c.slow_time, *c.paths(**errors), 0.0, c, c.aperture_time)
 
     def test_no_error_has_no_effect(self, broadside: Collection) -> None:
         effect = self.effect(broadside)
@@ -258,7 +258,7 @@ class TestExactEffect:
     def test_clock_quadratic(self, broadside: Collection) -> None:
         clock = 1e-13 * broadside.slow_time**2
         transmitter, receiver = broadside.paths()
-        effect = exact_effect(broadside.slow_time, transmitter, receiver, clock, broadside.wavelength, 6.0)
+        effect = exact_effect(broadside.slow_time, transmitter, receiver, clock, broadside, 6.0)
         assert effect.quadratic == pytest.approx(math.pi * 10e9 * 1e-13 * 36 / 2, rel=1e-4)
 
     def test_height_error_of_both_platforms_is_a_height_of_the_scene(self, broadside: Collection) -> None:
@@ -272,7 +272,7 @@ class TestExactEffect:
 
 def test_displaced_points_peak_where_exact_ranges_say(broadside: Collection) -> None:
     error = PathError(velocity=(0.02, 0.01, 0.0), position=(1.0, -2.0, 0.5))
-    effect = exact_effect(broadside.slow_time, *broadside.paths(receiver=error), 0.0, broadside.wavelength, 6.0)
+    effect = exact_effect(broadside.slow_time, *broadside.paths(receiver=error), 0.0, broadside, 6.0)
     grid = ground_grid(effect.displacement, broadside.geometry.look_azimuth, (2.0, 2.0), (21, 21))
     image = np.abs(backprojection(broadside.record([0, 0, 0], receiver=error), grid))
     peak = np.unravel_index(np.argmax(image), image.shape)

@@ -92,9 +92,12 @@ class TestGain:
             assert what_else in failed.reason if rule == "each" else failed.reason.endswith("range walk allows 33.3")
 
     @pytest.mark.parametrize("rule", ["each", "rss"])
-    @pytest.mark.parametrize(("factor", "status"), [(0.999, "pass_with_autofocus"), (1.001, "fail")])
+    @pytest.mark.parametrize(("factor", "status"), [(0.999, "warn"), (1.001, "fail")])
     def test_both_sides_of_the_cap(self, rule: str, factor: float, status: str) -> None:
-        """A clock's quadratic phase of half of π·f₀/B: its share of what the cap corrects."""
+        """A clock's quadratic phase of half of π·f₀/B: its share of what the cap corrects.
+
+        Half a cell of walk is b·φ of hidden phase, 1.15 of the limit here: the full model says that it fails.
+        """
         size = factor * (math.pi * 100 / 3) / (math.pi * F0_MHZ * 1e6 * 6**2 / 2) / 2
         error = {"timing_error__quadratic": f"{size!r} 1/s", "allocation__combine": rule}
         row_id = "timing.quadratic" if rule == "each" else "receiver.quadratic_phase_error"

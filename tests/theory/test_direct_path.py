@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from sympy import Matrix, simplify
 
-from bisar_budget.ranges.exact_ranges import ExactRanges, Sampling
+from bisar_budget.image_plane import Sampling
+from bisar_budget.ranges.exact_ranges import ExactRanges
 from bisar_budget.theory import differential_range as dr
 from bisar_budget.theory import full
 from bisar_budget.theory.symbols import PLATFORMS, RECEIVER, TRANSMITTER
@@ -47,7 +48,7 @@ def test_the_range_error_at_one_time_is_the_derivative_of_range_less_distance(si
     tracks = [tuple(place[:, None, None]) for place in (own, other)][::sign]
     middles = [tuple(place[:, None]) for place in (own, other)][::sign]
     one_time = Sampling(np.zeros(1), np.zeros((4, 1)))
-    exact = ExactRanges(np.ones(1), np.ones(1), one_time, tracks, middles, has_direct_path=True)
+    exact = ExactRanges(np.ones(1), np.ones(1), np.zeros(1), one_time, tracks, middles, has_direct_path=True)
 
     def recorded(place):
         return np.linalg.norm(place) - np.linalg.norm(place - other)

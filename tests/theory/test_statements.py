@@ -84,7 +84,7 @@ def seen_from(place: tuple[float, float], errors: tuple[PathError | None, ...]) 
     for state, error in zip((SECTION_V.geometry.transmitter, SECTION_V.geometry.receiver), errors, strict=True):
         one = path(state, nodes, error)
         paths.append(Path(actual=one.actual - offset, measured=one.measured - offset))
-    effect = exact_effect(nodes, *paths, 0.0, SECTION_V.radar.wavelength, 6.0)
+    effect = exact_effect(nodes, *paths, 0.0, SECTION_V.radar, 6.0)
     return (*effect.displacement, effect.quadratic)
 
 

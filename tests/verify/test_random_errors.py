@@ -36,7 +36,7 @@ def of(one: Study, row_id: str) -> RandomError:
 def off(error: RandomError, factor: float) -> RandomError:
     """An error whose formulas say so much less than is true."""
     effect = error.full
-    wrong = type(effect)._make((*(part * factor for part in effect[:5]), effect.covariance))
+    wrong = type(effect)._make((*(part * factor for part in effect[:5]), effect.covariance, effect.hidden * factor))
     return error._replace(full=wrong, published=wrong)
 
 

@@ -282,10 +282,11 @@ class TestTogether:
         assert "(25) does not say where the image goes" in row.reason
 
     def test_location_of_errors_that_hide_each_other_is_not_confirmed(self) -> None:
-        """Together 0.3 m by (25), an eighth of a pixel off; each alone three metres, and metres off."""
+        """Together 0.3 m by (25) and 25 cm off, less than half a pixel; each alone three metres, and metres off."""
         row = self.location("published", [1, 1, 1], 0.3)
-        assert " and 0.14 pixels along" in row.reason
-        assert "transmitter.position.y alone: -2.334 m east, 2.143 m north by (25), -744.3 mm east" in row.reason
+        assert math.dist(row.displacement_full_m, row.measured_displacement_m) < 1e-3
+        assert "(25) and the image differ by " in row.reason
+        assert "transmitter.position.y alone: -2.334 m east, 2.143 m north by (25), -744.2 mm east" in row.reason
         assert row.verdict != "confirmed"
 
     def test_location_of_errors_that_defocus_is_read(self) -> None:

@@ -354,7 +354,7 @@ def test_beside_the_budget_stands_what_the_other_model_says(run, tmp_path, model
     by_hand = 2 * math.pi / 0.0299792458 * 40 * found.boundary_error / math.sqrt(76e6) * 9
     assert found.published_qpe_rad == pytest.approx(by_hand, rel=1e-9)
     assert found.published_qpe_rad < 0.97 * found.full_qpe_rad
-    assert found.budget_rad == pytest.approx(by_hand if model == "published" else found.full_qpe_rad)
+    assert found.budget_rad == pytest.approx(by_hand if model == "published" else found.equal_loss_qpe_rad)
     assert found.measured_qpe_rad == pytest.approx(found.full_qpe_rad, rel=0.05)
     lines = [line.split() for line in run("verify", path, "--only", row_id).stdout.splitlines() if line]
     other = found.full_qpe_rad if model == "published" else found.published_qpe_rad
