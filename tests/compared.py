@@ -140,7 +140,7 @@ def _excess(values: Array, limit: Array | float, floor: float) -> Array:
 
 
 def _allowable(
-    quantity: str, error: Error, found: float | None, sizes: Array, excess: Array, is_end: bool
+    quantity: str, error: Error, found: float | None, sizes: Array, excess: Array, is_end: bool = False
 ) -> Compared:
     """Hold one allowable to the excess (S,) over its limit at ascending sizes (S,)."""
     first = int(np.argmax(excess > 0)) if (excess > 0).any() else None
