@@ -46,7 +46,7 @@ OTHER_MODEL = {"published": "full", "full": "published"}
 # No navigation error: it takes the platform, within the aperture, farther than this part of its slant range.
 FARTHEST = 0.1
 SHARE = 0.004  # what the second order may add, of a phase, a displacement or a limit; the aim is 1 %
-FLOOR_RAD, FLOOR_M = 1e-3, 2e-3  # and whatever the size
+FLOOR_RAD, FLOOR_M = 1e-3, 2e-5  # and whatever the size
 
 _TOGETHER = 1 << 13  # lanes of a block
 _FLOORS = (FLOOR_RAD, FLOOR_RAD, FLOOR_M)

@@ -59,8 +59,6 @@ EPSILON = 2e-15  # of a range sum: what rounding of a few operations leaves
 BOWL = 0.05  # of the determinant of H; where V bends less, it is no bowl around the point
 AT_FOLD = 0.1  # of what gradients span at the centre: with less, what they span changes much in a small step
 OF_UNSEEN = 1e-4  # of the square of a last step elsewhere, that is left of the last one there
-FOLDED = 0.2  # of what gradients span at the centre; with less, the way of a point is near a fold or beyond one
-ENDS_RAD = math.pi  # of hidden phase, where the way is folded: no point has the range history
 UNSEEN_RAD = 3e-5  # what the last step of the search may change a phase by beyond the part counted linearly
 
 STILL = [np.zeros((1, 1))] * 3  # a platform that no error moves
