@@ -14,6 +14,7 @@ import numpy as np
 
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.geometry import GroundVector
+from bisar_budget.image_plane import GroundMatrix, band_variance, nodes
 from bisar_budget.simulator.collection import RangeLines
 from bisar_budget.simulator.far_field import far_field_filter, is_nonuniform, polar_format
 from bisar_budget.simulator.image_formation import Kernel, backprojection, bytes_held, ground_grid, matched_filter
@@ -21,7 +22,7 @@ from bisar_budget.simulator.phase_history import Complexes, Floats, PhaseHistory
 
 IMAGE_FORMERS = ("backprojection", "polar_format", "matched_filter", "far_field")
 
-_ORDER = 8  # of the polynomials through range histories, whose two lowest parts are compared
+_ORDER = 8  # of the polynomials through range histories
 _BLOCK = 1 << 18  # pixels formed between two words on the progress
 _TRIED, _TRIED_QUICKLY = 1 << 10, 1 << 15  # pixels of which the time is taken; of compiled kernels more
 _SECONDS_PER_SAMPLE = 3e-6  # of polar format or a non-uniform FFT to 1e-8, one core of 2024
@@ -125,11 +126,13 @@ class PlaneWaves:
         return math.atan2(self.middle[1], self.middle[0])
 
     def place(self, displaced: GroundVector, recorded: Floats) -> GroundVector:
-        """Point whose plane waves have the recorded constant and linear part, (5) in place of exact ranges."""
-        time = np.linspace(-1, 1, len(self.sight))
-        parts = np.polynomial.legendre.legfit(time, np.c_[recorded, self.sight], _ORDER)[:2]
-        east, north = np.linalg.solve(-parts[:, 1:], parts[:, 0])
-        return float(east), float(north)
+        """Point whose plane waves leave the phase with the least variance, (5) in place of exact ranges."""
+        slow_time, sampling = np.linspace(-1, 1, len(self.sight)), nodes(_ORDER + 1)
+        fitted = np.polynomial.legendre.legfit(slow_time, np.c_[self.sight, recorded], _ORDER)
+        *sight, error = np.polynomial.legendre.legval(sampling.places, fitted)[..., None]
+        matrix = GroundMatrix.of(np.array(sight), sampling.fit, np.atleast_1d(band_variance(self)))
+        by_east, by_north = ((weights * error).sum() for weights in matrix.place_weights)
+        return float(by_east), float(by_north)
 
     def left(self, place: GroundVector, left: Floats, recorded: Floats) -> Floats:
         """The range history that is left at a place: the far field's own error is in it."""
