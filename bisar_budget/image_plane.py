@@ -10,9 +10,8 @@ line look alike: there is no image plane. Derived here; `ranges.exact_ranges` fi
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache, reduce
+from functools import cache, cached_property, reduce
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -83,39 +82,53 @@ def band_variance(radar: Band) -> Any:
     return (radar.bandwidth / radar.center_frequency) ** 2 / 12
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class GroundMatrix:
-    """The matrix H of V over the ground, half its second derivative for what leaves nothing, (cases,); its product.
+    """The matrix H of V over the ground, half its second derivative for what leaves nothing; and its product.
 
-    With g the gradient of the range error over the ground at the nodes, H = ⟨g, gᵀ⟩ in the product of V. `projection`
-    (2, nodes, cases) takes range errors at the nodes to ⟨g, ρ⟩.
+    Attributes
+    ----------
+    slopes : (2, nodes, cases)
+        What a metre east, and north, adds to the range error at the nodes. [m/m]
+    fit : (4, nodes)
+        Weights of `Sampling.fit`.
+    band : (cases,)
+        b² of the band.
+    range_gradient : (2, cases)
+        Mean gradient of the range over the ground, east and north. [m/m]
+    covariance : (2, 2, cases)
+        Of the gradient over the aperture.
+    projection : (2, nodes, cases)
+        Takes range errors ρ at the nodes to ⟨g, ρ⟩ in the product of V, with g the gradient.
+    xx, xy, yy : (cases,)
+        H = ⟨g, gᵀ⟩.
     """
 
-    slopes: Sequence[Floats]
+    slopes: Floats
     fit: Floats
     band: Floats
+    range_gradient: Floats
+    covariance: Floats
     projection: Floats
     xx: Floats
     xy: Floats
     yy: Floats
 
     @classmethod
-    def of(cls, slopes: Sequence[Floats], fit: Floats, band: Floats) -> "GroundMatrix":
-        """Matrix of what a metre east, and north, adds to the range error at the nodes, (nodes, cases) each."""
-        mean = fit[0][:, None]
-        projection = np.empty((2, *np.broadcast_shapes(slopes[0].shape, slopes[1].shape)))
-        for axis, slope in enumerate(slopes):
-            projection[axis] = _projected(slope, mean, band)
-        xx, xy, yy = _covariances(slopes, mean)
-        east, north = ((mean * slope).sum(axis=0) for slope in slopes)
-        xx, xy, yy = (
-            (1 + band) * xx + band * east * east,
-            (1 + band) * xy + band * east * north,
-            (1 + band) * yy + band * north * north,
-        )
-        return cls(slopes, fit, band, projection, xx, xy, yy)
+    def of(cls, slopes: Floats, fit: Floats, band: Floats) -> "GroundMatrix":
+        """Matrix of what a metre east, and north, adds to the range error at the nodes, (2, nodes, cases)."""
+        weights, gradient = fit[0][:, None], fit[0] @ slopes
+        apart = slopes - gradient[:, None]
+        weighted = weights * apart
+        covariance = np.einsum("anc,bnc->abc", weighted, apart)
+        x, y = gradient
+        u, v = along = band * gradient
+        weighted *= 1 + band
+        weighted += weights * along[:, None]
+        xx, xy, yy = ((1 + band) * covariance[place] for place in ((0, 0), (0, 1), (1, 1)))
+        return cls(slopes, fit, band, gradient, covariance, weighted, xx + u * x, xy + u * y, yy + v * y)
 
-    @property
+    @cached_property
     def determinant(self) -> Floats:
         """Determinant of H, the square of the area that the gradients span."""
         return np.asarray(self.xx * self.yy - self.xy * self.xy)
@@ -134,12 +147,6 @@ class GroundMatrix:
             return (self.xy * y - self.yy * x) / determinant, (self.xy * x - self.xx * y) / determinant
 
     @property
-    def range_gradient(self) -> tuple[Floats, Floats]:
-        """Mean gradient of the range over the ground, east and north. [m/m]"""
-        east, north = (self.fit[0] @ slope for slope in self.slopes)
-        return east, north
-
-    @property
     def sine(self) -> Floats:
         """Sine of the angle between the directions that band and turn resolve.
 
@@ -149,12 +156,12 @@ class GroundMatrix:
         """
         x, y = self.range_gradient
         square = x * x + y * y
-        xx, xy, yy = _covariances(self.slopes, self.fit[0][:, None])
+        (xx, xy), (_, yy) = self.covariance
         with np.errstate(all="ignore"):
             is_seen = square > 0
             trace, square = xx + yy, np.where(is_seen, square, 1.0)
             a, b, c = xx / trace + x * x / square, xy / trace + x * y / square, yy / trace + y * y / square
-            return np.sqrt(np.maximum(a * c - b * b, 0.0)) * np.where(is_seen, 1.0, 2.0)
+            return np.asarray(np.sqrt(np.maximum(a * c - b * b, 0.0)) * np.where(is_seen, 1.0, 2.0))
 
     @property
     def turning(self) -> Floats:
@@ -162,19 +169,20 @@ class GroundMatrix:
         x, y = self.range_gradient
         along = self.xx * x * x + 2 * self.xy * x * y + self.yy * y * y
         with np.errstate(all="ignore"):
-            return np.sqrt(np.maximum(3 * self.determinant * (x * x + y * y) / along, 0.0))
+            return np.asarray(np.sqrt(np.maximum(3 * self.determinant * (x * x + y * y) / along, 0.0)))
 
-    @property
+    @cached_property
     def orientation(self) -> Floats:
         """Area between mean gradient and mean Doppler gradient, signed; 0 where the aperture resolves more."""
-        (x, y), (by_x, by_y) = self.range_gradient, (self.fit[1] @ slope for slope in self.slopes)
+        (x, y), (by_x, by_y) = self.range_gradient, self.fit[1] @ self.slopes
         area = x * by_y - y * by_x
         own = self.band * (1 + self.band) / 3 * area * area
         return np.where(own >= OWN_AREA * self.determinant, area, 0.0)
 
     def projected(self, values: Floats) -> Floats:
-        """Weights of the product of V with values at the nodes, (nodes, cases)."""
-        return _projected(values, self.fit[0][:, None], self.band)
+        """Weights of the product of V with values at the nodes, (nodes, cases): their sum with others is that."""
+        average = self.fit[0] @ values
+        return np.asarray(self.fit[0][:, None] * ((1 + self.band) * (values - average) + self.band * average))
 
     def turned_from(self, centre: "GroundMatrix", case: NDArray[np.intp]) -> Floats:
         """Area that gradients span, over that of the centre's of some cases; below 0 where they are turned around."""
@@ -193,14 +201,15 @@ def spans_ground(geometry: BistaticGeometry, radar: Band, aperture_time_s: Any, 
     """
     half = np.array(np.broadcast_to(np.asarray(aperture_time_s, dtype=float) / 2, (cases,)))
     places, fit = nodes(int(np.max(nodes_for(geometry, 2 * half), initial=FEWEST_NODES)))
-    slopes, turning = [np.zeros((places.size, cases)), np.zeros((places.size, cases))], np.zeros(cases)
+    slopes, turning = np.zeros((2, places.size, cases)), np.zeros(cases)
     for path in geometry.both:
         x, y, z = path.place(places[:, None] * half)
         distance = np.sqrt(x * x + y * y + z * z)
-        slopes = [slopes[0] + x / distance, slopes[1] + y / distance]
+        slopes[0] += x / distance
+        slopes[1] += y / distance
         turning = turning + path.travelled(half) / path.slant_range
     matrix = GroundMatrix.of(slopes, fit, band_variance(radar) * np.ones(cases))
-    spread = sum(np.ptp(slope, axis=0) for slope in slopes)
+    spread = np.ptp(slopes, axis=1).sum(axis=0)
     return spread > STANDS * turning, matrix.sine
 
 
@@ -216,15 +225,3 @@ def degeneracy(geometry: BistaticGeometry, radar: Band, aperture_time_s: float) 
         f"range and Doppler gradients on the ground are {degrees:.2g} deg from parallel over the aperture, at least "
         f"{MIN_GRADIENT_ANGLE_DEG:g} deg is needed: no image plane"
     )
-
-
-def _covariances(slopes: Sequence[Floats], mean: Floats) -> tuple[Floats, Floats, Floats]:
-    """Covariance of the gradient over the aperture, (cases,), of what each sample is off the mean."""
-    x, y = (slope - (mean * slope).sum(axis=0) for slope in slopes)
-    return (mean * x * x).sum(axis=0), (mean * x * y).sum(axis=0), (mean * y * y).sum(axis=0)
-
-
-def _projected(values: Floats, mean: Floats, band: Any) -> Floats:
-    """Weights of the product of V with values at the nodes, (nodes, cases): their sum with others is the product."""
-    average = (mean * values).sum(axis=0)
-    return np.asarray(mean * ((1 + band) * (values - average) + band * average))

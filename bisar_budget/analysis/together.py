@@ -107,20 +107,26 @@ class Together:
                     size = group.phase([quadratic[row_id] for row_id in group.ids])
                     for row_id in group.ids:
                         del found[row_id]
-                    found[group.id] = np.hypot(size, gain * self._hidden_of(group))
+                    found[group.id] = np.hypot(size, gain * self._hidden_of_groups[group.id])
         return list(found.items())
 
     def judged(self, members: Sequence[DeclaredPhase], rule: str = "", gain: Any = None) -> Floats:
         """Combine the judged phases of errors by the mission's rule, or another. [rad]"""
         return self.errors.array(combined_phase(self.judged_parts(members, rule, gain), rule or self.rule))
 
-    def _hidden_of(self, group: Correlated) -> Any:
-        """Hidden phase of the six errors of a covariance; none by the published model. [rad]
+    @cached_property
+    def _hidden_of_groups(self) -> dict[str, Any]:
+        """Hidden phase of the six errors of each covariance; none by the published model. [rad]"""
+        if self.model == "published":
+            return {group.id: 0.0 for group in self.groups}
+        stated = {error.subject.id for error in self.motion}
+        return {group.id: self._hidden_of(group) for group in self.groups if stated >= set(group.ids)}
+
+    def _hidden_of(self, group: Correlated) -> Floats:
+        """Hidden phase of the six errors of a covariance. [rad]
 
         A root of their correlations makes independent errors of them, whose squares add up.
         """
-        if self.model == "published":
-            return 0.0
         errors = {error.subject.id: error for error in self.motion}
         left = []
         for row_id in group.ids:
@@ -130,7 +136,7 @@ class Together:
         roots = factor(np.moveaxis(correlation, 2, 0))
         independent = np.einsum("cij,inc->jnc", roots, np.array(left))
         hidden, _ = self.errors.exact.unresolved(independent)
-        return np.sqrt(np.square(hidden).sum(axis=0))
+        return np.asarray(np.sqrt(np.square(hidden).sum(axis=0)))
 
     def combined(self, phases: Phases, rule: str = "") -> Floats:
         """Combine phases by the mission's rule, or another. [rad]"""

@@ -58,9 +58,8 @@ def changing_effects(exact: ExactRanges, delay: Floats, ratio: Floats, *, is_pha
         sign = -1.0
         weights = 2 * weights.sum(axis=1, keepdims=True) * mean[:, None] - weights
     coefficients = exact.fit / LEADING[:, None]
-    slopes = np.array(exact.slopes)  # east and north, (2, nodes, cases)
     places = np.polynomial.legendre.legvander(exact.sampling.places, _ORDERS - 1)
-    bends = slopes - np.einsum("no,om,amc->anc", places, coefficients, slopes)
+    bends = exact.slopes - np.einsum("no,om,amc->anc", places, coefficients, exact.slopes)
     # Integrals of the delay at the zenith: effects, Legendre parts, and the product with each slope's bend.
     of_bends = mean[:, None] * bends
     of_orders = np.broadcast_to(coefficients[..., None], (_ORDERS, *delay.shape))

@@ -269,7 +269,7 @@ class ExactRanges:
 
     Attributes
     ----------
-    gradient : two of (4, n)
+    gradient : (2, 4, n)
         Mean, P₁ part at the edge, quadratic and cubic part of what a metre east, and north, adds to the range error.
     """
 
@@ -290,7 +290,7 @@ class ExactRanges:
         self.fit = sampling.fit
         self.mean = self.fit[0][:, None]
         self.ranges = [norm(track) for track in tracks]
-        self.gradient = [self.fit @ slope for slope in self.slopes]
+        self.gradient = self.fit @ self.slopes
         self.matrix = GroundMatrix.of(self.slopes, self.fit, band)
 
     @classmethod
@@ -337,10 +337,10 @@ class ExactRanges:
         return times
 
     @cached_property
-    def slopes(self) -> list[Floats]:
-        """Decrease of the range at the nodes per metre east, and north: u_t + u_r on the ground. [m/m]"""
+    def slopes(self) -> Floats:
+        """Decrease of the range at the nodes per metre east, and north, (2, nodes, n): u_t + u_r on the ground."""
         (p, q), (R, S) = self.tracks, self.ranges
-        return [p[axis] / R + q[axis] / S for axis in (0, 1)]
+        return np.array([p[axis] / R + q[axis] / S for axis in (0, 1)])
 
     @cached_property
     def sine(self) -> Floats:
@@ -504,7 +504,7 @@ class ExactRanges:
     def mean_squares(self, left: Floats, orders: Floats) -> tuple[Floats, Floats]:
         """Mean squares of range errors left at the nodes, and of what they have beyond orders 0 to 3. [m²]"""
         beyond = left - self._legendre @ orders
-        return (self.mean * left * left).sum(axis=-2), (self.mean * beyond * beyond).sum(axis=-2)
+        return self.fit[0] @ (left * left), self.fit[0] @ (beyond * beyond)
 
     @cached_property
     def _legendre(self) -> Floats:
@@ -541,42 +541,38 @@ class ExactRanges:
         """
         course = lanes.at_nodes
         east, north = place
-        change = lanes.clock(1.0)
-        by_east, by_north = np.zeros_like(course), np.zeros_like(course)
-        turns_east, turns_north = by_east, by_north
-        platforms = []
-        for track, weight, shift, (x, y, z) in zip(
-            self.tracks, lanes.moves, lanes.shifts(size), lanes.directions, strict=True
+        left, change = lanes.clock(size), lanes.clock(1.0)
+        looks, distances = np.empty((2, 2, *course.shape)), np.empty((2, *course.shape))
+        turns = np.zeros((2, *course.shape))
+        for platform, (track, weight, shift, (x, y, z)) in enumerate(
+            zip(self.tracks, lanes.moves, lanes.shifts(size), lanes.directions, strict=True)
         ):
-            a, b, c = (one + moved for one, moved in zip(_of([*track], lanes.case), shift, strict=True))
+            *true, own = _of([*track, self.ranges[platform]], lanes.case)
+            a, b, c = (one + moved for one, moved in zip(true, shift, strict=True))
             a, b = a - east, b - north
             R = np.sqrt(a * a + b * b + c * c)
             a, b, c = a / R, b / R, c / R
-            by_east, by_north = by_east + a, by_north + b
-            platforms.append((a, b, R))
+            looks[platform, 0], looks[platform, 1], distances[platform] = a, b, R
+            left = left + (own - R)
             if np.any(weight):
                 step = weight * course
                 along = a * x + b * y + c * z
                 change = change - step * along
-                turns_east, turns_north = (
-                    turns_east + step * (x - a * along) / R,
-                    turns_north + step * (y - b * along) / R,
-                )
+                turns[0] += step * (x - a * along) / R
+                turns[1] += step * (y - b * along) / R
         if self.has_direct_path:
             ahead, back = lanes.moves
             x, y, z = (ahead * one - back * other for one, other in zip(*lanes.directions, strict=True))
-            a, b, c = _of([*self._between], lanes.case)
+            a, b, c, own = _of([*self._between, self.baselines], lanes.case)
             a, b, c = a + size * course * x, b + size * course * y, c + size * course * z
             apart = np.sqrt(a * a + b * b + c * c)
+            left = left + (apart - own)
             change = change + np.where(apart > 0, course * (a * x + b * y + c * z) / apart, 0.0)
         (band,) = _of([self.band], lanes.case)
-        matrix = GroundMatrix.of((by_east, by_north), self.fit, band)
-        weights = matrix.projected(self.left_over(lanes, size, place))
-        slope_east, slope_north = (
-            (own * change).sum(axis=0) + (weights * turns).sum(axis=0)
-            for own, turns in zip(matrix.projection, (turns_east, turns_north), strict=True)
-        )
-        return _against(matrix, weights, platforms, slope_east, slope_north)
+        matrix = GroundMatrix.of(looks[0] + looks[1], self.fit, band)
+        weights = matrix.projected(left)
+        slope = (matrix.projection * change + weights * turns).sum(axis=1)
+        return _against(matrix, weights, looks, distances, slope)
 
     def settled(self, clock: Floats, shifts: Sequence[Any], near: Any, case: Places) -> Found:
         """Newton's method for the least of V.
@@ -662,17 +658,17 @@ class _PointSearch:
         exact, before = self.exact, np.full(self.alive.size, math.inf)
         for _ in range(ITERATIONS):
             k, meets, band = _of([exact.k, exact.nearest, exact.band], self.of)
-            left, platforms, nearest = _seen(self.measured, self.east, self.north, self.room)
-            slopes = [platforms[0][axis] + platforms[1][axis] for axis in (0, 1)]
-            matrix = GroundMatrix.of(slopes, exact.fit, band)
-            step_east, step_north = _newton_step(matrix, left, platforms)
+            left, looks, distances = _seen(self.measured, self.east, self.north, self.room)
+            nearest = distances.min(axis=(0, 1))
+            matrix = GroundMatrix.of(looks[0] + looks[1], exact.fit, band)
+            step_east, step_north = _newton_step(matrix, left, looks, distances)
             self.east, self.north = self.east + step_east, self.north + step_north
             step = step_east * step_east + step_north * step_north
             is_apart = nearest >= MEETS * meets
             turn = matrix.turned_from(exact.matrix, self.of)
             unseen = np.where(np.abs(turn) < AT_FOLD, OF_UNSEEN * UNSEEN_RAD, UNSEEN_RAD)
             is_done = is_apart & (k * step < unseen * nearest)
-            self._keep(is_done & (turn > 0), left, slopes, (step_east, step_north), turn)
+            self._keep(is_done & (turn > 0), left, matrix.slopes, (step_east, step_north), turn)
             going = np.flatnonzero(~is_done & (step < SHRINKS * before) & is_apart)
             if not going.size:
                 return
@@ -687,9 +683,7 @@ class _PointSearch:
         self.east, self.north = self.east[going], self.north[going]
         self.measured, self.room = _some(self.measured, going), self.room[..., : going.size]
 
-    def _keep(
-        self, is_done: Truths, left: Floats, slopes: Sequence[Floats], step: tuple[Floats, Floats], turn: Floats
-    ) -> None:
+    def _keep(self, is_done: Truths, left: Floats, slopes: Floats, step: tuple[Floats, Floats], turn: Floats) -> None:
         """Note the lanes that have settled; what is less than rounding leaves is none.
 
         Their range error is that which was `left` before the last step, and what the step adds to it.
@@ -712,31 +706,30 @@ class _PointSearch:
             kept[places] = np.where(np.abs(phase) > rounding, phase, 0.0)
 
 
-def _newton_step(matrix: GroundMatrix, left: Floats, platforms: Sequence[Sequence[Floats]]) -> tuple[Floats, Floats]:
+def _newton_step(matrix: GroundMatrix, left: Floats, looks: Floats, distances: Floats) -> tuple[Floats, Floats]:
     """Step east and north to where V is least, by its slope and how that changes. [m]
 
-    Range errors left at the nodes [m], and from each platform what it sees: the components of its line of sight
-    over the ground, and its range. [m]
+    Range errors left at the nodes (nodes, lanes) [m], the components of the lines of sight of both platforms over the
+    ground (2, 2, nodes, lanes), and their ranges. [m]
     """
-    weights = matrix.projected(left)
-    x, y = ((weights * slope).sum(axis=0) for slope in matrix.slopes)
-    return _against(matrix, weights, platforms, x, y)
+    slope = np.einsum("anc,nc->ac", matrix.projection, left)
+    return _against(matrix, matrix.projected(left), looks, distances, slope)
 
 
 def _against(
-    matrix: GroundMatrix, weights: Floats, platforms: Sequence[Sequence[Floats]], x: Floats, y: Floats
+    matrix: GroundMatrix, weights: Floats, looks: Floats, distances: Floats, slope: Floats
 ) -> tuple[Floats, Floats]:
-    """Step that takes away half a slope of V (x, y), by how that changes; where V is no bowl, by H alone. [m]"""
-    xx, xy, yy = of_matrix = matrix.xx, matrix.xy, matrix.yy
-    for to_east, to_north, distance in platforms:
-        bends = weights / distance
-        xx = xx - (bends * (1 - to_east * to_east)).sum(axis=0)
-        xy = xy + (bends * to_east * to_north).sum(axis=0)
-        yy = yy - (bends * (1 - to_north * to_north)).sum(axis=0)
+    """Step that takes away half a slope of V, by how that changes; where V is no bowl, by H alone. [m]"""
+    x, y = slope
+    of_matrix = matrix.xx, matrix.xy, matrix.yy
+    bends = weights / distances
+    turned, total = np.einsum("panc,pbnc->abc", looks * bends[:, None], looks), bends.sum(axis=(0, 1))
+    xx, xy, yy = matrix.xx - total + turned[0, 0], matrix.xy + turned[0, 1], matrix.yy - total + turned[1, 1]
     determinant = xx * yy - xy * xy
     is_bowl = (determinant > BOWL * matrix.determinant) & (xx > 0)
-    xx, xy, yy = (np.where(is_bowl, *both) for both in zip((xx, xy, yy), of_matrix, strict=True))
-    determinant = np.where(is_bowl, determinant, matrix.determinant)
+    if not is_bowl.all():
+        xx, xy, yy = (np.where(is_bowl, *both) for both in zip((xx, xy, yy), of_matrix, strict=True))
+        determinant = np.where(is_bowl, determinant, matrix.determinant)
     return (xy * y - yy * x) / determinant, (xy * x - xx * y) / determinant
 
 
@@ -787,27 +780,20 @@ def _left(measured: Sequence[Floats], east: Any, north: Any, room: Floats) -> Fl
     return left
 
 
-def _seen(
-    measured: Sequence[Floats], east: Floats, north: Floats, room: Floats
-) -> tuple[Floats, Sequence[Sequence[Floats]], Floats]:
-    """Range error at the nodes that is left at points; what each platform sees; the least range there, (lanes,). [m]
+def _seen(measured: Sequence[Floats], east: Floats, north: Floats, room: Floats) -> tuple[Floats, Floats, Floats]:
+    """Range error at the nodes that is left at points, (nodes, lanes) [m]; and what both platforms see, in `room`.
 
-    From each platform: components east and north of its line of sight, and its range, (nodes, lanes).
+    Components east and north of their lines of sight, (2, 2, nodes, lanes), and their ranges, (2, nodes, lanes). [m]
     """
-    platforms: list[Any] = []
-    grown: list[Floats] = []
-    nearest = np.asarray(math.inf)
-    for place, platform in enumerate((measured[1:6], measured[6:])):
-        out = room[4 * place : 4 * place + 4]
+    both = room[:8].reshape(2, 4, *room.shape[1:])
+    for platform, out in zip((measured[1:6], measured[6:]), both, strict=True):
         _grow(platform, east, north, out, out[3])
         np.subtract(platform[0], east, out=out[1])
         np.subtract(platform[1], north, out=out[2])
         out[1:3] /= out[3]
-        nearest = np.minimum(nearest, out[3].min(axis=0))
-        grown.append(out[0])
-        platforms.append(out[1:])
-    left = np.add(grown[0], grown[1], out=grown[0])
-    return np.subtract(measured[0], left, out=left), platforms, nearest
+    left = measured[0] - both[0, 0]
+    left -= both[1, 0]
+    return left, both[:, 1:3], both[:, 3]
 
 
 def followed(exact: ExactRanges, clock: Floats, shifts: Sequence[Any], case: Places) -> Found:

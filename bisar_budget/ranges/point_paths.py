@@ -28,6 +28,7 @@ ALMOST = 0.002  # of a limit, from where a curve leads to it
 BENDS = 0.1  # of a slope: what changes more within an interval is bent, and a curve through its ends misses more
 ALMOST_BENT = 3e-5  # of a limit, from where a curve leads to it there
 CREST = 0.01  # of a limit: so little below it, the crest of a curve through few points may be above
+STEEP = 2.0  # square of a value over its limit, from where a power leads to the limit better than a cubic
 DEPARTS = 0.5  # of the limit: a value so far from a straight line may have been anywhere in between
 COARSE = 0.02  # of the size: within a shorter interval a curve is trusted
 GROWTH = 1.5  # of a size in a step
@@ -383,7 +384,20 @@ class _SearchState:
         is_close = (b - 1 < 2 * almost) & (top - found < 2 * almost * top)
         is_close |= (1 - a < 2 * almost) & (found - (top - width) < 2 * almost * top)
         self.inside = top - (1 - np.where(self.tries % 4 == 3, 0.5, np.minimum(np.maximum(part, 0.01), 0.99))) * width
+        by_power = self._by_power(every, low, high)
+        is_steep = (b > STEEP) & (by_power > self.size[every, low]) & (by_power < top)
+        self.inside = np.where(is_steep, by_power, self.inside)
         return np.where(is_narrow, top - width, found), is_close | is_narrow
+
+    def _by_power(self, every: Places, low: Places, high: Places) -> Floats:
+        """Size at which a power of the size reaches the limit: that of two points, or of two beyond the limit."""
+        after = np.minimum(high + 1, self.count - 1)
+        is_from_nothing = low == 0
+        below, above = np.where(is_from_nothing, high, low), np.where(is_from_nothing, after, high)
+        rise, growth = (np.log(part[every, above] / part[every, below]) for part in (self.square, self.size))
+        power = np.where(below < above, rise / growth, 2.0)
+        found: Floats = self.size[every, high] * self.square[every, high] ** (-1 / power)
+        return found
 
     def _ahead(self, every: Places, last: Places) -> tuple[Floats, Truths]:
         """Size at which a parabola through the last known points reaches the limit; whether that is close to it."""
