@@ -47,7 +47,7 @@ def variants(mission: Mission) -> list[Mission]:
 
 
 def assert_alike(one: Any, other: Any, where: str) -> None:
-    """Words and statuses are the same, and numbers but for what a search leaves: 1e-5 of a limit, 3e-5 rad of a point.
+    """Words and statuses are the same, and numbers but for what searches leave: 1e-5 of a limit, and 3e-5 rad.
 
     Where an image ends at a fold the way of its point is lost, and the size at which it ends is known to 1e-3.
     """
