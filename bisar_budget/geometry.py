@@ -294,6 +294,11 @@ class BistaticGeometry:
         t, r = self.both
         return (t.slant_range + r.slant_range - self.apart.slant_range) / SPEED_OF_LIGHT
 
+    def at(self, tau: Any) -> "BistaticGeometry":
+        """The geometry at other slow times, of straight paths through them. [s]"""
+        transmitter, receiver = (PlatformState(position=p, velocity=v) for p, v in (one.at(tau) for one in self.both))
+        return BistaticGeometry(transmitter=transmitter, receiver=receiver)
+
     def sights(self, *, has_direct_path: bool) -> tuple[Vectors, Vectors]:
         """The range at mid-aperture that a metre of the transmitter's motion, and of the receiver's, takes away. [-]
 

@@ -1058,6 +1058,13 @@ def seen_of_vibration(stated: str, along: float, has_direct_path: bool) -> str:
     return f"{stated}: {format_quantity(along, 'm')} of it {where}"
 
 
+@phrase
+def does_as_much_as_along_the_sight(stated: str, along: float, has_direct_path: bool) -> str:
+    """Said of a slow vibration of which the line of sight sees a part, that turns. [m]"""
+    where = "in the range less the direct path" if has_direct_path else "along the line of sight"
+    return f"{stated}: in the worst phase it does as much as {format_quantity(along, 'm')} {where}"
+
+
 # ---------------------------------------------------------------------- vibration by its spectrum, and of oscillators
 @phrase
 def spectrum_shakes(rms: float, level_db: float) -> str:

@@ -20,8 +20,9 @@ from bisar_budget.effects.declared import Declared, DeclaredErrors, Model
 from bisar_budget.effects.effect import ErrorSource, Subject, plain
 from bisar_budget.effects.random_effect import RandomError
 from bisar_budget.effects.random_errors import in_one_case, random_errors
+from bisar_budget.effects.slow_tones import SlowTone, slow_phases, slow_tones
 from bisar_budget.effects.sources import exact_ranges
-from bisar_budget.effects.vibration import DeclaredPhase, slow_phases
+from bisar_budget.effects.vibration import DeclaredPhase
 from bisar_budget.geometry import BistaticGeometry, GroundVector
 from bisar_budget.image_plane import nodes_for
 from bisar_budget.mission.model import Mission, has_random_errors
@@ -121,9 +122,14 @@ class Analysis:
         return tones(self.mission, self.geometry)
 
     @cached_property
+    def slow_tones(self) -> dict[str, SlowTone]:
+        """Declared vibrations below three cycles per aperture, by the ids of their rows."""
+        return slow_tones(self.mission, self.geometry, self.cases)
+
+    @cached_property
     def slow(self) -> list[DeclaredPhase]:
         """Phases of the declared vibrations below one cycle per aperture."""
-        return slow_phases(self.mission, self.geometry)
+        return slow_phases(self.mission, self.slow_tones, autofocus_gain_of(self.mission))
 
     @cached_property
     def displacing_tones(self) -> list[ToneDisplacement]:

@@ -167,7 +167,7 @@ def noise(analysis: "Analysis", model: str) -> list[SpreadPhase]:
 
 
 def rests(analysis: "Analysis", model: str) -> list[SpreadPhase]:
-    """List what errors of motion and clocks leave beyond the cubic, at one sigma, where an image shows it.
+    """List what errors of motion, clocks and slow vibrations leave beyond the cubic, at one sigma, where it shows.
 
     Short apertures leave next to nothing, a quarter of a circle does. The published model knows none; where a line of
     sight turns by more than a radian the phase of equal loss holds it.
@@ -182,6 +182,12 @@ def rests(analysis: "Analysis", model: str) -> list[SpreadPhase]:
             shows = (rms > SMALLEST_REST_RAD) & np.isfinite(rms) & ~errors.exact.is_turned
             if shows.any():
                 found.append(SpreadPhase(error.id, error.owner, np.where(shows, rms**2, math.nan)))
+    slow = {one.row_id: one.is_there for one in analysis.slow}
+    for tone in analysis.slow_tones.values():
+        rms = tone.declared.rest
+        shows = slow.get(tone.subject.id, False) & (rms > SMALLEST_REST_RAD) & ~errors.exact.is_turned
+        if shows.any():
+            found.append(SpreadPhase(tone.subject.id, tone.subject.owner, np.where(shows, rms**2, math.nan)))
     return found
 
 

@@ -26,7 +26,8 @@ from bisar_budget import evaluators
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.spread import Tone, mainlobe_energy, spread_phase
 from bisar_budget.effects.effect import PLATFORMS
-from bisar_budget.effects.vibration import cubic_part, near_groups, quadratic_part, worst_phases
+from bisar_budget.effects.slow_tones import SlowTone
+from bisar_budget.effects.vibration import near_groups, worst_phases
 from bisar_budget.mission.model import Mission, Shares
 
 LARGEST_ECHO = 2.0  # rad; beyond, echoes are above the response
@@ -174,10 +175,15 @@ def amplitude_share(split: Shares, name: str) -> Any:
 
 
 class SlowLimits(NamedTuple):
-    """Amplitudes at which a slow vibration reaches a platform's quadratic and the required cubic phase. [m]"""
+    """Amplitudes along the line of sight that reach a platform's quadratic and the required cubic phase. [m]
+
+    `use` is the part of the smaller limit that the declared vibration uses, `quadratic_use` that of the quadratic.
+    """
 
     quadratic: Any
     cubic: Any | None
+    use: Any
+    quadratic_use: Any
 
     @property
     def smallest(self) -> Any:
@@ -187,16 +193,20 @@ class SlowLimits(NamedTuple):
     @property
     def is_cubic(self) -> Any:
         """Whether the cubic phase sets it."""
-        return self.smallest < self.quadratic
+        return self.use > self.quadratic_use
 
 
-def slow_limits(mission: Mission, allocation: Allocation, name: str, cycles: Any) -> SlowLimits:
-    """Largest amplitude of a vibration below one cycle per aperture, in its worst phase.
+def slow_limits(mission: Mission, allocation: Allocation, tone: SlowTone) -> SlowLimits:
+    """Largest vibration below one cycle per aperture, in its worst phase; see `effects.slow_tones`.
 
     The quadratic phase is held to the platform's share, autofocus gain included; the cubic phase, where it is
     required, to the whole requirement without gain.
     """
-    wavenumber = 2 * math.pi / mission.radar.wavelength
-    quadratic = allocation.qpe_allowed(name) / (wavenumber * quadratic_part(cycles))
+    gain, allowed = allocation.autofocus_gain, allocation.qpe_allowed(tone.subject.owner)
     required = mission.requirements.cubic_phase_error
-    return SlowLimits(quadratic, None if required is None else required / (wavenumber * cubic_part(cycles)))
+    with np.errstate(all="ignore"):
+        quadratic, use = allowed / tone.per_metre.judged(gain), tone.declared.judged(gain) / allowed
+        if required is None:
+            return SlowLimits(quadratic, None, use, use)
+        of_cubic = tone.declared.cubic / required
+        return SlowLimits(quadratic, required / tone.per_metre.cubic, np.maximum(use, of_cubic), use)

@@ -22,7 +22,6 @@ from bisar_budget.analysis.vibration_limits import (
 from bisar_budget.budget.judged_rows import BOUND, REQUIREMENTS, FamilyRow, Judged, Judging, worded
 from bisar_budget.effects.declared import CUBIC, OTHER_MODEL, QUADRATIC
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
-from bisar_budget.effects.spectra import tone
 from bisar_budget.effects.vibration import (
     ECHO_CYCLES,
     NEAR_CYCLES,
@@ -48,7 +47,7 @@ class Vibrations:
 
     def __init__(self, judging: Judging, analysis: Analysis) -> None:
         mission, geometry, allocation = analysis.mission, analysis.geometry, analysis.allocation
-        self.judging, self.mission, self.geometry = judging, mission, geometry
+        self.judging, self.mission, self.geometry, self.slow_tones = judging, mission, geometry, analysis.slow_tones
         self.allocation, self.array = allocation, judging.array
         self.metric, self.tones = tone_limits(mission, allocation)
         self.noise = vibration_limits(mission, allocation, "islr")
@@ -121,20 +120,18 @@ class Vibrations:
         published, full = map(self.array, limits)
         return judged._replace(allowable_published=published, allowable_full=full)
 
-    def _phases(self, name: str, index: int) -> Floats:
-        """Quadratic and cubic phase of a line in its worst phase, (2, cases). [rad]"""
-        phase, cycles = self.to_phase * self.amplitudes[name][index], self.cycles[name][index]
-        return np.asarray(phase * np.abs(tone(math.pi * cycles)[:2]))
-
     def _line(self, model: str, name: str, index: int, is_there: Truths) -> "VibrationRow":
         """A vibration from one cycle per aperture on: as its echoes, or, where ISLR holds it, the power they take."""
         cycles, both = self.cycles[name][index], self._both[name][index]
         allowed = self.mission.requirements.cubic_phase_error
         is_near = cycles < ECHO_CYCLES
-        qpe = cubic = np.full(cycles.shape, math.nan)
+        what = subject(name, "vibration", "sinusoidal", entry=index)
+        qpe = cubic = judged = np.full(cycles.shape, math.nan)
         if is_near.any():
-            qpe, cubic = np.where(is_near, self._phases(name, index), math.nan)
-        is_over_phase = qpe > self.allocation.qpe_allowed(name) * BOUND
+            phases = self.slow_tones[what.id].declared
+            of_phases = (phases.quadratic, phases.cubic, phases.judged(self.allocation.autofocus_gain))
+            qpe, cubic, judged = np.where(is_near, of_phases, math.nan)
+        is_over_phase = judged > self.allocation.qpe_allowed(name) * BOUND
         if allowed is not None:
             is_over_phase |= cubic > allowed * BOUND
         level = 20 * np.log10(echo_level(np.minimum(both, LARGEST_ECHO)))
@@ -142,7 +139,7 @@ class Vibrations:
         is_over_both = np.zeros(is_there.shape, dtype=bool) if required is None else level > required + _ROUNDING_DB
         return self._row(
             model,
-            subject(name, "vibration", "sinusoidal", entry=index),
+            what,
             self.metric,
             self.amplitudes[name][index],
             self.tones.get(name),
@@ -158,22 +155,35 @@ class Vibrations:
         )
 
     def _slow(self, name: str, index: int, is_there: Truths) -> "VibrationRow":
-        """A vibration below one cycle per aperture: as the quadratic and cubic phase that it is."""
-        amplitude, cycles = self.amplitudes[name][index], self.cycles[name][index]
-        (qpe, cubic), limits = self._phases(name, index), slow_limits(self.mission, self.allocation, name, cycles)
-        without_autofocus = qpe / self.allocation.qpe_limit(name)
+        """A vibration below one cycle per aperture: as the quadratic and cubic phase that it is.
+
+        One along three axes is declared as the amplitude along the line of sight that uses as much.
+        """
+        what, cycles = subject(name, "vibration", "sinusoidal", entry=index), self.cycles[name][index]
+        tone = self.slow_tones[what.id]
+        limits = slow_limits(self.mission, self.allocation, tone)
+        declared, allowable = limits.use * limits.smallest, self.array(limits.smallest)
+        if not tone.hears_part:
+            declared = self.amplitudes[name][index]
+            with np.errstate(all="ignore"):
+                allowable = np.where(limits.use > 0, declared / limits.use, allowable)
+        does = tone.declared
+        without_autofocus = does.judged(1.0) / self.allocation.qpe_limit(name)
         judged = self.judging.row(
-            subject(name, "vibration", "sinusoidal", entry=index),
-            amplitude,
-            self.array(limits.smallest),
+            what,
+            declared,
+            allowable,
             without_autofocus=without_autofocus,
             is_info=self.mission.allocation.combine != "each",
         )
+        qpe, cubic = does.quadratic, does.cubic
         judged = judged._replace(
             binding=np.where(limits.is_cubic, *map(REQUIREMENTS.index, (CUBIC, QUADRATIC))).astype(np.int8),
             qpe_published_rad=qpe,
             cubic_rad=cubic,
-            quadratic_use=amplitude / limits.quadratic,
+            equal_loss_qpe_rad=does.judged(1.0),
+            rest_rad=does.rest,
+            quadratic_use=limits.quadratic_use,
         )
         same = VibrationLimits(limits.quadratic, limits.quadratic)
         if self.judging.is_whole:
@@ -342,7 +352,7 @@ def _row(
 
 def _seen(case: Case, one: VibrationRow, error: MotionError, value: Any) -> tuple[Note, ...]:
     metres = case.number(one.judged.declared) / case.number(one.per_metre)
-    seen = projected(case.mission, value, error, metres)
+    seen = projected(case.mission, value, error, metres, is_slow=one.is_slow)
     stated = () if seen or _unit(case, one) == "m" else (phrases.amplitude_of_acceleration(metres),)
     return (*stated, *seen)
 

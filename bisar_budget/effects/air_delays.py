@@ -19,10 +19,10 @@ from typing import Any
 import numpy as np
 
 from bisar_budget.constants import EARTH_RADIUS
-from bisar_budget.effects.changing_delays import changing_effects, departure_at_nodes
+from bisar_budget.effects.changing_delays import departure_at_nodes
 from bisar_budget.effects.combined import combined
 from bisar_budget.effects.effect import PLATFORMS, subject
-from bisar_budget.effects.random_effect import NODES, RandomEffect, RandomError, SensorCases, factor, sigmas
+from bisar_budget.effects.random_effect import NODES, RandomEffect, RandomError, SensorCases, factor
 from bisar_budget.effects.spectra import gauss_markov
 from bisar_budget.geometry import BistaticGeometry, PlatformState, Vectors, norm
 from bisar_budget.mission.model import Mission
@@ -213,10 +213,8 @@ def _changing(
     quadratic, cubic, left = (k * np.sqrt(power) for power in along[:3])
     # What spreads is a mean power, which has no coverage factor.
     published = RandomEffect(quadratic, cubic, left / seen.factor, *seen.moved(along.constant, along.linear))
-    found = changing_effects(seen.exact, group, half / correlation_time, is_phase_advanced=delay == CONTENT)
-    (quadratic, cubic, east, north, hidden), covariance = sigmas(found.covariance, found.sizes)
-    spread = k * np.sqrt(found.left) / seen.factor
-    return published, RandomEffect(quadratic, cubic, spread, east, north, covariance, hidden)
+    full = seen.of_gauss_markov(group[None], correlation_time, is_phase_advanced=delay == CONTENT)
+    return published, full
 
 
 def changing_air(

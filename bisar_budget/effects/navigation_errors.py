@@ -463,15 +463,13 @@ def _noise(seen: SensorCases, process: _Process, axes: Mapping[str, Floats], pat
     largest, sizes = parts_of_largest(seen.vector(process.sigma))
     found = gauss_markov(seen.aperture_time, process.correlation_time)
     courses = seen.courses(found.covariance) if seen.has_edge else np.zeros((0, NODES, 1))
-    sighted, heard, moved, moves = list[Floats](), list[Floats](), list[Floats](), list[Moves]()
+    sighted, moved, moves = list[Floats](), list[Floats](), list[Moves]()
     for name, of_platform in axes.items():
         place, directions = PLATFORMS.index(name), of_platform * sizes[:, None]
-        for kept, sight in ((sighted, seen.geometry.both[place].look), (heard, seen.sights[place])):
-            kept.append((directions * seen.vector(sight)).sum(axis=1))
+        sighted.append((directions * seen.vector(seen.geometry.both[place].look)).sum(axis=1))
         moved.append(seen.range_errors(place, directions[:, :, None]))
         moves.append(Moves(place, directions[:, :, None], courses))
-    along, along_heard = (np.sqrt(np.square(sum(one)).sum(axis=0)) for one in (sighted, heard))
-    (own, own_cubic, east, north, hidden), covariance = seen.of_orders(found.covariance, sum(moved))
+    along = np.sqrt(np.square(sum(sighted)).sum(axis=0))
     quadratic, cubic, left = (np.sqrt(one) for one in found[:3])
     return RandomError(
         subject=process.subject,
@@ -484,7 +482,7 @@ def _noise(seen: SensorCases, process: _Process, axes: Mapping[str, Floats], pat
             k * along * left / seen.factor,
             *seen.moved(found.constant * along**2, found.linear * along**2),
         ),
-        full=RandomEffect(own, own_cubic, k * along_heard * left / seen.factor, east, north, covariance, hidden),
+        full=seen.of_gauss_markov(np.asarray(sum(moved)), process.correlation_time),
         spreads=process.spreads,
         moves=tuple(moves),
     )

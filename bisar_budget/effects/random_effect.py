@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget.constants import ROUNDING
+from bisar_budget.effects.changing_delays import changing_effects
 from bisar_budget.effects.declared import ImagePlane, published_planes
 from bisar_budget.effects.effect import PLATFORMS, Subject, plain
 from bisar_budget.effects.sources import exact_ranges
@@ -234,6 +235,27 @@ class SensorCases:
         effects, sizes = weighted.sum(axis=2), np.square(np.abs(weighted).sum(axis=2)).sum(axis=1)
         (qpe, edge, east, north, hidden), covariance = sigmas(np.einsum("fec,gec->fgc", effects, effects), sizes)
         return published, RandomEffect(qpe, edge, 0.0 * k, east, north, covariance, hidden)
+
+    def of_gauss_markov(
+        self, courses: Floats, correlation_time: Any, *, is_phase_advanced: bool = False
+    ) -> RandomEffect:
+        """Effect by the full model of independent range errors of variance 1 that change as Gauss–Markov processes.
+
+        Parameters
+        ----------
+        courses : (errors, nodes, cases)
+            Range error of a unit of each, with the line of sight as it turns, and as data hear it. [m/unit]
+        correlation_time : float or (cases,)
+            [s]
+        is_phase_advanced : bool
+            See `changing_effects`.
+        """
+        k, ratio = self.exact.k, self.exact.half / correlation_time
+        each = [changing_effects(self.exact, one, ratio, is_phase_advanced=is_phase_advanced) for one in courses]
+        covariance, sizes, left = (sum(parts) for parts in zip(*each, strict=True))
+        (quadratic, cubic, east, north, hidden), covariance = sigmas(covariance, sizes)
+        # What spreads is a mean power, which has no coverage factor.
+        return RandomEffect(quadratic, cubic, k * np.sqrt(left) / self.factor, east, north, covariance, hidden)
 
     def of_motion(self, place: int, moved: Floats) -> tuple["RandomEffect", "RandomEffect"]:
         """The same of independent position errors of a platform, (errors, 3, nodes, cases). [m/unit]"""

@@ -34,7 +34,8 @@ from bisar_budget.constants import ROUNDING
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.random_effect import Moves, RandomError, SensorCases
 from bisar_budget.effects.spectra import Parts, PowerLawPiece, heard_parts, left_parts, tone
-from bisar_budget.geometry import FRAME_AXES, Vector, dot
+from bisar_budget.geometry import FRAME_AXES, BistaticGeometry, Vector, Vectors, dot
+from bisar_budget.image_plane import nodes, nodes_for
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
 from bisar_budget.mission.vibrations import AcceleratedSinusoid, FeltVibration, Spectrum, Vibration
@@ -189,18 +190,30 @@ class Line(NamedTuple):
     per_metre: Any = 1.0
 
 
-def along_line_of_sight(value: Any, error: MotionError, state: Any, metric: str, sight: Vector | None = None) -> Any:
-    """Amplitude (`pslr`) or rms (`islr`) along the line of sight at the aperture midpoint. [m]
+def along_line_of_sight(value: Any, ways: Sequence[Vectors], sight: Vectors, weights: Floats, metric: str) -> Any:
+    """Amplitude (`pslr`) or rms (`islr`) along the line of sight, as it turns over the aperture. [m]
 
-    A single value is along it. Of a vector, amplitudes along the axes of the error's frame, projections add: the
-    axes may vibrate in any phase. Rms values are taken for independent and add as squares. `sight` is what a metre
-    takes from the range, where that is not the line of sight.
+    That of each way is its root mean square over the aperture: no echo is higher, and as much spreads.
+    Projections of amplitudes add, as the axes may vibrate in any phase; rms values are taken for independent and add
+    as squares.
+
+    Parameters
+    ----------
+    value : sequence
+        Along each way. [m]
+    ways : sequence of Vectors
+        Unit vectors; floats, (cases,) or (nodes, cases).
+    sight : Vectors
+        What a metre takes from the range at the nodes, (nodes, cases).
+    weights : (nodes,)
+        Of the mean over the aperture.
+    metric : str
+        `pslr` or `islr`.
     """
-    if not isinstance(value, tuple):
-        return value if sight is None else value * np.abs(dot(state.look, sight))
-    along = [dot(axis, sight or state.look) for axis in state.frame(error.frame)]
-    floor = ROUNDING * np.sqrt(sum(one * one for one in along))
-    parts = [np.where(np.abs(one) > floor, one, 0.0) * size for one, size in zip(along, value, strict=True)]
+    floor, parts = ROUNDING * np.sqrt(weights @ sum(one * one for one in sight)), []
+    for way, size in zip(ways, value, strict=True):
+        along = np.sqrt(weights @ np.square(dot(way, sight)))
+        parts.append(np.where(along > floor, along, 0.0)[()] * size)
     return sum(map(np.abs, parts)) if metric == "pslr" else np.sqrt(sum(part * part for part in parts))
 
 
@@ -211,13 +224,23 @@ def sight_of(mission: Mission, name: str, geometry: Any = None) -> Vector:
     return found
 
 
-def counted(mission: Mission, name: str, value: Any, metric: str, geometry: Any = None) -> Any:
-    """The same of a platform of a mission: what changes the range, or the range less the direct path. [m]"""
-    platform = getattr(mission.platforms, name)
-    error: MotionError = platform.motion_error
-    state = getattr(geometry or mission.geometry, name)
-    sight = sight_of(mission, name, geometry) if mission.has_direct_path else None
-    return along_line_of_sight(value, error, state, metric, sight)
+def counted(mission: Mission, name: str, value: Any, metric: str, geometry: BistaticGeometry | None = None) -> Any:
+    """The same of a platform of a mission: what changes the range, or the range less the direct path. [m]
+
+    A single value is along the line of sight.
+    """
+    geometry = geometry or mission.geometry
+    is_vector, is_heard = isinstance(value, tuple), mission.has_direct_path
+    if not is_vector and not is_heard:
+        return value
+    T, place = mission.collection.aperture_time, PLATFORMS.index(name)
+    sampling = nodes(int(np.max(nodes_for(geometry, T, has_direct_path=is_heard))))
+    turned = geometry.at(np.multiply.outer(sampling.places, np.atleast_1d(T) / 2))
+    sight = turned.sights(has_direct_path=is_heard)[place]
+    error: MotionError = getattr(mission.platforms, name).motion_error
+    ways = getattr(geometry, name).frame(error.frame) if is_vector else [turned.both[place].look]
+    found = along_line_of_sight(value if is_vector else (value,), ways, sight, sampling.fit[0], metric)
+    return found if np.size(found) > 1 or np.ndim(T) else float(np.ravel(found)[0])
 
 
 def lines_of(mission: Mission, name: str, geometry: Any = None) -> list[Line]:
@@ -236,18 +259,22 @@ def unit_of_line(mission: Mission, name: str, entry: int) -> str:
     return "m/s^2" if entry < len(lines) and isinstance(lines[entry], AcceleratedSinusoid) else "m"
 
 
-def projected(mission: Mission, value: float | Vector, error: MotionError, along: float) -> tuple[Note, ...]:
+def projected(
+    mission: Mission, value: float | Vector, error: MotionError, along: float, *, is_slow: bool = False
+) -> tuple[Note, ...]:
     """Say of a vibration along three axes what is along the line of sight; nothing of one that is.
 
-    With a direct path say of either what is left in the range less the direct path.
+    With a direct path say of either what is left in the range less the direct path. One that `is_slow` does as much
+    as that.
     """
+    says = phrases.does_as_much_as_along_the_sight if is_slow else phrases.seen_of_vibration
     if not isinstance(value, tuple):
         stated = f"{format_quantity(value, 'm')} along the line of sight"
-        return (phrases.seen_of_vibration(stated, along, True),) if mission.has_direct_path else ()
+        return (says(stated, along, True),) if mission.has_direct_path else ()
     axes = ", ".join(
         f"{axis} {format_quantity(part, 'm')}" for axis, part in zip(FRAME_AXES[error.frame], value, strict=True)
     )
-    return (phrases.seen_of_vibration(axes, along, mission.has_direct_path),)
+    return (says(axes, along, mission.has_direct_path),)
 
 
 # ---------------------------------------------------------------------- below one cycle per aperture
@@ -283,22 +310,6 @@ class DeclaredPhase(NamedTuple):
     def judged(self, gain: Any) -> Any:
         """Magnitude of the phase that is held to a limit with autofocus' gain in it: `Declared.judged`. [rad]"""
         return np.hypot(self.qpe_rad, gain * self.hidden_rad)
-
-
-def slow_phases(mission: Mission, geometry: Any = None) -> list[DeclaredPhase]:
-    """Phases of the declared vibrations below one cycle per aperture, which count with those of other errors."""
-    T = mission.collection.aperture_time
-    found = []
-    for name in PLATFORMS:
-        for index, line in enumerate(lines_of(mission, name, geometry)):
-            cycles = line.frequency * T
-            is_slow = np.asarray(cycles < SLOWEST)[()]
-            if np.any(is_slow):
-                phase = is_slow * 2 * math.pi * line.amplitude / mission.radar.wavelength
-                row_id = subject(name, "vibration", "sinusoidal", entry=index).id
-                qpe, cubic = phase * quadratic_part(cycles), phase * cubic_part(cycles)
-                found.append(DeclaredPhase(row_id, name, qpe, cubic, is_there=is_slow))
-    return found
 
 
 def slow_moves(seen: SensorCases) -> Iterator[tuple[Subject, Moves]]:

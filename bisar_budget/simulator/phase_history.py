@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget.constants import SPEED_OF_LIGHT
-from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState, Vectors
+from bisar_budget.geometry import BistaticGeometry, GroundVector, PlatformState, Vector, Vectors
 from bisar_budget.image_plane import LEADING, Sampling, band_variance
 from bisar_budget.mission.model import Radar
 from bisar_budget.ranges.exact_ranges import ExactEffect, ExactRanges, followed
@@ -29,11 +29,15 @@ Complexes = NDArray[np.complex128]
 
 
 class PathSinusoid(NamedTuple):
-    """One vibration along the line of sight: amplitude 0 to peak [m], frequency [Hz], phase at τ = 0 [rad]."""
+    """One vibration: amplitude 0 to peak [m], frequency [Hz], phase at τ = 0 [rad].
+
+    It moves its platform along `axis`, a unit vector; along the line of sight, as it turns, where there is none.
+    """
 
     amplitude: float
     frequency: float
     phase: float = 0.0
+    axis: Vector | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,9 +71,9 @@ class PathError(NamedTuple):
     """Measured minus actual position of one platform, r̃(τ): (22) and what is faster.
 
     Position [m], velocity [m/s], acceleration [m/s²] and `course` [m], which is any other history, are
-    east-north-up; vibration is along the line of sight, positive away from the scene. `time_tag` [s] takes the true
-    path for what it is so much later. `wideband_rms` [m] is noise
-    of the pulses, white or within `wideband_band` (low, high) [Hz], and needs a generator.
+    east-north-up; noise is along the line of sight, positive away from the scene, and so is a vibration without an
+    axis. `time_tag` [s] takes the true path for what it is so much later. `wideband_rms` [m] is noise of the pulses,
+    white or within `wideband_band` (low, high) [Hz], and needs a generator.
     """
 
     position: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -290,7 +294,11 @@ def path(
         measured = measured + error.course.at(slow_time)
     along = np.zeros_like(slow_time)
     for sinusoid in error.sinusoids:
-        along += sinusoid.amplitude * np.sin(2 * math.pi * sinusoid.frequency * slow_time + sinusoid.phase)
+        course = sinusoid.amplitude * np.sin(2 * math.pi * sinusoid.frequency * slow_time + sinusoid.phase)
+        if sinusoid.axis is None:
+            along += course
+        else:
+            measured = measured + np.multiply.outer(course, sinusoid.axis)
     if error.wideband_rms:
         if rng is None:
             raise ValueError("wideband vibration needs a random generator")

@@ -496,8 +496,20 @@ def _flown_lines(mission: Mission) -> list[PathSinusoid]:
 
 def _sinusoids(mission: Mission, name: str) -> tuple[PathSinusoid, ...]:
     """Those of one platform."""
-    lines = (PathSinusoid(line.amplitude, line.frequency) for line in lines_of(mission, name))
+    count = len(getattr(mission.platforms, name).motion_error.vibration.sinusoidal)
+    lines = (one for entry in range(count) for one in sinusoids_of(mission, name, entry))
     return (*lines, *oscillator_sinusoids(mission, name))
+
+
+def sinusoids_of(mission: Mission, name: str, entry: int) -> list[PathSinusoid]:
+    """Motion of one declared vibration: of three axes along each, else along the line of sight."""
+    error: DeclaredError = getattr(mission.platforms, name).motion_error
+    line = error.vibration.sinusoidal[entry]
+    if not isinstance(line.displacement, tuple):
+        return [PathSinusoid(lines_of(mission, name)[entry].amplitude, line.frequency)]
+    axes = getattr(mission.geometry, name).frame(error.frame)
+    moved = zip(axes, line.displacement, strict=True)
+    return [PathSinusoid(size, line.frequency, axis=axis) for axis, size in moved if size]
 
 
 def pulses_for(mission: Mission, cells: int) -> int:

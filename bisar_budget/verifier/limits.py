@@ -155,7 +155,7 @@ def _cases(study: Study) -> Iterator[tuple[str, Case]]:
         for index, line in enumerate(lines_of(mission, name)):
             if line.frequency * study.collection.aperture_time < SLOWEST:
                 one = subject(name, "vibration", "sinusoidal", entry=index)
-                slow[one] = partial(phase_cases.slow_vibration, study, one, line)
+                slow[one] = partial(phase_cases.slow_vibration, study, one)
     swaying = slow | dict(vibration_cases(study))
     for owner in (*PLATFORMS, "mission"):
         for one in sorted((one for one in swaying if one.owner == owner), key=_order):

@@ -4,10 +4,10 @@ import math
 from typing import Any
 
 from bisar_budget.analysis.allocation import ROOM, range_walk_cap
-from bisar_budget.analysis.vibration_limits import slow_limits
 from bisar_budget.effects.declared import CUBIC
 from bisar_budget.effects.effect import ErrorSource, Subject
-from bisar_budget.effects.vibration import Line, unit_of_line
+from bisar_budget.effects.slow_tones import PHASES
+from bisar_budget.effects.vibration import lines_of, unit_of_line
 from bisar_budget.findings.images import Verdict
 from bisar_budget.geometry import GroundVector
 from bisar_budget.phrases import NOTHING, Note
@@ -15,6 +15,7 @@ from bisar_budget.ranges.exact_ranges import ExactEffect
 from bisar_budget.simulator.collection import CELLS, MAX_CELLS, OVERSAMPLING, RANGE_CELLS
 from bisar_budget.simulator.impulse_response import highest, impulse_response, line_at, row_of_peak
 from bisar_budget.simulator.phase_history import Errors, NoGroundPointError, PathError, PathSinusoid
+from bisar_budget.simulator.point import sinusoids_of
 from bisar_budget.verifier import reasons
 from bisar_budget.verifier.aperture_reading import READ_CELLS, ApertureReading
 from bisar_budget.verifier.study import Responses, Sizes, Study
@@ -41,30 +42,45 @@ def quadratic(study: Study, source: ErrorSource) -> Verdict:
     return verdict._replace(boundary_autofocus=farther, **refocused(study, [(source, farther)], budget))
 
 
-def slow_vibration(study: Study, of: Subject, line: Line) -> Verdict:
-    """Limit of a vibration below one cycle per aperture, in its worst phase: its turning point at mid-aperture."""
-    name, allocation, budget = of.owner, study.allocation, study.allocation.qpe_limit(of.owner)
-    limits = slow_limits(study.mission, allocation, name, line.frequency * study.collection.aperture_time)
-    size = limits.quadratic / allocation.autofocus_gain
-    unit = unit_of_line(study.mission, name, of.entry or 0)
-    blank = study.blank(of.id, size * line.per_metre, unit, budget_rad=budget)
+def slow_vibration(study: Study, of: Subject) -> Verdict:
+    """Limit of a vibration below one cycle per aperture: each of its axes alone, in its worst phase.
+
+    The axes of a vector are so large together that by exact ranges they reach the limit, as the phases add up.
+    """
+    name, entry, budget = of.owner, of.entry or 0, study.allocation.qpe_limit(of.owner)
+    mission, tone = study.mission, study.analysis.slow_tones[of.id]
+    line, size = lines_of(mission, name)[entry], budget / float(tone.per_metre.judged(1.0)[0])
+    blank = study.blank(of.id, size * float(line.per_metre), unit_of_line(mission, name, entry), budget_rad=budget)
+    lines = sinusoids_of(mission, name, entry)
+    use = float(tone.declared.judged(1.0)[0]) / budget
+    if not use or (len(lines) == 1 and lines[0].axis is None):
+        lines, use = [PathSinusoid(size, line.frequency)], 1.0
     try:
-        both = [
-            Errors().of(name, PathError(sinusoids=(PathSinusoid(size, line.frequency, phase),)))
-            for phase in (math.pi / 2, -math.pi / 2)
-        ]
-        images = study.images(max(both, key=lambda errors: abs(study.collection.effect(errors).quadratic)))
-        reading = study.read(images)
+        worst = [_worst_phase(study, name, one._replace(amplitude=one.amplitude / use)) for one in lines]
+        images = [study.images(errors) for errors in worst]
+        readings = [study.read(one) for one in images]
     except ValueError as error:
         return _without_image(study, blank, error)
-    measured = abs(reading.quadratic)
+    both = list(zip(images, readings, strict=True))
+    measured = [study.equal_loss(*one) for one in both]
+    largest = measured.index(max(measured))
+    phases = [predicted(one.effect) for one in images]
+    summed = {key: math.fsum(one[key] for one in phases) for key in phases[0] if key.endswith("_rad")}
     return blank._replace(
-        **predicted(images.effect),
-        **_of_response(study, images, reading),
-        measured_qpe_rad=measured,
-        verdict=compare(measured / budget - 1, TOLERANCE),
-        reason=reasons.in_its_worst_phase(),
+        **(phases[largest] | summed),
+        **_of_response(study, *both[largest]),
+        measured_qpe_rad=math.fsum(abs(reading.quadratic) for reading in readings),
+        measured_equal_loss_qpe_rad=math.fsum(measured),
+        verdict=compare(math.fsum(measured) / budget - 1, TOLERANCE),
+        reason=reasons.in_its_worst_phase(len(lines)),
     )
+
+
+def _worst_phase(study: Study, name: str, line: PathSinusoid) -> Errors:
+    """The vibration in the phase in which exact ranges lose most of the peak."""
+    turned = (line._replace(phase=2 * math.pi * step / PHASES) for step in range(PHASES))
+    every = [Errors().of(name, PathError(sinusoids=(one,))) for one in turned]
+    return max(every, key=lambda errors: study.collection.effect(errors).equal_loss)
 
 
 def _bound_elsewhere(study: Study, source: ErrorSource) -> Verdict:

@@ -124,9 +124,10 @@ def no_image_of_a_vibration(cycles: float, why: str) -> str:
 
 # ---------------------------------------------------------------------- what a verdict rests on
 @phrase
-def in_its_worst_phase() -> str:
-    """Said of a vibration below one cycle per aperture."""
-    return "in the worst phase of the vibration"
+def in_its_worst_phase(axes: int) -> str:
+    """Said of a vibration below one cycle per aperture, and of how many axes move."""
+    each = f", each of {axes} axes alone: their phases add up" if axes > 1 else ""
+    return f"in the worst phase of the vibration{each}"
 
 
 @phrase

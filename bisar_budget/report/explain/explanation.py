@@ -33,7 +33,8 @@ from bisar_budget.effects.air_delays import CONTENT, ELECTRONS, dispersed_legs, 
 from bisar_budget.effects.combined import phase_parts
 from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.effect import MOTION_UNITS, ErrorSource
-from bisar_budget.effects.vibration import cubic_part, lines_of, near_lines, quadratic_part, sight_of, worst_phases
+from bisar_budget.effects.slow_tones import SlowTone
+from bisar_budget.effects.vibration import lines_of, near_lines, sight_of, worst_phases
 from bisar_budget.faults import KeyPath, changes_words, printable
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.requirement import JudgedRequirement
@@ -143,7 +144,7 @@ def _to_utilization(mission: Mission, found: MissionFindings, row: Row) -> Itera
     elif row.subject.kind == "islr":
         yield from explained_islr(analysis, found.allocation, row)
     elif row.subject.kind == "vibration":
-        yield from _vibration_in_its_unit(mission, found.allocation, row)
+        yield from _vibration_in_its_unit(mission, found.allocation, row, analysis.slow_tones.get(row.id))
     elif row.subject.kind in (QUADRATIC, "autofocus_pull_in"):
         yield from _phase_aggregate(together, found, row)
     elif row.subject.kind == CUBIC:
@@ -240,24 +241,26 @@ def _budget(analysis: Analysis, source: ErrorSource, row: Row) -> Iterator[Step]
     yield from smallest_size(row, sizes)
 
 
-def _vibration_in_its_unit(mission: Mission, allocation: Allocation, row: Row) -> Iterator[Step]:
+def _vibration_in_its_unit(
+    mission: Mission, allocation: Allocation, row: Row, tone: SlowTone | None
+) -> Iterator[Step]:
     """The same of a line in metres; of one that the file states in g, with the way from there and back."""
     lines = lines_of(mission, row.owner)
     entry = row.subject.entry or 0
     if row.unit == "m" or row.declared is None:
-        yield from _vibration(mission, allocation, row)
+        yield from _vibration(mission, allocation, row, tone)
         return
     line = lines[entry]
     sizes = ("declared", "allowable", "allowable_published", "allowable_full")
     metres = {name: getattr(row, name) and getattr(row, name) / line.per_metre for name in sizes}
-    yield from _vibration(mission, allocation, row._replace(unit="m", **metres))
+    yield from _vibration(mission, allocation, row._replace(unit="m", **metres), tone)
     for name in ("declared", "allowable"):
         if (size := getattr(row, name)) is not None:
             values = {"A": metres[name], "f": line.frequency}
             yield step(f"As an acceleration, {name}", WorkedEquation(name, "A*(2*π*f)^2", values, size, row.unit))
 
 
-def _vibration(mission: Mission, allocation: Allocation, row: Row) -> Iterator[Step]:
+def _vibration(mission: Mission, allocation: Allocation, row: Row, tone: SlowTone | None) -> Iterator[Step]:
     """From the file to the limits of both models, for one line, lines near each other, or noise."""
     platform, entry = row.owner, row.subject.entry or 0
     is_sinusoid, is_sum = row.subject.axis != "wideband", row.subject.axis == "sinusoidal.sum"
@@ -271,23 +274,22 @@ def _vibration(mission: Mission, allocation: Allocation, row: Row) -> Iterator[S
         yield step(f"Declared in {place(mission, path)}", as_written(mission, path))
         if is_sinusoid:
             yield from _displacement(mission, platform, entry)
-        yield from _line_of_sight(mission, platform, is_sinusoid, entry, row.declared)
+        if row.metric != QUADRATIC:
+            yield from _line_of_sight(mission, platform, is_sinusoid, entry, row.declared)
     if row.evidence:
         yield step("Evidence", printable(row.evidence))
     wavelength = mission.radar.wavelength
-    if row.qpe_full_rad is not None and row.declared is not None:
-        line = lines_of(mission, platform)[entry]
-        values = {
-            "A": row.declared,
-            "λ": wavelength,
-            "q": quadratic_part(line.frequency * mission.collection.aperture_time),
-        }
-        worked = WorkedEquation("QPE_full", "2*π*A*q/λ", values, row.qpe_full_rad, "rad")
-        if row.metric == QUADRATIC:  # the same by both models
-            yield step("By either model", WorkedEquation("QPE", "2*π*A*q/λ", values, row.qpe_full_rad, "rad"))
-        yield step("Quadratic phase in the worst phase, q = 7.5·j₂(π·f·T)", worked)
+    if tone is not None and row.qpe_full_rad is not None:
+        does, gain = tone.declared, allocation.autofocus_gain
+        phases = (does.quadratic, does.cubic, does.hidden(gain), does.rest)
+        quadratic, cubic, hidden, rest = (float(part[0]) for part in phases)
+        yield step(
+            "By exact ranges, each axis in its worst phase, with what the displacement of the image adds",
+            f"QPE {with_unit(quadratic, 'rad')}, cubic {with_unit(cubic, 'rad')}, hidden {with_unit(hidden, 'rad')}, "
+            f"beyond the cubic {with_unit(rest, 'rad')} rms",
+        )
         if row.metric == QUADRATIC:
-            yield from _slow_vibration(mission, allocation, row, line.frequency * mission.collection.aperture_time)
+            yield from _slow_vibration(mission, allocation, row, tone)
             return
     by_echoes = row.metric == "pslr"
     requirement = mission.requirements.pslr if by_echoes else mission.requirements.islr
@@ -354,26 +356,33 @@ def _limit(
     yield WorkedEquation(model, "sqrt(2)*σ", {"σ": rms}, result, "m")
 
 
-def _slow_vibration(mission: Mission, allocation: Allocation, row: Row, cycles: float) -> Iterator[Step]:
+def _slow_vibration(mission: Mission, allocation: Allocation, row: Row, tone: SlowTone) -> Iterator[Step]:
     """From the phases of a vibration below one cycle per aperture to the amplitude that they allow."""
-    platform, wavelength = row.owner, mission.radar.wavelength
-    values = {"A": row.declared or 0.0, "λ": wavelength, "c": cubic_part(cycles)}
-    worked = WorkedEquation("cubic", "2*π*A*c/λ", values, row.cubic_rad or 0.0, "rad")
-    yield step("Cubic phase in the worst phase, c = 17.5·j₃(π·f·T)", worked)
-    limit = allocation.qpe_allowed(platform)
-    yield from limit_steps(allocation, platform, limit)
-    limits, required = slow_limits(mission, allocation, platform, cycles), mission.requirements.cubic_phase_error
-    values = {"limit": limit, "λ": wavelength, "q": quadratic_part(cycles)}
-    worked = WorkedEquation("by_QPE", "limit*λ/(2*π*q)", values, limits.quadratic, "m")
-    yield step("Allowable by the quadratic phase", worked)
-    sizes = {"by_QPE": limits.quadratic}
-    if required is not None and limits.cubic is not None:
-        values = {"required": required, "λ": wavelength, "c": cubic_part(cycles)}
-        worked = WorkedEquation("by_cubic", "required*λ/(2*π*c)", values, limits.cubic, "m")
+    limit, gain, required = allocation.qpe_allowed(row.owner), allocation.autofocus_gain, mission.requirements
+    yield from limit_steps(allocation, row.owner, limit)
+    limits = slow_limits(mission, allocation, tone)
+    by_qpe, use = float(limits.quadratic[0]), float(limits.use[0])
+    sizes = {"by_QPE": by_qpe}
+    values = {"limit": limit, "effect/unit": float(tone.per_metre.judged(gain)[0])}
+    worked = WorkedEquation("by_QPE", "limit/(effect/unit)", values, by_qpe, "m")
+    yield step("Allowable along the line of sight by the quadratic phase of a metre there", worked)
+    if required.cubic_phase_error is not None and limits.cubic is not None:
+        sizes["by_cubic"] = float(limits.cubic[0])
+        values = {"limit": required.cubic_phase_error, "effect/unit": float(tone.per_metre.cubic[0])}
+        worked = WorkedEquation("by_cubic", "limit/(effect/unit)", values, sizes["by_cubic"], "m")
         yield step("Allowable by requirements.cubic_phase_error", worked)
-        sizes["by_cubic"] = limits.cubic
-    smallest = "by_cubic" if limits.is_cubic else "by_QPE"
-    yield step("Allowable, the smallest", WorkedEquation("allowable", smallest, sizes, limits.smallest, "m"))
+    smallest = min(sizes, key=lambda name: sizes[name])
+    yield step("The smallest", WorkedEquation("smallest", smallest, sizes, sizes[smallest], "m"))
+    judged = {"judged": float(tone.declared.judged(gain)[0]), "limit": limit}
+    if limits.is_cubic[0]:
+        judged = {"judged": float(tone.declared.cubic[0]), "limit": required.cubic_phase_error or 0.0}
+    yield step(
+        "Part of the limit that the declared vibration uses", WorkedEquation("use", "judged/limit", judged, use, "")
+    )
+    values = {"use": use, "smallest": sizes[smallest]}
+    if tone.hears_part:
+        what = "Declared, the amplitude along the line of sight that uses as much"
+        yield step(what, WorkedEquation("declared", "use*smallest", values, row.declared or 0.0, "m"))
 
 
 def _displacement(mission: Mission, platform: str, entry: int) -> Iterator[Step]:

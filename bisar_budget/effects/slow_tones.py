@@ -1,0 +1,192 @@
+"""Vibrations below three cycles per aperture, by exact ranges: as the phases that they are, in the worst phase.
+
+A vibration moves its platform by A·cos(2πfτ + ψ) along an axis, and its phase ψ is not known. What it does is looked
+at in phases all around, and the worst counts: of a small vibration as a cosine and a sine do it, and where the second
+order matters by the image point of exact ranges. The line of sight turns under it, so that motion along the track
+counts too, and the image is displaced, which defocuses as well. The squares of phases run over ψ as harmonics, of a
+small vibration as the second alone, so that few phases give the largest. The axes may be in any phase: what each does
+adds.
+
+A vibration that is stated along the line of sight moves along it as it turns. Derived here; held to exact ranges in
+36 phases (`tests/effects/test_slow_tones.py`).
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from bisar_budget.effects.declared import FLOOR_RAD, SHARE
+from bisar_budget.effects.effect import PLATFORMS, Subject, subject
+from bisar_budget.effects.sources import exact_ranges
+from bisar_budget.effects.vibration import ECHO_CYCLES, SLOWEST, DeclaredPhase
+from bisar_budget.geometry import BistaticGeometry, Vectors
+from bisar_budget.image_plane import nodes_for
+from bisar_budget.mission.model import Mission
+from bisar_budget.mission.platforms import MotionError
+from bisar_budget.ranges.exact_ranges import FINE, STILL, ExactRanges, Floats, Places, Truths, followed
+
+PHASES = 16  # in which a large vibration is followed
+ANGLES = 2 * math.pi * np.arange(PHASES) / PHASES
+TURNED = np.stack((np.cos(ANGLES), np.sin(ANGLES)), axis=1)  # what a cosine and a sine have in each
+BETWEEN = 16  # values between two of them, of the harmonics that they give
+TOGETHER = 1 << 12  # lanes that are followed at once
+
+
+@dataclass(frozen=True, eq=False)
+class TonePhases:
+    """What a vibration does in `PHASES` phases all around, of each of its axes, (axes, PHASES, cases) each.
+
+    Quadratic and cubic phase at the aperture edge; the hidden phase, and the rms beyond the cubic. [rad]
+    """
+
+    quadratics: Floats
+    cubics: Floats
+    hiddens: Floats
+    rests: Floats
+
+    @cached_property
+    def quadratic(self) -> Floats:
+        """Quadratic phase in the worst phases, (cases,). [rad]"""
+        return _worst(np.square(self.quadratics))
+
+    @cached_property
+    def cubic(self) -> Floats:
+        """Cubic phase in the worst phases, (cases,). [rad]"""
+        return _worst(np.square(self.cubics))
+
+    @cached_property
+    def rest(self) -> Floats:
+        """Rms beyond the cubic in the worst phases, (cases,). [rad]"""
+        return _worst(np.square(self.rests))
+
+    def judged(self, gain: Any) -> Floats:
+        """Phase that is held to a limit with the gain of autofocus in it: `Declared.judged`, (cases,). [rad]"""
+        return _worst(np.square(self.quadratics) + np.square(gain * self.hiddens))
+
+    def hidden(self, gain: Any) -> Floats:
+        """Hidden phase of as large a judged phase beside the worst quadratic phase, (cases,). [rad]"""
+        return np.asarray(np.sqrt(np.maximum(self.judged(gain) ** 2 - self.quadratic**2, 0.0)) / gain)
+
+
+class SlowTone(NamedTuple):
+    """A vibration of a row: what a metre of the range that data hear does, and what the declared one does.
+
+    `is_there` says in which cases it has fewer than three cycles per aperture. Of a vibration along three axes, or
+    beside a direct path, the range `hears_part`.
+    """
+
+    subject: Subject
+    is_there: Truths
+    per_metre: TonePhases
+    declared: TonePhases
+    hears_part: bool
+
+
+def slow_tones(mission: Mission, geometry: BistaticGeometry, cases: int) -> dict[str, SlowTone]:
+    """Every declared vibration that has fewer than three cycles per aperture in any case, by the id of its row."""
+    T, found = mission.collection.aperture_time, dict[str, SlowTone]()
+    exact: ExactRanges | None = None
+    for place, name in enumerate(PLATFORMS):
+        error: MotionError = getattr(mission.platforms, name).motion_error
+        for index, line in enumerate(error.vibration.sinusoidal):
+            is_there = np.broadcast_to(np.asarray(line.frequency * T < ECHO_CYCLES), (cases,))
+            if not is_there.any():
+                continue
+            if exact is None:
+                count = nodes_for(geometry, T, has_direct_path=mission.has_direct_path)
+                exact = exact_ranges(mission, geometry, max(FINE, int(np.max(count))), cases)
+            tone = _Tone(exact, place, line.frequency)
+            x, y, z = (track / exact.ranges[place] for track in exact.tracks[place])
+            value = line.displacement
+            is_vector = isinstance(value, tuple)
+            ways = getattr(geometry, name).frame(error.frame) if is_vector else [(x, y, z)]
+            sizes = value if is_vector else (value,)
+            of_axes = np.array([tone.of(way, size) for way, size in zip(ways, sizes, strict=True)])
+            declared, of_metre = TonePhases(*np.moveaxis(of_axes, 1, 0)), TonePhases(*tone.of_range(1.0)[:, None])
+            what = subject(name, "vibration", "sinusoidal", entry=index)
+            found[what.id] = SlowTone(what, is_there, of_metre, declared, is_vector or exact.has_direct_path)
+    return found
+
+
+def slow_phases(mission: Mission, found: Mapping[str, SlowTone], gain: Any) -> list[DeclaredPhase]:
+    """Phases of the vibrations below one cycle per aperture, which count with those of other errors."""
+    T, phases = mission.collection.aperture_time, []
+    for row_id, one in found.items():
+        line = getattr(mission.platforms, one.subject.owner).motion_error.vibration.sinusoidal[one.subject.entry or 0]
+        is_slow = np.asarray(line.frequency * T < SLOWEST)[()]
+        if np.any(is_slow):
+            does = one.declared
+            quadratic, cubic, hidden = (
+                np.where(is_slow, part, 0.0) for part in (does.quadratic, does.cubic, does.hidden(gain))
+            )
+            phase = DeclaredPhase(row_id, one.subject.owner, quadratic, cubic, is_there=is_slow)
+            phases.append(phase._replace(hidden_rad=hidden))
+    return phases
+
+
+class _Tone:
+    """A frequency of a platform's motion in many cases."""
+
+    def __init__(self, exact: ExactRanges, place: int, frequency: Any) -> None:
+        self.exact, self.place = exact, place
+        self.angle = 2 * math.pi * frequency * exact.times
+
+    def of_range(self, size: Any) -> Floats:
+        """Effects of a range error of an amplitude, a number or (nodes, cases), of the first order in it. [m]
+
+        Those of `TonePhases` in all phases, (4, PHASES, cases). [rad]
+        """
+        exact = self.exact
+        range_error = np.array((np.cos(self.angle), -np.sin(self.angle))) * size
+        effect = exact.effect(range_error)
+        left = exact.left_of_small(range_error, (effect.east, effect.north))
+        quadratic, cubic = (TURNED @ both for both in (effect.qpe, effect.cubic))
+        hidden, rest = exact.unresolved(np.tensordot(TURNED, left, 1))
+        return np.array((quadratic, cubic, hidden, rest))
+
+    def of(self, way: Vectors, size: Any) -> Floats:
+        """Effects of a motion along a way, floats, (cases,) or (nodes, cases), of any size [m], as `of_range`."""
+        exact, cases = self.exact, self.exact.half.size
+        small, size = self.of_range(exact.along(self.place, way) * size), np.broadcast_to(np.abs(size), (cases,))
+        quadratic, cubic, hidden, moved = exact.most_per_metre
+        reach = size * (1 + moved)
+        grows = reach * reach / exact.nearest_node
+        of_quadratic, of_cubic, of_hidden = (np.abs(part).max(axis=0) for part in small[:3])
+        share = SHARE * np.hypot(of_quadratic, of_hidden)
+        is_large = np.asarray((quadratic + hidden) * grows > np.maximum(FLOOR_RAD, share))
+        is_large |= cubic * grows > np.maximum(FLOOR_RAD, SHARE * of_cubic)
+        some = np.flatnonzero(is_large & (size > 0))
+        for first in range(0, some.size, TOGETHER // PHASES):
+            here = some[first : first + TOGETHER // PHASES]
+            small[..., here] = self._of_large(way, size, here)
+        return small
+
+    def _of_large(self, way: Vectors, size: Floats, some: Places) -> Floats:
+        """The same in some cases by exact ranges.
+
+        Where no ground point has the range history of a phase, that of the whole motion stands for each.
+        """
+        case, turned = np.repeat(some, PHASES), np.tile(ANGLES, some.size)
+        angle = self.angle[:, case] if self.angle.shape[1] > 1 else self.angle
+        course = size[case] * np.cos(angle + turned)
+        moved = [_of_case(part, case) * course for part in way]
+        shifts = [moved, STILL] if self.place == 0 else [STILL, moved]
+        point = followed(self.exact, np.zeros_like(course), shifts, case)
+        found = np.array((point.quadratic, point.cubic, point.hidden, point.rest))
+        found = np.moveaxis(found.reshape(4, some.size, PHASES), 2, 1)
+        return np.where(np.isnan(found), 2 * self.exact.k[some] * size[some], found)
+
+
+def _of_case(part: Any, case: Places) -> Any:
+    return part[..., case] if np.ndim(part) and np.shape(part)[-1] > 1 else part
+
+
+def _worst(squares: Floats) -> Floats:
+    """Roots of the largest squares of axes, by values around a circle, (axes, PHASES, cases), added."""
+    steps = PHASES * BETWEEN
+    around = np.fft.irfft(np.fft.rfft(squares, axis=1), steps, axis=1) * BETWEEN
+    return np.asarray(np.sqrt(np.maximum(around.max(axis=1), 0.0)).sum(axis=0))
