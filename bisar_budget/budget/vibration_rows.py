@@ -162,17 +162,13 @@ class Vibrations:
         what, cycles = subject(name, "vibration", "sinusoidal", entry=index), self.cycles[name][index]
         tone = self.slow_tones[what.id]
         limits = slow_limits(self.mission, self.allocation, tone)
-        declared, allowable = limits.use * limits.smallest, self.array(limits.smallest)
-        if not tone.hears_part:
-            declared = self.amplitudes[name][index]
-            with np.errstate(all="ignore"):
-                allowable = np.where(limits.use > 0, declared / limits.use, allowable)
+        declared = limits.use * limits.smallest if tone.hears_part else self.amplitudes[name][index]
         does = tone.declared
         without_autofocus = does.judged(1.0) / self.allocation.qpe_limit(name)
         judged = self.judging.row(
             what,
             declared,
-            allowable,
+            self.array(limits.smallest),
             without_autofocus=without_autofocus,
             is_info=self.mission.allocation.combine != "each",
         )

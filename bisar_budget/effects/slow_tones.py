@@ -7,8 +7,8 @@ counts too, and the image is displaced, which defocuses as well. The squares of 
 small vibration as the second alone, so that few phases give the largest. The axes may be in any phase: what each does
 adds.
 
-A vibration that is stated along the line of sight moves along it as it turns. Derived here; held to exact ranges in
-36 phases (`tests/effects/test_slow_tones.py`).
+A vibration that is stated along the line of sight moves along it as it turns, and is all range error. Derived here;
+held to exact ranges in 36 phases (`tests/effects/test_slow_tones.py`).
 """
 
 import math
@@ -47,6 +47,11 @@ class TonePhases:
     cubics: Floats
     hiddens: Floats
     rests: Floats
+
+    def axes(self) -> list["TonePhases"]:
+        """Those of each axis alone."""
+        parts = (self.quadratics, self.cubics, self.hiddens, self.rests)
+        return [TonePhases(*(part[[axis]] for part in parts)) for axis in range(len(self.quadratics))]
 
     @cached_property
     def quadratic(self) -> Floats:
@@ -88,7 +93,7 @@ class SlowTone(NamedTuple):
 
 def slow_tones(mission: Mission, geometry: BistaticGeometry, cases: int) -> dict[str, SlowTone]:
     """Every declared vibration that has fewer than three cycles per aperture in any case, by the id of its row."""
-    T, found = mission.collection.aperture_time, dict[str, SlowTone]()
+    T, is_heard, found = mission.collection.aperture_time, mission.has_direct_path, dict[str, SlowTone]()
     exact: ExactRanges | None = None
     for place, name in enumerate(PLATFORMS):
         error: MotionError = getattr(mission.platforms, name).motion_error
@@ -97,18 +102,21 @@ def slow_tones(mission: Mission, geometry: BistaticGeometry, cases: int) -> dict
             if not is_there.any():
                 continue
             if exact is None:
-                count = nodes_for(geometry, T, has_direct_path=mission.has_direct_path)
+                count = nodes_for(geometry, T, has_direct_path=is_heard)
                 exact = exact_ranges(mission, geometry, max(FINE, int(np.max(count))), cases)
             tone = _Tone(exact, place, line.frequency)
-            x, y, z = (track / exact.ranges[place] for track in exact.tracks[place])
-            value = line.displacement
-            is_vector = isinstance(value, tuple)
-            ways = getattr(geometry, name).frame(error.frame) if is_vector else [(x, y, z)]
-            sizes = value if is_vector else (value,)
-            of_axes = np.array([tone.of(way, size) for way, size in zip(ways, sizes, strict=True)])
+            value, hears_all = line.displacement, not (is_heard or isinstance(line.displacement, tuple))
+            if hears_all:  # and what its displacement adds in second order is a rounding of it
+                of_axes = tone.of_range(value)[None]
+            else:
+                x, y, z = (track / exact.ranges[place] for track in exact.tracks[place])
+                axes, sizes = [(x, y, z)], (value,)
+                if isinstance(value, tuple):
+                    axes, sizes = getattr(geometry, name).frame(error.frame), value
+                of_axes = np.array([tone.of(axis, size) for axis, size in zip(axes, sizes, strict=True)])
             declared, of_metre = TonePhases(*np.moveaxis(of_axes, 1, 0)), TonePhases(*tone.of_range(1.0)[:, None])
             what = subject(name, "vibration", "sinusoidal", entry=index)
-            found[what.id] = SlowTone(what, is_there, of_metre, declared, is_vector or exact.has_direct_path)
+            found[what.id] = SlowTone(what, is_there, of_metre, declared, not hears_all)
     return found
 
 

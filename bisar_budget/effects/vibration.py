@@ -34,7 +34,7 @@ from bisar_budget.constants import ROUNDING
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.random_effect import Moves, RandomError, SensorCases
 from bisar_budget.effects.spectra import Parts, PowerLawPiece, heard_parts, left_parts, tone
-from bisar_budget.geometry import FRAME_AXES, BistaticGeometry, Vector, Vectors, dot
+from bisar_budget.geometry import FRAME_AXES, BistaticGeometry, Vector, dot
 from bisar_budget.image_plane import nodes, nodes_for
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
@@ -190,33 +190,6 @@ class Line(NamedTuple):
     per_metre: Any = 1.0
 
 
-def along_line_of_sight(value: Any, ways: Sequence[Vectors], sight: Vectors, weights: Floats, metric: str) -> Any:
-    """Amplitude (`pslr`) or rms (`islr`) along the line of sight, as it turns over the aperture. [m]
-
-    That of each way is its root mean square over the aperture: no echo is higher, and as much spreads.
-    Projections of amplitudes add, as the axes may vibrate in any phase; rms values are taken for independent and add
-    as squares.
-
-    Parameters
-    ----------
-    value : sequence
-        Along each way. [m]
-    ways : sequence of Vectors
-        Unit vectors; floats, (cases,) or (nodes, cases).
-    sight : Vectors
-        What a metre takes from the range at the nodes, (nodes, cases).
-    weights : (nodes,)
-        Of the mean over the aperture.
-    metric : str
-        `pslr` or `islr`.
-    """
-    floor, parts = ROUNDING * np.sqrt(weights @ sum(one * one for one in sight)), []
-    for way, size in zip(ways, value, strict=True):
-        along = np.sqrt(weights @ np.square(dot(way, sight)))
-        parts.append(np.where(along > floor, along, 0.0)[()] * size)
-    return sum(map(np.abs, parts)) if metric == "pslr" else np.sqrt(sum(part * part for part in parts))
-
-
 def sight_of(mission: Mission, name: str, geometry: Any = None) -> Vector:
     """Part of a metre of a platform's motion that the range loses, or the range less the direct path. [-]"""
     sights = (geometry or mission.geometry).sights(has_direct_path=mission.has_direct_path)
@@ -224,23 +197,40 @@ def sight_of(mission: Mission, name: str, geometry: Any = None) -> Vector:
     return found
 
 
-def counted(mission: Mission, name: str, value: Any, metric: str, geometry: BistaticGeometry | None = None) -> Any:
-    """The same of a platform of a mission: what changes the range, or the range less the direct path. [m]
+def seen_of_axes(
+    mission: Mission, name: str, *, is_vector: bool, geometry: BistaticGeometry | None = None
+) -> list[Any]:
+    """What the range has of a metre along each axis of a platform's error, root mean square over the aperture. [-]
 
-    A single value is along the line of sight.
+    The line of sight turns. No echo is higher than by the rms, and as much spreads. A vibration that is no vector is
+    along the line of sight, of which the range has all, and the range less the direct path a part.
     """
-    geometry = geometry or mission.geometry
-    is_vector, is_heard = isinstance(value, tuple), mission.has_direct_path
+    geometry, is_heard = geometry or mission.geometry, mission.has_direct_path
     if not is_vector and not is_heard:
-        return value
+        return [1.0]
     T, place = mission.collection.aperture_time, PLATFORMS.index(name)
     sampling = nodes(int(np.max(nodes_for(geometry, T, has_direct_path=is_heard))))
     turned = geometry.at(np.multiply.outer(sampling.places, np.atleast_1d(T) / 2))
     sight = turned.sights(has_direct_path=is_heard)[place]
     error: MotionError = getattr(mission.platforms, name).motion_error
     ways = getattr(geometry, name).frame(error.frame) if is_vector else [turned.both[place].look]
-    found = along_line_of_sight(value if is_vector else (value,), ways, sight, sampling.fit[0], metric)
-    return found if np.size(found) > 1 or np.ndim(T) else float(np.ravel(found)[0])
+    mean = sampling.fit[0]
+    floor = ROUNDING * np.sqrt(mean @ sum(one * one for one in sight))
+    along = [np.sqrt(mean @ np.square(dot(way, sight))) for way in ways]
+    found = [np.where(one > floor, one, 0.0) for one in along]
+    return found if np.ndim(T) or found[0].size > 1 else [one.item() for one in found]
+
+
+def counted(mission: Mission, name: str, value: Any, metric: str, geometry: BistaticGeometry | None = None) -> Any:
+    """Amplitude (`pslr`) or rms (`islr`) of a platform's vibration along the line of sight: of `seen_of_axes`. [m]
+
+    Projections of amplitudes add, as the axes may vibrate in any phase; rms values are taken for independent and add
+    as squares.
+    """
+    is_vector = isinstance(value, tuple)
+    seen = seen_of_axes(mission, name, is_vector=is_vector, geometry=geometry)
+    parts = [along * size for along, size in zip(seen, value if is_vector else (value,), strict=True)]
+    return sum(map(np.abs, parts)) if metric == "pslr" else np.sqrt(sum(part * part for part in parts))
 
 
 def lines_of(mission: Mission, name: str, geometry: Any = None) -> list[Line]:

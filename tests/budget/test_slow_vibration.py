@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
+from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.budget.check import check_mission
-from bisar_budget.effects.vibration import slow_phases
 from bisar_budget.findings.mission import Report
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.report import FORMATS, Style, render
@@ -23,10 +23,21 @@ ROW = "transmitter.vibration.sinusoidal.0"
 
 
 def worst(cycles: float, order: int) -> float:
-    """Largest P₂ or P₃ part at the aperture edge over the phases of a vibration of 1 rad, by a Legendre fit."""
+    """Largest P₂ or P₃ part at the aperture edge over the phases of a vibration of 1 rad, by a Legendre fit.
+
+    Where the variance of the phase over band and aperture is least: the displacement of the image defocuses too.
+    """
     x = (np.arange(2000) + 0.5) / 1000 - 1
     phases = np.linspace(0, math.pi, 361)
     waves = np.cos(math.pi * cycles * x[:, None] + phases)
+    mission = parse_mission(mission_text())
+    band = (mission.radar.bandwidth / mission.radar.center_frequency) ** 2 / 12
+    slopes = np.zeros((x.size, 2))
+    for path in mission.geometry.both:
+        place = np.stack(np.broadcast_arrays(*path.place(x * T / 2)), axis=1)
+        slopes += place[:, :2] / np.linalg.norm(place, axis=1)[:, None]
+    weighted = (1 + band) * slopes - slopes.mean(axis=0)
+    waves -= slopes @ np.linalg.solve(weighted.T @ slopes, weighted.T @ waves)
     parts = np.polynomial.legendre.legfit(x, waves, 5)[order]
     return float(np.abs(parts).max()) * {2: 1.5, 3: 2.5}[order]
 
@@ -76,7 +87,8 @@ def test_the_cubic_requirement_binds_where_it_is_smaller(factor: float, status: 
     found = row(swaying((factor * limit, 0.9), **changes), ROW)
     assert (found.status, found.binding_requirement) == (status, "cubic_phase_error")
     assert found.allowable == pytest.approx(limit, rel=1e-3)
-    assert found.allowable_full == pytest.approx(of_phase(8 * SHARE, 0.9, 2), rel=1e-3)
+    # Autofocus does not gain on what band and turn hide: 1 % of the phase, of which the square of 8 % counts.
+    assert found.allowable_full == pytest.approx(of_phase(8 * SHARE, 0.9, 2), rel=5e-3)
     if status == "fail":
         assert "autofocus gain does not apply" in found.reason
 
@@ -155,16 +167,27 @@ class TestTogether:
 
     def test_the_phases_are_those_of_the_rows(self) -> None:
         text = mission_text(**{ERROR.format("receiver"): {"sinusoidal": [{"amplitude": 1e-4, "frequency": 0.1}]}})
-        (slow,) = slow_phases(parse_mission(text))
+        (slow,) = Analysis(parse_mission(text)).slow
         found = row(check_mission(parse_mission(text), TODAY), slow.row_id)
-        assert (slow.owner, slow.qpe_rad, slow.cubic_rad) == ("receiver", found.qpe_full_rad, found.cubic_rad)
+        assert (slow.owner, slow.qpe_rad.item(), slow.cubic_rad.item()) == (
+            "receiver",
+            found.qpe_full_rad,
+            found.cubic_rad,
+        )
 
 
 def test_a_vector_counts_along_the_line_of_sight() -> None:
-    """The transmitter of the base mission is at (30, 0, 6) km."""
-    line = {"amplitude": [1e-4, 1.0, 0], "frequency": 0.5 / T}
+    """The transmitter of the base mission is at (30, 0, 6) km, and what displaces the image defocuses by 1e-3."""
+    line = {"amplitude": [1e-4, 0, 0], "frequency": 0.5 / T}
     found = row(findings(**{ERROR.format("transmitter"): {"sinusoidal": [line]}}), ROW)
-    assert found.declared == pytest.approx(1e-4 * 30 / math.hypot(30, 6))
+    assert found.declared == pytest.approx(1e-4 * 30 / math.hypot(30, 6), rel=2e-3)
+
+
+def test_a_metre_across_the_line_of_sight_is_no_small_error() -> None:
+    """It passed with 0 rad; `tests.effects.test_slow_tones` holds the number to exact ranges."""
+    line = {"amplitude": [0, 1.0, 0], "frequency": 0.5 / T}
+    found = row(findings(**{ERROR.format("transmitter"): {"sinusoidal": [line]}}), ROW)
+    assert (found.status, found.qpe_full_rad is not None and found.qpe_full_rad > 1) == ("fail", True)
 
 
 def test_a_vibration_of_nothing_passes() -> None:

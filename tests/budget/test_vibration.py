@@ -9,11 +9,9 @@ from hypothesis import strategies as st
 
 from bisar_budget.analysis import vibration_limits as vibration
 from bisar_budget.budget.check import check_mission
-from bisar_budget.effects.vibration import along_line_of_sight, cubic_part, quadratic_part
-from bisar_budget.geometry import PlatformState
+from bisar_budget.effects.vibration import counted, cubic_part, quadratic_part
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import Shares
-from bisar_budget.mission.platforms import MotionError
 from bisar_budget.units import format_limit
 from tests.conftest import TODAY, findings, mission_text, row
 from tests.responses import energy_within
@@ -235,36 +233,42 @@ class TestSharedFrequency:
 
 class TestVector:
     @pytest.mark.parametrize("frame", ["scene", "track", "look"])
-    def test_only_the_line_of_sight_counts(self, frame: str) -> None:
-        """Against the axes as the README has them, by NumPy."""
-        state = PlatformState(position=(6e3, 6e3, 2e3), velocity=(-40.0, 40.0, 3.0))
-        u = np.array(state.position) / np.linalg.norm(state.position)
-        first = {"track": np.array(state.velocity), "look": u, "scene": np.array([1.0, 0, 0])}[frame]
+    def test_the_line_of_sight_counts_as_it_turns(self, frame: str) -> None:
+        """Against the axes as the README has them, by NumPy: root mean square over the aperture of each."""
+        position, velocity = np.array([6e3, 6e3, 2e3]), np.array([-40.0, 40.0, 3.0])
+        times = (np.arange(4000) + 0.5) / 4000 * T - T / 2
+        sight = position + np.outer(times, velocity)
+        sight /= np.linalg.norm(sight, axis=1)[:, None]
+        u = position / np.linalg.norm(position)
+        first = {"track": velocity, "look": u, "scene": np.array([1.0, 0, 0])}[frame]
         first = first / np.linalg.norm(first)
         cross = np.cross([0, 0, 1.0], first)
         cross /= np.linalg.norm(cross)
         axes = np.array([first, cross, np.cross(first, cross)])
-        value, error = (3e-5, 1e-5, 2e-5), MotionError(frame=frame)
-        sizes = np.abs(axes @ u) * value
-        assert along_line_of_sight(value, error, state, "pslr") == pytest.approx(sizes.sum())
-        assert along_line_of_sight(value, error, state, "islr") == pytest.approx(np.linalg.norm(sizes))
+        value = (3e-5, 1e-5, 2e-5)
+        receiver = {"position": position.tolist(), "velocity": velocity.tolist(), "motion_error": {"frame": frame}}
+        mission = parse_mission(mission_text(platforms__receiver=receiver))
+        sizes = np.sqrt(np.mean((sight @ axes.T) ** 2, axis=0)) * value
+        assert counted(mission, "receiver", value, "pslr") == pytest.approx(sizes.sum(), rel=1e-6)
+        assert counted(mission, "receiver", value, "islr") == pytest.approx(np.linalg.norm(sizes), rel=1e-6)
+        assert counted(mission, "receiver", 3e-5, "pslr") == 3e-5  # a single value is along it
 
-    def test_a_single_value_is_along_the_line_of_sight_whatever_the_frame(self) -> None:
-        state = PlatformState(position=(6e3, 6e3, 2e3), velocity=(-40.0, 40.0, 3.0))
-        assert along_line_of_sight(3e-5, MotionError(frame="track"), state, "pslr") == 3e-5
-
-    def test_a_vibration_across_the_line_of_sight_is_none(self) -> None:
-        error = {"frame": "look", "vibration": {"sinusoidal": [{"amplitude": [0, "1 m", "1 m"], "frequency": 15}]}}
+    def test_a_vibration_across_the_line_of_sight_counts_as_that_turns(self) -> None:
+        """It was none: of a metre across the receiver's line of sight 12 mm rms lie along it, as it turns."""
+        error = {"frame": "look", "vibration": {"sinusoidal": [{"amplitude": [0, "1 m", 0], "frequency": 15}]}}
         found = findings(requirements={"pslr": -30}, platforms__receiver__motion_error=error)
         line = row(found, "receiver.vibration.sinusoidal.0")
-        assert (line.declared, line.status) == (0.0, "pass")
-        assert any("0 m of it along the line of sight" in note for note in line.notes)
+        state = found.geometry.receiver
+        way = np.array(state.velocity) - np.dot(state.velocity, state.look) * np.array(state.look)
+        # The line of sight turns by v⊥τ/R, of which the root mean square is that at the edge over √3.
+        turned = np.dot(way, state.frame("look")[1]) / state.slant_range * (T / 2) / math.sqrt(3)
+        assert (line.declared, line.status) == (pytest.approx(abs(turned), rel=2e-3), "fail")
 
     def test_both_sides_of_the_limit(self) -> None:
         """The transmitter of the base mission is at (30, 0, 6) km: cosine 0.98058 east, nothing north."""
         limit = row(vibrating(), "transmitter.vibration.sinusoidal.0").allowable
         for size, status in ((0.999, "warn"), (1.001, "fail")):
-            line = {"amplitude": [size * limit / (30 / math.hypot(30, 6)), 1.0, 0], "frequency": 15}
+            line = {"amplitude": [size * limit / (30 / math.hypot(30, 6)), 0, 0], "frequency": 15}
             assert row(vibrating(sinusoidal=[line]), "transmitter.vibration.sinusoidal.0").status == status
 
     def test_the_three_axes_add_in_the_worst_phase(self) -> None:
@@ -272,8 +276,8 @@ class TestVector:
         receiver = {"position": ["-6 km", "6 km", "2 km"], "velocity": [-40, -40, 0]}
         receiver["motion_error"] = {"vibration": {"sinusoidal": [{"amplitude": [1e-3, 1e-3, 0], "frequency": 15}]}}
         found = findings(requirements={"pslr": -30}, platforms__receiver=receiver)
-        want = 2e-3 * 6 / math.sqrt(76)
-        assert row(found, "receiver.vibration.sinusoidal.0").declared == pytest.approx(want)
+        want = 2e-3 * 6 / math.sqrt(76)  # and 1e-4 more as the line of sight turns
+        assert row(found, "receiver.vibration.sinusoidal.0").declared == pytest.approx(want, rel=5e-4)
 
 
 def test_amplitude_shares_of_both_platforms_sum_to_one() -> None:

@@ -34,18 +34,18 @@ from bisar_budget.effects.combined import phase_parts
 from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.effect import MOTION_UNITS, ErrorSource
 from bisar_budget.effects.slow_tones import SlowTone
-from bisar_budget.effects.vibration import lines_of, near_lines, sight_of, worst_phases
+from bisar_budget.effects.vibration import lines_of, near_lines, seen_of_axes, worst_phases
 from bisar_budget.faults import KeyPath, changes_words, printable
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.requirement import JudgedRequirement
 from bisar_budget.findings.row import DECLARE, SPECIFICATION, Row
 from bisar_budget.findings.status import STATUS
-from bisar_budget.geometry import dot, without_rounding
 from bisar_budget.mission.changes import name_of_error
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import Platform
 from bisar_budget.mission.vibrations import AcceleratedSinusoid
 from bisar_budget.phrases import Note
+from bisar_budget.ranges.exact_ranges import Floats
 from bisar_budget.report.explain import notation
 from bisar_budget.report.explain.explained_error import (
     RULES,
@@ -280,14 +280,8 @@ def _vibration(mission: Mission, allocation: Allocation, row: Row, tone: SlowTon
         yield step("Evidence", printable(row.evidence))
     wavelength = mission.radar.wavelength
     if tone is not None and row.qpe_full_rad is not None:
-        does, gain = tone.declared, allocation.autofocus_gain
-        phases = (does.quadratic, does.cubic, does.hidden(gain), does.rest)
-        quadratic, cubic, hidden, rest = (float(part[0]) for part in phases)
-        yield step(
-            "By exact ranges, each axis in its worst phase, with what the displacement of the image adds",
-            f"QPE {with_unit(quadratic, 'rad')}, cubic {with_unit(cubic, 'rad')}, hidden {with_unit(hidden, 'rad')}, "
-            f"beyond the cubic {with_unit(rest, 'rad')} rms",
-        )
+        words = "By exact ranges, each axis in its worst phase, with what the displacement adds"
+        yield step(words, _of_axes("QPE_full", [one.quadratic for one in tone.declared.axes()]))
         if row.metric == QUADRATIC:
             yield from _slow_vibration(mission, allocation, row, tone)
             return
@@ -358,7 +352,12 @@ def _limit(
 
 def _slow_vibration(mission: Mission, allocation: Allocation, row: Row, tone: SlowTone) -> Iterator[Step]:
     """From the phases of a vibration below one cycle per aperture to the amplitude that they allow."""
-    limit, gain, required = allocation.qpe_allowed(row.owner), allocation.autofocus_gain, mission.requirements
+    axes, gain = tone.declared.axes(), allocation.autofocus_gain
+    yield step("By either model", _of_axes("QPE", [one.quadratic for one in axes]))
+    yield step("Cubic phase likewise", _of_axes("cubic", [one.cubic for one in axes]))
+    judged = _of_axes("judged", [one.judged(gain) for one in axes])
+    yield step("Judged: with gain times the phase of as much loss that band and turn do not resolve, squared", judged)
+    limit, required = allocation.qpe_allowed(row.owner), mission.requirements
     yield from limit_steps(allocation, row.owner, limit)
     limits = slow_limits(mission, allocation, tone)
     by_qpe, use = float(limits.quadratic[0]), float(limits.use[0])
@@ -372,17 +371,24 @@ def _slow_vibration(mission: Mission, allocation: Allocation, row: Row, tone: Sl
         worked = WorkedEquation("by_cubic", "limit/(effect/unit)", values, sizes["by_cubic"], "m")
         yield step("Allowable by requirements.cubic_phase_error", worked)
     smallest = min(sizes, key=lambda name: sizes[name])
-    yield step("The smallest", WorkedEquation("smallest", smallest, sizes, sizes[smallest], "m"))
-    judged = {"judged": float(tone.declared.judged(gain)[0]), "limit": limit}
+    yield step("Allowable, the smallest", WorkedEquation("allowable", smallest, sizes, sizes[smallest], "m"))
+    if not tone.hears_part:
+        return
+    values = {"judged": tone.declared.judged(gain).item(), "limit": limit}
     if limits.is_cubic[0]:
-        judged = {"judged": float(tone.declared.cubic[0]), "limit": required.cubic_phase_error or 0.0}
+        values = {"judged": tone.declared.cubic.item(), "limit": required.cubic_phase_error or 0.0}
     yield step(
-        "Part of the limit that the declared vibration uses", WorkedEquation("use", "judged/limit", judged, use, "")
+        "Part of the limit that the declared vibration uses", WorkedEquation("use", "judged/limit", values, use, "")
     )
-    values = {"use": use, "smallest": sizes[smallest]}
-    if tone.hears_part:
-        what = "Declared, the amplitude along the line of sight that uses as much"
-        yield step(what, WorkedEquation("declared", "use*smallest", values, row.declared or 0.0, "m"))
+    values = {"use": use, "allowable": sizes[smallest]}
+    what = "Declared, the amplitude along the line of sight that uses as much"
+    yield step(what, WorkedEquation("declared", "use*allowable", values, row.declared or 0.0, "m"))
+
+
+def _of_axes(symbol: str, phases: Sequence[Floats]) -> Sum:
+    """Sum of the phases of axes. [rad]"""
+    numbers = [one.item() for one in phases]
+    return Sum(f"{symbol} = {' + '.join(map(number, numbers))} = {with_unit(math.fsum(numbers), 'rad')}")
 
 
 def _displacement(mission: Mission, platform: str, entry: int) -> Iterator[Step]:
@@ -400,20 +406,18 @@ def _displacement(mission: Mission, platform: str, entry: int) -> Iterator[Step]
 
 def _line_of_sight(mission: Mission, platform: str, is_sinusoid: bool, entry: int, declared: float) -> Iterator[Step]:
     """The part of a vibration along three axes in the line of sight; of any, in the range less the direct path."""
-    body = getattr(mission.platforms, platform)
-    vibration = body.motion_error.vibration
+    vibration = getattr(mission.platforms, platform).motion_error.vibration
     value = vibration.sinusoidal[entry].displacement if is_sinusoid else vibration.wideband.rms
-    sight, whither = sight_of(mission, platform), "Along the line of sight"
+    whither, is_vector = "Along the line of sight, as it turns, rms over the aperture", isinstance(value, tuple)
     if mission.has_direct_path:
-        whither = "In the range less the direct path, u_t − b or u_r + b in place of the line of sight"
-    if not isinstance(value, tuple):
+        whither = "In the range less the direct path, as it turns, rms over the aperture"
+    seen = seen_of_axes(mission, platform, is_vector=is_vector)
+    if not is_vector:
         if mission.has_direct_path:
-            text = f"{number(value)}*{number(abs(dot(body.state.look, sight)))}"
+            text = f"{number(value)}*{number(seen[0])}"
             yield step(whither, Sum(f"declared = {text} = {with_unit(declared, 'm')}"))
         return
-    u, v, w = (dot(axis, sight) for axis in body.state.frame(body.motion_error.frame))
-    axes = without_rounding((u, v, w))
-    parts = [f"{number(size)}*{number(along)}" for size, along in zip(value, axes, strict=True)]
+    parts = [f"{number(size)}*{number(along)}" for size, along in zip(value, seen, strict=True)]
     if is_sinusoid:
         text, how = " + ".join(f"|{part}|" for part in parts), "axes may vibrate in any phase: projections add"
     else:
