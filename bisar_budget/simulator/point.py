@@ -12,8 +12,8 @@ from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.combined import correlated_errors, likely_error
 from bisar_budget.effects.effect import PLATFORMS, LinePiece, gradients_of, indicated_point
-from bisar_budget.effects.vibration import counted, lines_of
-from bisar_budget.geometry import GroundVector, Vector
+from bisar_budget.effects.vibration import counted, lines_of, sight_of
+from bisar_budget.geometry import GroundVector, Vector, dot
 from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.mission.platforms import MotionError as DeclaredError
 from bisar_budget.ranges.exact_ranges import ExactEffect
@@ -502,14 +502,20 @@ def _sinusoids(mission: Mission, name: str) -> tuple[PathSinusoid, ...]:
 
 
 def sinusoids_of(mission: Mission, name: str, entry: int) -> list[PathSinusoid]:
-    """Motion of one declared vibration: of three axes along each, else along the line of sight."""
+    """Motion of one declared vibration: of three axes along each, else along the line of sight.
+
+    The axes are in the phase in which they add along the line of sight of mid-aperture.
+    """
     error: DeclaredError = getattr(mission.platforms, name).motion_error
     line = error.vibration.sinusoidal[entry]
     if not isinstance(line.displacement, tuple):
         return [PathSinusoid(lines_of(mission, name)[entry].amplitude, line.frequency)]
-    axes = getattr(mission.geometry, name).frame(error.frame)
-    moved = zip(axes, line.displacement, strict=True)
-    return [PathSinusoid(size, line.frequency, axis=axis) for axis, size in moved if size]
+    axes, sight = getattr(mission.geometry, name).frame(error.frame), sight_of(mission, name)
+    return [
+        PathSinusoid(size, line.frequency, 0.0 if dot(axis, sight) >= 0 else math.pi, axis)
+        for axis, size in zip(axes, line.displacement, strict=True)
+        if size
+    ]
 
 
 def pulses_for(mission: Mission, cells: int) -> int:
