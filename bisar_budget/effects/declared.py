@@ -389,7 +389,10 @@ class ErrorBlock:
     # ---------------------------------------------------------------- how large they may be
     @cached_property
     def farthest(self) -> Floats:
-        """Size beyond which an error is none of navigation; infinite: it has no effect whatever its size."""
+        """Size beyond which none is looked for; infinite: an error has no effect whatever its size.
+
+        A larger error of a path is none of navigation.
+        """
         slant = [path.slant_range for path in self.table.geometries.both]
         found = np.full(self.declared.shape, math.inf)
         for place in self.moves:
@@ -399,8 +402,10 @@ class ErrorBlock:
                 nearer = np.minimum(*reached) if len(reached) > 1 else reached[0]
                 found[place] = FARTHEST * nearer / self.edge[place]
             else:
+                # A clock takes no platform anywhere. No range sum is shorter than the distance of the platforms, and
+                # that is at least the sum less twice the nearer range: by then an image has ended.
                 course = self.exact.clock_course(source.clock or ())
-                found[place] = FARTHEST * np.minimum(*slant) / np.abs(course).max(axis=0)
+                found[place] = 2 * np.minimum(*slant) / np.abs(course).max(axis=0)
         return found
 
     def allowed(self, model: str, limits: Sequence[Any], *, is_whole: bool) -> Allowed:
