@@ -142,6 +142,25 @@ class PlatformState:
             x, y, z = x + bend[0] * faster, y + bend[1] * faster, z + bend[2] * faster
         return self.place(tau), (x, y, z)
 
+    def later(self, tau: Any, delay_s: Any) -> Vectors:
+        """How far it gets from slow times on within a delay. [m]"""
+        return _minus(self.place(tau + delay_s), self.place(tau))
+
+    def of(self, cases: Any) -> "PlatformState":
+        """The paths of some cases, by their places; what all cases share stays as it is."""
+
+        def some(vector: Vectors) -> Vectors:
+            x, y, z = (part[cases] if isinstance(part, np.ndarray) and part.size > 1 else part for part in vector)
+            return (x, y, z)
+
+        bends = tuple(map(some, self.bends))
+        return PlatformState(
+            position=some(self.position),
+            velocity=some(self.velocity),
+            acceleration=some(self.acceleration),
+            bends=bends,
+        )
+
     @cached_property
     def slant_range(self) -> Any:
         """Distance to the scene centre. [m]"""

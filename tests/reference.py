@@ -53,7 +53,8 @@ class Error(NamedTuple):
 
     `paths` (2, 3, 3) is position, velocity, acceleration of transmitter and receiver along x, y, z; `clock` (4,) the
     terms of t̃. `declared` carries sign and coverage factor. `cap` is the size at which it takes a platform farther
-    than a tenth of its slant range within the aperture. `is_stated` tells the axes of the file from those of the
+    than a tenth of its slant range within the aperture, of a clock that at which a range sum has no ground point any
+    more: it is no less than the distance of the platforms. `is_stated` tells the axes of the file from those of the
     scene, along which the same error is shown again.
     """
 
@@ -92,7 +93,7 @@ def errors_of(mission: Mission) -> Iterator[Error]:
     near, still = FAR * min(ranges), np.zeros((2, 3, 3))
     for order, term in enumerate(CLOCK):
         value = getattr(mission.timing_error, term)
-        cap = near / SPEED_OF_LIGHT / (T / 2) ** order
+        cap = 2 * min(ranges) / SPEED_OF_LIGHT / (T / 2) ** order
         size = None if value is None else factor * value
         clock = np.zeros(4) if _is_heard(mission) else np.eye(4)[order]
         yield Error(f"timing.{term}", "clock", still, clock, size, cap)

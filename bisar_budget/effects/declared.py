@@ -33,6 +33,7 @@ from bisar_budget.ranges.exact_ranges import (
     FullEffect,
     Lanes,
     Places,
+    TimeTags,
     Truths,
 )
 from bisar_budget.ranges.point_paths import ROWS, Held, PointPaths, is_few
@@ -244,11 +245,25 @@ class ErrorBlock:
         A platform that is moved within the aperture sees the ground in another direction, by r̃/R. Where that turns
         as the phase does, V is less beside the point: by H⁻¹⟨r̃/R, ρ⟩.
         """
-        full, exact = self.effects["full"], self.exact
+        full, exact, bent = self.effects["full"], self.exact, self._bent(size)
         hidden, rest = self.hidden_per_unit
         left_rad = np.sqrt(4 / 45 * (full.qpe**2 + hidden**2) + 4 / 175 * full.cubic**2 + rest**2)
-        turns = np.abs(size) * self.edge / exact.nearest_node
-        return np.asarray(turns * np.abs(size) * left_rad / exact.k * (1 + exact.band) / exact.matrix.least)
+        turns = (np.abs(size) * self.edge + bent) / exact.nearest_node
+        left = np.abs(size) * left_rad / exact.k + bent
+        return np.asarray(turns * left * (1 + exact.band) / exact.matrix.least)
+
+    def _bent(self, size: Floats) -> Any:
+        """How far errors take platforms from where small ones do, times what is known of them, (errors, cases). [m]
+
+        Only a time tag is not proportional to its size. Where the direct path is the clock a metre is twice a metre.
+        """
+        tags = [place for place, source in enumerate(self.sources) if source.is_time_tag]
+        if not tags:
+            return 0.0
+        found = np.zeros(size.shape)
+        for place in tags:
+            found[place] = self.table.bent(self.sources[place], size[place]) * (1 + self.exact.has_direct_path)
+        return found
 
     def _grows(self, size: Floats, strays: Floats) -> Floats:
         """Bound of the range error that the second order of errors adds, in metres.
@@ -257,8 +272,8 @@ class ErrorBlock:
         the ranges is kept apart by platform: of a distant one much cancels to first order. That of the distance,
         |P⊥r̃|²/2D, has the other sign: no more than the larger is added.
         """
-        exact = self.exact
-        own, moved = size * self.edge, size * self.per_unit("full")[2] + strays
+        exact, bent = self.exact, self._bent(size)
+        own, moved = size * self.edge + bent, size * self.per_unit("full")[2] + strays
         reach = own + moved
         square = reach * reach
         found = square / exact.nearest_node
@@ -269,7 +284,7 @@ class ErrorBlock:
                     platform = PLATFORMS.index(source.owner)
                     of_ranges = square[place] / nearest[platform] + moved[place] ** 2 / nearest[1 - platform]
                     found[place] = np.maximum(of_ranges, own[place] ** 2 / apart) / 2
-        return np.asarray(found)
+        return np.asarray(found + bent)
 
     def is_large(self, size: Floats) -> Truths:
         """Where effects of errors are not proportional to their size, as far as anybody can see."""
@@ -374,7 +389,10 @@ class ErrorBlock:
     # ---------------------------------------------------------------- how large they may be
     @cached_property
     def farthest(self) -> Floats:
-        """Size beyond which an error is none of navigation; infinite: it has no effect whatever its size."""
+        """Size beyond which none is looked for; infinite: an error has no effect whatever its size.
+
+        A larger error of a path is none of navigation.
+        """
         slant = [path.slant_range for path in self.table.geometries.both]
         found = np.full(self.declared.shape, math.inf)
         for place in self.moves:
@@ -384,8 +402,10 @@ class ErrorBlock:
                 nearer = np.minimum(*reached) if len(reached) > 1 else reached[0]
                 found[place] = FARTHEST * nearer / self.edge[place]
             else:
+                # A clock takes no platform anywhere. No range sum is shorter than the distance of the platforms, and
+                # that is at least the sum less twice the nearer range: by then an image has ended.
                 course = self.exact.clock_course(source.clock or ())
-                found[place] = FARTHEST * np.minimum(*slant) / np.abs(course).max(axis=0)
+                found[place] = 2 * np.minimum(*slant) / np.abs(course).max(axis=0)
         return found
 
     def allowed(self, model: str, limits: Sequence[Any], *, is_whole: bool) -> Allowed:
@@ -539,20 +559,37 @@ class DeclaredErrors:
         if any(error.of_receiver is not None for error in errors):
             ways = [[error.direction_of(1)[axis] for error in errors] for axis in (0, 1, 2)]
             of_receiver = tuple(self._of_each(along, len(signs)) for along in ways)
-        case = np.tile(self.each, len(errors) * len(signs))
-        return Lanes(case, at_nodes.reshape(len(at_nodes), -1), (u, v), (x, y, z), order, of_receiver)
+        case, tags = np.tile(self.each, len(errors) * len(signs)), None
+        if any(error.is_time_tag for error in errors):
+            is_tag = np.repeat([error.is_time_tag for error in errors], self.cases * len(signs))
+            tags = TimeTags(self.geometries.both, self.exact.times, np.where(is_tag, case, -1))
+        return Lanes(case, at_nodes.reshape(len(at_nodes), -1), (u, v), (x, y, z), order, of_receiver, tags)
 
     def edge_of(self, error: ErrorSource) -> Any:
         """Position error at the aperture's edge by a unit of an error, the larger of both platforms; 0 of a clock."""
-        if error.subject.kind != "time_tag":
+        if not error.is_time_tag:
             return self.edge.get(error.unit, 0.0)
         return np.max([norm(error.direction_of(place)).max(axis=0) for place in error.platforms], axis=0)
+
+    def bent(self, error: ErrorSource, size: Floats) -> Floats:
+        """How far a time tag, of either sign, takes its platforms from where their velocities lead, added. [m]"""
+        times, found = self.exact.times, np.zeros(self.cases)
+        for place in error.platforms:
+            path, straight = self.geometries.both[place], error.direction_of(place)
+            found += np.max(
+                [
+                    norm(tuple(one - tag * way for one, way in zip(path.later(times, tag), straight, strict=True)))
+                    for tag in (size, -size)
+                ],
+                axis=(0, 1),
+            )
+        return found
 
     def _order(self, error: ErrorSource) -> int:
         """Power of slow time with which a position error grows: -1 of a clock, 0 of a time tag, whose way turns."""
         if not error.platforms:
             return -1
-        return 0 if error.subject.kind == "time_tag" else list(self.edge).index(error.unit)
+        return 0 if error.is_time_tag else list(self.edge).index(error.unit)
 
     def _course(self, error: ErrorSource, order: int) -> Floats:
         """Position error at the nodes of a unit of an error, or the range error of what moves no platform."""

@@ -94,8 +94,9 @@ class ErrorSource(NamedTuple):
     them: sums and root-sum-squares run over these alone, so that an error stated along the track is not
     counted again by its components along the scene's axes. `direction` is a unit vector of the scene, zero for
     what is no motion; of the mission's own it is that of both platforms, unless the receiver has another one. That of
-    a time tag is the velocity at the nodes of the aperture, (nodes, cases). [m/s] `clock` are t̃₀ … t̃₃ of a unit of an
-    error of the clock, zeros where nothing of it is heard; None for any other error.
+    a time tag is the velocity at the nodes of the aperture, (nodes, cases), along which a small one moves. [m/s]
+    `clock` are t̃₀ … t̃₃ of a unit of an error of the clock, zeros where nothing of it is heard; None for any other
+    error.
     """
 
     subject: Subject
@@ -141,6 +142,11 @@ class ErrorSource(NamedTuple):
     def is_motion(self) -> bool:
         """Whether it moves platforms, or the clock: what only is a phase displaces nothing."""
         return self.unit != "rad"
+
+    @property
+    def is_time_tag(self) -> bool:
+        """Whether it takes a path for what it is later: not proportional to its size where the path turns."""
+        return self.subject.kind == "time_tag"
 
     @property
     def is_covered(self) -> bool:

@@ -320,8 +320,8 @@ class ErrorListing:
     def _of_time_tags(self) -> Iterator[ErrorSource]:
         """Time of the navigation against that of the radar: each platform's, and that of one clock for both.
 
-        A path is measured where the platform is a little later: p(τ + δt) − p(τ) = v(τ)·δt, to first order in δt.
-        What a·δt²/2 adds is δt·a/2v of it: 0.2 % for 0.1 s in a turn of 4 m/s² at 100 m/s.
+        A path is measured where the platform is a little later, p(τ + δt) − p(τ). Of a small tag that is v(τ)·δt, and
+        of any other exact ranges take the path itself.
         """
         for place, name in enumerate(PLATFORMS):
             error: MotionError = getattr(self.mission.platforms, name).motion_error

@@ -100,6 +100,35 @@ class FullEffect(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class TimeTags:
+    """Lanes that are time tags: each takes the path of a platform for what it is later, p(τ + δt) − p(τ).
+
+    `paths` are those of both platforms, `times` the nodes of the cases (nodes, cases) [s]. `case` (lanes,) is the one
+    whose path each lane takes, -1 of a lane that is no time tag.
+    """
+
+    paths: tuple[PlatformState, PlatformState]
+    times: Floats
+    case: Places
+
+    def of(self, some: Places) -> "TimeTags | None":
+        """Some of the lanes; None where none of them is a time tag."""
+        case = self.case.take(some)
+        return replace(self, case=case) if (case >= 0).any() else None
+
+    def put(self, platform: int, tag_s: Floats, along: Sequence[Floats], *, is_rate: bool = False) -> list[Any]:
+        """Put what time tags (nodes, lanes) shift a platform by [m], or that per second more, into other motions."""
+        some = np.flatnonzero(self.case >= 0)
+        (times,), tag_s = _of([self.times], self.case[some]), tag_s[:, some]
+        path = self.paths[platform].of(self.case[some])
+        found = [np.array(np.broadcast_to(part, (len(times), self.case.size))) for part in along]
+        moved = path.at(times + tag_s)[1] if is_rate else path.later(times, tag_s)
+        for whole, part in zip(found, moved, strict=True):
+            whole[:, some] = part
+        return found
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Lanes:
     """Units of errors, one a lane: of the position of platforms along a direction, or of the range by a clock.
 
@@ -108,15 +137,17 @@ class Lanes:
     case : (lanes,)
         The case that each is an error of.
     at_nodes : (nodes, lanes)
-        Position error, of a clock range error. [m/unit]
+        Position error, of a clock range error [m/unit]; of a time tag its sign.
     moves : two of float or (lanes,)
         1 where transmitter, receiver moves, else 0.
     direction : Vectors
-        Of the motion; floats, (lanes,), or (nodes, lanes) of one that turns.
+        Of the motion; floats, (lanes,), or (nodes, lanes) of one that turns. Of a small time tag the velocity. [m/s]
     order : int or (lanes,)
         Power of slow time that a position error grows with, those of velocity turn Doppler; -1 of a clock.
     of_receiver : Vectors, optional
         Direction of the receiver's motion where it is another one.
+    tags : TimeTags, optional
+        What lanes that are time tags take for the path, where there are any.
     """
 
     case: Places
@@ -125,6 +156,7 @@ class Lanes:
     direction: Vectors = (0.0, 0.0, 0.0)
     order: Any = -1
     of_receiver: Vectors | None = None
+    tags: TimeTags | None = None
 
     @property
     def directions(self) -> tuple[Vectors, Vectors]:
@@ -148,7 +180,9 @@ class Lanes:
             for part in (*self.moves, *self.direction, self.order, *(self.of_receiver or ()))
         )
         of_receiver = (others[0], others[1], others[2]) if others else None
-        return Lanes(self.case.take(some), self.at_nodes.take(some, axis=1), (u, v), (x, y, z), order, of_receiver)
+        tags = self.tags and self.tags.of(some)
+        at_nodes = self.at_nodes.take(some, axis=1)
+        return Lanes(self.case.take(some), at_nodes, (u, v), (x, y, z), order, of_receiver, tags)
 
     def there(self, case: Places) -> "Lanes":
         """The same of lanes, one a case, where cases are chosen anew: errors of `ExactRanges.at`."""
@@ -157,10 +191,21 @@ class Lanes:
     def shifts(self, size: Any) -> list[Any]:
         """Shift of each platform by errors of sizes at the nodes. [m]"""
         along = [self.at_nodes * (size * part) for part in self.direction]
-        if self.of_receiver is None:
-            return [_weighted(along, weight) for weight in self.moves]
-        other = [self.at_nodes * (size * part) for part in self.of_receiver]
-        return [_weighted(own, weight) for own, weight in zip((along, other), self.moves, strict=True)]
+        both = [along, along]
+        if self.of_receiver is not None:
+            both[1] = [self.at_nodes * (size * part) for part in self.of_receiver]
+        if self.tags is not None:
+            both = [self.tags.put(place, self.at_nodes * size, one) for place, one in enumerate(both)]
+        return [_weighted(own, weight) for own, weight in zip(both, self.moves, strict=True)]
+
+    def ways(self, size: Any) -> tuple[Sequence[Any], Sequence[Any]]:
+        """Directions in which larger errors move transmitter and receiver on; those of time tags turn as paths do."""
+        if self.tags is None:
+            return self.directions
+        of_transmitter, of_receiver = (
+            self.tags.put(place, self.at_nodes * size, one, is_rate=True) for place, one in enumerate(self.directions)
+        )
+        return of_transmitter, of_receiver
 
     def clock(self, size: Any) -> Any:
         """Range error by clocks of errors of sizes at the nodes. [m]"""
@@ -539,13 +584,13 @@ class ExactRanges:
 
         As the least of V does: by its second derivative, and by what a larger error changes of its slope.
         """
-        course = lanes.at_nodes
+        course, ways = lanes.at_nodes, lanes.ways(size)
         east, north = place
-        left, change = lanes.clock(size), lanes.clock(1.0)
+        shifts, left, change = lanes.shifts(size), lanes.clock(size), lanes.clock(1.0)
         looks, distances = np.empty((2, 2, *course.shape)), np.empty((2, *course.shape))
         turns = np.zeros((2, *course.shape))
         for platform, (track, weight, shift, (x, y, z)) in enumerate(
-            zip(self.tracks, lanes.moves, lanes.shifts(size), lanes.directions, strict=True)
+            zip(self.tracks, lanes.moves, shifts, ways, strict=True)
         ):
             *true, own = _of([*track, self.ranges[platform]], lanes.case)
             a, b, c = (one + moved for one, moved in zip(true, shift, strict=True))
@@ -562,9 +607,9 @@ class ExactRanges:
                 turns[1] += step * (y - b * along) / R
         if self.has_direct_path:
             ahead, back = lanes.moves
-            x, y, z = (ahead * one - back * other for one, other in zip(*lanes.directions, strict=True))
+            x, y, z = (ahead * one - back * other for one, other in zip(*ways, strict=True))
             a, b, c, own = _of([*self._between, self.baselines], lanes.case)
-            a, b, c = a + size * course * x, b + size * course * y, c + size * course * z
+            a, b, c = (part + one - other for part, one, other in zip((a, b, c), *shifts, strict=True))
             apart = np.sqrt(a * a + b * b + c * c)
             left = left + (apart - own)
             change = change + np.where(apart > 0, course * (a * x + b * y + c * z) / apart, 0.0)

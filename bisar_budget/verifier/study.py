@@ -122,7 +122,7 @@ class Study:
             kind = "position"
         for place in source.platforms:
             stated: Any = size
-            if kind != "time_tag":
+            if not source.is_time_tag:
                 stated = tuple(size * component for component in source.direction_of(place))
             found = found.of(PLATFORMS[place], PathError(**{kind: stated}))
         return found

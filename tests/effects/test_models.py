@@ -12,9 +12,11 @@ from hypothesis import strategies as st
 
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.effects.declared import CUBIC, FARTHEST, LOCATION, QUADRATIC
+from bisar_budget.faults import SetValue
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.ranges import point_paths
 from bisar_budget.ranges.point_paths import PointPaths
+from tests import reference
 from tests.conftest import ROOT, findings, mission_text, row
 from tests.families import FAMILIES
 from tests.families import mission_text as family_text
@@ -289,8 +291,26 @@ def test_terrain_clock_and_common_errors_have_their_own_farthest_size() -> None:
     sources = {s.id: s for s in analysis.sources}
     assert farthest_size(analysis, sources["mission.terrain"]) == pytest.approx(0.1 * nearest)
     assert farthest_size(analysis, sources["common.velocity.x"]) == pytest.approx(0.1 * nearest / 3)
+    # A clock is not a path: it is searched to where the range sum is as short as the distance of the platforms.
     constant = farthest_size(analysis, sources["timing.constant"])
-    assert constant == pytest.approx(0.1 * nearest / C)
+    assert constant == pytest.approx(2 * nearest / C)
+
+
+@pytest.mark.parametrize("declared", [None, "0 s", "1 ns", "0.1 us", "10 us", "1 ms"])
+def test_a_clock_has_its_limit_whatever_is_declared(declared: str | None) -> None:
+    """Below a low orbit 1.4 km of range beside a mast of 1.5 km: it was found only where more was declared."""
+    changes = [] if declared is None else [SetValue("timing_error.constant", declared)]
+    mission = load_mission(str(ROOT / "specs" / "missions" / "sentinel1_fixed_receiver.yaml"), changes=changes)
+    analysis = Analysis(mission)
+    (source,) = (one for one in analysis.sources if one.id == "timing.constant")
+    limit = analysis.allocation.qpe_allowed(source.owner)
+    size = analysis.full.allowable(source, QUADRATIC, limit)
+    assert size * C > 0.1 * min(path.slant_range for path in mission.geometry.both)
+    (error,) = (one for one in reference.errors_of(mission) if one.id == "timing.constant")
+    sizes = np.outer((1, -1), (0.2, 0.5, 0.9, 0.9999, 1.0001)) * size
+    reached = reference.Lanes(mission, [error, error]).follow(sizes).judged(1.0).max(axis=0) / limit
+    assert (reached[:-1] < 1).all()
+    assert reached[-1] > 1
 
 
 @pytest.mark.parametrize("constant", [4e-6, 2e-5, 1e-4])

@@ -16,6 +16,9 @@ from bisar_budget.effects.random_errors import random_errors
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import Mission
 from bisar_budget.ranges.exact_ranges import FINE, STILL, ExactRanges, Found, aperture_nodes, followed
+from bisar_budget.sampling.draws import HeldSum, Sums, Variable, drawing_of
+from bisar_budget.verifier.study import Study
+from tests.image_point import Collection, Path, Response, flight, no_error
 
 DRAWS = 40_000  # know a sigma to 0.35 %
 SIGMA = 0.01
@@ -285,7 +288,7 @@ platforms:
         assert does.displacement == pytest.approx((exact.east[0], exact.north[0]), rel=EXACT)
 
     def test_an_allowable_is_true_of_exact_ranges(self) -> None:
-        """First order is off by 4 % there, and what is left out, a·δt²/2, by 0.3 %."""
+        """First order is off by 4 % there."""
         analysis = Analysis(mission_of("{time_tag: 1 ms}"))
         (source,) = analysis.stated
         size, binding = analysis.full.allowed(source, (math.pi / 8, None, None))
@@ -332,6 +335,108 @@ platforms:
         exact = through(mission, flown(1e-3)[None], late)
         assert does.displacement == pytest.approx((exact.east[0], exact.north[0]), rel=EXACT)
         assert does.qpe == pytest.approx(exact.quadratic[0], rel=EXACT)
+
+
+class TestLargeTimeTags:
+    """Tags of any size take the path itself: an independent reference flies the turn, without expansion."""
+
+    SIZES = (0.1, 0.3, 1.0)
+
+    @pytest.mark.parametrize("size", SIZES)
+    @pytest.mark.parametrize("sign", [1, -1])
+    def test_of_one_platform(self, size: float, sign: int) -> None:
+        """v·δt alone is off by 1.5 m of 52 m, by 1 s."""
+        does = self.does(f"{{time_tag: {sign * size} s}}")
+        found = [late(receiver=one) for one in (sign * size, -sign * size)]
+        assert does.displacement == pytest.approx(found[0].point, rel=1e-6)
+        assert does.opposite == pytest.approx(found[1].point, rel=1e-6)
+        assert does.equal_loss == pytest.approx(max(one.equal_loss_rad for one in found), rel=1e-6)
+        assert abs(does.qpe) == pytest.approx(max(abs(one.quadratic_rad) for one in found), rel=1e-6)
+        assert abs(does.cubic) == pytest.approx(max(abs(one.cubic_rad) for one in found), rel=1e-6)
+
+    @pytest.mark.parametrize("size", SIZES)
+    def test_of_both_platforms(self, size: float) -> None:
+        does = self.does("{}", f"common_motion_error: {{time_tag: {size} s}}")
+        assert does.displacement == pytest.approx(late(size, size).point, rel=1e-6)
+        assert does.opposite == pytest.approx(late(-size, -size).point, rel=1e-6)
+
+    @pytest.mark.parametrize("binds", ["location_error: 5 m", "quadratic_phase_error: 170 deg"])
+    def test_an_allowable_is_the_size_that_reaches_the_limit(self, binds: str) -> None:
+        needs = ", ".join({binds, "quadratic_phase_error: 170 deg"})
+        mission = parse_mission(of_turn("{time_tag: 1 ms}", needs=f"{{{needs}}}"))
+        (source,) = (analysis := Analysis(mission)).stated
+        total, location = analysis.allocation.qpe_allowed("receiver"), mission.requirements.location_error
+        size, binding = analysis.full.allowed(source, (total, None, location))
+        found = [late(receiver=one) for one in (size, -size)]
+        reached = {
+            "location_error": max(np.linalg.norm(one.point) for one in found) / (location or math.inf),
+            "quadratic_phase_error": max(one.equal_loss_rad for one in found) / total,
+        }
+        assert binding == binds.split(":")[0]
+        assert reached.pop(binding) == pytest.approx(1, rel=1e-4)
+        assert max(reached.values()) < 1
+
+    def test_where_the_direct_path_is_the_clock(self) -> None:
+        common = "common_motion_error: {time_tag: 0.3 s}\nsynchronization: {method: direct_path, error: 1 deg}"
+        analysis = Analysis(mission_of(common=common))
+        exact = ExactRanges.of(analysis.geometry.both, analysis.mission.radar, T, FINE, has_direct_path=True)
+        shifts = [list((path(TIMES + 0.3) - path(TIMES)).T[..., None]) for path in (flight(PT, VT), flight(P, V, A))]
+        found = followed(exact, np.zeros((FINE, 1)), shifts, np.zeros(1, dtype=int))
+        (does,) = (Case(analysis).does(analysis.full, one) for one in analysis.stated)
+        assert does.displacement == pytest.approx((found.east[0], found.north[0]), rel=1e-6)
+
+    def test_at_the_edge_of_a_scene(self) -> None:
+        """It takes the path itself there too."""
+        (difference,) = differences(parse_mission(of_turn("{time_tag: 0.3 s}", "scene: {radius: 800 m}")))
+        edge = [late(receiver=one, scatterer=(0.0, 800.0)).quadratic_rad for one in (0.3, -0.3)]
+        centre = [late(receiver=one).quadratic_rad for one in (0.3, -0.3)]
+        assert abs(difference) == pytest.approx(np.abs(np.subtract(edge, centre)).max(), rel=1e-5)
+
+    def test_drawn_tags_of_a_platform_and_of_both_add(self) -> None:
+        analysis = Analysis(mission_of("{time_tag: 0.6 s}", "common_motion_error: {time_tag: 0.3 s}"))
+        variables = [
+            Variable(one.id, one.id, "mission", "bound", ((one, float(one.declared)),), (1.0,) * 4)
+            for one in analysis.stated
+        ]
+        held = HeldSum("mission.location_error", "m", 1.0, ("mission",), (2, 3))
+        sums = Sums(drawing_of(analysis, variables, [held], 4, 1), 4, adds=False, keeps_motion=True)
+        for variable, drawn in zip(variables, ([1.0, 1, -1, -1], [1.0, -1, 1, -1]), strict=True):
+            sums.add(variable, np.array(drawn))
+        wanted = [late(tx, rx).point for tx, rx in ((0.3, 0.9), (-0.3, 0.3), (0.3, -0.3), (-0.3, -0.9))]
+        assert np.sqrt(sums.exact_square(held)) == pytest.approx(np.linalg.norm(wanted, axis=1), rel=1e-6)
+
+    def test_images_are_of_the_same_motion(self) -> None:
+        """What is flown for an image is the path itself, as it was; `check` says the same now."""
+        study = Study(mission_of("{time_tag: 1 s}"))
+        (source,) = (one for one in study.sources if one.id == "receiver.time_tag")
+        assert study.effect([(source, 1.0)]).displacement == pytest.approx(late(receiver=1.0).point, rel=1e-6)
+        assert self.does("{time_tag: 1 s}").displacement == pytest.approx(late(receiver=1.0).point, rel=1e-6)
+
+    @staticmethod
+    def does(error: str, common: str = ""):
+        analysis = Analysis(parse_mission(of_turn(error, common)))
+        (source,) = analysis.stated
+        return Case(analysis).does(analysis.full, source)
+
+
+def of_turn(error: str, common: str = "", needs: str = "{location_error: 10 m, islr: -20 dB}") -> str:
+    text = TURN.replace("ERROR", error).replace("COMMON", common)
+    return text.replace("{location_error: 10 m, islr: -20 dB}", needs)
+
+
+def late(transmitter: float = 0.0, receiver: float = 0.0, scatterer: tuple[float, float] = (0.0, 0.0)) -> Response:
+    """Where the image of the turn peaks if paths are taken for what they are later by so much, and what is left."""
+
+    def from_there(path: Path) -> Path:
+        return lambda times: path(times) - np.array([*scatterer, 0.0])
+
+    paths = from_there(flight(PT, VT)), from_there(flight(P, V, A))
+    tags = (transmitter, receiver)
+    errors = tuple(
+        (lambda times, path=path, tag=tag: path(times + tag) - path(times)) if tag else no_error
+        for path, tag in zip(paths, tags, strict=True)
+    )
+    return Collection(10e9, 300e6, T, paths, errors).least_variance_point()
 
 
 def flown(late: float) -> np.ndarray:

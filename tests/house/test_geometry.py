@@ -195,6 +195,20 @@ def test_many_cases_are_those_of_each(cases) -> None:
             assert np.broadcast_to(of_many, (len(cases),))[index] == pytest.approx(of_one, rel=1e-9, abs=1e-9)
 
 
+def test_how_far_a_path_gets_within_a_delay() -> None:
+    """p(τ + δ) − p(τ) by hand: 10·2 + 3·(3² − 1²)/2 + 0.5·(3³ − 1³) along x, from 1 s on within 2 s."""
+    bent = {"acceleration": (3.0, 0, -9.0), "bends": ((0.5, 0, 0),)}
+    path = g.PlatformState(position=(7e6, 0, 5.0), velocity=(10.0, -1.0, 0), **bent)
+    assert path.later(1.0, 2.0) == pytest.approx((45.0, -2.0, -36.0))
+
+
+def test_paths_of_some_cases() -> None:
+    many = g.PlatformState(position=(np.arange(3.0), 0, 5.0), velocity=(1.0, np.array([4.0, 5, 6]), 0))
+    some = many.of(np.array([2, 0, 2]))
+    assert (some.position[0].tolist(), some.position[2]) == ([2, 0, 2], 5.0)
+    assert some.velocity[1].tolist() == [6, 4, 6]
+
+
 def numbers(pair: g.BistaticGeometry):
     """What a geometry says, where platforms are apart."""
     for path in (*pair.both, pair.apart):

@@ -521,7 +521,7 @@ def _assumptions(page: Page) -> Iterator[tuple[str, str]]:
             "the scene. Attitude swings an arm and turns the specific force: the row of the inertial sensor has both",
         )
     if any(row.subject.kind == "time_tag" for row in found.rows):
-        yield "Time tags", "a path is measured where its platform is later by so much: velocity times the time"
+        yield "Time tags", "a path is measured where its platform is later by so much"
     if any(platform.oscillator for platform in mission.platforms) or mission.synchronization:
         yield (
             "Clocks",

@@ -31,7 +31,7 @@ def declaration(mission: Mission, source: ErrorSource) -> Iterator[Step]:
     k = mission.allocation.coverage_factor
     if source.clock is not None:
         own = source.declared / k
-    elif kind == "time_tag":
+    elif source.is_time_tag:
         owner = mission.common_motion_error if source.is_common else getattr(mission.platforms, platform).motion_error
         own = getattr(owner, kind)
     elif platform in PLATFORMS:
@@ -97,12 +97,12 @@ def effect(analysis: Analysis, source: ErrorSource, model: str | None) -> Iterat
     qpe = abs(source.effect.qpe) * size
     platform, kind, axis = source.owner, source.subject.kind, source.subject.axis
     gates_by_full = model == "full"
-    if gates_by_full and source.is_motion and (source.owner != "mission" or kind == "time_tag"):
+    if gates_by_full and source.is_motion and (source.owner != "mission" or source.is_time_tag):
         unaware = ", which does not know the direct path" if analysis.mission.has_direct_path else ""
         yield step(f"The published model, for comparison{unaware}; what gates, the full model, comes after it")
     if not source.is_motion:
         yield step("Quadratic phase error, as declared", f"QPE = {size:.6g} rad")
-    elif kind == "time_tag":
+    elif source.is_time_tag:
         yield from _time_tag_effect(analysis, source, size, each)
     elif source.is_common and source.subject.frame != "scene":
         yield from _common_projected_effect(analysis, source, size, each)
