@@ -2,11 +2,11 @@
 
 An allowable of a position or a velocity follows from how the range to the platform bends. A fit to a noisy log has an
 error in its acceleration, and every allowable with it. The change is found with the path one sigma
-to either side.
+to either side. Of a path in pieces the acceleration is that of the parabola through the error of all of them: what
+the error does faster cancels in the quadratic phase of the aperture.
 """
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -47,8 +47,8 @@ def allowable_noise(mission: Mission, name: str) -> AllowableNoise | None:
     if not sigma > 0:
         return None
     shift = along / sigma  # of one sigma along the line of sight, with what goes with it
-    here, sides = np.array(path.state.acceleration), np.array([0.0, 1.0, -1.0])
-    state: Any = replace(path.state, acceleration=tuple(here[axis] + sides * shift[axis] for axis in range(3)))
+    sides = np.array([0.0, 1.0, -1.0])
+    state = path.state.bent((sides * shift[0], sides * shift[1], sides * shift[2]))
     shifted = platform._replace(path=path._replace(state=state))
     cases = mission._replace(platforms=mission.platforms._replace(**{name: shifted}))
     geometry = cases.geometry

@@ -552,6 +552,7 @@ def _flown(fitted: Fitted, words: str, file: str | None = None, digest: str | No
         file=file,
         sha256=digest,
         order=fitted.order,
+        pieces=fitted.pieces,
         farthest=fitted.farthest,
         rms=fitted.rms,
         samples=fitted.samples or None,
