@@ -7,7 +7,7 @@ numbers alone is a plain float, in a tenth of the time that NumPy takes for one.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import zip_longest
 from typing import Any, Protocol
@@ -101,7 +101,7 @@ def _minus(a: Vectors, b: Vectors) -> Vectors:
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
 
 
-class Curve(Protocol):
+class CurvedPath(Protocol):
     """A path that no single polynomial of slow time describes."""
 
     @property
@@ -167,17 +167,6 @@ class Pieces:
             return (x, y, z), (u, v, w)
         return (float(x), float(y), float(z)), (float(u), float(v), float(w))
 
-    def bent(self, acceleration: Vectors) -> "Pieces":
-        """The path with an acceleration in addition, without a change of place and velocity at the midpoint."""
-
-        def of_piece(powers: tuple[Vectors, ...], middle: Any) -> tuple[Vectors, ...]:
-            added = [tuple(a * factor for a in acceleration) for factor in (middle * middle / 2, middle, 0.5)]
-            sums = [(p[0] + a[0], p[1] + a[1], p[2] + a[2]) for p, a in zip(powers, added, strict=False)]
-            return (*sums, *powers[3:])
-
-        powers = tuple(map(of_piece, self.powers, self.middles))
-        return Pieces(self.starts, self.middles, powers)
-
 
 @dataclass(frozen=True)
 class _Apart:
@@ -209,7 +198,7 @@ class PlatformState:
     acceleration: Vectors = STRAIGHT
     bends: tuple[Vectors, ...] = ()
     radial: Axes | None = None
-    curve: Curve | None = None
+    curve: CurvedPath | None = None
 
     @property
     def is_still(self) -> Any:
@@ -298,11 +287,15 @@ class PlatformState:
         count = _FEWEST_LOOKS if self.curve is None else max(_FEWEST_LOOKS, _LOOKS_PER_PIECE * self.curve.count)
         return self.place(np.linspace(-1.0, 1.0, 2 * count + 1)[:, None] * duration_s)
 
-    def bent(self, acceleration: Vectors) -> "PlatformState":
-        """The path with an acceleration in addition, without a change of place and velocity at the midpoint."""
-        a, b = self.acceleration, acceleration
-        curve = self.curve.bent(b) if isinstance(self.curve, Pieces) else self.curve
-        return replace(self, acceleration=(a[0] + b[0], a[1] + b[1], a[2] + b[2]), curve=curve)
+    def less(self, other: "PlatformState") -> "PlatformState":
+        """The path less another one, at each time; it has no frame of an orbit."""
+        return PlatformState(
+            position=_minus(self.position, other.position),
+            velocity=_minus(self.velocity, other.velocity),
+            acceleration=_minus(self.acceleration, other.acceleration),
+            bends=tuple(_minus(*pair) for pair in zip_longest(self.bends, other.bends, fillvalue=STRAIGHT)),
+            curve=None if self.curve is None and other.curve is None else _Apart(self, other),
+        )
 
     @property
     def azimuth(self) -> Any:
@@ -410,14 +403,7 @@ class BistaticGeometry:
     @cached_property
     def apart(self) -> PlatformState:
         """The transmitter as the receiver has it: its position is the baseline."""
-        t, r = self.both
-        return PlatformState(
-            position=_minus(t.position, r.position),
-            velocity=_minus(t.velocity, r.velocity),
-            acceleration=_minus(t.acceleration, r.acceleration),
-            bends=tuple(_minus(*pair) for pair in zip_longest(t.bends, r.bends, fillvalue=STRAIGHT)),
-            curve=None if t.curve is None and r.curve is None else _Apart(t, r),
-        )
+        return self.transmitter.less(self.receiver)
 
     @property
     def echo_delay(self) -> Any:

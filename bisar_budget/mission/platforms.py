@@ -64,7 +64,7 @@ from bisar_budget.mission.readers import (
     either,
 )
 from bisar_budget.mission.vibrations import Vibration
-from bisar_budget.paths.accuracy import Matrix, StatedAccuracy
+from bisar_budget.paths.accuracy import Matrix, PathNoise, StatedAccuracy
 from bisar_budget.paths.instant import SCALES, parse_instant
 
 if TYPE_CHECKING:
@@ -438,6 +438,7 @@ class FlownPath(NamedTuple):
     stated: tuple[StatedAccuracy, ...] = ()  # by its own source, along the scene's axes
     log_noise: LogNoise | None = None
     acceleration_noise: Matrix | None = None  # covariance of the error of a fit [m²/s⁴]
+    path_noise: PathNoise | None = None
 
     @property
     def is_raw(self) -> bool:

@@ -17,7 +17,7 @@ from numpy.polynomial import chebyshev, legendre
 from numpy.typing import NDArray
 
 from bisar_budget.geometry import STRAIGHT, PlatformState, Vector
-from bisar_budget.paths.accuracy import Matrix, StatedAccuracy, as_matrix
+from bisar_budget.paths.accuracy import Matrix, PathNoise, StatedAccuracy, as_matrix
 from bisar_budget.paths.earth import Floats
 from bisar_budget.paths.instant import DAY, Instant, gps_week
 from bisar_budget.paths.splines import ORDER, SplineFit
@@ -37,6 +37,7 @@ _MOST_PIECES = 256
 _TRIED = 128  # coefficients at least, before no number of pieces is better: enough for 40 full circles
 _TRIED_RATIO = 4  # or so many times those of the best path
 _LOOKS_PER_PIECE = 4
+_SAME = 1e-9  # of the largest mode of the noise: what is less is rounding
 _FEWEST = 5  # places of a log that give a path
 _ENOUGH = 9  # of them that say what is noise; of a log that has fewer in the aperture, places beside it help
 _GROWTH = 1.5  # of a stretch to the next wider one
@@ -171,7 +172,8 @@ class Fitted:
     `residual` (3, 3) is the covariance of what the path leaves of the fixes in the aperture [m²], and
     `correlation_time` that of a Gauss-Markov process which is correlated as they are [s]. `acceleration_noise` (3, 3)
     is the covariance of the fit's own error of the acceleration [m²/s⁴], with what a wider stretch may have smeared:
-    of one polynomial at mid-aperture, of pieces that of the parabola through their error.
+    of one polynomial at mid-aperture, of pieces that of the parabola through their error. `path_noise` is that error
+    over the aperture.
     """
 
     state: PlatformState
@@ -185,6 +187,7 @@ class Fitted:
     residual: Matrix = NO_MATRIX
     correlation_time: float = 0.0
     acceleration_noise: Matrix = NO_MATRIX
+    path_noise: PathNoise | None = None
     pieces: int = 1
 
 
@@ -276,7 +279,7 @@ class _SmoothFit:
         return math.sqrt(float(np.mean(np.sum(self.left**2, axis=1))))
 
     def basis(self, times: Floats) -> Floats:
-        """What each coefficient gives at slow times (m,) [s], (m, coefficients)."""
+        """Matrix (m, coefficients) from coefficients to places at slow times (m,) [s]."""
         if self.spline is not None:
             return spline_basis(times, self.spline.edges)
         return np.asarray(legendre.legvander(times / self.half_s, self.order))
@@ -320,6 +323,22 @@ class _SmoothFit:
             bends = 3 * parabola @ self.basis(looks)  # P₂ has the second derivative 3
         variance = float(bends @ self.covariance @ bends) / scale_s**4
         return np.diag(variance * self.variances)
+
+    def path_noise(self, aperture_time_s: float, excess: float) -> PathNoise:
+        """The error of the path over the aperture, its variance times a factor."""
+        looks, half_s = self.looks(aperture_time_s), aperture_time_s / 2
+        through = np.linalg.pinv(legendre.legvander(looks / half_s, _HIGHEST)) @ self.basis(looks)
+        ways, sizes, _ = np.linalg.svd(through @ self.root, full_matrices=False)
+        ways = ways[:, sizes > _SAME * sizes[0]] * sizes[sizes > _SAME * sizes[0]]
+        sigmas = np.sqrt(excess * len(self.left) / self.independent * self.variances)
+        modes = []
+        for way in ways.T:
+            powers = np.array(legendre.leg2poly(way)) / half_s ** np.arange(len(way))
+            modes += [
+                tuple(_vector(sigma * power * axis) for power in powers)
+                for sigma, axis in zip(sigmas, np.eye(3), strict=True)
+            ]
+        return PathNoise(tuple(modes))
 
 
 def _information(fit_left: Floats, coefficients: int, independent: float) -> float:
@@ -500,6 +519,7 @@ def smoothed(times: Floats, places: Floats, aperture_time_s: float, widest_s: fl
         as_matrix(residual),
         float(used[-1] - used[0]) / max(count - 1, 1) * count / fit.independent / 2,
         as_matrix(excess * fit.acceleration_noise(aperture_time_s)),
+        fit.path_noise(aperture_time_s, excess),
         fit.pieces,
     )
 
@@ -753,6 +773,11 @@ def powers_of(coefficients: Floats, half_s: float, convert: Callable[..., Any] =
         found = convert(coefficients[:, axis])  # without the highest that are zero
         powers[: len(found), axis] = found
     return powers / half_s ** np.arange(len(powers))[:, None]
+
+
+def _vector(values: Floats) -> Vector:
+    x, y, z = values.tolist()
+    return (x, y, z)
 
 
 def path_of(powers: Iterable[Iterable[float]]) -> PlatformState:

@@ -172,21 +172,19 @@ def tally_of(drawing: Drawing, piece: DrawsPiece) -> Tally:
 class Sums:
     """Effects of one block of draws, added up: the quadratic phase by owner, all else for the mission.
 
-    By owner, if kept: `motion` is position, velocity, acceleration error and so on of both platforms, (2, rates, 3,
-    draws),
-    `clock` its coefficients (4, draws), `alone` what is known by its effects only: quadratic and cubic phase,
-    displacement east and north (4, draws). Where it `adds`, `square` can be asked for, where it `keeps_motion`,
-    `exact_square`.
+    By owner, if kept: `motion` is position, velocity and acceleration error of both platforms, (2, 3, 3, draws),
+    `late` their time tags (2, draws), `clock` its coefficients (4, draws), `alone` what is known by its effects only:
+    quadratic and cubic phase, displacement east and north (4, draws). Where it `adds`, `square` can be asked for,
+    where it `keeps_motion`, `exact_square`.
     """
 
     def __init__(self, drawing: Drawing, size: int, *, adds: bool, keeps_motion: bool) -> None:
         self.exact, self.size, self.keeps_motion, self.paths = drawing.exact, size, keeps_motion, drawing.paths
-        is_late = any(one.subject.kind == "time_tag" for variable in drawing.variables for one, _ in variable.parts)
-        self.rates = max(3, *(len(path.rates) for path in self.paths)) if is_late else 3
         wanted = {column for one in drawing.judged for column in one.columns}
         self.phases = {variable.owner: np.zeros(size) for variable in drawing.variables} if adds else {}
         self.totals = {column: np.zeros(size) for column in sorted(wanted - {0})} if adds else {}
         self.motion: dict[str, Floats] = {}
+        self.late: dict[str, Floats] = {}
         self.clock: dict[str, Floats] = {}
         self.alone: dict[str, Floats] = {}
         self._exact: dict[tuple[str, ...], Found] = {}
@@ -195,7 +193,7 @@ class Sums:
 
     def clear(self) -> None:
         """Begin another block."""
-        every: list[Mapping[Any, Floats]] = [self.phases, self.totals, self.motion, self.clock, self.alone]
+        every: list[Mapping[Any, Floats]] = [self.phases, self.totals, self.motion, self.late, self.clock, self.alone]
         for kept in every:
             for one in kept.values():
                 one.fill(0.0)
@@ -215,15 +213,16 @@ class Sums:
                 self._add_effects(variable.owner, variable.effects, drawn)
 
     def _add_motion(self, owner: str, source: ErrorSource, size: float, drawn: Floats) -> None:
-        if source.is_position:
-            motion = self._kept(self.motion, owner, (2, self.rates, 3))
+        if source.subject.kind == "time_tag":
+            late = self._kept(self.late, owner, (2,))
             for platform in source.platforms:
-                is_late = source.subject.kind == "time_tag"  # v·δt at mid-aperture, a·δt of velocity, …
-                ways = self.paths[platform].rates if is_late else (source.direction_of(platform),)
-                for order, way in enumerate(ways, 0 if is_late else _ORDER[source.unit]):
-                    for axis, component in enumerate(way):
-                        if component:
-                            motion[platform, order, axis] += size * component * drawn
+                late[platform] += size * drawn
+        elif source.is_position:
+            motion = self._kept(self.motion, owner, (2, 3, 3))
+            for platform in source.platforms:
+                for axis, component in enumerate(source.direction_of(platform)):
+                    if component:
+                        motion[platform, _ORDER[source.unit], axis] += size * component * drawn
         elif source.clock is not None:
             self._kept(self.clock, owner, (4,))[:] += np.multiply.outer(size * np.array(source.clock), drawn)
         else:
@@ -266,12 +265,15 @@ class Sums:
 
     def _by_exact_ranges(self, owners: tuple[str, ...]) -> Found:
         times = self.exact.times[:, 0]
-        factorials = [math.factorial(order) for order in range(self.rates)]
-        powers = times[:, None] ** np.arange(self.rates) / factorials  # of (22)
+        powers = times[:, None] ** np.arange(3) / (1, 1, 2)  # of (22)
         clock_powers = SPEED_OF_LIGHT * times[:, None] ** np.arange(4)
-        motion = _sum(self.motion, owners, np.broadcast_to(0.0, (2, self.rates, 3, self.size)))
+        motion = _sum(self.motion, owners, np.broadcast_to(0.0, (2, 3, 3, self.size)))
+        late = _sum(self.late, owners, np.broadcast_to(0.0, (2, self.size)))
         clock = _sum(self.clock, owners, np.broadcast_to(0.0, (4, self.size)))
         shifts = [powers @ one.swapaxes(0, 1) if one.any() else STILL for one in motion]
+        for platform in np.flatnonzero(late.any(axis=1)):  # v·δt along the whole path
+            velocities = np.array(np.broadcast_arrays(*self.paths[platform].at(times)[1], times)[:3])
+            shifts[platform] = shifts[platform] + velocities[:, :, None] * late[platform]
         return followed(self.exact, clock_powers @ clock, shifts, np.zeros(self.size, dtype=int))
 
 
