@@ -269,9 +269,14 @@ class _SmoothFit:
 
     @property
     def in_common(self) -> tuple[float, float]:
-        """Mean product of a residual and the next one, which white noise has none of, and its standard deviation."""
+        """Mean product of a residual and the next one, which white noise has none of, and its standard deviation.
+
+        Of white noise each coefficient takes a part that neighbours have in common; it is given back.
+        """
         products = (self.left[1:] * self.left[:-1]).sum(axis=1)
-        return float(products.mean()), math.sqrt(float(np.mean(products**2)) / len(products))
+        mean, square = float(products.mean()), float(np.mean(np.sum(self.left**2, axis=1)))
+        taken = len(self.series) / len(self.left) * (square - mean)
+        return mean + taken, math.sqrt(float(np.mean(products**2)) / len(products))
 
     @property
     def rms(self) -> float:
