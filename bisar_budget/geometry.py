@@ -10,9 +10,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import zip_longest
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bisar_budget.constants import ROUNDING, SPEED_OF_LIGHT
 
@@ -25,6 +26,8 @@ STRAIGHT: Vector = (0.0, 0.0, 0.0)  # acceleration of a platform whose path does
 Axes = tuple[Vectors, Vectors, Vectors]
 
 STILL = 1e-6  # m/s; slower than this no platform flies an aperture
+_LOOKS_PER_PIECE = 8  # at a path in pieces, for how far and how low it gets
+_FEWEST_LOOKS = 32  # to each side of the midpoint
 FRAME_AXES = {
     "scene": ("x", "y", "z"),
     "track": ("along", "cross", "up"),
@@ -89,16 +92,105 @@ def without_rounding(a: Vectors) -> Vectors:
     return (_above(floor, a[0]), _above(floor, a[1]), _above(floor, a[2]))
 
 
+def _of_cases(values: NDArray[np.float64], asked: Any) -> Any:
+    """Values of cases (cases,); a float where there is one case, and one was asked for."""
+    return values if np.ndim(asked) or values.size > 1 else values.item()
+
+
 def _minus(a: Vectors, b: Vectors) -> Vectors:
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
 
 
+class CurvedPath(Protocol):
+    """A path that no single polynomial of slow time describes."""
+
+    @property
+    def count(self) -> int:
+        """Number of its pieces."""
+
+    def at(self, tau: Any) -> tuple[Vectors, Vectors]:
+        """Position and velocity at slow times from the midpoint. [m], [m/s]"""
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """A path in polynomials, each over its own piece of slow time; the first and the last go on beyond their ends.
+
+    Each piece counts time from its own middle. A polynomial about the midpoint of a long aperture would lose digits
+    in powers of hundreds of seconds. Numbers may be arrays (cases,).
+
+    Attributes
+    ----------
+    starts : tuple
+        When each piece but the first begins, rising. [s]
+    middles : tuple
+        From when the time of each piece counts. [s]
+    powers : tuple
+        Coefficients of time to the power 0, 1, … of each piece. [m], [m/s], …
+    """
+
+    starts: tuple[Any, ...]
+    middles: tuple[Any, ...]
+    powers: tuple[tuple[Vectors, ...], ...]
+
+    @property
+    def count(self) -> int:
+        """Number of pieces."""
+        return len(self.middles)
+
+    @cached_property
+    def _arrays(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Starts (pieces - 1, …), middles (pieces, …), powers (pieces, …, order + 1, 3), with … () or (cases,)."""
+        numbers = [x for powers in self.powers for vector in powers for x in vector]
+        every = np.array(np.broadcast_arrays(*self.starts, *self.middles, *numbers), dtype=float)
+        starts, middles, powers = np.split(every, (len(self.starts), len(self.starts) + self.count))
+        powers = powers.reshape(self.count, -1, 3, *every.shape[1:])
+        return starts, middles, powers if every.ndim == 1 else np.moveaxis(powers, -1, 1)
+
+    def at(self, tau: Any) -> tuple[Vectors, Vectors]:
+        """Position and velocity at slow times from the midpoint. [m], [m/s]"""
+        starts, middles, powers = self._arrays
+        times = np.asarray(tau, dtype=float)
+        if middles.ndim == 1:
+            which: Any = np.searchsorted(starts, times, "right")
+        else:
+            times = np.broadcast_to(times, np.broadcast_shapes(times.shape, middles.shape[1:]))
+            begun = times >= starts.reshape(len(starts), *(1,) * (times.ndim - 1), middles.shape[1])
+            which = begun.sum(axis=0), np.arange(middles.shape[1])
+        since, of_piece = (times - middles[which])[..., None], powers[which]
+        place, rate = of_piece[..., -1, :], np.zeros((*times.shape, 3))
+        for power in range(of_piece.shape[-2] - 2, -1, -1):
+            rate = rate * since + place
+            place = place * since + of_piece[..., power, :]
+        (x, y, z), (u, v, w) = (np.moveaxis(one, -1, 0) for one in (place, rate))
+        if np.ndim(x):
+            return (x, y, z), (u, v, w)
+        return (float(x), float(y), float(z)), (float(u), float(v), float(w))
+
+
+@dataclass(frozen=True)
+class _Apart:
+    """A path less another one, one of which is in pieces."""
+
+    path: "PlatformState"
+    other: "PlatformState"
+
+    @property
+    def count(self) -> int:
+        return sum(one.curve.count for one in (self.path, self.other) if one.curve is not None)
+
+    def at(self, tau: Any) -> tuple[Vectors, Vectors]:
+        (place, rate), (from_place, from_rate) = self.path.at(tau), self.other.at(tau)
+        return _minus(place, from_place), _minus(rate, from_rate)
+
+
 @dataclass(frozen=True, kw_only=True)
 class PlatformState:
-    """The path of one platform over the aperture, a polynomial of slow time; of one case or of many.
+    """The path of one platform over the aperture, a function of slow time; of one case or of many.
 
     Position [m] and velocity [m/s] at the midpoint, acceleration [m/s²], and in `bends` the coefficients of τ³, τ⁴, …
-    [m/s³], [m/s⁴], …. `radial` are the axes of its `ric` frame, where the Earth's centre is known.
+    [m/s³], [m/s⁴], …: a polynomial, which is the whole path unless there is a `curve`. With one, the polynomial is
+    the path near the midpoint. `radial` are the axes of its `ric` frame, where the Earth's centre is known.
     """
 
     position: Vectors
@@ -106,16 +198,22 @@ class PlatformState:
     acceleration: Vectors = STRAIGHT
     bends: tuple[Vectors, ...] = ()
     radial: Axes | None = None
+    curve: CurvedPath | None = None
 
     @property
     def is_still(self) -> Any:
-        """Whether it stays where it is."""
-        return self.travelled(1.0) < STILL
+        """Whether it stays where it is; what flies several pieces does not."""
+        return self.curve is None and self.travelled(1.0) < STILL
 
     @property
     def is_straight(self) -> bool:
-        """Whether the velocity is constant."""
-        return self.acceleration == STRAIGHT and not self.bends
+        """Whether the velocity is constant; of one case."""
+        return self.acceleration == STRAIGHT and self.is_quadratic
+
+    @property
+    def is_quadratic(self) -> bool:
+        """Whether the acceleration is constant."""
+        return not self.bends and self.curve is None
 
     @property
     def rates(self) -> tuple[Vectors, ...]:
@@ -125,6 +223,8 @@ class PlatformState:
 
     def place(self, tau: Any) -> Vectors:
         """Position at slow times from the midpoint. [m]"""
+        if self.curve is not None:
+            return self.curve.at(tau)[0]
         p, v, a = self.position, self.velocity, self.acceleration
         half = tau * tau / 2
         x, y, z = p[0] + v[0] * tau + a[0] * half, p[1] + v[1] * tau + a[1] * half, p[2] + v[2] * tau + a[2] * half
@@ -135,6 +235,8 @@ class PlatformState:
 
     def at(self, tau: Any) -> tuple[Vectors, Vectors]:
         """Position and velocity at slow times from the midpoint. [m], [m/s]"""
+        if self.curve is not None:
+            return self.curve.at(tau)
         v, a = self.velocity, self.acceleration
         x, y, z = v[0] + a[0] * tau, v[1] + a[1] * tau, v[2] + a[2] * tau
         for power, bend in enumerate(self.bends, 3):
@@ -185,13 +287,34 @@ class PlatformState:
 
     def travelled(self, duration_s: Any) -> Any:
         """Bound of the way it makes from the midpoint in a time. [m]"""
+        if self.curve is not None:
+            steps = norm(tuple(np.diff(part, axis=0) for part in self._looks(duration_s)))
+            before, after = np.split(steps, 2)
+            return _of_cases(np.maximum(before.sum(axis=0), after.sum(axis=0)), duration_s)
         way = norm(self.velocity) * duration_s + norm(self.acceleration) * duration_s**2 / 2
         return way + sum(norm(bend) * duration_s**power for power, bend in enumerate(self.bends, 3))
 
     def sinks(self, duration_s: Any) -> Any:
         """Bound of how much lower than at the midpoint it is within a time. [m]"""
+        if self.curve is not None:
+            return _of_cases(self.position[2] - self._looks(duration_s)[2].min(axis=0), duration_s)
         way = abs(self.velocity[2]) * duration_s + abs(self.acceleration[2]) * duration_s**2 / 2
         return way + sum(abs(bend[2]) * duration_s**power for power, bend in enumerate(self.bends, 3))
+
+    def _looks(self, duration_s: Any) -> Vectors:
+        """Places within a time of the midpoint, as many to each side, (places, cases). [m]"""
+        count = _FEWEST_LOOKS if self.curve is None else max(_FEWEST_LOOKS, _LOOKS_PER_PIECE * self.curve.count)
+        return self.place(np.linspace(-1.0, 1.0, 2 * count + 1)[:, None] * duration_s)
+
+    def less(self, other: "PlatformState") -> "PlatformState":
+        """The path less another one, at each time; it has no frame of an orbit."""
+        return PlatformState(
+            position=_minus(self.position, other.position),
+            velocity=_minus(self.velocity, other.velocity),
+            acceleration=_minus(self.acceleration, other.acceleration),
+            bends=tuple(_minus(*pair) for pair in zip_longest(self.bends, other.bends, fillvalue=STRAIGHT)),
+            curve=None if self.curve is None and other.curve is None else _Apart(self, other),
+        )
 
     @property
     def azimuth(self) -> Any:
@@ -299,13 +422,7 @@ class BistaticGeometry:
     @cached_property
     def apart(self) -> PlatformState:
         """The transmitter as the receiver has it: its position is the baseline."""
-        t, r = self.both
-        return PlatformState(
-            position=_minus(t.position, r.position),
-            velocity=_minus(t.velocity, r.velocity),
-            acceleration=_minus(t.acceleration, r.acceleration),
-            bends=tuple(_minus(*pair) for pair in zip_longest(t.bends, r.bends, fillvalue=STRAIGHT)),
-        )
+        return self.transmitter.less(self.receiver)
 
     @property
     def echo_delay(self) -> Any:

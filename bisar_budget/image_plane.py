@@ -26,6 +26,8 @@ Floats = NDArray[np.float64]
 # 1e-6 of themselves up to 0.5, and by less than 1e-4 beyond.
 NODES = ((0.1, 6), (0.5, 10), (1.0, 16), (2.0, 32), (math.inf, 64))
 FEWEST_NODES = NODES[0][1]
+# Paths in pieces turn faster than their way says: 1.5 nodes to a piece change phases by less than 1e-4 of themselves.
+_NODES_PER_PIECE, _PIECE_NODES = 1.5, np.array((16, 32, 64, 128, 256))
 OWN_AREA = (
     0.5  # of the determinant of H, which mean gradient and mean Doppler gradient span where they tell sides apart
 )
@@ -74,6 +76,10 @@ def nodes_for(geometry: BistaticGeometry, aperture_time_s: Any, *, has_direct_pa
     way = reduce(np.maximum, [path.travelled(half) / path.slant_range for path in turning])
     limits, counts = zip(*NODES, strict=True)
     found = np.array(counts)[np.searchsorted(limits, way)]
+    pieces = max((path.curve.count for path in turning if path.curve is not None), default=0)
+    if pieces:
+        least = np.searchsorted(_PIECE_NODES[:-1], _NODES_PER_PIECE * pieces)
+        found = np.maximum(found, _PIECE_NODES[least])
     return found if np.ndim(way) else int(found)
 
 

@@ -1,17 +1,17 @@
 """Changes of the allowables by the noise of a log, through the path that is fitted to it.
 
-An allowable of a position or a velocity follows from how the range to the platform bends. A fit to a noisy log has an
-error in its acceleration, and every allowable with it. The change is found with the path one sigma
-to either side.
+An allowable of a position or a velocity follows from how the line of sight to the platform turns. A fit to a noisy
+log has an error at each time of the aperture, and every allowable with it. The error is a sum of independent modes,
+along each axis. Each is put into the path with one sigma of either sign, and the changes add as squares.
 """
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from bisar_budget.effects.effect import PLATFORMS, subject
 from bisar_budget.effects.sources import ErrorListing, exact_ranges
+from bisar_budget.geometry import PlatformState
 from bisar_budget.image_plane import nodes_for
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import Platform
@@ -24,10 +24,10 @@ _KINDS = ("position", "velocity")
 
 @dataclass(frozen=True)
 class AllowableNoise:
-    """The allowable that changes most where a platform's path is off by one sigma of its fit.
+    """The allowable that changes most by the noise of the fit to the log of a platform.
 
-    `acceleration` is that sigma along the line of sight at mid-aperture [m/s²], `change` the relative change of the
-    allowable of a row.
+    `acceleration` is one sigma of the error of the path's acceleration along the line of sight at mid-aperture
+    [m/s²], `change` one sigma of the relative change of the allowable of a row.
     """
 
     acceleration: float
@@ -39,17 +39,22 @@ def allowable_noise(mission: Mission, name: str) -> AllowableNoise | None:
     """Largest change of an allowable of both platforms by the fit's own noise; None of a path that is no fit."""
     platform: Platform = getattr(mission.platforms, name)
     path = platform.path
-    if path is None or path.acceleration_noise is None:
+    if path is None or path.path_noise is None or path.acceleration_noise is None:
         return None
-    covariance, look = np.array(path.acceleration_noise), np.array(path.state.look)
-    along = covariance @ look
-    sigma = float(np.sqrt(max(look @ along, 0.0)))
+    look = np.array(path.state.look)
+    sigma = float(np.sqrt(max(look @ np.array(path.acceleration_noise) @ look, 0.0)))
     if not sigma > 0:
         return None
-    shift = along / sigma  # of one sigma along the line of sight, with what goes with it
-    here, sides = np.array(path.state.acceleration), np.array([0.0, 1.0, -1.0])
-    state: Any = replace(path.state, acceleration=tuple(here[axis] + sides * shift[axis] for axis in range(3)))
-    shifted = platform._replace(path=path._replace(state=state))
+    modes = np.array(path.path_noise.modes)  # (modes, orders, 3)
+    sides = np.concatenate([np.zeros_like(modes[:1]), modes, -modes])
+    position, velocity, half_acceleration, *bends = (tuple(power.T) for power in sides.swapaxes(0, 1))
+    error = PlatformState(
+        position=position,
+        velocity=velocity,
+        acceleration=tuple(2 * part for part in half_acceleration),
+        bends=tuple(bends),
+    )
+    shifted = platform._replace(path=path._replace(state=path.state.less(error)))
     cases = mission._replace(platforms=mission.platforms._replace(**{name: shifted}))
     geometry = cases.geometry
     count = nodes_for(geometry, mission.collection.aperture_time, has_direct_path=mission.has_direct_path)
@@ -72,8 +77,12 @@ def allowable_noise(mission: Mission, name: str) -> AllowableNoise | None:
 
 
 def _changes(units: Floats) -> Floats:
-    """Largest relative change of the allowable of each error, (platforms, axes), by effects per unit at each side."""
+    """One sigma of the relative change of the allowable of each error, (platforms, axes), by effects per unit.
+
+    These are of the path itself, of each mode, and of each with the other sign, (platforms, axes, sides).
+    """
     here = units[..., 0]
     with np.errstate(all="ignore"):
-        changes = np.abs(here[..., None] / units[..., 1:] - 1).max(axis=-1)
+        first, second = np.split(np.abs(here[..., None] / units[..., 1:] - 1), 2, axis=-1)
+        changes = np.sqrt(np.square(np.maximum(first, second)).sum(axis=-1))
     return np.where(here > _MATTERS * here.max(), np.nan_to_num(changes, nan=0.0, posinf=np.inf), 0.0)

@@ -71,7 +71,7 @@ def is_unshaken(mission: Mission, name: str) -> bool:
     if one is None or not is_heard or not np.any(one.sensitivity) or one.vibration.is_stated:
         return False
     state: PlatformState = getattr(mission.geometry, name)
-    return not (state.bends or any(map(np.any, state.acceleration)))
+    return state.is_quadratic and not any(map(np.any, state.acceleration))
 
 
 class AcceleratedTone(NamedTuple):
@@ -170,7 +170,7 @@ def _vibrating(seen: SensorCases, name: str, one: Felt) -> Parts:
 def _turning(seen: SensorCases, name: str) -> tuple[RandomEffect, RandomEffect] | None:
     """Effects of a unit of Γ by the acceleration of a path; None where it has none."""
     state: PlatformState = getattr(seen.geometry, name)
-    if not (state.bends or np.any(norm(state.acceleration) > _FELT)):
+    if state.is_quadratic and not np.any(norm(state.acceleration) > _FELT):
         return None
     felt_part = np.where(_falls(seen.mission, state), 0.0, 1.0)
     if not np.any(felt_part):
@@ -212,7 +212,7 @@ def _falls(mission: Mission, state: PlatformState) -> Any:
 def flies_a_turn(mission: Mission, name: str) -> bool:
     """Whether an oscillator feels the path of its platform."""
     state: PlatformState = getattr(mission.platforms, name).state
-    return bool(state.bends or norm(state.acceleration) > _FELT) and not _falls(mission, state)
+    return bool(not state.is_quadratic or norm(state.acceleration) > _FELT) and not _falls(mission, state)
 
 
 def _together(one: RandomEffect, other: RandomEffect) -> RandomEffect:

@@ -205,7 +205,7 @@ def _vectors(
     turn: Floats = np.array(axes.axes)
     for side, path, slow, state, sign in sides:
         place = path.measured
-        velocity = np.array([state.at(tau)[1] for tau in slow_time.tolist()])
+        velocity = np.stack(np.broadcast_arrays(*state.at(slow_time)[1]), axis=1)
         velocity = velocity + np.gradient(slow.measured - slow.actual, slow_time, axis=0, edge_order=2)
         length = np.linalg.norm(place, axis=1)
         closing = np.sum(place * velocity, axis=1) / length

@@ -426,6 +426,7 @@ def _log_path(
         is_doubted=fitted.missed > _NOISE_M,
         log_noise=LogNoise(fitted.residual, fitted.correlation_time, log.grid, route.processed),
         acceleration_noise=fitted.acceleration_noise,
+        path_noise=fitted.path_noise,
     )
 
 
@@ -552,6 +553,7 @@ def _flown(fitted: Fitted, words: str, file: str | None = None, digest: str | No
         file=file,
         sha256=digest,
         order=fitted.order,
+        pieces=fitted.pieces,
         farthest=fitted.farthest,
         rms=fitted.rms,
         samples=fitted.samples or None,

@@ -64,7 +64,7 @@ from bisar_budget.mission.readers import (
     either,
 )
 from bisar_budget.mission.vibrations import Vibration
-from bisar_budget.paths.accuracy import Matrix, StatedAccuracy
+from bisar_budget.paths.accuracy import Matrix, PathNoise, StatedAccuracy
 from bisar_budget.paths.instant import SCALES, parse_instant
 
 if TYPE_CHECKING:
@@ -408,8 +408,9 @@ class FlownPath(NamedTuple):
     """The path of a platform that the scene's place on the Earth, an orbit or a log of a flight decide.
 
     `source` says where it comes from, empty where the file states it; `file` and `sha256` are those of the file it
-    was read from, `age` that of its elements [s]. Of a fit the order, the residual at most and root mean square [m],
-    the number of places of a log and the stretch of time that they are from [s]. `doubts` are warnings, for reports.
+    was read from, `age` that of its elements [s]. Of a fit the order, the number of pieces, the residual at most and
+    root mean square [m], the number of places of a log and the stretch of time that they are from [s]. `doubts` are
+    warnings, for reports.
 
     `doubt_m` is how far the truth may be from it by what its own source says: the age of elements, the interpolation
     of an ephemeris, the residual of a smoothed log; `doubt_of` says which. Where the file declares no position error,
@@ -422,6 +423,7 @@ class FlownPath(NamedTuple):
     sha256: str | None = None
     age: float | None = None
     order: int | None = None
+    pieces: int | None = None
     farthest: float | None = None
     rms: float | None = None
     samples: int | None = None
@@ -435,7 +437,8 @@ class FlownPath(NamedTuple):
     orientation: tuple[str, str] | None = None  # table by which it is turned to the Earth, and its SHA-256
     stated: tuple[StatedAccuracy, ...] = ()  # by its own source, along the scene's axes
     log_noise: LogNoise | None = None
-    acceleration_noise: Matrix | None = None  # covariance of the error of a fit at mid-aperture [m²/s⁴]
+    acceleration_noise: Matrix | None = None  # covariance of the error of a fit [m²/s⁴]
+    path_noise: PathNoise | None = None
 
     @property
     def is_raw(self) -> bool:
@@ -682,7 +685,7 @@ def _turning_points(state: PlatformState, half: float) -> Iterator[float]:
     Of a path that bends more than once, places a 64th of the aperture apart.
     """
     yield from (-half, half)
-    if state.bends:
+    if not state.is_quadratic:
         yield from (half * part / 32 for part in range(-31, 32))
     elif state.acceleration[2] > 0:
         yield max(-half, min(half, -state.velocity[2] / state.acceleration[2]))

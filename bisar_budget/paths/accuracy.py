@@ -47,6 +47,16 @@ class StatedAccuracy(NamedTuple):
         return math.sqrt(max(math.fsum(variances), 0.0))
 
 
+class PathNoise(NamedTuple):
+    """The error of a path by the noise of its log, as polynomials of slow time over the aperture.
+
+    `modes` (modes, orders, 3) are coefficients of slow time to the power 0, 1, …: errors of one sigma each along one
+    axis of the scene, independent of each other [m], [m/s], …. What errs faster than order 8 is left out.
+    """
+
+    modes: tuple[tuple[Vector, ...], ...]
+
+
 class CovarianceError(ValueError):
     """Numbers that are no covariance."""
 

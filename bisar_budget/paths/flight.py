@@ -1,8 +1,9 @@
-"""A platform's path as a file knows it, and the polynomial of slow time that a budget flies.
+"""A platform's path as a file knows it, and the function of slow time that a budget flies.
 
-Exact ranges, images and every other command take a path as a polynomial over the aperture. An orbit gives a place at
-any time: its polynomial interpolates. A log gives measured places: its polynomial smooths them by least squares. Both
-say how far the polynomial is from what the file has.
+Exact ranges, images and every other command take a path as a polynomial over the aperture, or as several in pieces.
+An orbit gives a place at any time: its polynomial interpolates. A log gives measured places: one polynomial smooths
+them by least squares, or a spline of as many pieces as the log needs. Both say how far the path is from what the file
+has.
 """
 
 import math
@@ -16,9 +17,11 @@ from numpy.polynomial import chebyshev, legendre
 from numpy.typing import NDArray
 
 from bisar_budget.geometry import STRAIGHT, PlatformState, Vector
-from bisar_budget.paths.accuracy import Matrix, StatedAccuracy, as_matrix
+from bisar_budget.paths.accuracy import Matrix, PathNoise, StatedAccuracy, as_matrix
 from bisar_budget.paths.earth import Floats
 from bisar_budget.paths.instant import DAY, Instant, gps_week
+from bisar_budget.paths.splines import ORDER, SplineFit
+from bisar_budget.paths.splines import basis as spline_basis
 
 _NODES = 15  # Chebyshev points of an interpolation, so many coefficients
 _LEAST_WINDOW = 10.0  # s; in a shorter one rounding of an Earth-fixed place, 1e-9 m, is an acceleration
@@ -27,7 +30,14 @@ _UNSEEN_M = 1e-7  # a coefficient that moves the path by less is rounding
 _ROUGH_M = 5e-3  # a path that is farther from its polynomial is not smooth; messages have places to 1 mm
 _TRIFLE_M = 1e-3
 _STRAY = 8  # times the usual residual; noise of thousands of places reaches 4
-_HIGHEST = 8  # order of a smoothed path
+_HIGHEST = 8  # order of a smoothed path of one piece
+_CLEAN_M = 1e-5  # root mean square that a path leaves of a log: what is less is no reason for more pieces
+_WHITE = 2.0  # times its standard deviation: so far what neighbouring residuals have in common is chance
+_MOST_PIECES = 256
+_TRIED = 128  # coefficients at least, before no number of pieces is better: enough for 40 full circles
+_TRIED_RATIO = 4  # or so many times those of the best path
+_LOOKS_PER_PIECE = 4
+_SAME = 1e-9  # of the largest mode of the noise: what is less is rounding
 _FEWEST = 5  # places of a log that give a path
 _ENOUGH = 9  # of them that say what is noise; of a log that has fewer in the aperture, places beside it help
 _GROWTH = 1.5  # of a stretch to the next wider one
@@ -153,14 +163,17 @@ class Log:
 
 @dataclass(frozen=True)
 class Fitted:
-    """A path as a polynomial, its order, and how far it is from the file's places, at most and root mean square [m].
+    """A path by polynomials, their order, and how far it is from the file's places, at most and root mean square [m].
 
-    `samples` is how many of a log's places the polynomial smooths, over `stretch` [s]; none of an orbit, which is
-    interpolated. `missed` is how far the path goes by a place of the log that it does not know, root mean square [m].
-    `doubts` are warnings. `residual` (3, 3) is the covariance of what the polynomial leaves of the fixes in the
-    aperture [m²], and `correlation_time` that of a Gauss-Markov process which is correlated as they are [s].
-    `acceleration_noise` (3, 3) is the covariance of the fit's own error of the acceleration at mid-aperture [m²/s⁴],
-    with what a wider stretch may have smeared.
+    `pieces` is the number of the polynomials: more than one, and they meet with one place and one velocity.
+    `samples` is how many of a log's places they smooth, over `stretch` [s]; none of an orbit, which is interpolated.
+    `missed` is how far the path goes by a place of the log that it does not know, root mean square [m]. `doubts` are
+    warnings.
+    `residual` (3, 3) is the covariance of what the path leaves of the fixes in the aperture [m²], and
+    `correlation_time` that of a Gauss-Markov process which is correlated as they are [s]. `acceleration_noise` (3, 3)
+    is the covariance of the fit's own error of the acceleration [m²/s⁴], with what a wider stretch may have smeared:
+    of one polynomial at mid-aperture, of pieces that of the parabola through their error. `path_noise` is that error
+    over the aperture.
     """
 
     state: PlatformState
@@ -174,6 +187,8 @@ class Fitted:
     residual: Matrix = NO_MATRIX
     correlation_time: float = 0.0
     acceleration_noise: Matrix = NO_MATRIX
+    path_noise: PathNoise | None = None
+    pieces: int = 1
 
 
 def interpolated(places: Callable[[Floats], Floats], aperture_time_s: float, widest_s: float = math.inf) -> Fitted:
@@ -214,10 +229,11 @@ def stretch_around(times: Floats, aperture_time_s: float) -> float:
 
 @dataclass(frozen=True, eq=False)
 class _SmoothFit:
-    """A Legendre series through the fixes of a stretch: slow times (n,) [s], and what it leaves of them (n, 3) [m].
+    """A path through the fixes of a stretch: slow times (n,) [s], and what it leaves of them (n, 3) [m].
 
-    `independent` is how many independent fixes they are worth. `covariance` (order + 1, order + 1) is that of the
-    coefficients, over the variance of a fix.
+    It is a Legendre series, or a spline. `independent` is how many independent fixes they are worth. `root`
+    (coefficients, coefficients) times its transpose is the covariance of the coefficients, over the variance of white
+    fixes.
     """
 
     half_s: float
@@ -225,11 +241,25 @@ class _SmoothFit:
     series: Floats
     left: Floats
     independent: float
-    covariance: Floats
+    root: Floats
+    spline: SplineFit | None = None
+
+    @classmethod
+    def of_spline(cls, half_s: float, times: Floats, spline: SplineFit, independent: float) -> "_SmoothFit":
+        return cls(half_s, times, spline.series, spline.left, independent, spline.root, spline)
 
     @property
     def order(self) -> int:
-        return len(self.series) - 1
+        return len(self.series) - 1 if self.spline is None else ORDER
+
+    @property
+    def pieces(self) -> int:
+        return 1 if self.spline is None else len(self.spline.edges) - 1
+
+    @property
+    def covariance(self) -> Floats:
+        """Covariance of the coefficients, over the variance of a fix; correlated fixes count as fewer."""
+        return np.asarray(self.root @ self.root.T * (len(self.left) / self.independent))
 
     @property
     def variances(self) -> Floats:
@@ -237,43 +267,132 @@ class _SmoothFit:
         found: Floats = (self.left**2).sum(axis=0) / max(len(self.left) - len(self.series), 1)
         return found
 
+    @property
+    def in_common(self) -> tuple[float, float]:
+        """Mean product of a residual and the next one, which white noise has none of, and its standard deviation.
+
+        Of white noise each coefficient takes a part that neighbours have in common; it is given back.
+        """
+        products = (self.left[1:] * self.left[:-1]).sum(axis=1)
+        mean, square = float(products.mean()), float(np.mean(np.sum(self.left**2, axis=1)))
+        taken = len(self.series) / len(self.left) * (square - mean)
+        return mean + taken, math.sqrt(float(np.mean(products**2)) / len(products))
+
+    @property
+    def rms(self) -> float:
+        """Root mean square of what it leaves. [m]"""
+        return math.sqrt(float(np.mean(np.sum(self.left**2, axis=1))))
+
+    def basis(self, times: Floats) -> Floats:
+        """Matrix (m, coefficients) from coefficients to places at slow times (m,) [s]."""
+        if self.spline is not None:
+            return spline_basis(times, self.spline.edges)
+        return np.asarray(legendre.legvander(times / self.half_s, self.order))
+
     def places(self, times: Floats) -> Floats:
         """Places at slow times [s], (m, 3). [m]"""
-        found: Floats = legendre.legvander(times / self.half_s, self.order) @ self.series
-        return found
+        found: Floats = self.basis(times) @ self.series
+        return found if self.spline is None else found + self.spline.middle
+
+    def leverage(self, times: Floats) -> Floats:
+        """Variance that the fit has at slow times (m,) [s], over that of a fix."""
+        return np.asarray(np.sum((self.basis(times) @ self.root) ** 2, axis=1))
+
+    def state(self) -> PlatformState:
+        """The path that it is."""
+        return path_of(powers_of(self.series, self.half_s)) if self.spline is None else self.spline.state()
+
+    def looks(self, aperture_time_s: float) -> Floats:
+        """Slow times over an aperture, close enough for the error of the path. [s]"""
+        count = max(_LOOKS, _LOOKS_PER_PIECE * self.pieces + 1)
+        return np.asarray(aperture_time_s / 2 * np.linspace(-1, 1, count))
 
     def noise(self, times: Floats, left_out: Floats) -> float:
         """Mean square of the fit's own error over times (m,), of which a projection (m, m) is left out. [m²]"""
-        basis = legendre.legvander(times / self.half_s, self.order)
+        basis = self.basis(times)
         basis = basis - left_out @ basis
         return float(np.einsum("mi,ij,mj->", basis, self.covariance, basis) / times.size * self.variances.sum())
 
-    def acceleration_noise(self) -> Floats:
-        """Covariance of the error of the acceleration at mid-aperture, (3, 3). [m²/s⁴]"""
-        bends = np.array([legendre.legval(0.0, legendre.legder(one, 2)) for one in np.eye(self.order + 1)])
-        variance = float(bends @ self.covariance @ bends) / self.half_s**4
+    def acceleration_noise(self, aperture_time_s: float) -> Floats:
+        """Covariance of the error of the acceleration, (3, 3). [m²/s⁴]
+
+        A polynomial's error has it at mid-aperture. Each piece of a spline has an error of its own, of which the
+        bend over the whole aperture counts: that of the parabola through the error.
+        """
+        if self.spline is None:
+            bends = np.array([legendre.legval(0.0, legendre.legder(one, 2)) for one in np.eye(self.order + 1)])
+            scale_s = self.half_s
+        else:
+            looks, scale_s = self.looks(aperture_time_s), aperture_time_s / 2
+            parabola = np.linalg.pinv(legendre.legvander(looks / scale_s, 2))[2]
+            bends = 3 * parabola @ self.basis(looks)  # P₂ has the second derivative 3
+        variance = float(bends @ self.covariance @ bends) / scale_s**4
         return np.diag(variance * self.variances)
 
+    def path_noise(self, aperture_time_s: float, excess: float) -> PathNoise:
+        """The error of the path over the aperture, its variance times a factor."""
+        looks, half_s = self.looks(aperture_time_s), aperture_time_s / 2
+        through = np.linalg.pinv(legendre.legvander(looks / half_s, _HIGHEST)) @ self.basis(looks)
+        ways, sizes, _ = np.linalg.svd(through @ self.root, full_matrices=False)
+        ways = ways[:, sizes > _SAME * sizes[0]] * sizes[sizes > _SAME * sizes[0]]
+        sigmas = np.sqrt(excess * len(self.left) / self.independent * self.variances)
+        modes = []
+        for way in ways.T:
+            powers = np.array(legendre.leg2poly(way)) / half_s ** np.arange(len(way))
+            modes += [
+                tuple(_vector(sigma * power * axis) for power in powers)
+                for sigma, axis in zip(sigmas, np.eye(3), strict=True)
+            ]
+        return PathNoise(tuple(modes))
 
-def _fit(times: Floats, places: Floats, half_s: float) -> _SmoothFit:
-    """The series of the least Bayesian information criterion (Schwarz 1978) through the fixes of a stretch."""
+
+def _information(fit_left: Floats, coefficients: int, independent: float) -> float:
+    """Information criterion of a fit by what it leaves (n, 3) [m]: the less, the better.
+
+    Each axis has its own noise, and as many coefficients. The last factor is that of AICc (Hurvich & Tsai 1989): a
+    few samples are fitted too well by chance.
+    """
+    count, squares = len(fit_left), (fit_left**2).mean(axis=0) + _UNSEEN_M**2
+    cost = 3 * coefficients * math.log(independent) * count / (count - coefficients - 1)
+    return float(independent * np.log(squares).sum()) + cost
+
+
+def _fit(times: Floats, places: Floats, half_s: float, *, may_have_pieces: bool) -> _SmoothFit:
+    """The path of the least Bayesian information criterion (Schwarz 1978) through the fixes of a stretch."""
     inside = np.abs(times) <= half_s * (1 + 1e-9)
     used, wanted, count = times[inside], places[inside], int(inside.sum())
     at = used / half_s
     fits = [least_squares(at, wanted, order) for order in range(2, min(_HIGHEST, (count - 1) // 2) + 1)]
     independent = _independent(fits[-1][1])
-
-    def information(left: Floats, order: int) -> float:
-        squares = (left**2).mean(axis=0) + _UNSEEN_M**2
-        # Each axis has its own noise, and a coefficient of each order. The last factor is that of AICc (Hurvich &
-        # Tsai 1989): a few samples are fitted too well by chance.
-        coefficients = 3 * (order + 1) * math.log(independent) * count / (count - order - 2)
-        return float(independent * np.log(squares).sum()) + coefficients
-
-    series, left = min(fits, key=lambda fit: information(fit[1], len(fit[0]) - 1))
+    series, left = min(fits, key=lambda fit: _information(fit[1], len(fit[0]), independent))
     triangle = np.linalg.qr(legendre.legvander(at, len(series) - 1))[1]
-    inverse = np.linalg.inv(triangle)
-    return _SmoothFit(half_s, used, series, left, independent, inverse @ inverse.T * (count / independent))
+    fit = _SmoothFit(half_s, used, series, left, independent, np.linalg.inv(triangle))
+    return _in_pieces(fit, wanted) if may_have_pieces else fit
+
+
+def _in_pieces(fit: _SmoothFit, places: Floats) -> _SmoothFit:
+    """The polynomial itself, or a spline through its fixes (n, 3) [m] where that has less information left.
+
+    Pieces are halved, see `splines`, as long as residuals have something in common.
+    """
+    best = last = fit
+    edges: Floats | None = np.array([-fit.half_s, fit.half_s])
+    while edges is not None and best.rms > _CLEAN_M and last.in_common[0] > _WHITE * last.in_common[1]:
+        coefficients = len(edges) - 1 + ORDER
+        most = min(max(_TRIED, _TRIED_RATIO * len(best.series)), _MOST_PIECES + ORDER, len(places) // 2)
+        if coefficients > most:
+            break
+        spline = SplineFit.of(fit.times, places, edges)
+        independent = _independent(spline.left)
+        last = _SmoothFit.of_spline(fit.half_s, fit.times, spline, independent)
+        gain = _information(best.left, len(best.series), independent) - _information(
+            last.left, coefficients, independent
+        )
+        falls = last.in_common[0] * coefficients**2 <= best.in_common[0] * len(best.series) ** 2
+        if gain > 0 and falls:
+            best = last
+        edges = spline.halved(fit.times)
+    return best
 
 
 def _widened(
@@ -288,11 +407,13 @@ def _widened(
     error that counts is that beyond a straight line, which defocuses; the whole path must not become worse, and the
     residual in the aperture must not grow.
     """
-    looks = aperture_time_s / 2 * np.linspace(-1, 1, _LOOKS)
+    looks, has_pieces = narrowest.looks(aperture_time_s), narrowest.spline is not None
     straight = np.linalg.qr(np.vander(looks, 2))[0]
-    projection, nothing = straight @ straight.T, np.zeros((_LOOKS, _LOOKS))
+    projection, nothing = straight @ straight.T, np.zeros((looks.size, looks.size))
     kept = (projection, nothing)  # what is left out of the error that counts, and of the whole
     reach_s = min(widest_s / 2, max(abs(float(times[0])), abs(float(times[-1]))), _WIDEST_RATIO * narrowest.half_s)
+    if has_pieces:  # noise of distant fixes does not reach the aperture: only its ends gain
+        reach_s = min(reach_s, _GROWTH * narrowest.half_s)
     candidates, half_s = [(narrowest, [narrowest.noise(looks, one) for one in kept])], narrowest.half_s
     best, least = narrowest, candidates[0][1][0]
     residual = _residual_within(narrowest, aperture_time_s)
@@ -300,7 +421,7 @@ def _widened(
         half_s = min(half_s * _GROWTH, reach_s)
         if np.searchsorted(times, half_s, "right") - np.searchsorted(times, -half_s) > _MOST_FITTED:
             break
-        fit = _fit(times, places, half_s)
+        fit = _fit(times, places, half_s, may_have_pieces=has_pieces)
         noises = [fit.noise(looks, one) for one in kept]
         smears = [0.0, 0.0]
         for other, of_other in candidates:
@@ -331,8 +452,10 @@ def smoothed(times: Floats, places: Floats, aperture_time_s: float, widest_s: fl
     """Path that fits the places of a log around the aperture by least squares.
 
     The order is that of the least Bayesian information criterion (Schwarz 1978), to 8 at most and to half the
-    samples: what a platform does faster is in the log's noise, or is vibration. Samples with correlated residuals
-    count as fewer. A slow error of the log, which looks like motion, is then not fitted as if it were white noise.
+    samples. Where one polynomial leaves motion, the path is a spline of as many pieces as the same criterion asks
+    for, see `splines`. What a platform does faster is in the log's noise, or is vibration. Samples with correlated
+    residuals count as fewer. A slow error of the log, which looks like motion, is then not fitted as if it were white
+    noise.
 
     The stretch is that around the aperture, or as much longer as makes the predicted error of the path least, see
     `_widened`: noise of the log is an acceleration of the path, by which allowables are wrong.
@@ -368,9 +491,8 @@ def smoothed(times: Floats, places: Floats, aperture_time_s: float, widest_s: fl
             f"has {count} places around the aperture of {aperture_time_s:g} s, at least {_FEWEST} are needed; keep"
             " more of the log"
         )
-    fit, excess = _widened(_fit(times, places, half), times, places, aperture_time_s, widest_s)
-    half, used, left, order = fit.half_s, fit.times, fit.left, fit.order
-    at, count = used / half, len(used)
+    fit, excess = _widened(_fit(times, places, half, may_have_pieces=True), times, places, aperture_time_s, widest_s)
+    used, left, count = fit.times, fit.left, len(fit.times)
     rms = math.sqrt(float((left**2).sum()) / max(count - len(fit.series), 1))
     apart = np.linalg.norm(left, axis=1)
     farthest, usual = float(apart.max()), float(np.median(apart))
@@ -383,35 +505,28 @@ def smoothed(times: Floats, places: Floats, aperture_time_s: float, widest_s: fl
         )
     first = max(int(np.searchsorted(used, -aperture_time_s / 2)) - 1, 0)
     near = slice(first, int(np.searchsorted(used, aperture_time_s / 2, "right")) + 1)
-    missed = float(np.sqrt(np.mean((apart / (1 - _leverage(at, at, order)))[near] ** 2)))
+    own = np.minimum(fit.leverage(used), 1 - 1e-9)  # at a place: its own part in the fit
+    missed = float(np.sqrt(np.mean((apart / (1 - own))[near] ** 2)))
     # Noise of places beside a gap may be more in it.
-    widest = _leverage(at, np.linspace(-1, 1, _LOOKS) * (aperture_time_s / 2 / half), order)
+    widest = fit.leverage(fit.looks(aperture_time_s))
     missed *= max(1.0, math.sqrt(float(widest.max())))
     of_aperture = left[near]
     residual = of_aperture.T @ of_aperture / len(of_aperture) * (count / max(count - len(fit.series), 1))
     return Fitted(
-        path_of(powers_of(fit.series, half)),
-        order,
+        fit.state(),
+        fit.order,
         farthest,
         rms,
         count,
         doubts,
-        2 * half,
+        2 * fit.half_s,
         missed,
         as_matrix(residual),
         float(used[-1] - used[0]) / max(count - 1, 1) * count / fit.independent / 2,
-        as_matrix(excess * fit.acceleration_noise()),
+        as_matrix(excess * fit.acceleration_noise(aperture_time_s)),
+        fit.path_noise(aperture_time_s, excess),
+        fit.pieces,
     )
-
-
-def _leverage(at: Floats, where: Floats, order: int) -> Floats:
-    """Variance that a fit of an order to places at (n,) has elsewhere (m,), over that of a place.
-
-    At a place it is its own part in the fit, less than 1.
-    """
-    triangle = np.linalg.qr(legendre.legvander(at, order))[1]
-    found: Floats = np.sum(np.linalg.solve(triangle.T, legendre.legvander(where, order).T) ** 2, axis=0)
-    return np.minimum(found, 1 - 1e-9) if where is at else found
 
 
 def around_aperture(times: Floats, aperture_time_s: float) -> slice:
@@ -663,6 +778,11 @@ def powers_of(coefficients: Floats, half_s: float, convert: Callable[..., Any] =
         found = convert(coefficients[:, axis])  # without the highest that are zero
         powers[: len(found), axis] = found
     return powers / half_s ** np.arange(len(powers))[:, None]
+
+
+def _vector(values: Floats) -> Vector:
+    x, y, z = values.tolist()
+    return (x, y, z)
 
 
 def path_of(powers: Iterable[Iterable[float]]) -> PlatformState:

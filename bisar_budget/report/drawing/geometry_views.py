@@ -29,7 +29,7 @@ _SHORT = 0.3  # of an arrow; less of it in the plane of the drawing is drawn as 
 _SEEN_PATH = 20.0  # px; shorter paths are hidden by marker and arrow
 _NOTE_COLUMNS = 88
 _SCENE: Place = (0.0, 0.0)
-_PATH_STEPS = 32
+_PATH_STEPS, _STEPS_PER_PIECE = 32, 4
 _LOWER = 0.75  # of the largest height: an enlargement's
 # Least and largest height of a panel, and its margins: left and right, above, below what is in it. [px]
 _PLAN, _SIDE = ((210.0, 400.0), (74.0, 66.0, 66.0)), ((130.0, 360.0), (82.0, 52.0, 34.0))
@@ -117,6 +117,8 @@ def _named(geometry: BistaticGeometry) -> tuple[tuple[str, PlatformState], tuple
 def _flown(state: PlatformState, aperture_time: float) -> tuple[Vector, ...]:
     """Places along the aperture; both ends say all of a straight path."""
     steps = 1 if state.is_straight else _PATH_STEPS
+    if state.curve is not None:
+        steps = max(steps, _STEPS_PER_PIECE * state.curve.count)
     times = (aperture_time * (index / steps - 0.5) for index in range(steps + 1))
     return tuple(state.at(time)[0] for time in times)
 

@@ -238,6 +238,7 @@ def _platform(mission: MissionFindings, name: str) -> dict[str, Any]:
             "sha256": path.sha256,
             "age_s": path.age,
             "order": path.order,
+            "pieces": path.pieces,
             "residual_max_m": path.farthest,
             "residual_rms_m": path.rms,
             "samples": path.samples,

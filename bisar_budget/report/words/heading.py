@@ -156,14 +156,15 @@ def head(mission: MissionFindings) -> Iterator[tuple[str, str]]:
 
 
 def path_words(path: FlownPath) -> str:
-    """Say where a path comes from, and how far the polynomial that stands for it is from what the file has."""
+    """Say where a path comes from, and how far the polynomials that stand for it are from what the file has."""
     said = path.source if path.file is None else f"{path.file}: {path.source}"
     if path.age is not None:
         when = "old" if path.age >= 0 else "ahead"
         said += f", {format_quantity(abs(path.age) / 86400, '')} days {when}"
     if path.order is None or path.farthest is None or path.rms is None:
         return said
-    said += f"; flown as a polynomial of order {path.order}"
+    is_one = path.pieces is None or path.pieces == 1
+    said += f"; flown as {'a polynomial' if is_one else f'{path.pieces} polynomials'} of order {path.order}"
     if path.samples:
         rms, farthest = (format_quantity(one, "m") for one in (path.rms, path.farthest))
         within = "" if path.stretch is None else f" in {format_quantity(path.stretch, 's')}"
