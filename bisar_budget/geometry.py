@@ -101,6 +101,16 @@ def _minus(a: Vectors, b: Vectors) -> Vectors:
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
 
 
+def _of_some(part: Any, cases: Any) -> Any:
+    """The numbers of some cases; a number that all cases share stays as it is."""
+    return part[cases] if isinstance(part, np.ndarray) and part.size > 1 else part
+
+
+def _some_of(vector: Vectors, cases: Any) -> Vectors:
+    x, y, z = (_of_some(part, cases) for part in vector)
+    return (x, y, z)
+
+
 class CurvedPath(Protocol):
     """A path that no single polynomial of slow time describes."""
 
@@ -110,6 +120,9 @@ class CurvedPath(Protocol):
 
     def at(self, tau: Any) -> tuple[Vectors, Vectors]:
         """Position and velocity at slow times from the midpoint. [m], [m/s]"""
+
+    def of(self, cases: Any) -> "CurvedPath":
+        """The paths of some cases, by their places."""
 
 
 @dataclass(frozen=True)
@@ -167,6 +180,11 @@ class Pieces:
             return (x, y, z), (u, v, w)
         return (float(x), float(y), float(z)), (float(u), float(v), float(w))
 
+    def of(self, cases: Any) -> "Pieces":
+        """The paths of some cases, by their places; what all cases share stays as it is."""
+        starts, middles = (tuple(_of_some(part, cases) for part in parts) for parts in (self.starts, self.middles))
+        return Pieces(starts, middles, tuple(tuple(_some_of(one, cases) for one in powers) for powers in self.powers))
+
 
 @dataclass(frozen=True)
 class _Apart:
@@ -182,6 +200,9 @@ class _Apart:
     def at(self, tau: Any) -> tuple[Vectors, Vectors]:
         (place, rate), (from_place, from_rate) = self.path.at(tau), self.other.at(tau)
         return _minus(place, from_place), _minus(rate, from_rate)
+
+    def of(self, cases: Any) -> "_Apart":
+        return _Apart(self.path.of(cases), self.other.of(cases))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -250,17 +271,12 @@ class PlatformState:
 
     def of(self, cases: Any) -> "PlatformState":
         """The paths of some cases, by their places; what all cases share stays as it is."""
-
-        def some(vector: Vectors) -> Vectors:
-            x, y, z = (part[cases] if isinstance(part, np.ndarray) and part.size > 1 else part for part in vector)
-            return (x, y, z)
-
-        bends = tuple(map(some, self.bends))
         return PlatformState(
-            position=some(self.position),
-            velocity=some(self.velocity),
-            acceleration=some(self.acceleration),
-            bends=bends,
+            position=_some_of(self.position, cases),
+            velocity=_some_of(self.velocity, cases),
+            acceleration=_some_of(self.acceleration, cases),
+            bends=tuple(_some_of(bend, cases) for bend in self.bends),
+            curve=self.curve and self.curve.of(cases),
         )
 
     @cached_property
