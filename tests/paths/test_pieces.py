@@ -3,6 +3,7 @@
 The truth of each flight is a formula. What a fit to noise does is redrawn here, not taken from the package.
 """
 
+import itertools
 import math
 from collections.abc import Callable
 from typing import Any
@@ -260,3 +261,24 @@ def test_what_the_noise_of_the_fit_does_to_the_path_is_said() -> None:
     assert np.sqrt(np.mean(said)) == pytest.approx(np.sqrt(np.mean(np.sum(scatter**2, axis=2))), rel=0.1)
     bent = np.einsum("t,sta->sa", parabola, scatter)
     assert np.sqrt(np.mean(bends)) == pytest.approx(np.sqrt(np.mean(bent**2)), rel=0.2)
+
+
+def test_some_cases_of_a_path_in_pieces_fly_the_same_pieces() -> None:
+    """Time tags look at paths case by case: the polynomial about the midpoint was flown instead."""
+    times = np.linspace(-TURN_S / 2, TURN_S / 2, 201)
+    ends, powers = (TURN_S / 4) * np.arange(-2, 3), []
+    for start, end in itertools.pairwise(ends):
+        inside = np.linspace(start, end, 50)
+        fit = np.polynomial.polynomial.polyfit(inside - (start + end) / 2, circle(inside), 8)
+        powers.append(tuple(map(tuple, fit)))
+    middles = tuple((ends[:-1] + ends[1:]) / 2)
+    curve = Pieces(tuple(ends[1:-1]), middles, tuple(powers))
+    grows = np.array([1.0, 1.5, 2.0])  # three cases, each a larger circle
+    larger = Pieces(
+        curve.starts, curve.middles, tuple(tuple(tuple(x * grows for x in v) for v in one) for one in powers)
+    )
+    path = PlatformState(position=(0.0, 0.0, 0.0), velocity=(0.0, 0.0, 0.0), curve=larger)
+    places = np.array(path.of(np.array([2, 0])).place(times[:, None]))
+    wanted = np.array(path.place(times[:, None]))
+    np.testing.assert_array_equal(places, wanted[..., [2, 0]])
+    assert np.abs(places[..., 1] - circle(times).T).max() < 0.05
