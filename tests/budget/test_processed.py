@@ -226,15 +226,20 @@ class TestTheNoiseOfTheFit:
         assert any("noise of the log" in one and noise.row_id in one for one in said)
 
     def test_it_is_the_scatter_of_the_allowable_of_its_row(self, tmp_path: Path) -> None:
-        """Allowables of missions whose logs have the noise drawn anew: one sigma of them, to what 40 draws say."""
+        """Allowables of missions whose logs have the noise drawn anew, fitted over the same stretch of 10 s.
+
+        What 25 draws scatter by is known to 14 %, and what is said counts some smear beside the noise.
+        """
         said, allowables = [], []
         for seed in range(40):
             mission = logged(tmp_path, geodetic_csv(noisy(0.3, seed)), "smoothed", position="30 m")
             noise = allowable_noise(mission, "receiver")
             assert noise is not None
-            said.append(noise.change)
-            allowables.append(row(check_mission(mission, TODAY), noise.row_id).allowable_full)
-        assert np.std(allowables) / np.mean(allowables) == pytest.approx(np.mean(said), rel=0.3)
+            if mission.platforms.receiver.path.stretch > 9.5 and noise.row_id == "receiver.position.z":
+                said.append(noise.change)
+                allowables.append(row(check_mission(mission, TODAY), noise.row_id).allowable_full)
+        assert len(said) >= 20
+        assert 0.8 < np.median(said) / (np.std(allowables) / np.mean(allowables)) < 1.5
 
     def test_a_clean_log_says_nothing(self, tmp_path: Path) -> None:
         mission = logged(tmp_path, geodetic_csv(flight()))
