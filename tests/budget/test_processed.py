@@ -1,7 +1,6 @@
 """The rest that a smooth path leaves of a log, and the steps of its fixes: `trajectory.processed` judges both."""
 
 import math
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -226,23 +225,21 @@ class TestTheNoiseOfTheFit:
         said = [str(one.message) for one in check_mission(mission, TODAY).warnings]
         assert any("noise of the log" in one and noise.row_id in one for one in said)
 
-    def test_it_is_the_change_of_the_allowable_of_its_row(self, tmp_path: Path) -> None:
-        """Allowables of the mission whose path is stated as the fit's own, and one sigma to a side."""
-        mission = logged(tmp_path, geodetic_csv(noisy(1.0)), "smoothed", position="30 m")
-        noise = allowable_noise(mission, "receiver")
-        assert noise is not None
-        platform = mission.platforms.receiver
-        path, allowables = platform.path, []
-        shift = np.array(path.acceleration_noise) @ np.array(path.state.look) / noise.acceleration
-        for side in (0.0, 1.0, -1.0):
-            state = replace(
-                path.state, acceleration=tuple((np.array(path.state.acceleration) + side * shift).tolist())
-            )
-            receiver = platform._replace(path=path._replace(state=state))
-            shifted = mission._replace(platforms=mission.platforms._replace(receiver=receiver))
-            allowables.append(row(check_mission(shifted, TODAY), noise.row_id).allowable_full)
-        here, *sides = allowables
-        assert max(abs(one / here - 1) for one in sides) == pytest.approx(noise.change, rel=0.05)
+    def test_it_is_the_scatter_of_the_allowable_of_its_row(self, tmp_path: Path) -> None:
+        """Allowables of missions whose logs have the noise drawn anew, fitted over the same stretch of 10 s.
+
+        What 25 draws scatter by is known to 14 %, and what is said counts some smear beside the noise.
+        """
+        said, allowables = [], []
+        for seed in range(40):
+            mission = logged(tmp_path, geodetic_csv(noisy(0.3, seed)), "smoothed", position="30 m")
+            noise = allowable_noise(mission, "receiver")
+            assert noise is not None
+            if mission.platforms.receiver.path.stretch > 9.5 and noise.row_id == "receiver.position.z":
+                said.append(noise.change)
+                allowables.append(row(check_mission(mission, TODAY), noise.row_id).allowable_full)
+        assert len(said) >= 20
+        assert 0.8 < np.median(said) / (np.std(allowables) / np.mean(allowables)) < 1.5
 
     def test_a_clean_log_says_nothing(self, tmp_path: Path) -> None:
         mission = logged(tmp_path, geodetic_csv(flight()))
