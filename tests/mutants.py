@@ -380,8 +380,8 @@ MUTANTS = (
     Mutant(
         "seam: autofocus gain on the limit of a slow vibration",
         _PHASES,
-        "size = limits.quadratic / allocation.autofocus_gain",
-        "size = limits.quadratic",
+        "size = lines_of(mission, name)[entry], budget / float(tone.per_metre.judged(1.0)[0])",
+        "size = lines_of(mission, name)[entry], 2 * budget / float(tone.per_metre.judged(1.0)[0])",
         (f"{_SEAMS}test_autofocus_gives_a_slow_vibration_no_larger_limit",),
     ),
     Mutant(

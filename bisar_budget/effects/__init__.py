@@ -12,6 +12,7 @@ __all__ = [
     "oscillators",
     "random_effect",
     "random_errors",
+    "slow_tones",
     "sources",
     "spectra",
     "vibration",

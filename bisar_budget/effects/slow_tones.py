@@ -38,7 +38,7 @@ TOGETHER = 1 << 12  # lanes that are followed at once
 
 @dataclass(frozen=True, eq=False)
 class TonePhases:
-    """What a vibration does in `PHASES` phases all around, of each of its axes, (axes, PHASES, cases) each.
+    """Effects of a vibration in `PHASES` phases all around, of each of its axes, (axes, PHASES, cases) each.
 
     Quadratic and cubic phase at the aperture edge; the hidden phase, and the rms beyond the cubic. [rad]
     """

@@ -200,7 +200,7 @@ def sight_of(mission: Mission, name: str, geometry: Any = None) -> Vector:
 def seen_of_axes(
     mission: Mission, name: str, *, is_vector: bool, geometry: BistaticGeometry | None = None
 ) -> list[Any]:
-    """What the range has of a metre along each axis of a platform's error, root mean square over the aperture. [-]
+    """Part of a metre along each axis of a platform's error that the range has, rms over the aperture. [-]
 
     The line of sight turns. No echo is higher than by the rms, and as much spreads. A vibration that is no vector is
     along the line of sight, of which the range has all, and the range less the direct path a part.

@@ -81,6 +81,10 @@ def test_bad_faults_point_at_the_culprit(path: Path) -> None:
         assert last in nearby, fault
 
 
+# What examples warn of: the noise of a short log decides how its path is curved.
+WARNINGS = {"sentinel1_aircraft_log": ("the noise of the log leaves the acceleration of its path uncertain",)}
+
+
 @pytest.mark.parametrize("path", EXAMPLES, ids=name)
 def test_example_gives_what_its_comments_say(run, path: Path) -> None:
     result, mission = check(run, path)
@@ -97,7 +101,9 @@ def test_example_gives_what_its_comments_say(run, path: Path) -> None:
         if figure:
             assert 100 * rows[subject]["utilization"] == pytest.approx(float(figure[0]), rel=5e-3)
     assert result.stderr == ""
-    assert mission["warnings"] == []
+    said = [warning["message"] for warning in mission["warnings"]]
+    assert len(said) == len(WARNINGS.get(path.stem, ()))
+    assert all(words in text for words, text in zip(WARNINGS.get(path.stem, ()), said, strict=True))
 
 
 def test_section_v_numbers(run) -> None:
