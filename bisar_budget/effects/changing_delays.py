@@ -1,4 +1,6 @@
-"""Delays that change within the aperture: a Gauss–Markov process of the zenith, seen along legs that turn.
+"""Range errors that change within the aperture as Gauss–Markov processes, seen along lines of sight that turn.
+
+They are delays of the zenith, and noise of a position along one axis; below both are called delays.
 
 A delay z(τ) at the zenith has variance 1 and correlation exp(−|t|/τ_c). A leg makes the range error m(τ)·z(τ) of it,
 of one air both legs their sum. Each effect on the image, a phase or a displacement, is an integral of weight times
@@ -7,7 +9,7 @@ first is a delay that stays, the second departs from that, and vanishes for a lo
 
 What is left of the range error beyond order 3, where the image is, spreads. It has the parts beyond order 3 of the
 delay itself, and of what the displacement of the image adds along a line of sight that turns. Derived here; against
-time series in `tests/effects/test_changing_air.py`.
+time series in `tests/effects/test_changing_air.py` and `tests/effects/test_long_noise.py`.
 """
 
 from functools import cache

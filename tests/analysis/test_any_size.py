@@ -112,7 +112,7 @@ class TestTheReferenceItself:
 
     @pytest.mark.parametrize("family", FAMILIES)
     def test_against_a_plain_fit_of_ranges(self, family: str) -> None:
-        """What is left at the place found, sampled evenly and fitted to order 12: least in V, and the phases."""
+        """The range error at the place found, sampled evenly and fitted to order 12: least in V, and the phases."""
         mission = parse_mission(mission_text(family, 1))
         declared = [error for error in reference.errors_of(mission) if error.declared]
         responses = reference.at_declared(mission, declared)

@@ -217,7 +217,7 @@ def test_what_fails_stays_failed() -> None:
 
 
 def test_without_a_requirement_on_islr_there_is_nothing_of_it() -> None:
-    """What it would spread follows the rule of effects that no requirement takes: negligible below 0.08 rad."""
+    """Its spread follows the rule of effects that no requirement takes: negligible below 0.08 rad."""
     needs = {key: value for key, value in NEEDS.items() if key != "islr"}
     for size, status in ((0.5e-3, "pass"), (5e-3, "not_evaluated")):
         found = findings(of_delay(size), requirements=needs)

@@ -406,7 +406,7 @@ class TestLargeTimeTags:
         assert np.sqrt(sums.exact_square(held)) == pytest.approx(np.linalg.norm(wanted, axis=1), rel=1e-6)
 
     def test_images_are_of_the_same_motion(self) -> None:
-        """What is flown for an image is the path itself, as it was; `check` says the same now."""
+        """An image flies the path itself, as before; `check` says the same now."""
         study = Study(mission_of("{time_tag: 1 s}"))
         (source,) = (one for one in study.sources if one.id == "receiver.time_tag")
         assert study.effect([(source, 1.0)]).displacement == pytest.approx(late(receiver=1.0).point, rel=1e-6)

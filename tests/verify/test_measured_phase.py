@@ -104,7 +104,7 @@ def test_a_long_aperture_bends_frequency_over_time() -> None:
 
 
 def read_to(c: PointCollection, effect: ExactEffect) -> float:
-    """What an image shows a phase to: 1e-3 of it, and what a hidden phase changes from the middle of the band on."""
+    """Accuracy of a phase in an image: 1e-3 of it, and the change of a hidden one over half the band. [rad]"""
     return 1e-3 * abs(effect.quadratic) + effect.hidden * c.radar.bandwidth / (2 * c.radar.center_frequency)
 
 
