@@ -26,6 +26,7 @@ Floats = NDArray[np.float64]
 # 1e-6 of themselves up to 0.5, and by less than 1e-4 beyond.
 NODES = ((0.1, 6), (0.5, 10), (1.0, 16), (2.0, 32), (math.inf, 64))
 FEWEST_NODES = NODES[0][1]
+OF_ENDS = 16  # polynomials that follow a line of sight around a full circle to 1e-6
 # Paths in pieces turn faster than their way says: 1.5 nodes to a piece change phases by less than 1e-4 of themselves.
 _NODES_PER_PIECE, _PIECE_NODES = 1.5, np.array((16, 32, 64, 128, 256))
 OWN_AREA = (
@@ -56,6 +57,12 @@ class Sampling(NamedTuple):
 
     places: Floats
     fit: Floats
+
+    def to_ends(self) -> Floats:
+        """Weights (2, samples) that carry a smooth history from the samples to both ends of the aperture."""
+        degree = min(self.places.size, OF_ENDS) - 1
+        polynomials = np.polynomial.legendre.legvander(self.places, degree)
+        return np.asarray(np.polynomial.legendre.legvander(np.array((-1.0, 1.0)), degree) @ np.linalg.pinv(polynomials))
 
 
 LEADING = np.array((1.0, 1.0, 1.5, 2.5))  # coefficient of xⁿ in the Legendre polynomial Pₙ

@@ -14,6 +14,7 @@ for the brightest point of the image itself, which knows no expansion.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +33,10 @@ _LEGENDRE = np.array([np.polynomial.legendre.Legendre.basis(order)(_NODES) for o
 def no_error(times: Floats) -> Floats:
     """The error of a path that is known."""
     return np.zeros((len(times), 3))
+
+
+def _squares(vectors: Floats) -> Floats:
+    return np.einsum("ni,ni->n", vectors, vectors)
 
 
 Vector = tuple[float, float, float]
@@ -86,20 +91,26 @@ class Collection:
         """2π over the wavelength of the band's centre. [rad/m]"""
         return 2 * math.pi * self.center_frequency / SPEED_OF_LIGHT
 
-    def left(self, point: Floats, size: float, times: Floats) -> Floats:
-        """Range that errors of a size leave at a ground point, (n,). [m]"""
-        left = np.zeros(len(times))
-        for path, error in zip(self.paths, self.errors, strict=True):
-            true, shift = path(times), size * error(times) - np.append(point, 0.0)
-            lengths = np.linalg.norm(true, axis=1) + np.linalg.norm(true + shift, axis=1)
-            left -= (shift * (2 * true + shift)).sum(axis=1) / lengths  # |a| − |b| without their rounding
+    @cached_property
+    def _at_nodes(self) -> list[tuple[Floats, Floats]]:
+        """True path and error of each platform at the nodes, (64, 3). [m]"""
+        times = self.aperture_time / 2 * _NODES
+        return [(path(times), error(times)) for path, error in zip(self.paths, self.errors, strict=True)]
+
+    def left(self, point: Floats, size: float) -> Floats:
+        """Range that errors of a size leave at a ground point, (64,). [m]"""
+        left, (east, north) = np.zeros(_NODES.size), point
+        for true, error in self._at_nodes:
+            shift = size * error - (east, north, 0.0)
+            moved = true + shift
+            lengths = np.sqrt(_squares(true)) + np.sqrt(_squares(moved))
+            left -= (shift * (true + moved)).sum(axis=1) / lengths  # |a| − |b| without their rounding
         return left
 
-    def _slopes(self, point: Floats, size: float, times: Floats) -> Floats:
-        measured = (
-            p(times) + size * e(times) - np.append(point, 0.0) for p, e in zip(self.paths, self.errors, strict=True)
-        )
-        return sum(m[:, :2] / np.linalg.norm(m, axis=1)[:, None] for m in measured)
+    def _slopes(self, point: Floats, size: float) -> Floats:
+        east, north = point
+        measured = [true + size * error - (east, north, 0.0) for true, error in self._at_nodes]
+        return sum(m[:, :2] / np.sqrt(_squares(m))[:, None] for m in measured)
 
     def _variance(self, a: Floats, b: Floats) -> Floats:
         """Covariance over aperture and band of two ranges (64, …), relative to f₀. [m²]"""
@@ -110,15 +121,15 @@ class Collection:
 
     def least_variance_point(self, steps: int = 8) -> Response:
         """Follow the least of V from no error on, by Gauss and Newton."""
-        times, point = self.aperture_time / 2 * _NODES, np.zeros(2)
+        point = np.zeros(2)
         for step in range(1, steps + 1):
             for _ in range(50):
-                left, slopes = self.left(point, step / steps, times), self._slopes(point, step / steps, times)
+                left, slopes = self.left(point, step / steps), self._slopes(point, step / steps)
                 move = np.linalg.solve(self._variance(slopes, slopes), self._variance(slopes, left)[:, 0])
                 point = point - move
                 if np.abs(move).max() < 1e-9:
                     break
-        left = self.left(point, 1.0, times)
+        left = self.left(point, 1.0)
         parts = (2 * np.arange(4) + 1) * (_LEGENDRE * _MEAN @ left)
         quadratic, cubic = 1.5 * self.wavenumber * parts[2], 2.5 * self.wavenumber * parts[3]
         rest = self.wavenumber * math.sqrt(_MEAN @ (left - parts @ _LEGENDRE) ** 2)
@@ -127,7 +138,7 @@ class Collection:
 
     def level(self, point: Floats, size: float = 1.0) -> float:
         """The image at a ground point, of a perfect point that is 0 dB, by quadrature over band and aperture."""
-        left = self.left(point, size, self.aperture_time / 2 * _NODES)
+        left = self.left(point, size)
         frequency = self.center_frequency + self.bandwidth / 2 * _BAND_NODES
         phase = np.exp(2j * math.pi / SPEED_OF_LIGHT * np.outer(frequency, left))
         return 20 * math.log10(abs(_BAND_WEIGHTS / 2 @ phase @ _MEAN))
