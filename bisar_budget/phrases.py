@@ -391,6 +391,13 @@ def quadratic_phase_over(phase: float, limit: float, equation: str = "", quadrat
 
 
 @phrase
+def no_image_of(allowable: float, unit: str, limit: float) -> str:
+    """Said of one error that is larger than any with an image, whose phase reaches its limit before. [rad]"""
+    reached = f"its QPE reaches {format_limit(limit, 'rad')} at {format_limit(allowable, unit)}"
+    return f"no ground point has the range history of so large an error: {reached}"
+
+
+@phrase
 def cubic_phase_over(phase: float, limit: float, equation: str = "") -> str:
     """Said of one error. [rad]"""
     text = _by(f"cubic phase {_against(phase, limit, 'rad')}", equation)

@@ -162,9 +162,9 @@ def _over(case: Case, model: Model, row: Judged, source: ErrorSource, mine: Decl
         by = "equation (25)" if model.is_published else "full model"
         return phrases.location_over(moved, requirements.location_error, by)
     gain, hidden = case.allocation.autofocus_gain, float(mine.hidden)
-    over = phrases.quadratic_phase_over(float(mine.judged(gain)), limit, model.equation(source), abs(mine.qpe))
     if not math.isfinite(mine.qpe):
-        return over
+        return phrases.no_image_of(case.number(row.allowable), source.unit, limit)
+    over = phrases.quadratic_phase_over(float(mine.judged(gain)), limit, model.equation(source), abs(mine.qpe))
     return over.then(case.allocation.passes_with(abs(mine.qpe), hidden, source.owner, case.mission))
 
 

@@ -434,14 +434,12 @@ class ErrorBlock:
         return Allowed(smallest, quadratic if is_whole else smallest, binding)
 
     def ends_image(self, size: Floats) -> Truths:
-        """Whether allowables, as found, are where the image ends: range and Doppler have become parallel there."""
+        """Whether allowables, as found, are where the image ends."""
         found = np.zeros(size.shape, dtype=bool)
         if self._follows is not None:
-            both = np.repeat(size[self.moves][:, None], 2, axis=1)
-            ends = self._follows.end.reshape(both.shape) == both
-            lanes = np.flatnonzero(np.isfinite(both) & ~ends)
-            ends.reshape(-1)[lanes] = self._follows.is_parallel(lanes, both.reshape(-1)[lanes])
-            found[self.moves] = ends.any(axis=1) & np.isfinite(size[self.moves])
+            sizes = size[self.moves]
+            ends = self._follows.end.reshape(len(self.moves), 2, -1)
+            found[self.moves] = (ends == sizes[:, None]).any(axis=1) & np.isfinite(sizes)
         return found
 
     def _limit(self, place: int, limit: Any) -> Floats:

@@ -57,7 +57,11 @@ MEETS = 1e-5  # of the nearest range; of a platform that is nearer, rounding dec
 SHRINKS = 0.5  # square of each step of the search over that of the one before; else it does not settle
 EPSILON = 2e-15  # of a range sum: what rounding of a few operations leaves
 BOWL = 0.05  # of the determinant of H; where V bends less, it is no bowl around the point
-AT_FOLD = 0.1  # of what gradients span at the centre: with less, what they span changes much in a small step
+DESCENTS = 80  # damped steps
+DAMPING, DAMPED = 1e-3, 4.0  # of the trace of H at the centre; and by how much more or less with each step
+AT_FOLD = (
+    0.1  # of the same area: with less it changes much in a small step, and a peak may fade into one beyond the fold
+)
 OF_UNSEEN = 1e-4  # of the square of a last step elsewhere, that is left of the last one there
 UNSEEN_RAD = 3e-5  # what the last step of the search may change a phase by beyond the part counted linearly
 
@@ -558,14 +562,14 @@ class ExactRanges:
         return np.asarray(np.polynomial.legendre.legvander(self.sampling.places, 3) / LEADING)
 
     # ------------------------------------------------------------------ errors of any size
-    def phases(self, lanes: Lanes, size: Floats, near: tuple[Any, Any]) -> Found:
+    def phases(self, lanes: Lanes, size: Floats, near: tuple[Any, Any], *, is_at_fold: bool = False) -> Found:
         """Find where errors of given sizes move a point at the centre, and what defocuses there.
 
-        The search starts `near` [m] and has to settle from there at once: `paths` follows a point. Not found is what
-        does not, and what lies beyond a line on which range and Doppler gradients are parallel: no error leads there
-        from nothing.
+        The search starts `near` [m]. A point is found where the search settles at once; `is_at_fold`, where V leads
+        down to it from there. `paths` follows a point. A point beyond a line on which range and Doppler gradients are
+        parallel is not found: no error leads there from nothing.
         """
-        return self.settled(lanes.clock(size), lanes.shifts(size), near, lanes.case)
+        return self.settled(lanes.clock(size), lanes.shifts(size), near, lanes.case, is_at_fold=is_at_fold)
 
     def left_over(self, lanes: Lanes, size: Floats, place: tuple[Any, Any]) -> Floats:
         """Range error at the nodes that errors leave at ground points, (nodes, lanes). [m]"""
@@ -620,8 +624,10 @@ class ExactRanges:
         slope = (matrix.projection * change + weights * turns).sum(axis=1)
         return _against(matrix, weights, looks, distances, slope)
 
-    def settled(self, clock: Floats, shifts: Sequence[Any], near: Any, case: Places) -> Found:
-        """Newton's method for the least of V.
+    def settled(
+        self, clock: Floats, shifts: Sequence[Any], near: Any, case: Places, *, is_at_fold: bool = False
+    ) -> Found:
+        """Newton's method for the least of V, or `is_at_fold` a descent.
 
         Range errors by clocks (nodes, lanes) [m], three shifts of each platform there [m], where the search starts
         [m], and the cases of the lanes.
@@ -639,9 +645,10 @@ class ExactRanges:
                 measured = self._measured(clock[:, some], moved, case[some], room)
                 places = np.arange(here.east.size)
                 near_by = start[0][some], start[1][some]
-                _PointSearch(
+                search = _PointSearch(
                     self, here, places, case[some], *near_by, measured, room[MEASURED:, :, : places.size]
-                ).run()
+                )
+                search.descend() if is_at_fold else search.run()
         return found
 
     def _room(self, lanes: int) -> Floats:
@@ -714,7 +721,7 @@ class _PointSearch:
             turn = matrix.turned_from(exact.matrix, self.of)
             unseen = np.where(np.abs(turn) < AT_FOLD, OF_UNSEEN * UNSEEN_RAD, UNSEEN_RAD)
             is_done = is_apart & (k * step < unseen * nearest)
-            self._keep(is_done & (turn > 0), left, matrix.slopes, (step_east, step_north), turn)
+            self._keep(is_done & (turn > -AT_FOLD), left, matrix.slopes, (step_east, step_north), turn)
             going = np.flatnonzero(~is_done & (step < SHRINKS * before) & is_apart)
             if not going.size:
                 return
@@ -722,6 +729,36 @@ class _PointSearch:
             if going.size < self.alive.size:
                 before = step[going]
                 self._go_on(going)
+
+    def descend(self) -> None:
+        """Search by damped steps that only go down V: slower, and safe where V hardly bends, as near a fold."""
+        exact = self.exact
+        k, meets, band = _of([exact.k, exact.nearest, exact.band], self.of)
+        damping = DAMPING * sum(_of([exact.matrix.xx + exact.matrix.yy], self.of))
+        least, is_going = np.full(self.alive.size, math.inf), np.ones(self.alive.size, dtype=bool)
+        place, slope, bends = (np.zeros((count, least.size)) for count in (2, 2, 3))
+        for _ in range(DESCENTS):
+            left, looks, distances = _seen(self.measured, self.east, self.north, self.room)
+            matrix = GroundMatrix.of(looks[0] + looks[1], exact.fit, band)
+            weights, nearest = matrix.projected(left), distances.min(axis=(0, 1))
+            variance = (weights * left).sum(axis=0)
+            falls = variance <= least
+            least, damping = np.minimum(least, variance), np.where(falls, damping / DAMPED, damping * DAMPED)
+            place = np.where(falls, (self.east, self.north), place)
+            bends = np.where(falls, _bends(matrix, weights, looks, distances), bends)
+            slope = np.where(falls, np.einsum("anc,nc->ac", matrix.projection, left), slope)
+            xx, xy, yy = bends
+            flattest = (xx + yy) / 2 - np.hypot((xx - yy) / 2, xy)
+            more = np.maximum(damping, -2 * flattest)
+            step = _solved((xx + more, xy, yy + more), slope)
+            turn = matrix.turned_from(exact.matrix, self.of)
+            is_done = falls & (k * (step[0] ** 2 + step[1] ** 2) < OF_UNSEEN * UNSEEN_RAD * nearest)
+            is_done &= nearest >= MEETS * meets
+            self._keep(is_going & is_done & (turn > -AT_FOLD), left, matrix.slopes, step, turn)
+            is_going &= ~is_done
+            if not is_going.any():
+                return
+            self.east, self.north = place + np.array(step)
 
     def _go_on(self, going: Places) -> None:
         """Go on with some of the lanes."""
@@ -766,16 +803,25 @@ def _against(
     matrix: GroundMatrix, weights: Floats, looks: Floats, distances: Floats, slope: Floats
 ) -> tuple[Floats, Floats]:
     """Step that takes away half a slope of V, by how that changes; where V is no bowl, by H alone. [m]"""
-    x, y = slope
-    of_matrix = matrix.xx, matrix.xy, matrix.yy
+    xx, xy, yy = _bends(matrix, weights, looks, distances)
+    is_bowl = (xx * yy - xy * xy > BOWL * matrix.determinant) & (xx > 0)
+    if not is_bowl.all():
+        of_matrix = matrix.xx, matrix.xy, matrix.yy
+        xx, xy, yy = (np.where(is_bowl, *both) for both in zip((xx, xy, yy), of_matrix, strict=True))
+    return _solved((xx, xy, yy), slope)
+
+
+def _bends(matrix: GroundMatrix, weights: Floats, looks: Floats, distances: Floats) -> tuple[Floats, Floats, Floats]:
+    """Half the second derivative of V: east and east, east and north, north and north."""
     bends = weights / distances
     turned, total = np.einsum("panc,pbnc->abc", looks * bends[:, None], looks), bends.sum(axis=(0, 1))
-    xx, xy, yy = matrix.xx - total + turned[0, 0], matrix.xy + turned[0, 1], matrix.yy - total + turned[1, 1]
+    return matrix.xx - total + turned[0, 0], matrix.xy + turned[0, 1], matrix.yy - total + turned[1, 1]
+
+
+def _solved(bends: tuple[Floats, Floats, Floats], slope: Floats) -> tuple[Floats, Floats]:
+    """Step that takes away half a slope of V where V bends so. [m]"""
+    (xx, xy, yy), (x, y) = bends, slope
     determinant = xx * yy - xy * xy
-    is_bowl = (determinant > BOWL * matrix.determinant) & (xx > 0)
-    if not is_bowl.all():
-        xx, xy, yy = (np.where(is_bowl, *both) for both in zip((xx, xy, yy), of_matrix, strict=True))
-        determinant = np.where(is_bowl, determinant, matrix.determinant)
     return (xy * y - yy * x) / determinant, (xy * x - xx * y) / determinant
 
 

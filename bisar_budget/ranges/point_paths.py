@@ -13,10 +13,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bisar_budget.constants import ROUNDING
-from bisar_budget.ranges.exact_ranges import ENDS_RAD, FOLDED, ExactRanges, Floats, Lanes, Places, Truths
+from bisar_budget.ranges.exact_ranges import AT_FOLD, ENDS_RAD, FOLDED, ExactRanges, Floats, Lanes, Places, Truths
 
-PARALLEL = 0.02  # of the area that gradients span at the centre; with less they are parallel
 STRAY = 0.15  # of a step; farther from where it led, a point is not the one that was followed
+FADES = 0.3  # of a displacement, within which a peak that is lost at a fold has faded into another
 STRAIGHT = 0.1  # of a displacement, by which it may be off a straight way
 FLOOR_M = 1e-3
 FINEST_STEP = 1e-6  # where the gradients stay apart, the way only turns
@@ -128,13 +128,6 @@ class PointPaths:
         found[:, (found[0] != size) | (size >= self.end[some])] = math.nan
         return found
 
-    def is_parallel(self, some: Places, size: Floats) -> Truths:
-        """Whether gradients are parallel at a known point next to a size, in some lanes."""
-        above = (self._known[0, some] < size[:, None]).sum(axis=1)
-        last = self._known.shape[2] - 1
-        turns = (np.abs(self._at(np.clip(above - back, 0, last), some)[-1]) for back in (1, 0))
-        return np.asarray(np.minimum(*turns) < PARALLEL)
-
     # ---------------------------------------------------------------- one step
     @np.errstate(all="ignore")
     def to(self, some: Places, size: Floats) -> None:
@@ -180,6 +173,13 @@ class PointPaths:
             one, two = point[:, later - 1], np.where(begins[later - 1], last[:, later], point[:, later - 2])
             earlier = np.where(begins[later - 1], self._at(np.maximum(index - 1, 0), some)[:, later], last[:, later])
             is_on[later] = _is_on_the_way(one, point[:, later], _through(earlier, two, one, size[later]))
+        lost = np.flatnonzero(~is_on & (last[-1] < AT_FOLD))
+        if lost.size:  # at a fold a peak fades into a wider one, which is where V leads down to
+            here = last[:, lost]
+            there = self.exact.phases(self.lanes.of(some[lost]), size[lost], (here[1], here[2]), is_at_fold=True)
+            point[1:, lost] = there[1:]
+            led = np.hypot(there.east - here[1], there.north - here[2])
+            is_on[lost] = there.is_found & (led <= FADES * np.hypot(here[1], here[2]))
         is_end = is_on & (np.abs(point[-1]) < FOLDED) & (point[HIDDEN] > ENDS_RAD)
 
         # Of several steps from one known point those count that come before the first that leads nowhere.
