@@ -36,7 +36,8 @@ from bisar_budget.ranges.exact_ranges import (
     TimeTags,
     Truths,
 )
-from bisar_budget.ranges.point_paths import ROWS, Held, PointPaths, is_few
+from bisar_budget.ranges.limit_search import LimitSearches, find_first_sizes
+from bisar_budget.ranges.point_paths import ROWS, PointPaths, tries_several_sizes
 
 QUADRATIC, CUBIC, LOCATION = "quadratic_phase_error", "cubic_phase_error", "location_error"
 HELD = (QUADRATIC, CUBIC, LOCATION)  # what an error is held to
@@ -341,11 +342,11 @@ class ErrorBlock:
             place[0][is_large], place[1][is_large] = one[1:3]
 
     def followed(self, some: Truths, sizes: Floats) -> Floats:
-        """Rows of known points of some errors by sizes, of the positive sign and of the other, (2, ROWS, some)."""
+        """Rows of known points of some errors by sizes, of the positive sign and of the other, (2, rows, some)."""
         lanes = np.concatenate(self._lanes_of(some))
         both = np.tile(sizes, 2)
-        self.paths.to(lanes, both)
-        return self.paths.known(lanes, both).reshape(ROWS, 2, -1).swapaxes(0, 1)
+        self.paths.follow_to(lanes, both)
+        return self.paths.known(lanes, both).reshape(len(ROWS), 2, -1).swapaxes(0, 1)
 
     @cached_property
     def _lane(self) -> Places:
@@ -457,9 +458,9 @@ class ErrorBlock:
         """
         most = np.fmax(self.farthest, np.abs(self.declared))
         found = np.full(small.shape, math.inf)
-        searches = list[Held]()
+        searches = list[LimitSearches]()
         # Few are all searched for together.
-        is_together = is_few(2 * len(held) * self.declared.size, self.table.is_whole)
+        is_together = tries_several_sizes(2 * len(held) * self.declared.size, self.table.is_whole)
         for turn in np.array(held)[np.argsort(small[held], axis=0, kind="stable")]:
             of, first = (np.take_along_axis(sizes, turn[None], axis=0)[0] for sizes in (limit, small))
             is_alone = (turn == 0) & is_whole
@@ -474,11 +475,11 @@ class ErrorBlock:
             gain = np.broadcast_to(self.table.gain, some.shape)[some]
             numbers = of[some], gain, first[some], upto[some], np.flatnonzero(some), is_alone[some]
             for lane in self._lanes_of(some):
-                searches.append(Held(lane, turn[some], *numbers))
+                searches.append(LimitSearches(lane, turn[some], *numbers))
                 if not is_together:
-                    self.paths.first_reaching(searches.pop(), found.reshape(3, -1))
+                    find_first_sizes(self.paths, searches.pop(), found.reshape(3, -1))
         if searches:
-            self.paths.first_reaching(Held(*map(np.concatenate, zip(*searches, strict=True))), found.reshape(3, -1))
+            find_first_sizes(self.paths, LimitSearches.joined(searches), found.reshape(3, -1))
         return found
 
 

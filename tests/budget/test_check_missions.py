@@ -20,7 +20,7 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.mission.quantities import QuestionError, with_number
 from bisar_budget.mission.stacked import stacked
 from bisar_budget.ranges.exact_ranges import UNSEEN_RAD
-from bisar_budget.ranges.point_paths import CLOSE
+from bisar_budget.ranges.limit_search import LIMIT_FRACTION
 from tests.conftest import ROOT, mission_text
 from tests.families import FAMILIES
 from tests.families import mission_text as of_family
@@ -55,7 +55,7 @@ def assert_alike(one: Any, other: Any, where: str) -> None:
         return
     if isinstance(one, float) and isinstance(other, float):
         # A phase of 1e-10 rad is what terms cancel to.
-        room = (100 if "allowable" in where else 2) * CLOSE
+        room = (100 if "allowable" in where else 2) * LIMIT_FRACTION
         floor = UNSEEN_RAD if where.endswith("_rad") else 1e-9
         assert other == pytest.approx(one, rel=room, abs=floor, nan_ok=True), where
     elif isinstance(one, DecidingShare) and isinstance(other, DecidingShare):

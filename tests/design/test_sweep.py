@@ -21,7 +21,7 @@ from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.mission.model import flies_on_earth
 from bisar_budget.mission.quantities import QuestionError, number_of, tree_of
 from bisar_budget.mission.tree import read_tree
-from bisar_budget.ranges.point_paths import CLOSE
+from bisar_budget.ranges.limit_search import LIMIT_FRACTION
 from tests.conftest import ROOT, mission_text, row
 from tests.families import FAMILIES
 from tests.families import mission_text as of_family
@@ -188,11 +188,11 @@ def test_every_case_is_that_of_check(data, family, seed) -> None:
 def test_where_an_image_ends_is_found_to_rounding() -> None:
     """Half a cycle is hidden behind a fold at 1.4533 s; at 2.9066 s a phase reaches its limit shortly before one.
 
-    Searches for an end agree to rounding; of a phase each ends within 1e-5 of the limit (`point_paths.CLOSE`).
+    Searches for an end agree to rounding; a search for a phase ends within `LIMIT_FRACTION` of the limit.
     """
     noise = SetValue("platforms.receiver.motion_error.random", _RULES["platforms.receiver.motion_error.random"][0])
     mission = parse_mission(of_family("satellite_fixed", 21), "m.yaml", changes=[noise])
-    for aperture_time, near in ((1.4533, NEAR), (2.9066, CLOSE)):
+    for aperture_time, near in ((1.4533, NEAR), (2.9066, LIMIT_FRACTION)):
         cases = grid(mission, collection__aperture_time=[aperture_time])
         assert_as_checked(mission, cases, swept(mission, cases), near=near)
 
@@ -361,7 +361,7 @@ def test_the_end_of_the_image_binds() -> None:
     cases = grid(mission, collection__aperture_time=[0.9 * T, T, 1.1 * T])
     whole = swept(mission, cases, model="full")
     assert list(whole["binding_requirement"]) == ["end_of_image"] * 3
-    assert_as_checked(mission, cases, whole, model="full", near=CLOSE)
+    assert_as_checked(mission, cases, whole, model="full", near=LIMIT_FRACTION)
 
 
 def test_what_decides_more_than_itself_is_read_and_judged_together() -> None:

@@ -3,6 +3,7 @@
 import gc
 import math
 import weakref
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -339,7 +340,7 @@ def test_of_few_lanes_and_of_many_the_same_is_found(family: str, monkeypatch: py
         return np.array((allowed.smallest, allowed.quadratic))
 
     of_few = found()
-    monkeypatch.setattr(point_paths, "FEW", 0)
+    monkeypatch.setattr(point_paths, "SETTINGS", replace(point_paths.SETTINGS, few_lanes_count=0))
     assert np.isfinite(of_few).sum() > 30
     assert found() == pytest.approx(of_few, rel=1e-4, nan_ok=True)
 
@@ -360,14 +361,14 @@ def test_the_errors_of_a_part_go_as_soon_as_nobody_asks_for_them() -> None:
 @pytest.mark.parametrize("name", ["drones_same_gnss", "geostationary_direct_path", "sentinel1_fixed_receiver"])
 def test_following_a_point_to_any_size_ends(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """A step that led nowhere was tried again for ever where the size lay a little beyond a shorter one."""
-    count, follow = [0], PointPaths._follow
+    count, follow = [0], PointPaths.step_toward
 
     def counted(self: PointPaths, some: Any, size: Any) -> None:
         count[0] += 1
         assert count[0] <= 200, "it goes on and on"
         follow(self, some, size)
 
-    monkeypatch.setattr(PointPaths, "_follow", counted)
+    monkeypatch.setattr(PointPaths, "step_toward", counted)
     analysis = Analysis(load_mission(str(ROOT / "specs" / "missions" / f"{name}.yaml")))
     sizes = np.random.default_rng(1)
     for source in analysis.sources:

@@ -1,0 +1,338 @@
+"""The first size at which an error reaches a limit, searched along the path of the image point.
+
+A search holds the square of a phase or of a displacement over its limit: the square is smooth in the size, the value
+is not. After each step the search looks at all known points. It ends where an interpolation is close to the limit and
+no crest between smaller sizes may be above it. All searches take each step together.
+"""
+
+import math
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from bisar_budget.ranges.exact_ranges import Floats, Places, Truths
+from bisar_budget.ranges.point_paths import (
+    AREA,
+    CUBIC,
+    EAST,
+    HIDDEN,
+    NORTH,
+    SIZE,
+    PointPaths,
+    tries_several_sizes,
+    up_to,
+)
+from bisar_budget.ranges.point_paths import QUADRATIC as QUADRATIC_ROW
+
+QUADRATIC_LIMIT, CUBIC_LIMIT, DISPLACEMENT_LIMIT = range(3)
+
+LIMIT_FRACTION = 1e-5  # of a limit, to which a search finds it
+
+
+@dataclass(frozen=True)
+class SearchSettings:
+    """Tunings of the search for a limit.
+
+    Attributes
+    ----------
+    trusted_fraction, trusted_bent_fraction : float
+        Distance to a limit from which an interpolation leads to it, as a fraction of the limit: where the value is
+        almost straight, and where its slope changes by more than `bent_fraction` within the interval.
+    bent_fraction : float
+        Change of a slope within an interval, as a fraction of the slope.
+    crest_fraction : float
+        Distance below a limit at which the crest of an interpolation may hide a value above it, as a fraction.
+    departure_fraction : float
+        Difference between a rise and the rise that the slope before predicts, as a fraction of the limit. With a
+        larger difference the value within the interval is unknown.
+    trusted_interval_fraction : float
+        Width of an interval within which an interpolation is trusted, as a fraction of the size.
+    steep_ratio : float
+        Square of a value over its limit, from which a power of the size leads to the limit better than a cubic.
+    growth_factor : float
+        Growth of the size in a step.
+    newton_steps : int
+        Steps of Newton's method on an interpolating cubic.
+    max_rounds : int
+        Largest number of steps of a search. No search is known that takes more than 25.
+    """
+
+    trusted_fraction: float = 0.002
+    trusted_bent_fraction: float = 3e-5
+    bent_fraction: float = 0.1
+    crest_fraction: float = 0.01
+    departure_fraction: float = 0.5
+    trusted_interval_fraction: float = 0.02
+    steep_ratio: float = 2.0
+    growth_factor: float = 1.5
+    newton_steps: int = 3
+    max_rounds: int = 100
+
+
+SETTINGS = SearchSettings()
+
+# Sizes that a few searches try in addition: fractions of the first size, factors around the size where a limit is
+# expected, and factors of a size while the search looks for the limit.
+FIRST_SIZE_FRACTIONS = np.array((0.25, 0.5, 0.75, 1.3, 2.0))
+NEIGHBOUR_FACTORS = np.array((0.98, 0.996, 1.004, 1.02))
+GROWTH_FACTORS = SETTINGS.growth_factor ** np.arange(1, 5)
+
+
+@dataclass(frozen=True, eq=False)
+class LimitSearches:
+    """Searches for the first size at which a value reaches a limit, (searches,).
+
+    Attributes
+    ----------
+    lane : (searches,)
+        Lane of the path.
+    requirement : (searches,)
+        QUADRATIC_LIMIT, CUBIC_LIMIT or DISPLACEMENT_LIMIT.
+    limit : (searches,)
+        The limit of the quadratic phase, with the gain of autofocus in it, of the cubic phase [rad], or of the
+        displacement. [m]
+    gain : (searches,)
+        Factor by which autofocus lets the quadratic phase be larger. The hidden phase gets no such factor.
+    first : (searches,)
+        Size that is tried first: where a small error would reach the limit. [unit]
+    largest : (searches,)
+        Size at which the search ends. [unit]
+    group : (searches,)
+        Searches of a group share the smallest size: a search ends where another search of its group found a limit.
+    is_alone : (searches,)
+        Whether only searches for the same requirement end the search.
+    """
+
+    lane: Places
+    requirement: Places
+    limit: Floats
+    gain: Floats
+    first: Floats
+    largest: Floats
+    group: Places
+    is_alone: Truths
+
+    @classmethod
+    def joined(cls, searches: "list[LimitSearches]") -> "LimitSearches":
+        """All searches of a list."""
+        return cls(*(np.concatenate([getattr(each, field.name) for each in searches]) for field in fields(cls)))
+
+    def of(self, index: Any) -> "LimitSearches":
+        """Some of the searches."""
+        return LimitSearches(*(getattr(self, field.name)[index] for field in fields(self)))
+
+    def square(self, points: Floats) -> Floats:
+        """Square of the value over its limit at known points, (rows, searches, points)."""
+        requirement, gain = self.requirement[:, None], self.gain[:, None]
+        judged = points[QUADRATIC_ROW] ** 2 + (gain * points[HIDDEN]) ** 2
+        square = np.where(requirement == QUADRATIC_LIMIT, judged, points[CUBIC] ** 2)
+        displacement = points[EAST] ** 2 + points[NORTH] ** 2
+        square = np.where(requirement == DISPLACEMENT_LIMIT, displacement, square)
+        return np.asarray(square / self.limit[:, None] ** 2)
+
+
+@np.errstate(all="ignore")
+def find_first_sizes(paths: PointPaths, searches: LimitSearches, smallest: Floats) -> None:
+    """Find the first sizes at which values reach their limits.
+
+    Parameters
+    ----------
+    paths : PointPaths
+        The paths of the image point.
+    searches : LimitSearches
+        The searches.
+    smallest : (requirements, groups)
+        The smallest sizes known so far; the sizes that are found replace larger ones. [unit]
+    """
+    tries = np.zeros(searches.lane.shape, dtype=int)
+    for _ in range(SETTINGS.max_rounds):
+        of_group = smallest[:, searches.group]
+        bound = np.where(searches.is_alone, np.choose(searches.requirement, of_group), of_group.min(axis=0))
+        state = _SearchState(paths, searches, np.minimum(searches.largest, bound), tries)
+        is_done = state.is_sure
+        np.minimum.at(smallest, (searches.requirement[is_done], searches.group[is_done]), state.result[is_done])
+        going = np.flatnonzero(~is_done)
+        if not going.size:
+            return
+        index, size = state.next_sizes(going, is_several=tries_several_sizes(going.size, paths.is_alike))
+        paths.step_toward(searches.lane[index], size)
+        searches, tries, low = searches.of(going), tries[going] + state.is_between[going], state.low[going]
+    np.minimum.at(smallest, (searches.requirement, searches.group), low)  # below every limit, and safe
+
+
+class _SearchState:
+    """State of searches by the points that are known.
+
+    Attributes
+    ----------
+    result : (searches,)
+        Sizes at which values reach their limits; infinite where no limit is reached.
+    is_sure : (searches,)
+        Whether the result is final.
+    is_between : (searches,)
+        Whether the limit lies between known points.
+    low : (searches,)
+        Largest known size below the limit.
+    """
+
+    def __init__(self, paths: PointPaths, searches: LimitSearches, bound: Floats, tries: Places) -> None:
+        self.searches, self.bound, self.tries, every = searches, bound, tries, np.arange(tries.size)
+        end = paths.end[searches.lane]
+        points = paths.known_points.take(searches.lane, axis=1)
+        is_known = points[SIZE] < end[:, None]
+        self.count = is_known.sum(axis=1)
+        width = max(2, int(self.count.max()))
+        points, is_known = points[:, :, :width], is_known[:, :width]
+        self.size = np.where(is_known, points[SIZE], math.nan)
+        self.square = np.where(is_known, searches.square(points), math.nan)
+        reaches = self.square >= 1 - 2 * LIMIT_FRACTION
+        self.is_between: Truths = np.asarray(reaches.any(axis=1))
+        first_above = np.where(self.is_between, reaches.argmax(axis=1), self.count)
+        self._set_slopes(every)
+        self.doubtful = self._doubtful_sizes(first_above)
+        last_below = first_above - 1
+        self.low, self.area = self.size[every, last_below], points[AREA, every, last_below]
+        between, is_close = self._between(every, first_above)
+        self.ahead, is_ahead = self._ahead(every, last_below)
+        is_past, has_end = self.low >= bound, np.isfinite(end)
+        self.is_sure = np.isnan(self.doubtful).all(axis=1)
+        self.is_sure &= np.where(self.is_between, is_close, has_end | is_ahead) | is_past
+        result = np.where(self.is_between, between, np.minimum(end, self.ahead))
+        self.result = np.where((result <= bound) & ~is_past, result, math.inf)
+
+    def _set_slopes(self, every: Places) -> None:
+        """Slopes at known points, of the parabola through each point and its neighbours."""
+        self.width = self.size[:, 1:] - self.size[:, :-1]
+        chord = (self.square[:, 1:] - self.square[:, :-1]) / self.width
+        self.slope = np.empty(self.size.shape)
+        self.slope[:, 0] = 0.0  # a square begins without a slope
+        before, after = self.width[:, :-1], self.width[:, 1:]
+        self.slope[:, 1:-1] = (chord[:, :-1] * after + chord[:, 1:] * before) / (before + after)
+        last = np.maximum(self.count - 1, 1)
+        self.slope[every, last] = 2 * chord[every, last - 1] - self.slope[every, last - 1]
+
+    def _doubtful_sizes(self, first_above: Places) -> Floats:
+        """Size to try within each interval below the limit; not a number where the interval holds no doubt."""
+        low, width = self.size[:, :-1], self.width
+        start, stop = self.square[:, :-1], self.square[:, 1:]
+        rise, slope_low, slope_high = stop - start, self.slope[:, :-1] * width, self.slope[:, 1:] * width
+        expected_rise = slope_low.copy()
+        expected_rise[:, 0] = (width[:, 0] / self.searches.first) ** 2  # the rise of a small error
+        is_wide = width > SETTINGS.trusted_interval_fraction * self.size[:, 1:]
+        threshold = np.where(is_wide, (1 - SETTINGS.crest_fraction) ** 2, 1.0)
+        departs = np.abs(rise - expected_rise) > SETTINGS.departure_fraction
+        size = np.where(is_wide & departs, low + width / 2, math.nan)
+        for position in reversed(_crests(slope_low, rise, slope_high)):
+            height = _on_cubic(position, start, rise, slope_low, slope_high)
+            is_above = (position > 0.02) & (position < 0.98) & (height >= threshold)
+            size = np.where(is_above, low + position * width, size)
+        is_below = np.arange(1, self.size.shape[1]) < first_above[:, None]
+        return np.where(is_below & (low < self.bound[:, None]), size, math.nan)
+
+    def _between(self, every: Places, first_above: Places) -> tuple[Floats, Truths]:
+        """Size at which a cubic between known points reaches the limit, and whether it is close enough."""
+        high = np.minimum(first_above, self.size.shape[1] - 1)
+        low = high - 1
+        width, self.high = self.width[every, low], self.size[every, high]
+        start, stop = self.square[every, low], self.square[every, high]
+        slope_low, slope_high = (self.slope[every, point] * width for point in (low, high))
+        position = chord = (1 - start) / (stop - start)
+        square_term = 2 * (3 * (stop - start) - 2 * slope_low - slope_high)
+        cube_term = 3 * (slope_low + slope_high - 2 * (stop - start))
+        for _ in range(SETTINGS.newton_steps):
+            steepness = slope_low + position * (square_term + cube_term * position)
+            height = _on_cubic(position, start, stop - start, slope_low, slope_high)
+            position = position - (height - 1) / steepness
+            position = np.where((position >= 0) & (position <= 1), position, chord)
+        size = self.high - (1 - position) * width
+        is_narrow = width <= LIMIT_FRACTION * self.high
+        rise = np.sqrt(stop) - np.sqrt(start)  # of the value itself, whose slope a straight line keeps
+        value_slope_low = np.where(start > 0, slope_low / (2 * np.sqrt(start)), rise)
+        bend = np.abs(value_slope_low - slope_high / (2 * np.sqrt(stop)))
+        is_bent = bend > SETTINGS.bent_fraction * np.abs(rise)
+        trusted = np.where(is_bent, SETTINGS.trusted_bent_fraction, SETTINGS.trusted_fraction)
+        is_close = (stop - 1 < 2 * trusted) & (self.high - size < 2 * trusted * self.high)
+        is_close |= (1 - start < 2 * trusted) & (size - (self.high - width) < 2 * trusted * self.high)
+        # Every fourth try halves the interval, so that no search is slow.
+        position = np.where(self.tries % 4 == 3, 0.5, np.minimum(np.maximum(position, 0.01), 0.99))
+        self.inside = self.high - (1 - position) * width
+        by_power = self._by_power(every, low, high)
+        is_steep = (stop > SETTINGS.steep_ratio) & (by_power > self.size[every, low]) & (by_power < self.high)
+        self.inside = np.where(is_steep, by_power, self.inside)
+        return np.where(is_narrow, self.high - width, size), is_close | is_narrow
+
+    def _by_power(self, every: Places, low: Places, high: Places) -> Floats:
+        """Size at which a power of the size reaches the limit.
+
+        The power of two points around the limit, or of two points beyond it where the lower point is the start.
+        """
+        after = np.minimum(high + 1, self.count - 1)
+        is_start = low == 0
+        below, above = np.where(is_start, high, low), np.where(is_start, after, high)
+        rise, growth = (np.log(array[every, above] / array[every, below]) for array in (self.square, self.size))
+        power = np.where(below < above, rise / growth, 2.0)
+        return np.asarray(self.size[every, high] * self.square[every, high] ** (-1 / power))
+
+    def _ahead(self, every: Places, last: Places) -> tuple[Floats, Truths]:
+        """Size at which a parabola through the last points reaches the limit, and whether it is close enough."""
+        before = np.maximum(last - 1, 0)
+        slope = self.slope[every, last]
+        bend = np.where(last > 0, (slope - self.slope[every, before]) / self.width[every, before], 0.0)
+        missing = 1 - self.square[every, last]
+        discriminant = slope * slope + 2 * bend * missing
+        steepness = slope + np.sqrt(np.maximum(discriminant, 0.0))
+        is_rising = (discriminant >= 0) & (steepness > 0)
+        ahead = np.where(is_rising, self.low + 2 * missing / steepness, math.inf)
+        value, value_before = np.sqrt(self.square[every, last]), np.sqrt(self.square[every, before])
+        rise, expected_rise = value - value_before, slope / (2 * value) * self.width[every, before]
+        is_bent = np.abs(expected_rise - rise) > SETTINGS.bent_fraction / 2 * np.abs(rise)
+        trusted = np.where(is_bent, SETTINGS.trusted_bent_fraction, SETTINGS.trusted_fraction)
+        is_close = (missing < 2 * trusted) & (ahead < (1 + 1.5 * trusted) * self.low) & (self.area > 0.5)
+        return ahead, is_close
+
+    def next_sizes(self, going: Places, *, is_several: bool) -> tuple[Places, Floats]:
+        """Searches that go on and the sizes that they try next: one per lane, or several."""
+        growth = SETTINGS.growth_factor
+        low, bound, is_between = self.low[going], self.bound[going], self.is_between[going]
+        grown = np.minimum(np.maximum(self.ahead[going], 1.01 * low), growth * low)
+        is_first = low < self.searches.first[going]
+        ahead = np.where(is_first, self.searches.first[going], grown)
+        size = np.where(is_between, self.inside[going], np.minimum(ahead, bound))
+        doubtful = self.doubtful[going]
+        if not is_several:
+            least = np.where(np.isnan(doubtful), math.inf, doubtful).min(axis=1)
+            size = np.where(np.isfinite(least), least, size)
+            order = np.lexsort((size, self.searches.lane[going]))
+            lane = self.searches.lane[going][order]
+            order = order[np.append(True, np.diff(lane) > 0)]
+            return going[order], size[order]
+        is_needed = (low < bound) | is_between
+        size, low, is_between = np.where(is_needed, size, math.nan)[:, None], low[:, None], is_between[:, None]
+        neighbours = size * NEIGHBOUR_FACTORS
+        is_inside = is_between & (low < neighbours) & (neighbours < self.high[going][:, None])
+        is_growing = ~is_between & (~is_first & (grown >= growth * low[:, 0]))[:, None]
+        is_starting = ~is_between & is_first[:, None]
+        more = (
+            np.where(is_inside, neighbours, math.nan),
+            np.where(is_growing, size * GROWTH_FACTORS, math.nan),
+            np.where(is_starting, low + (size - low) * FIRST_SIZE_FRACTIONS, math.nan),
+        )
+        sizes = np.concatenate((size, doubtful, *more), axis=1)
+        sizes = np.where(is_between, sizes, up_to(sizes, bound[:, None]))
+        row, column = np.nonzero(np.isfinite(sizes))
+        return going[row], sizes[row, column]
+
+
+def _on_cubic(position: Floats, start: Floats, rise: Floats, slope_low: Floats, slope_high: Floats) -> Floats:
+    """Height of the cubic with these slopes at both ends of an interval, at a position from 0 to 1."""
+    square, cube = position**2, position * position * position
+    height = start + slope_low * (position - 2 * square + cube) + slope_high * (cube - square)
+    return np.asarray(height + rise * (3 * square - 2 * cube))
+
+
+def _crests(slope_low: Floats, rise: Floats, slope_high: Floats) -> tuple[Floats, Floats]:
+    """Positions at which the cubic has no slope; not finite where there is none."""
+    b, c = 3 * rise - 2 * slope_low - slope_high, slope_low + slope_high - 2 * rise
+    far = -(b + np.copysign(np.sqrt(b * b - 3 * c * slope_low), b))
+    return far / (3 * c), slope_low / far
