@@ -115,7 +115,7 @@ FORWARD = {
     "platforms.receiver": "{position: [3 km, 200 m, 2 km], velocity: [5 m/s, 25 m/s, 0 m/s]}",
 }
 
-# By an independent search with exact ranges, to the digits of its print: point [m], quadratic phase and phase of equal
+# Of an independent search with exact ranges, to the digits of its print: point [m], quadratic phase, phase of equal
 # loss [rad]. The reference finds them, and the check finds what the reference does.
 NAMED = {
     "Section V, 10 MHz": (
