@@ -142,7 +142,7 @@ def _shown(verdict: Verdict) -> str:
         digits = 1 if verdict.measured_db_interval is None else 2  # of noise half a decibel decides
         levels = [f"{level:.{digits}f} dB" for level in (verdict.measured_db, verdict.requirement_db)]
         return f"the image shows {levels[0]} at it, {levels[1]} allowed"
-    measured = verdict.measured_qpe_rad if verdict.measured_cubic_rad is None else verdict.measured_cubic_rad
+    _, measured = verdict.judged_phases_rad
     if measured is not None and verdict.budget_rad is not None:
         return f"the image shows {measured:.3g} rad at it, the budget is {format_limit(verdict.budget_rad, 'rad')}"
     return verdict.reason or "the image shows more than it promises"

@@ -63,6 +63,18 @@ class Verdict(NamedTuple):
     reason: Note | None = None
     reason_autofocus: Note | None = None
 
+    @property
+    def judged_phases_rad(self) -> tuple[float | None, float | None]:
+        """The phase that the budget bounds, as exact ranges predict it and as the image shows it. [rad]
+
+        The cubic phase where the row holds it, else the quadratic phase of equal loss.
+        """
+        if self.measured_cubic_rad is not None:
+            return self.predicted_cubic_rad, self.measured_cubic_rad
+        if self.measured_equal_loss_qpe_rad is not None:
+            return self.equal_loss_qpe_rad, self.measured_equal_loss_qpe_rad
+        return self.predicted_qpe_rad, self.measured_qpe_rad
+
 
 class VerifiedMission(NamedTuple):
     """The verdicts on one mission's limits; `conditions` says of what images they are.

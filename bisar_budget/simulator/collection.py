@@ -353,8 +353,11 @@ class PointCollection:
             self._require_room(cells, range_cells)
             lines = self.range_lines(errors)
             cell = lines.cells(centre, self.radar.bandwidth, self.wavelength)
-            spacing = (cell[0] / OVERSAMPLING, cell[1] / OVERSAMPLING)
-            shape = (max(1, 2 * round(range_cells * OVERSAMPLING / 2)), 2 * round(cells * OVERSAMPLING / 2))
+            # Cells of the bandwidth alone are too coarse where the aperture resolves range too: peaks were misread.
+            fine = lines.sampled(centre, self.radar.bandwidth, self.wavelength)
+            spacing = (fine[0] / OVERSAMPLING, fine[1] / OVERSAMPLING)
+            rows = range_cells * OVERSAMPLING * cell[0] / fine[0]
+            shape = (max(1, 2 * round(rows / 2)), 2 * round(cells * OVERSAMPLING / 2))
             self._kept = (key, lines.grid(centre, spacing, shape), spacing)
         return self._kept[1:]
 

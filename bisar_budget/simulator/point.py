@@ -383,6 +383,8 @@ def declared_errors(mission: Mission) -> Errors:
             shared = (common.position, common.velocity, common.acceleration)
             of_both = _turned(shared, state.frame(common.frame), factor)
             error = error.plus(of_both._replace(time_tag=factor * (common.time_tag or 0.0)))
+        if mission.scene.height_error:  # a higher scene: both platforms are measured too high
+            error = error.plus(PathError(position=(0.0, 0.0, mission.scene.height_error)))
         wideband = declared.vibration.wideband
         error = error._replace(
             sinusoids=_sinusoids(mission, name),

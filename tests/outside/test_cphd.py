@@ -85,6 +85,7 @@ def with_one_error(name: str, row_id: str, size: float) -> Mission:
     for key in ("common_motion_error", "timing_error"):
         found.pop(key, None)
     found.get("allocation", {}).pop("coverage_factor", None)
+    found.get("scene", {}).pop("height_error", None)
     for one in found["platforms"].values():
         one.pop("motion_error", None)
         one.pop("oscillator", None)

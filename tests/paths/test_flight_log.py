@@ -333,8 +333,8 @@ def test_any_cells(rows: list[list[str]]) -> None:
     held_to_its_word("\n".join([HEADER, *(",".join(row) for row in rows)]).encode(errors="surrogatepass"))
 
 
-def make_flight() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("make_flight", ROOT / "docs" / "make_flight.py")
+def script_of_docs(name: str) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(name, ROOT / "docs" / f"{name}.py")
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
@@ -342,9 +342,14 @@ def make_flight() -> ModuleType:
     return module
 
 
+def test_the_circle_of_the_examples_is_what_its_script_writes() -> None:
+    log = ROOT / "specs" / "missions" / "paths" / "circle_made_up.csv"
+    assert log.read_text(encoding="utf-8").splitlines() == list(script_of_docs("make_circle").lines())
+
+
 def test_the_flight_of_the_examples_can_be_flown() -> None:
     """Smoothed over two seconds, what is left is its noise."""
-    maker = make_flight()
+    maker = script_of_docs("make_flight")
     lines = list(maker.lines())
     data = "\n".join(lines).encode()
     assert lines == list(maker.lines())

@@ -508,6 +508,11 @@ class TestSummary:
         assert moved[0][:4] == ["both platforms", "position", "x", "3 m"]
         assert table_with(page, "owner", "kind", "qpe")[0][1] == "velocity"
 
+    def test_contributions_to_the_phase_are_of_equal_loss(self, language: str) -> None:
+        """DVB-T: 16.2 deg, the quadratic part alone, stood below a requirement that is reached by 54.8 deg."""
+        page = self.page(language, found_in(ROOT / "specs" / "missions" / "dvbt_aircraft.yaml"))
+        assert table_with(page, "owner", "kind", "qpe")[0][:4] == ["receiver", "velocity", "y", "54.8 deg"]
+
     def test_only_the_largest_contributions(self, language: str) -> None:
         errors = [{"name": f"e{n:02}", "quadratic_phase_error": 0.001 * (n + 1)} for n in range(12)]
         page = self.page(language, findings(other_errors=errors))

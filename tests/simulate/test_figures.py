@@ -164,6 +164,20 @@ class TestPictures:
         assert (right - left, top - bottom) == pytest.approx((nx * width, ny * height))
         assert (left, bottom) == pytest.approx(tuple(places[0, 0] - (width / 2, height / 2)))
 
+    def test_a_peak_beside_25_is_marked(self, moved) -> None:
+        """A narrow band or a long aperture makes the image peak elsewhere: then the circle alone marks nothing."""
+        at = np.array(moved.responses[0].shown)
+        assert sheet(moved).in_scene.image_points.shape == (0, 2)  # both say the same
+        aside = np.array((0.0, 5.0))
+        drawn = sheet(moved._replace(points=moved.points + aside))
+        assert drawn.in_scene.image_points == pytest.approx(at[None])
+        assert drawn.in_scene.shown_places == pytest.approx(at[None] + aside, abs=0.01)
+        look = moved.look_azimuth
+        turned = [math.cos(look) * at[0] + math.sin(look) * at[1], math.cos(look) * at[1] - math.sin(look) * at[0]]
+        assert drawn.rotated.image_points[0] == pytest.approx(turned)
+        key = next(panel for panel in point_plot.figure(drawn, "").axes if panel.get_legend())
+        assert key.get_legend().get_texts()[-1].get_text() == "where the image peaks"
+
     def test_a_displaced_response_stands_where_25_puts_it(self, moved) -> None:
         """Two metres north of its place; it was drawn at 0, 0."""
         mission = parse_mission(mission_text(platforms__transmitter__motion_error={"position": [1, 5, 2]}))

@@ -33,3 +33,19 @@ def test_a_spectrum_is_flown_beside_errors_that_change_slowly() -> None:
     noise = next(one for one in Analysis(mission).random if one.id == "receiver.random.GNSS")
     beside = noise.full.spread * noise.declared * mission.radar.wavelength / (2 * np.pi)
     assert np.std(fast) == pytest.approx(np.hypot(rms, beside), rel=0.25)  # one draw, and GNSS is slow
+
+
+@pytest.mark.parametrize("height", [10.0, -3.0])
+def test_a_wrong_height_of_the_scene_is_flown(height: float) -> None:
+    """Both platforms are measured too high by as much, once, whatever the coverage factor. It was left out."""
+    platforms = {
+        "transmitter": {"position": [6e3, 0, 2e3], "velocity": [0, 40, 0], "motion_error": {"position": [0, 0, 1]}},
+        "receiver": {"position": [3e3, 3e3, 1e3], "velocity": [-20, 20, 0]},
+    }
+    flown = declared_errors(
+        parse_mission(
+            mission_text(platforms=platforms, scene={"height_error": height}, allocation__coverage_factor=2)
+        )
+    )
+    assert flown.transmitter.position == (0.0, 0.0, 2.0 + height)
+    assert flown.receiver.position == (0.0, 0.0, height)

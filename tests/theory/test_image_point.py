@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import bisar_budget as bb
+from bisar_budget.findings.row import Row
 from tests.conftest import ROOT
 from tests.image_point import Collection, Path, Response, circle, flight, no_error
 
@@ -89,11 +90,96 @@ def test_an_image_peaks_where_its_phase_varies_least(kind: str) -> None:
         assert found.peak_db == pytest.approx(level, abs=0.002), (kind, seed)
 
 
+STILL = (0.0, 0.0, 0.0)
+EAST_10_CM = (0.1, 0.0, 0.0)
+
+
+def section_v(bandwidth: float) -> Collection:
+    """The paper's example, with 41.7 mm/s of the receiver along y."""
+    geometry = bb.load(ROOT / "specs" / "missions" / "rigling_moses_section_v.yaml").platforms
+    states = (geometry.transmitter.state, geometry.receiver.state)
+    paths = tuple(flight(state.position, state.velocity) for state in states)
+    return Collection(10e9, bandwidth, 6.0, paths, (no_error, flight(STILL, (0, 0.0417, 0))))
+
+
+def television() -> Collection:
+    paths = flight((-18e3, 9e3, 420), STILL), flight((-2e3, -7e3, 2500), (-65, 8, 0))
+    return Collection(602e6, 7.61e6, 60.0, paths, (no_error, flight(STILL, (0, 0.05, 0))))
+
+
+def forward_scatter() -> Collection:
+    paths = flight((-18e3, 0, 420), STILL), flight((3e3, 200, 2000), (5, 25, 0))
+    return Collection(602e6, 7.61e6, 60.0, paths, (flight((1, 0, 0), STILL), no_error))
+
+
+def drone(aperture_s: float) -> Collection:
+    paths = flight((600, 500, 60), STILL), circle(1000, 500, 0.025, 0.0)
+    return Collection(435e6, 100e6, aperture_s, paths, (no_error, flight(EAST_10_CM, STILL)))
+
+
+def of_gallery(name: str, changes: dict[str, str], row_id: str) -> Row:
+    """A row of a mission of the gallery, by the full model."""
+    mission = bb.load(ROOT / "specs" / "missions" / f"{name}.yaml").replace(changes)
+    return bb.check(mission, model="full")[row_id]
+
+
+SECTION_V = {
+    "platforms.transmitter.motion_error": "{}",
+    "platforms.receiver.motion_error.velocity": "[0 m/s, 0.0417 m/s, 0 m/s]",
+}
+FORWARD = {
+    "platforms.transmitter.position": "[-18 km, 0 m, 420 m]",
+    "platforms.transmitter.motion_error": "{position: [1 m, 0 m, 0 m]}",
+    "platforms.receiver": "{position: [3 km, 200 m, 2 km], velocity: [5 m/s, 25 m/s, 0 m/s]}",
+}
+
+# Of an independent search with exact ranges, to the digits of its print: point [m], quadratic phase, phase of equal
+# loss [rad]. The reference finds them, and the check finds what the reference does.
+NAMED = {
+    "Section V, 10 MHz": (
+        section_v(1e7), (-1.162, 2.324), 0.4050, 0.4110,
+        "rigling_moses_section_v", {**SECTION_V, "radar.bandwidth": "10 MHz"}, "receiver.velocity.y",
+    ),
+    "Section V, 3 MHz": (
+        section_v(3e6), (-2.457, 1.667), 0.3139, 0.3618,
+        "rigling_moses_section_v", {**SECTION_V, "radar.bandwidth": "3 MHz"}, "receiver.velocity.y",
+    ),
+    "DVB-T": (television(), (5.406, -0.709), 0.282, 0.957, "dvbt_aircraft", {}, "receiver.velocity.y"),
+    "forward scatter": (
+        forward_scatter(), (0.0866, -0.0019), 0.019, 0.153, "dvbt_aircraft", FORWARD, "transmitter.position.x",
+    ),
+    "circle, 100 s": (
+        drone(100.0), (0.0890, -0.0014), 0.063, 0.138, "circling_drone", {}, "receiver.position.x",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", NAMED)
+def test_named_points(name: str) -> None:
+    collection, point, quadratic, equal_loss, mission, changes, row_id = NAMED[name]
+    found = collection.least_variance_point()
+    assert found.point == pytest.approx(point, abs=1e-3)
+    assert abs(found.quadratic_rad) == pytest.approx(quadratic, abs=1e-3)
+    assert found.equal_loss_rad == pytest.approx(equal_loss, abs=1e-3)
+    row = of_gallery(mission, changes, row_id)
+    assert row.displacement_m == pytest.approx(found.point, abs=1e-3)
+    assert row.qpe_full_rad == pytest.approx(found.quadratic_rad, abs=1e-3)
+    assert row.equal_loss_qpe_rad == pytest.approx(found.equal_loss_rad, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("aperture_s", "moved_mm"), [(20.0, 53.9), (40.0, 56.9), (60.0, 67.2), (100.0, 89.0)], ids=str
+)
+def test_more_of_a_circle_moves_the_point_farther(aperture_s: float, moved_mm: float) -> None:
+    """Gradients at mid-aperture say 53.6, 52.8, 51.5 and 47.0 mm, less and less."""
+    assert 1e3 * np.hypot(*drone(aperture_s).least_variance_point().point) == pytest.approx(moved_mm, abs=0.05)
+    row = of_gallery("circling_drone", {"collection.aperture_time": f"{aperture_s} s"}, "receiver.position.x")
+    assert 1e3 * np.hypot(*row.displacement_m) == pytest.approx(moved_mm, abs=0.05)
+
+
 def test_the_quadratic_phase_of_equal_loss_loses_what_the_image_does() -> None:
     """φ loses 4φ²/45 of a peak's power. Where cells are coarse the P₂ phase alone would say much less."""
-    paths = flight((-18e3, 9e3, 420), (0, 0, 0)), flight((-2e3, -7e3, 2500), (-65, 8, 0))
-    television = Collection(602e6, 7.61e6, 60.0, paths, (no_error, flight((0, 0, 0), (0, 0.05, 0))))
-    found = television.least_variance_point()
+    found = television().least_variance_point()
     of_quadratic, of_all = (
         -10 * math.log10(math.exp(-4 / 45 * phase**2)) for phase in (found.quadratic_rad, found.equal_loss_rad)
     )

@@ -1,10 +1,12 @@
 """Limits where a narrow band hides most of what defocuses: images of passive radar lose what exact ranges say."""
 
+import numpy as np
 import pytest
 
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.verifier.limits import verify_mission
 from tests.conftest import mission_text
+from tests.image_point import Collection, flight, no_error
 
 DVB_T = {"radar": {"center_frequency": 602e6, "bandwidth": 7.61e6}, "collection": {"aperture_time": 60}}
 PASSIVE = {
@@ -40,3 +42,20 @@ def test_images_at_a_limit_lose_as_much_as_the_budget(platforms: dict, row_id: s
     assert row.measured_equal_loss_qpe_rad == pytest.approx(row.budget_rad, rel=5e-3)
     assert row.measured_qpe_rad < row.budget_rad / 3
     assert row.measured_inside_rad < row.measured_equal_loss_qpe_rad < row.measured_beyond_rad
+
+
+def test_a_displacement_is_read_where_direct_sums_have_the_peak() -> None:
+    """At 12 m, where the image has lost 2 dB. Over a minute the aperture resolves range finer than the band does.
+
+    Pixels of the band's cells of 32 m put it 1.9 m beside, and called the limit optimistic.
+    """
+    text = mission_text(**DVB_T, platforms=PASSIVE, allocation__model="full", requirements__location_error=12)
+    (row,) = verify_mission(parse_mission(text), "mission.location_error").rows
+    paths = flight((-18e3, 9e3, 420), (0, 0, 0)), flight((-2e3, -7e3, 2500), (-65, 8, 0))
+    unit = Collection(602e6, 7.61e6, 60.0, paths, (no_error, flight((0, 0, 0), (0, 0.05, 0))))
+    size = 0.05 * 12 / np.hypot(*unit.least_variance_point().point)
+    limit = Collection(602e6, 7.61e6, 60.0, paths, (no_error, flight((0, 0, 0), (0, size, 0))))
+    peak, level = limit.peak(limit.least_variance_point().point, 1.0)
+    assert level == pytest.approx(-1.8, abs=0.2)
+    assert row.verdict == "confirmed"
+    assert row.measured_displacement_m == pytest.approx(peak, abs=0.03)

@@ -13,7 +13,7 @@ from bisar_budget.cli import cli
 from bisar_budget.findings.images import Verdict, VerifiedMission
 from bisar_budget.findings.status import exit_code
 from bisar_budget.report import Style
-from bisar_budget.report.formats.verification import evidence
+from bisar_budget.report.formats.verification import evidence, numbers
 from bisar_budget.verifier.limits import verify_mission
 from tests.conftest import TODAY, findings, mission_text
 from tests.conftest import row as row_of
@@ -384,3 +384,16 @@ def test_a_remark_of_many_rows_is_said_once() -> None:
     assert lines.count(SAID) == 1
     assert f"receiver.imu.attitude, receiver.imu.gyro_bias: {SAID}" in lines
     assert "receiver.imu.accelerometer_bias: another" in lines
+
+
+def test_phases_beside_a_budget_are_those_that_it_bounds() -> None:
+    """Of a narrow band: the quadratic part stood there, a third of the budget, and was called confirmed."""
+    narrow = Verdict(
+        "receiver.velocity.y", "full", 0.0205, "m/s", budget_rad=0.3927, published_qpe_rad=0.242, full_qpe_rad=0.1157,
+        predicted_qpe_rad=0.1157, measured_qpe_rad=0.117, equal_loss_qpe_rad=0.3927,
+        measured_equal_loss_qpe_rad=0.3931, verdict="confirmed",
+    )  # fmt: skip
+    assert numbers(narrow) == ("0.392", "0.242", "0.393", "0.393", "0.393")
+    assert narrow.judged_phases_rad == (0.3927, 0.3931)
+    cubic = narrow._replace(predicted_cubic_rad=0.78, measured_cubic_rad=0.79)
+    assert cubic.judged_phases_rad == (0.78, 0.79)

@@ -254,14 +254,14 @@ class Contribution:
 
 
 def phases(page: Page) -> list[Contribution]:
-    """Quadratic phase errors as the file states them, with their part of the sum, and by both models.
+    """Quadratic phase errors, of equal loss, as the file states them, with their part of the sum, and by both models.
 
     An error that no image has comes before all others, and the others are no part of a sum with it.
     """
     by_model: dict[str, dict[str, float]] = {}
     for model in ("published", "full"):
         of_all = page.analysis.together(model).phases
-        by_model[model] = {one.row_id: abs(float(one.qpe_rad[0])) for one in of_all}
+        by_model[model] = {one.row_id: float(one.judged(1.0)[0]) for one in of_all}
     subjects = {row.id: row.subject for row in page.found.rows}
     gating = [name for name in by_model if page.found.model in (name, "strictest")]
     sizes = {row_id: max(by_model[name][row_id] for name in gating) for row_id in by_model["full"]}

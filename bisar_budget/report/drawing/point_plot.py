@@ -35,7 +35,8 @@ _RESTORED_DB = 1.0  # below the error-free peak; a focused response is within a 
 _EQUAL = 8.0  # an image that is not longer for its width than this has equal scales
 _MARKED, _GRID = "#c1502e", "#dddddd"  # of lines that approximate or mark, of a grid
 _NOT_FORMED = "#3a3a3a"  # beside a patch that is narrower than the panel
-_TRUE, _AT = "#5fd3f3", "#7CFC9A"
+_TRUE, _AT, _PEAK = "#5fd3f3", "#7CFC9A", "#f5f0a0"
+_APART = 2  # pixels across: (25) is then beside the peak
 _CUT_SIZE = (300.0, 170.0)  # px of the drawing of the cuts, of its frame
 
 Limits = tuple[float, float, float, float]
@@ -46,8 +47,8 @@ class ImagePanel(NamedTuple):
 
     `level_db` is (nx, ny), x or x′ along its first axis, NaN where no image was formed; `corners`
     (nx + 1, ny + 1, 2) are the corners of those pixels. `true_places` (n, 2) is where the targets stand,
-    `shown_places` (n, 2) where (25) puts them, `points` (n, 3, 2) where (29) puts the pieces of the aperture. All
-    places are in `axes`. [m]
+    `shown_places` (n, 2) where (25) puts them, `image_points` (n, 2) where they peak, none where (25) says the same;
+    `points` (n, 3, 2) where (29) puts the pieces of the aperture. All places are in `axes`. [m]
     """
 
     title: str
@@ -56,6 +57,7 @@ class ImagePanel(NamedTuple):
     corners: Floats
     true_places: Floats
     shown_places: Floats
+    image_points: Floats
     points: Floats
 
     @property
@@ -106,8 +108,9 @@ def sheet(images: PointImages) -> Sheet:
     true = np.array([[one.east, one.north] for one in images.targets.points])
     middle = len(images.points) // 2
     by_25 = images.points[middle] - np.asarray(images.effect.displacement)  # against exact ranges
-    shown = np.array([one.shown for one in images.responses]) + by_25
-    shown_in_scene = np.array([one.shown_in_scene for one in images.responses]) + by_25
+    is_elsewhere = float(np.hypot(*by_25)) > _APART * images.spacing[1]
+    shown = np.array([one.shown for one in images.responses])
+    shown_in_scene = np.array([one.shown_in_scene for one in images.responses])
     back = rotated_back(images)
     how = images.image_former.replace("_", " ")
     in_scene_how = "backprojection" if images.image_former == "polar_format" else how
@@ -116,8 +119,9 @@ def sheet(images: PointImages) -> Sheet:
 
     def picture(title: str, image: Complexes, grid: Floats, part: tuple[slice, slice], at: Floats) -> ImagePanel:
         level, corners = _interpolated(image, grid[..., :2], part, peak)
-        points = at[:, None] + images.points - images.points[middle]
-        return ImagePanel(title, ("x [m]", "y [m]"), level, corners, true, at, points)
+        points = (at + by_25)[:, None] + images.points - images.points[middle]
+        peaks = at if is_elsewhere else at[:0]
+        return ImagePanel(title, ("x [m]", "y [m]"), level, corners, true, at + by_25, peaks, points)
 
     def turned(title: str, image: Complexes) -> ImagePanel:
         flat = picture(title, image, images.grid, crop, shown)
@@ -221,14 +225,14 @@ def figure(drawn: Sheet, title: str) -> Any:
     key.axis("off")
     bar = page.colorbar(artist, ax=key, orientation="horizontal", location="bottom", fraction=0.5, pad=0.02)
     bar.set_label("dB to the error-free peak")
-    marks = [
-        key.plot([], [], label=label, **style)[0]
-        for style, label in (
-            (_stands(_TRUE), "where the target stands"),
-            (_put(_AT), "where (25) puts it"),
-            ({"ls": "none", "marker": "o", "color": _MARKED, "ms": 5}, "points of (29)"),
-        )
+    styles = [
+        (_stands(_TRUE), "where the target stands"),
+        (_put(_AT), "where (25) puts it"),
+        ({"ls": "none", "marker": "o", "color": _MARKED, "ms": 5}, "points of (29)"),
     ]
+    if drawn.in_scene.image_points.size:
+        styles.append((_peaks(_PEAK), "where the image peaks"))
+    marks = [key.plot([], [], label=label, **style)[0] for style, label in styles]
     key.legend(handles=marks, loc="lower center", facecolor=_NOT_FORMED, labelcolor="white", fontsize=10)
     page.suptitle(printable(title), parse_math=False)  # a name is no formula
     return page
@@ -426,6 +430,8 @@ def _image(panel: Any, picture: ImagePanel, *, with_points: bool = False) -> Any
     if with_points:
         for three in picture.points:
             panel.plot(*three.T, "o-", color=_MARKED, ms=4, lw=0.8)
+    if picture.image_points.size:
+        panel.plot(*picture.image_points.T, **_peaks(_PEAK))
     panel.plot(*picture.shown_places.T, **_put(_AT))
     panel.plot(*picture.true_places.T, **_stands(_TRUE))
     for true in picture.true_places:
@@ -447,6 +453,11 @@ def _stands(color: str) -> dict[str, Any]:
 def _put(color: str) -> dict[str, Any]:
     """Mark of where a response is."""
     return {"ls": "none", "marker": "o", "color": color, "ms": 12, "mfc": "none", "mew": 1.2}
+
+
+def _peaks(color: str) -> dict[str, Any]:
+    """Mark of where an image peaks: a square, so that it can be told from a circle."""
+    return {"ls": "none", "marker": "s", "color": color, "ms": 12, "mfc": "none", "mew": 1.2}
 
 
 def _is_within(place: Floats, limits: Limits) -> bool:

@@ -123,7 +123,7 @@ def _cells(row: Verdict) -> tuple[str, ...]:
 
 
 def _smaller(row: Verdict) -> float | None:
-    phases = [phase for phase in (row.published_qpe_rad, row.full_qpe_rad) if phase is not None]
+    phases = [phase for phase in (row.published_qpe_rad, _by_full(row)) if phase is not None]
     return min(phases, default=None)
 
 
@@ -140,11 +140,17 @@ def numbers(row: Verdict) -> tuple[str, str, str, str, str]:
         moves = (row.displacement_m, row.measured_displacement_m)
         exact, image = ("-" if move is None else format_quantity(math.hypot(*move), "m") for move in moves)
         return limit(row) if row.id == "mission.location_error" else "-", "-", "-", exact, image
+    exact, image = map(_phase, row.judged_phases_rad)
     if row.measured_cubic_rad is not None:
-        cubic = (_phase(row.predicted_cubic_rad), _phase(row.measured_cubic_rad))
-        return _budget(row), "-", "-", *cubic
-    by_model = (_phase(row.published_qpe_rad), _phase(row.full_qpe_rad))
-    return _budget(row), *by_model, _phase(row.predicted_qpe_rad), _phase(row.measured_qpe_rad)
+        return _budget(row), "-", "-", exact, image
+    return _budget(row), _phase(row.published_qpe_rad), _phase(_by_full(row)), exact, image
+
+
+def _by_full(row: Verdict) -> float | None:
+    """Quadratic phase of equal loss by the full model, which is what it holds to the budget. [rad]"""
+    if row.full_qpe_rad is None or row.measured_equal_loss_qpe_rad is None:
+        return row.full_qpe_rad
+    return row.equal_loss_qpe_rad
 
 
 def _budget(row: Verdict) -> str:
