@@ -138,7 +138,7 @@ class _Pixels:
         self.collection, self.errors, self.places = collection, errors.smooth(), pixels
         self.point = np.array([[*centre, 0.0]])
         lines = collection.range_lines(errors)
-        self.at_middle = lines.range_sum(pixels) - lines.range_sum(self.point[0, :2])
+        self.carrier = lines.carrier(pixels) - lines.carrier(self.point[0, :2])
         self.squares = _squares(pixels)
         if collection.is_tapered:
             weights, frequency = taylor_window(257), cell_centres(1.0, 257)
@@ -164,7 +164,7 @@ class _Pixels:
                 farther -= _distance(one.measured[part], self.point, _squares(self.point))
             # Whole cycles are taken off in double precision; of what is left single precision holds 1e-6 rad, in a
             # quarter of the time.
-            cycles = (farther - self.at_middle) / collection.wavelength
+            cycles = (farther - self.carrier) / collection.wavelength
             cycles -= np.rint(cycles)
             turned = (2 * math.pi * cycles).astype(np.float32)
             if left is not None:
@@ -424,7 +424,7 @@ def refocused(
 def _frequency(
     collection: PointCollection, errors: Errors, centre: GroundVector, chip: Chip, slow_time: Floats
 ) -> Floats:
-    """Frequency of each pulse along the middle of a line, the midpoint's taken out, (times,). [cycles/pixel]"""
+    """Frequency of each pulse along the middle of a line, the carrier's taken out, (times,). [cycles/pixel]"""
     line = chip.grid[chip.grid.shape[0] // 2]
     middle = line.shape[0] // 2
     slope = np.zeros(slow_time.size)
@@ -432,6 +432,6 @@ def _frequency(
         for pixel, sign in ((line[middle + 1], 1), (line[middle - 1], -1)):
             slope += sign * np.linalg.norm(pixel - one.measured, axis=1) / 2
     lines = collection.range_lines(errors)
-    at_middle = (lines.range_sum(line[middle + 1]) - lines.range_sum(line[middle - 1])) / 2
-    frequency: Floats = (slope - at_middle) / collection.wavelength
+    carrier = (lines.carrier(line[middle + 1]) - lines.carrier(line[middle - 1])) / 2
+    frequency: Floats = (slope - carrier) / collection.wavelength
     return frequency

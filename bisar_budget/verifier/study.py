@@ -38,10 +38,14 @@ _SLOWEST = 0.02  # of the fastest turn of Doppler: slower, a part of the apertur
 
 
 class Spread(NamedTuple):
-    """Resolution cells over which a response is smeared along its line, and over which it walks in range."""
+    """Resolution cells over which a response is smeared along its line, and over which it walks in range.
+
+    Where Doppler turns back (`is_round`) it spreads all ways, and both are the same.
+    """
 
     smear: int
     walk: int
+    is_round: bool = False
 
 
 class Responses(NamedTuple):
@@ -218,12 +222,13 @@ class Study:
         effect = self.collection.effect(errors)
         spread = self.spread(errors, effect)
         cells = min(MAX_CELLS, max(CELLS + spread.smear, math.ceil(room * spread.smear)))
-        chips = self.collection.pair(errors, effect.displacement, cells, range_cells + spread.walk)
+        high = cells if spread.is_round else range_cells + spread.walk
+        chips = self.collection.pair(errors, effect.displacement, cells, high)
         return Responses(errors, effect, spread, *chips)
 
     def read(self, images: Responses, *, is_focused: bool = False) -> ApertureReading:
         """Quadratic and cubic phase of a response, measured."""
-        walk = images.spread.walk
+        walk = images.chip.image.shape[0] if images.spread.is_round else images.spread.walk
         return read_aperture(
             self.collection,
             images.errors,
@@ -303,7 +308,11 @@ class Study:
         left = flight.range_error((0.0, 0.0), effect.displacement)
         slopes = -look_sum(*(one.measured - point for one in flight.paths))[:, :2]
         lines = self.collection.range_lines(errors)
-        cells = lines.cells(effect.displacement, self.mission.radar.bandwidth, self.collection.wavelength)
+        cells = lines.cells(effect.displacement, self.mission.radar)
+        if lines.turns_back:  # each moment sees the point at a place of its own, along the turn of the line of sight
+            turn = np.hypot(*np.gradient(slopes, time, axis=0).T)
+            reach = 2 * math.ceil(min(float(np.abs(np.gradient(left, time) / turn).max()) / min(cells), 1e6))
+            return Spread(reach, reach, is_round=True)
         by_range = slopes[time.size // 2]
         doppler = slopes @ (np.array([by_range[1], -by_range[0]]) / np.hypot(*by_range))
         rate = np.gradient(doppler, time)
