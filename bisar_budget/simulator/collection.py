@@ -48,7 +48,7 @@ _BYTES_PER_CONTRIBUTION = 8 + 2 * 16  # in single and in double precision
 _STRIDE = 4  # pixels from one step along a line to the next; between them a cubic is drawn
 _STRETCH = 4.0  # of a pixel, at most: where Doppler hardly changes along a line
 _TIMES = 65  # at which paths show how far the line of sight turns
-_ONE_WAY = 0.7  # of all that Doppler runs through over the aperture, that lies between its ends unless it turns back
+_ONE_WAY = 0.99  # of all that Doppler runs through over the aperture, which its ends span unless it turns back
 _SLANT = 60.0  # of the way from line to line, at most: where equal Doppler runs along equal range
 _CORRECTIONS = 3  # of each pixel's range sum
 _BLOCK = 1 << 14  # pixels corrected at once
@@ -409,11 +409,12 @@ class PointCollection:
         """Pixels of a chip and their spacing; the last one is kept, since images come in pairs."""
         key = (centre, errors.smooth(), cells, range_cells)
         if self._kept is None or self._kept[0] != key:
-            self._require_room(cells, range_cells)
             lines = self.range_lines(errors)
-            cell = lines.cells(centre, self.radar)
+            cell = lines.sampled(centre, self.radar)
+            finer = lines.cells(centre, self.radar)[0] / cell[0]
+            self._require_room(cells, finer * range_cells)
             spacing = (cell[0] / OVERSAMPLING, cell[1] / OVERSAMPLING)
-            shape = (max(1, 2 * round(range_cells * OVERSAMPLING / 2)), 2 * round(cells * OVERSAMPLING / 2))
+            shape = (max(1, 2 * round(finer * range_cells * OVERSAMPLING / 2)), 2 * round(cells * OVERSAMPLING / 2))
             self._kept = (key, lines.grid(centre, spacing, shape), spacing)
         return self._kept[1:]
 
@@ -432,7 +433,7 @@ class PointCollection:
         cells = 2 * farthest * self.radar.bandwidth / SPEED_OF_LIGHT
         return max(_FREQUENCIES, 16 * math.ceil((cells + _FREQUENCIES / 2) / 16))
 
-    def _require_room(self, cells: int, range_cells: int) -> None:
+    def _require_room(self, cells: int, range_cells: float) -> None:
         """Refuse a patch that aliases or is too large. More pulses than it takes would change nothing."""
         if cells > MAX_CELLS:
             raise ValueError(f"a patch of {cells} resolution cells, at most {MAX_CELLS} are formed")

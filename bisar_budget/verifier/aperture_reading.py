@@ -97,7 +97,9 @@ def read_aperture(
     """
     lines, columns = chip.image.shape
     middle = lines // 2
-    half = min(middle, lines - 1 - middle, round(walk_cells * OVERSAMPLING / 2)) // _STRIDE * _STRIDE
+    by_range = collection.range_lines(errors).gradients(np.asarray(centre, dtype=float))[0]
+    lines_per_cell = collection.range_cell / (float(np.hypot(*by_range)) * chip.spacing[0])
+    half = min(middle, lines - 1 - middle, round(walk_cells * lines_per_cell / 2)) // _STRIDE * _STRIDE
     rows = slice(middle - half, middle + half + 1, _STRIDE)
     slow_time = cell_centres(collection.aperture_time, pulses_for(round(columns / OVERSAMPLING)))
     pixels = chip.grid[rows].reshape(-1, 3)
@@ -126,7 +128,7 @@ def read_aperture(
     mean = float(np.mean(place * np.polynomial.legendre.legval(place, slope)))
     radar = collection.radar
     # Range cells that a wavelength of range error walks: the bandwidth over the centre frequency.
-    walked = mean / (2 * math.pi) * (radar.bandwidth / radar.center_frequency) * OVERSAMPLING
+    walked = mean / (2 * math.pi) * (radar.bandwidth / radar.center_frequency) * lines_per_cell
     # The image's phase is −2π/λ times the range error; P₂ = (3t² - 1)/2, P₃ = (5t³ - 3t)/2.
     return ApertureReading(float(-1.5 * fit[2]), float(-2.5 * fit[3]), across, -walked, min(1.0, covered * 1.02))
 

@@ -40,12 +40,14 @@ _SLOWEST = 0.02  # of the fastest turn of Doppler: slower, a part of the apertur
 class Spread(NamedTuple):
     """Resolution cells over which a response is smeared along its line, and over which it walks in range.
 
-    Where Doppler turns back (`is_round`) it spreads all ways, and both are the same.
+    Where Doppler turns back (`is_round`) it spreads all ways, and both are the same. A range cell has `finer` times
+    as many pixels as one across.
     """
 
     smear: int
     walk: int
     is_round: bool = False
+    finer: float = 1.0
 
 
 class Responses(NamedTuple):
@@ -291,9 +293,9 @@ class Study:
         (a, c, east, _), (b, d, north, _) = (gradient[:, 0] for gradient in exact.gradient)
         # A metre of range along equal Doppler leads by (d, −c) over the determinant.
         area, bends = abs(a * d - b * c), abs(float(exact.k[0]) * (d * east - c * north))
-        per_line = bends * self.collection.range_cell / OVERSAMPLING
+        per_line = bends * self.collection.range_cell / (OVERSAMPLING * spread.finer)
         shared = int(min(_SHARED_RAD * area / per_line if per_line else 1e6, 1e6))
-        return max(shared, round(spread.walk * OVERSAMPLING / 2))
+        return max(shared, round(spread.walk * OVERSAMPLING * spread.finer / 2))
 
     def spread(self, errors: Errors, effect: ExactEffect) -> Spread:
         """Where an error puts the parts of a response, by the range error that it leaves over the aperture.
@@ -322,6 +324,7 @@ class Study:
         return Spread(
             2 * math.ceil(min(float(np.abs(places).max()) / cells[1], 1e6)),
             2 * math.ceil(min(float(np.abs(walk).max()) / self.collection.range_cell - 0.25, 64)),
+            finer=cells[0] / lines.sampled(effect.displacement, self.mission.radar)[0],
         )
 
 

@@ -3,6 +3,7 @@
 import json
 import math
 import tracemalloc
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -129,12 +130,15 @@ class TestAutofocus:
         assert np.sqrt(np.mean(focused.phase**2)) < 0.05
 
 
+RADAR = SimpleNamespace(center_frequency=10e9, bandwidth=100e6)
+
+
 class TestRefusals:
     def test_a_point_below_both_platforms_has_no_image_plane(self) -> None:
         """The range does not change over the ground there: it was divided by first."""
         above = np.array([[0.0, 0.0, 1e3]] * 3)
         with pytest.raises(ValueError, match="no image plane"):
-            RangeLines(above, above).cells((0.0, 0.0), 1e8, 0.03)
+            RangeLines(above, above).cells((0.0, 0.0), RADAR)
 
     def test_too_few_pulses_alias(self) -> None:
         with pytest.raises(SimulationError, match="aliases below"):
@@ -282,9 +286,7 @@ class TestLinesOfEqualRangeThatBend:
         """drones 1 is in focus over 0.9 m of a range cell of 22 m: an aperture of 28° at 100 m, in X-band."""
         mission = parse_mission(families.mission_text("drones", 1))
         lines = PointCollection(mission, mission.geometry).range_lines(declared_errors(mission))
-        nominal, sampled = (
-            of((0.0, 0.0), mission.radar.bandwidth, mission.radar.wavelength) for of in (lines.cells, lines.sampled)
-        )
+        nominal, sampled = (of((0.0, 0.0), mission.radar) for of in (lines.cells, lines.sampled))
         slopes = []
         step = 1e-3 * (lines.grid((0.0, 0.0), (nominal[0] / 100, nominal[1]), (3, 2))[2, 1, :2])
         for tau in np.linspace(-0.5, 0.5, 101) * mission.collection.aperture_time:
