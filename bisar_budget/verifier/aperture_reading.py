@@ -72,7 +72,7 @@ def read_aperture(
     centre: GroundVector,
     chip: Chip,
     reference: Chip,
-    walk_cells: float = 0.0,
+    beside: int = 0,
     expected: ExactEffect | None = None,
 ) -> ApertureReading:
     """Read quadratic and cubic phase of a response.
@@ -85,8 +85,8 @@ def read_aperture(
         Middle of the chips and place of the reference. [m]
     chip, reference : Chip
         With and without error, on the same pixels.
-    walk_cells : float
-        Range cells that the response walks, both ways: so many lines are read.
+    beside : int
+        Lines on either side of the middle one that are read too.
     expected : ExactEffect, optional
         Where the fit starts. If no polynomial near it reproduces the pixels, what single pulses say is tried too.
 
@@ -97,14 +97,12 @@ def read_aperture(
     """
     lines, columns = chip.image.shape
     middle = lines // 2
-    by_range = collection.range_lines(errors).gradients(np.asarray(centre, dtype=float))[0]
-    lines_per_cell = collection.range_cell / (float(np.hypot(*by_range)) * chip.spacing[0])
-    half = min(middle, lines - 1 - middle, round(walk_cells * lines_per_cell / 2)) // _STRIDE * _STRIDE
+    half = min(middle, lines - 1 - middle, beside) // _STRIDE * _STRIDE
     rows = slice(middle - half, middle + half + 1, _STRIDE)
     slow_time = cell_centres(collection.aperture_time, pulses_for(round(columns / OVERSAMPLING)))
     pixels = chip.grid[rows].reshape(-1, 3)
     images = [one.image[rows] for one in (chip, reference)]
-    fitting = _Fitting(collection, errors, centre, pixels, slow_time, images, bool(walk_cells))
+    fitting = _Fitting(collection, errors, centre, pixels, slow_time, images, bool(beside))
     best, covered = _Refined(np.zeros(4), math.inf), 1.0
     if expected is not None:
         best = fitting.refined(np.array([0.0, 0.0, -expected.quadratic / 1.5, -expected.cubic / 2.5]))
@@ -127,6 +125,8 @@ def read_aperture(
     slope = np.polynomial.legendre.legder([0.0, 0.0, *fit[2:]])
     mean = float(np.mean(place * np.polynomial.legendre.legval(place, slope)))
     radar = collection.radar
+    by_range = collection.range_lines(errors).gradients(np.asarray(centre, dtype=float))[0]
+    lines_per_cell = collection.range_cell / (float(np.hypot(*by_range)) * chip.spacing[0])
     # Range cells that a wavelength of range error walks: the bandwidth over the centre frequency.
     walked = mean / (2 * math.pi) * (radar.bandwidth / radar.center_frequency) * lines_per_cell
     # The image's phase is −2π/λ times the range error; P₂ = (3t² - 1)/2, P₃ = (5t³ - 3t)/2.

@@ -34,6 +34,7 @@ _SCALED, _SCALINGS = 1e-4, 40  # of a budget; steps at most
 _HIDDEN = 0.1  # of the equal-loss phase: less than that is hidden, and a phase is measured better than a loss
 _ONE_PEAK = math.log(2)  # variance of a phase that takes half the peak's power [rad²]
 _SUMMED = 256  # pulses, and frequencies, of a direct sum
+_ROUND_CELLS = 6  # around the middle line, that tell moments apart which look alike along it
 _SLOWEST = 0.02  # of the fastest turn of Doppler: slower, a part of the aperture is not followed
 
 
@@ -230,14 +231,15 @@ class Study:
 
     def read(self, images: Responses, *, is_focused: bool = False) -> ApertureReading:
         """Quadratic and cubic phase of a response, measured."""
-        walk = images.chip.image.shape[0] if images.spread.is_round else images.spread.walk
+        spread = images.spread
+        cells = spread.walk + (_ROUND_CELLS if spread.is_round else READ_CELLS if spread.walk else 0)
         return read_aperture(
             self.collection,
             images.errors,
             images.effect.displacement,
             images.chip,
             images.reference,
-            walk and walk + READ_CELLS,
+            round(cells * OVERSAMPLING * spread.finer / 2),
             None if is_focused else images.effect,
         )
 
