@@ -142,9 +142,10 @@ def _shown(verdict: Verdict) -> str:
         digits = 1 if verdict.measured_db_interval is None else 2  # of noise half a decibel decides
         levels = [f"{level:.{digits}f} dB" for level in (verdict.measured_db, verdict.requirement_db)]
         return f"the image shows {levels[0]} at it, {levels[1]} allowed"
-    measured = verdict.measured_qpe_rad if verdict.measured_cubic_rad is None else verdict.measured_cubic_rad
+    _, measured = verdict.judged
     if measured is not None and verdict.budget_rad is not None:
-        return f"the image shows {measured:.3g} rad at it, the budget is {format_limit(verdict.budget_rad, 'rad')}"
+        phase, budget = f"{measured:.3g} rad{verdict.of_equal_loss}", format_limit(verdict.budget_rad, "rad")
+        return f"the image shows {phase} at it, the budget is {budget}"
     return verdict.reason or "the image shows more than it promises"
 
 

@@ -108,9 +108,10 @@ def _chunk(kind: bytes, content: bytes) -> bytes:
 
 def _at_limit(verdict: Verdict) -> str:
     limit = format_limit(verdict.boundary_error, verdict.unit)
+    predicted, measured = map(_phase, verdict.judged)
     return (
-        f"At the limit, {limit}: predicted {_phase(verdict.predicted_qpe_rad)}, measured "
-        f"{_phase(verdict.measured_qpe_rad)}, budget {format_limit(verdict.budget_rad or 0.0, 'rad')}"
+        f"At the limit, {limit}: predicted {predicted}, measured {measured}{verdict.of_equal_loss}, "
+        f"budget {format_limit(verdict.budget_rad or 0.0, 'rad')}"
     )
 
 
