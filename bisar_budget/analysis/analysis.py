@@ -29,6 +29,7 @@ from bisar_budget.mission.model import Mission, has_random_errors
 from bisar_budget.mission.stacked import picked
 from bisar_budget.phrases import Note
 from bisar_budget.ranges.exact_ranges import ExactRanges
+from bisar_budget.ranges.resolution import Resolution, resolution
 
 __all__ = ["Analysis", "Case", "Model", "by_nodes"]
 
@@ -90,6 +91,11 @@ class Analysis:
     def exact(self) -> ExactRanges:
         """Exact ranges over the aperture."""
         return exact_ranges(self.mission, self.geometry, self.nodes, self.cases)
+
+    @cached_property
+    def resolution(self) -> Resolution:
+        """Widths of the response without errors, (cases,)."""
+        return resolution(self.exact, self.geometry, self.mission.radar, self.mission.collection.aperture_time)
 
     @cached_property
     def errors(self) -> DeclaredErrors:
@@ -203,6 +209,11 @@ class Case:
     def geometry(self) -> BistaticGeometry:
         """Its geometry."""
         return self.mission.geometry
+
+    @cached_property
+    def resolution(self) -> Resolution:
+        """Widths of its response without errors."""
+        return Resolution._make(map(self.number, self.analysis.resolution))
 
     @cached_property
     def allocation(self) -> Allocation:

@@ -24,10 +24,9 @@ from bisar_budget.budget.file_warnings import file_warnings
 from bisar_budget.budget.judged_mission import JudgedMission, judged_mission
 from bisar_budget.budget.requirement_table import negligible_effects, requirements_in_words, rows_in_words
 from bisar_budget.budget.waivers import apply_waivers, overrides
-from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.effect import PLATFORMS, override_notes
 from bisar_budget.faults import MissionError, SetValue
-from bisar_budget.findings.mission import MissionFindings, Resolution, UnusableMission
+from bisar_budget.findings.mission import MissionFindings, UnusableMission
 from bisar_budget.findings.requirement import NOTHING_OUTSIDE, Outside
 from bisar_budget.mission.load import load_mission
 from bisar_budget.mission.model import Mission
@@ -94,10 +93,6 @@ def _findings(judged: JudgedMission, case: Case, today: date, outside: Outside) 
     mission, geometry = case.mission, case.geometry
     waived = apply_waivers(list(rows_in_words(judged, case)), mission, today)
     rows, requirements = waived.rows, requirements_in_words(judged, case, waived)
-    resolution = Resolution(
-        range=geometry.range_resolution(mission.radar.bandwidth, SPEED_OF_LIGHT),
-        cross_range=geometry.cross_range_resolution(mission.radar.wavelength, mission.collection.aperture_time),
-    )
     return MissionFindings(
         analysis=case.analysis if case.analysis.is_by_itself else Analysis(mission, is_whole=True),
         file=mission.file,
@@ -109,13 +104,13 @@ def _findings(judged: JudgedMission, case: Case, today: date, outside: Outside) 
         geometry=geometry,
         aperture_time=mission.collection.aperture_time,
         scene_radius=mission.scene.radius,
-        resolution=resolution,
+        resolution=case.resolution,
         allocation=case.allocation,
         rows=tuple(rows),
         requirements=requirements,
         kinds=declared_kinds(mission),
         overrides=overrides(mission, outside, today),
-        warnings=file_warnings(case, rows, list(waived.unused(requirements)), resolution),
+        warnings=file_warnings(case, rows, list(waived.unused(requirements))),
         place=_place(mission),
         paths=_flown_paths(mission),
         scene=None if judged.scene is None else judged.scene.edge(case),

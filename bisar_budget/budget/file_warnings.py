@@ -18,12 +18,13 @@ from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.oscillator_acceleration import is_unshaken
 from bisar_budget.effects.oscillators import clocks_without_oscillator
 from bisar_budget.faults import KeyPath, changes_words
-from bisar_budget.findings.mission import FileWarning, Resolution
+from bisar_budget.findings.mission import FileWarning
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import norm
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import Platform
 from bisar_budget.phrases import Note, phrase
+from bisar_budget.ranges.resolution import Resolution
 from bisar_budget.units import format_quantity
 
 _SENSITIVITY = "acceleration_sensitivity"
@@ -39,7 +40,7 @@ class _Warned(NamedTuple):
 
 
 def file_warnings(
-    case: Case, rows: Sequence[Row], waivers: Sequence[tuple[KeyPath, Note]], resolution: Resolution
+    case: Case, rows: Sequence[Row], waivers: Sequence[tuple[KeyPath, Note]]
 ) -> tuple[FileWarning, ...]:
     """Everything about the file of a mission that should not go unsaid.
 
@@ -51,8 +52,6 @@ def file_warnings(
         As judged.
     waivers : sequence of (key, sentence)
         What is to be said of waivers.
-    resolution : Resolution
-        On the ground.
     """
     mission = case.mission
     found = (
@@ -66,7 +65,7 @@ def file_warnings(
         *_of_lever_arms(mission),
         *_of_calm_oscillators(mission),
         *_of_doubted_noise(mission, rows),
-        *_of_autofocus(mission, resolution),
+        *_of_autofocus(mission, case.resolution),
         *_nothing_declared(rows),
     )
     return tuple(FileWarning(None if one.key is None else mission.line(one.key), *one[1:]) for one in found)

@@ -144,7 +144,8 @@ def _shown(verdict: Verdict) -> str:
         return f"the image shows {levels[0]} at it, {levels[1]} allowed"
     _, measured = verdict.judged_phases_rad
     if measured is not None and verdict.budget_rad is not None:
-        return f"the image shows {measured:.3g} rad at it, the budget is {format_limit(verdict.budget_rad, 'rad')}"
+        phase, budget = f"{measured:.3g} rad{verdict.of_equal_loss}", format_limit(verdict.budget_rad, "rad")
+        return f"the image shows {phase} at it, the budget is {budget}"
     return verdict.reason or "the image shows more than it promises"
 
 

@@ -19,7 +19,6 @@ from bisar_budget.analysis.analysis import Analysis, by_nodes
 from bisar_budget.budget.judged_mission import JudgedMission, judged_mission
 from bisar_budget.budget.judged_requirements import first_highest
 from bisar_budget.budget.judged_rows import REQUIREMENTS, WHOLE, Judged, statuses
-from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.design.cases import Values
 from bisar_budget.design.varied import is_held, is_image, scaled
 from bisar_budget.faults import MissionError, SetNumber, SetValue
@@ -432,8 +431,7 @@ class Table:
             columns = _verdict(judged, rows, self.question.row, self.question.breaks)
             with np.errstate(all="ignore"):
                 geometry = (
-                    seen.range_resolution(part.radar.bandwidth, SPEED_OF_LIGHT),
-                    seen.cross_range_resolution(part.radar.wavelength, part.collection.aperture_time),
+                    *analysis.resolution[:2],
                     seen.bistatic_angle,
                     seen.gradient_angle,
                 )

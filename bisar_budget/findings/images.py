@@ -75,6 +75,13 @@ class Verdict(NamedTuple):
             return self.equal_loss_qpe_rad, self.measured_equal_loss_qpe_rad
         return self.predicted_qpe_rad, self.measured_qpe_rad
 
+    @property
+    def of_equal_loss(self) -> str:
+        """Words that name the judged phase where the quadratic part of it is less than 0.99."""
+        phase, quadratic = self.measured_equal_loss_qpe_rad, self.measured_qpe_rad
+        is_more = self.measured_cubic_rad is None and phase is not None and (quadratic or 0.0) < 0.99 * phase
+        return " of equal loss" if is_more else ""
+
 
 class VerifiedMission(NamedTuple):
     """The verdicts on one mission's limits; `conditions` says of what images they are.

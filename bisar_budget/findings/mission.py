@@ -12,6 +12,7 @@ from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.model import Document, Mission
 from bisar_budget.mission.platforms import FlownPath
 from bisar_budget.phrases import NOTHING, Note
+from bisar_budget.ranges.resolution import Resolution
 
 if TYPE_CHECKING:
     from bisar_budget.analysis.analysis import Analysis
@@ -33,13 +34,6 @@ class FileWarning(NamedTuple):
     message: Note
     is_doubt: bool = False
     is_of_options: bool = False
-
-
-class Resolution(NamedTuple):
-    """Peak to first null on the ground. [m]"""
-
-    range: float
-    cross_range: float
 
 
 class MissionFindings(NamedTuple):

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget import __version__
+from bisar_budget.analysis.analysis import Analysis, Case
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.faults import printable
 from bisar_budget.formats.collected import ADDED, KINDS, correlated
@@ -144,7 +145,8 @@ def _plan(mission: Mission, targets: Targets, collection: PointCollection, error
         raise SimulationError(f"the declared errors leave no image of a point: {fault}") from None
     moved = max(abs(part) for part in effect.displacement)
     reach = max(max(abs(one.east), abs(one.north)) for one in targets.points)
-    half = float(math.ceil(reach + moved + _MARGIN_CELLS * max(collection.resolution)))
+    cell = Case(Analysis(mission)).resolution[:2]
+    half = float(math.ceil(reach + moved + _MARGIN_CELLS * max(cell)))
     fine: Floats = np.linspace(-T / 2, T / 2, _FINE)
     flown = collection.flight(errors.smooth(), fine)
     measured = sum(np.linalg.norm(path.measured, axis=1) for path in flown.paths)
@@ -161,7 +163,7 @@ def _plan(mission: Mission, targets: Targets, collection: PointCollection, error
     if mission.collection.pulses is None:
         pulses += 1  # so that one is at the middle
     samples = max(_LEAST_SAMPLES, math.ceil(2 * _OVERSAMPLED * delay * radar.bandwidth)) + 1
-    return _Plan(pulses, samples, delay, half, collection.resolution)
+    return _Plan(pulses, samples, delay, half, cell)
 
 
 def _scene(mission: Mission, targets: Targets, plan: _Plan) -> tuple[Floats, NDArray[np.complex128]]:

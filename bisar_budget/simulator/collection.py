@@ -1,18 +1,27 @@
 """The collection of a mission and images of one point in it, with any errors, where exact ranges put it."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.effects.air_delays import CONTENT, seen_course
 from bisar_budget.geometry import BistaticGeometry, GroundVector
+from bisar_budget.image_plane import Band
 from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.ranges.exact_ranges import ExactEffect, aperture_nodes
-from bisar_budget.simulator.image_formation import backprojection, bytes_held, kernel_within, taylor_window
+from bisar_budget.ranges.resolution import cells_of_support
+from bisar_budget.simulator.image_formation import (
+    backprojection,
+    bytes_held,
+    ground_grid,
+    kernel_within,
+    taylor_window,
+)
 from bisar_budget.simulator.phase_history import (
     Complexes,
     Errors,
@@ -38,6 +47,8 @@ CONTRIBUTIONS = 1 << 21  # of pulses to pixels, which the reading of an image ho
 _BYTES_PER_CONTRIBUTION = 8 + 2 * 16  # in single and in double precision
 _STRIDE = 4  # pixels from one step along a line to the next; between them a cubic is drawn
 _STRETCH = 4.0  # of a pixel, at most: where Doppler hardly changes along a line
+_TIMES = 65  # at which paths show how far the line of sight turns
+_ONE_WAY = 0.99  # of all that Doppler runs through over the aperture, which its ends span unless it turns back
 _SLANT = 60.0  # of the way from line to line, at most: where equal Doppler runs along equal range
 _CORRECTIONS = 3  # of each pixel's range sum
 _BLOCK = 1 << 14  # pixels corrected at once
@@ -53,7 +64,10 @@ class RangeLines:
     of a column one change of the range sum over the aperture. Lines are followed from the middle outwards, so a patch
     may bend around a platform.
 
-    Both platforms are where they were measured at the beginning, the middle and the end of the aperture, (3, 3). [m]
+    Where the line of sight turns so far that Doppler turns back, as on a full circle, no range sums of three moments
+    say where a point is: there pixels lie along straight lines, and sample the whole wave-number support.
+
+    Both platforms are where they were measured at an odd number of times, evenly over the aperture, (times, 3). [m]
     """
 
     transmitter: Floats
@@ -66,12 +80,24 @@ class RangeLines:
 
     def _sums(self, points: Floats) -> tuple[Floats, Floats, Floats]:
         """Gradients of the range sum at the beginning, the middle and the end, at points (..., 2): (..., 2)."""
-        platforms = np.concatenate((self.transmitter, self.receiver))
-        ground = points[..., None, :] - platforms[:, :2]
-        square = ground[..., 0] ** 2 + ground[..., 1] ** 2 + platforms[:, 2] ** 2
-        directions = ground / np.sqrt(square)[..., None]
-        sums = directions[..., :3, :] + directions[..., 3:, :]
+        sums = self._gradients(points, np.array([0, len(self.transmitter) // 2, -1]))
         return sums[..., 0, :], sums[..., 1, :], sums[..., 2, :]
+
+    def _gradients(self, points: Floats, times: slice | NDArray[np.intp]) -> Floats:
+        """Gradients of the range sum at some of the times, at points (..., 2): (..., times, 2)."""
+        sums: Floats = np.zeros(1)
+        for platform in (self.transmitter[times], self.receiver[times]):
+            ground = points[..., None, :] - platform[:, :2]
+            square = ground[..., 0] ** 2 + ground[..., 1] ** 2 + platform[:, 2] ** 2
+            sums = sums + ground / np.sqrt(square)[..., None]
+        return sums
+
+    @property
+    def turns_back(self) -> bool:
+        """Whether Doppler turns back along the line of equal range through the scene centre."""
+        every = self._gradients(np.zeros(2), slice(None))
+        along = every @ _left(every[len(every) // 2])
+        return bool(abs(along[-1] - along[0]) < _ONE_WAY * np.ptp(along))
 
     @staticmethod
     def _column(by_range: Floats, by_doppler: Floats) -> Floats:
@@ -85,45 +111,83 @@ class RangeLines:
 
     def range_sum(self, points: Floats) -> Floats:
         """At the midpoint, of ground points (..., 2 or 3), (...). [m]"""
+        return self._range_sum(points, [len(self.transmitter) // 2])
+
+    def carrier(self, points: Floats) -> Floats:
+        """Range sum whose phase is taken out of images: at the midpoint, or where Doppler turns back its mean. [m]"""
+        return self._range_sum(
+            points, range(len(self.transmitter)) if self.turns_back else [len(self.transmitter) // 2]
+        )
+
+    def _range_sum(self, points: Floats, times: Sequence[int]) -> Floats:
+        """Mean over some of the times, of ground points (..., 2 or 3), (...). [m]"""
         total: Floats = np.zeros(points.shape[:-1])
-        for one in (self.transmitter, self.receiver):
-            east, north = points[..., 0] - one[1, 0], points[..., 1] - one[1, 1]
-            total += np.sqrt(east**2 + north**2 + one[1, 2] ** 2)
-        return total
+        for x, y, z in (platform[time] for time in times for platform in (self.transmitter, self.receiver)):
+            total += np.sqrt((points[..., 0] - x) ** 2 + (points[..., 1] - y) ** 2 + z**2)
+        return total / len(times)
 
     def turns_left(self, centre: GroundVector) -> bool:
         """Whether the range sum grows over the aperture for points counter-clockwise of a ground point."""
         by_range, by_doppler = self.gradients(np.asarray(centre, dtype=float))
         return float(by_doppler @ _left(by_range)) < 0
 
-    def cells(self, centre: GroundVector, bandwidth_hz: float, wavelength_m: float) -> tuple[float, float]:
-        """Resolution at a ground point: peak to first null across the lines of equal range, and along them. [m]"""
-        by_range, by_doppler = self.gradients(np.asarray(centre, dtype=float))
+    def axes(self, centre: GroundVector) -> Floats:
+        """Directions of x′, towards the platforms, and y′, counter-clockwise of it, as columns (2, 2)."""
+        by_range = self.gradients(np.asarray(centre, dtype=float))[0]
+        towards = -by_range / float(np.hypot(*by_range))
+        return np.stack((towards, _left(towards)), axis=1)
+
+    def cells(self, centre: GroundVector, radar: Band) -> tuple[float, float]:
+        """Resolution at a ground point: peak to first null across the lines of equal range, and along them. [m]
+
+        Where Doppler turns back they are the cells that sample the wave-number support.
+        """
+        place = np.asarray(centre, dtype=float)
+        if self.turns_back:
+            across, along = cells_of_support(self._gradients(place, slice(None)), self.axes(centre), radar)
+            return float(across), float(along)
+        by_range, by_doppler = self.gradients(place)
         steepness, area = float(np.hypot(*by_range)), abs(float(by_doppler @ _left(by_range)))
         if not area:
             raise ValueError("range or Doppler does not change over the ground there: no image plane")
-        return SPEED_OF_LIGHT / (bandwidth_hz * steepness), wavelength_m / (area / steepness)
+        wavelength = SPEED_OF_LIGHT / radar.center_frequency
+        return SPEED_OF_LIGHT / (radar.bandwidth * steepness), wavelength / (area / steepness)
 
-    def sampled(self, centre: GroundVector, bandwidth_hz: float, wavelength_m: float) -> tuple[float, float]:
+    def sampled(self, centre: GroundVector, radar: Band) -> tuple[float, float]:
         """Cells for pixels to sample: those of `cells`, or finer ones across the lines. [m]
 
         Over a long aperture near a platform wavefronts bend: beside a point, along its column, it is out of focus
         within less than a cell, and the spectrum there is wider than that of the bandwidth.
         """
-        across, along = self.cells(centre, bandwidth_hz, wavelength_m)
+        across, along = self.cells(centre, radar)
+        if self.turns_back:
+            return across, along
         first, middle, last = self._sums(np.asarray(centre, dtype=float))
         column = self._column(middle, last - first) * float(np.hypot(*middle))  # by a metre across the lines
-        wider = abs(float(((first + last) / 2 - middle) @ column)) / wavelength_m
+        wider = abs(float(((first + last) / 2 - middle) @ column)) * radar.center_frequency / SPEED_OF_LIGHT
         return min(across, _WIDEST / (1 / across + wider)), along
 
+    def offsets(self, places: Floats, centre: GroundVector, radar: Band) -> Floats:
+        """Resolution cells from a ground point along x′ and y′, by range sum and by its change over the aperture.
+
+        Places (n, 2) give (n, 2).
+        """
+        if self.turns_back:
+            return np.asarray((places - np.asarray(centre)) @ self.axes(centre) / np.array(self.cells(centre, radar)))
+        points = np.concatenate(([centre], places))
+        nearer, last, first = (self._range_sum(points, [time]) for time in (len(self.transmitter) // 2, -1, 0))
+        turned = (1 if self.turns_left(centre) else -1) * (last - first)
+        cells = (nearer[0] - nearer) * radar.bandwidth, (turned - turned[0]) * radar.center_frequency
+        return np.stack(cells, axis=1)[1:] / SPEED_OF_LIGHT
+
     def baseband(self, points: Floats, wavelength_m: float) -> Complexes:
-        """Phase that takes the range history at the midpoint out of an image of points (..., 3).
+        """Phase that takes the `carrier` out of an image of points (..., 3).
 
         What stays is the aperture's own spectrum. A backprojected image carries the phase of the range to each
         pixel, which close to a platform is a chirp across the patch and hides the aperture from autofocus.
         """
-        reference = float(np.linalg.norm(self.transmitter[1]) + np.linalg.norm(self.receiver[1]))
-        phase: Complexes = np.exp(-2j * math.pi / wavelength_m * (self.range_sum(points) - reference))
+        left = self.carrier(points) - self.carrier(np.zeros(2))
+        phase: Complexes = np.exp(-2j * math.pi / wavelength_m * left)
         return phase
 
     def grid(self, centre: GroundVector, spacing: tuple[float, float], shape: tuple[int, int]) -> Floats:
@@ -145,6 +209,9 @@ class RangeLines:
         """
         nx, ny = shape
         middle = np.asarray(centre, dtype=float)
+        if self.turns_back:
+            east, north = self.axes(centre)[:, 0]
+            return ground_grid(centre, math.atan2(north, east), (nx * spacing[0], ny * spacing[1]), shape)
         by_range, by_doppler = self.gradients(middle)
         range_step = -spacing[0] * float(np.hypot(*by_range))
         doppler_step = -spacing[1] * float(by_doppler @ _left(by_range)) / float(np.hypot(*by_range))
@@ -205,10 +272,7 @@ class Chip(NamedTuple):
 
 
 class PointCollection:
-    """A mission's collection, for images of a single point.
-
-    `resolution` and `spacing` (2,) [m] are those of cells and of a chip's pixels at the scene centre, x′ first.
-    """
+    """A mission's collection, for images of a single point."""
 
     def __init__(self, mission: Mission, geometry: BistaticGeometry) -> None:
         self.radar, self.geometry = mission.radar, geometry
@@ -219,11 +283,6 @@ class PointCollection:
         self.memory_limit = (mission.simulation or Simulation()).memory_limit
         self.kernel = kernel_within(self.memory_limit)
         self.is_tapered = mission.simulation is not None and mission.simulation.window == "taylor"
-        self.resolution = (
-            geometry.range_resolution(mission.radar.bandwidth, SPEED_OF_LIGHT),
-            geometry.cross_range_resolution(self.wavelength, self.aperture_time),
-        )
-        self.spacing = (self.resolution[0] / OVERSAMPLING, self.resolution[1] / OVERSAMPLING)
         self._nodes = aperture_nodes(self.aperture_time)
         self._kept: tuple[object, Floats, tuple[float, float]] | None = None
 
@@ -286,8 +345,8 @@ class PointCollection:
 
     def range_lines(self, errors: Errors) -> RangeLines:
         """Lines of equal range by the measured paths, vibration left out: what a processor lays its grid by."""
-        ends = np.array([-1.0, 0.0, 1.0]) * self.aperture_time / 2
-        return RangeLines(*(one.measured for one in self.flight(errors.smooth(), ends).paths))
+        times = np.linspace(-1.0, 1.0, _TIMES) * self.aperture_time / 2
+        return RangeLines(*(one.measured for one in self.flight(errors.smooth(), times).paths))
 
     def chip(
         self,
@@ -350,14 +409,12 @@ class PointCollection:
         """Pixels of a chip and their spacing; the last one is kept, since images come in pairs."""
         key = (centre, errors.smooth(), cells, range_cells)
         if self._kept is None or self._kept[0] != key:
-            self._require_room(cells, range_cells)
             lines = self.range_lines(errors)
-            cell = lines.cells(centre, self.radar.bandwidth, self.wavelength)
-            # Cells of the bandwidth alone are too coarse where the aperture resolves range too: peaks were misread.
-            fine = lines.sampled(centre, self.radar.bandwidth, self.wavelength)
-            spacing = (fine[0] / OVERSAMPLING, fine[1] / OVERSAMPLING)
-            rows = range_cells * OVERSAMPLING * cell[0] / fine[0]
-            shape = (max(1, 2 * round(rows / 2)), 2 * round(cells * OVERSAMPLING / 2))
+            cell = lines.sampled(centre, self.radar)
+            finer = lines.cells(centre, self.radar)[0] / cell[0]
+            self._require_room(cells, finer * range_cells)
+            spacing = (cell[0] / OVERSAMPLING, cell[1] / OVERSAMPLING)
+            shape = (max(1, 2 * round(finer * range_cells * OVERSAMPLING / 2)), 2 * round(cells * OVERSAMPLING / 2))
             self._kept = (key, lines.grid(centre, spacing, shape), spacing)
         return self._kept[1:]
 
@@ -365,7 +422,7 @@ class PointCollection:
         """How many keep a range profile from repeating within a patch: its range walk sets that."""
         farthest = 0.0
         point = np.array([*scatterer, 0.0])
-        for pulse in (0, -1):
+        for pulse in (0, len(flight.clock) // 2, -1):
             off = np.zeros(grid.shape[:-1])
             if self.has_direct_path:  # takes out most of what a distant platform's error puts in
                 off -= SPEED_OF_LIGHT * flight.clock[pulse]
@@ -376,7 +433,7 @@ class PointCollection:
         cells = 2 * farthest * self.radar.bandwidth / SPEED_OF_LIGHT
         return max(_FREQUENCIES, 16 * math.ceil((cells + _FREQUENCIES / 2) / 16))
 
-    def _require_room(self, cells: int, range_cells: int) -> None:
+    def _require_room(self, cells: int, range_cells: float) -> None:
         """Refuse a patch that aliases or is too large. More pulses than it takes would change nothing."""
         if cells > MAX_CELLS:
             raise ValueError(f"a patch of {cells} resolution cells, at most {MAX_CELLS} are formed")

@@ -14,7 +14,8 @@ import numpy as np
 
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.geometry import GroundVector
-from bisar_budget.image_plane import GroundMatrix, band_variance, nodes
+from bisar_budget.image_plane import Band, GroundMatrix, band_variance, nodes
+from bisar_budget.ranges.resolution import cells_of_support
 from bisar_budget.simulator.collection import RangeLines
 from bisar_budget.simulator.far_field import far_field_filter, is_nonuniform, polar_format
 from bisar_budget.simulator.image_formation import Kernel, backprojection, bytes_held, ground_grid, matched_filter
@@ -36,8 +37,7 @@ class ExactRangeFormer:
     """Matched filter (4) or backprojection, which equals it."""
 
     lines: RangeLines
-    bandwidth: float
-    wavelength: float
+    radar: Band
     is_direct: bool
     kernel: Kernel = "auto"
 
@@ -56,30 +56,20 @@ class ExactRangeFormer:
 
     def cells(self, centre: GroundVector) -> tuple[float, float]:
         """Resolution along x′ and y′, peak to first null. [m]"""
-        return self.lines.cells(centre, self.bandwidth, self.wavelength)
+        return self.lines.cells(centre, self.radar)
 
     def sampled(self, centre: GroundVector) -> tuple[float, float]:
         """Cells for pixels to sample, no larger than the resolution. [m]"""
-        return self.lines.sampled(centre, self.bandwidth, self.wavelength)
+        return self.lines.sampled(centre, self.radar)
 
     def look(self, centre: GroundVector) -> Floats:
         """Direction of x′, a unit vector (2,)."""
-        by_range = self.lines.gradients(np.asarray(centre))[0]
-        towards: Floats = -by_range / float(np.hypot(*by_range))
+        towards: Floats = self.lines.axes(centre)[:, 0]
         return towards
 
     def offsets(self, places: Floats, centre: GroundVector) -> Floats:
-        """Resolution cells from the centre along x′ and y′, by range sum and by its change over the aperture.
-
-        Places (n, 2) give (n, 2).
-        """
-        points = np.pad(np.concatenate(([centre], places)), ((0, 0), (0, 1)))
-        nearer, turned = self.lines.range_sum(points), np.zeros(len(points))
-        for one in (self.lines.transmitter, self.lines.receiver):
-            turned += np.linalg.norm(points - one[2], axis=1) - np.linalg.norm(points - one[0], axis=1)
-        way = 1 if self.lines.turns_left(centre) else -1
-        cells = nearer[0] - nearer, way * (turned - turned[0])
-        return np.stack((cells[0] * self.bandwidth / SPEED_OF_LIGHT, cells[1] / self.wavelength), axis=1)[1:]
+        """Resolution cells from the centre along x′ and y′; places (n, 2) give (n, 2)."""
+        return self.lines.offsets(places, centre, self.radar)
 
     def grid(self, centre: GroundVector, spacing: tuple[float, float], shape: tuple[int, int]) -> Floats:
         """Pixels of a patch along lines of equal range and of equal Doppler, (nx, ny, 3). [m]"""
@@ -96,7 +86,7 @@ class ExactRangeFormer:
 
     def _formed(self, history: PhaseHistory, part: Floats) -> Complexes:
         formed = matched_filter(history, part) if self.is_direct else backprojection(history, part, self.kernel)
-        formed *= self.lines.baseband(part, self.wavelength)
+        formed *= self.lines.baseband(part, SPEED_OF_LIGHT / self.radar.center_frequency)
         return formed
 
 
@@ -142,10 +132,8 @@ class PlaneWaves:
     def cells(self, centre: GroundVector) -> tuple[float, float]:
         """Resolution of all that was recorded, corners of the aperture included."""
         cosine, sine = math.cos(self.azimuth), math.sin(self.azimuth)
-        rotated = self.sight @ np.array([[cosine, -sine], [sine, cosine]])  # (9)
-        band = self.center_frequency + np.array([-0.5, 0.0, 0.5]) * self.bandwidth
-        along, across = (float(np.ptp(np.outer(band, rotated[:, axis]))) for axis in (0, 1))
-        return SPEED_OF_LIGHT / along, SPEED_OF_LIGHT / across
+        along, across = cells_of_support(self.sight, np.array([[cosine, -sine], [sine, cosine]]), self)  # (9)
+        return float(along), float(across)
 
     def sampled(self, centre: GroundVector) -> tuple[float, float]:
         """Cells for pixels to sample: those of all that was recorded."""

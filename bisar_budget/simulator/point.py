@@ -414,9 +414,7 @@ def _formers(
 ) -> tuple[Former, Former]:
     """Image formers of the rotated images, and of the one along (x, y)."""
     radar = collection.radar
-    exact = ExactRangeFormer(
-        lines, radar.bandwidth, radar.wavelength, image_former == "matched_filter", collection.kernel
-    )
+    exact = ExactRangeFormer(lines, radar, image_former == "matched_filter", collection.kernel)
     if image_former in ("backprojection", "matched_filter"):
         return exact, exact
     sight = look_sum(*(one.measured for one in flight.paths))[:, :2]

@@ -72,7 +72,7 @@ def read_aperture(
     centre: GroundVector,
     chip: Chip,
     reference: Chip,
-    walk_cells: float = 0.0,
+    beside: int = 0,
     expected: ExactEffect | None = None,
 ) -> ApertureReading:
     """Read quadratic and cubic phase of a response.
@@ -85,8 +85,8 @@ def read_aperture(
         Middle of the chips and place of the reference. [m]
     chip, reference : Chip
         With and without error, on the same pixels.
-    walk_cells : float
-        Range cells that the response walks, both ways: so many lines are read.
+    beside : int
+        Lines on either side of the middle one that are read too.
     expected : ExactEffect, optional
         Where the fit starts. If no polynomial near it reproduces the pixels, what single pulses say is tried too.
 
@@ -97,12 +97,12 @@ def read_aperture(
     """
     lines, columns = chip.image.shape
     middle = lines // 2
-    half = min(middle, lines - 1 - middle, round(walk_cells * OVERSAMPLING / 2)) // _STRIDE * _STRIDE
+    half = min(middle, lines - 1 - middle, beside) // _STRIDE * _STRIDE
     rows = slice(middle - half, middle + half + 1, _STRIDE)
     slow_time = cell_centres(collection.aperture_time, pulses_for(round(columns / OVERSAMPLING)))
     pixels = chip.grid[rows].reshape(-1, 3)
     images = [one.image[rows] for one in (chip, reference)]
-    fitting = _Fitting(collection, errors, centre, pixels, slow_time, images, bool(walk_cells))
+    fitting = _Fitting(collection, errors, centre, pixels, slow_time, images, bool(beside))
     best, covered = _Refined(np.zeros(4), math.inf), 1.0
     if expected is not None:
         best = fitting.refined(np.array([0.0, 0.0, -expected.quadratic / 1.5, -expected.cubic / 2.5]))
@@ -125,8 +125,10 @@ def read_aperture(
     slope = np.polynomial.legendre.legder([0.0, 0.0, *fit[2:]])
     mean = float(np.mean(place * np.polynomial.legendre.legval(place, slope)))
     radar = collection.radar
+    by_range = collection.range_lines(errors).gradients(np.asarray(centre, dtype=float))[0]
+    lines_per_cell = collection.range_cell / (float(np.hypot(*by_range)) * chip.spacing[0])
     # Range cells that a wavelength of range error walks: the bandwidth over the centre frequency.
-    walked = mean / (2 * math.pi) * (radar.bandwidth / radar.center_frequency) * OVERSAMPLING
+    walked = mean / (2 * math.pi) * (radar.bandwidth / radar.center_frequency) * lines_per_cell
     # The image's phase is −2π/λ times the range error; P₂ = (3t² - 1)/2, P₃ = (5t³ - 3t)/2.
     return ApertureReading(float(-1.5 * fit[2]), float(-2.5 * fit[3]), across, -walked, min(1.0, covered * 1.02))
 
@@ -138,7 +140,7 @@ class _Pixels:
         self.collection, self.errors, self.places = collection, errors.smooth(), pixels
         self.point = np.array([[*centre, 0.0]])
         lines = collection.range_lines(errors)
-        self.at_middle = lines.range_sum(pixels) - lines.range_sum(self.point[0, :2])
+        self.carrier = lines.carrier(pixels) - lines.carrier(self.point[0, :2])
         self.squares = _squares(pixels)
         if collection.is_tapered:
             weights, frequency = taylor_window(257), cell_centres(1.0, 257)
@@ -164,7 +166,7 @@ class _Pixels:
                 farther -= _distance(one.measured[part], self.point, _squares(self.point))
             # Whole cycles are taken off in double precision; of what is left single precision holds 1e-6 rad, in a
             # quarter of the time.
-            cycles = (farther - self.at_middle) / collection.wavelength
+            cycles = (farther - self.carrier) / collection.wavelength
             cycles -= np.rint(cycles)
             turned = (2 * math.pi * cycles).astype(np.float32)
             if left is not None:
@@ -424,7 +426,7 @@ def refocused(
 def _frequency(
     collection: PointCollection, errors: Errors, centre: GroundVector, chip: Chip, slow_time: Floats
 ) -> Floats:
-    """Frequency of each pulse along the middle of a line, the midpoint's taken out, (times,). [cycles/pixel]"""
+    """Frequency of each pulse along the middle of a line, the carrier's taken out, (times,). [cycles/pixel]"""
     line = chip.grid[chip.grid.shape[0] // 2]
     middle = line.shape[0] // 2
     slope = np.zeros(slow_time.size)
@@ -432,6 +434,6 @@ def _frequency(
         for pixel, sign in ((line[middle + 1], 1), (line[middle - 1], -1)):
             slope += sign * np.linalg.norm(pixel - one.measured, axis=1) / 2
     lines = collection.range_lines(errors)
-    at_middle = (lines.range_sum(line[middle + 1]) - lines.range_sum(line[middle - 1])) / 2
-    frequency: Floats = (slope - at_middle) / collection.wavelength
+    carrier = (lines.carrier(line[middle + 1]) - lines.carrier(line[middle - 1])) / 2
+    frequency: Floats = (slope - carrier) / collection.wavelength
     return frequency

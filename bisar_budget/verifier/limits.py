@@ -303,7 +303,9 @@ def _point_image(chip: Chip, reference: Chip, smear_cells: float) -> PointImage:
     peak = float(clean.max())
     fine = slice(_FINE * (middle - half), _FINE * (middle + half) + 1)
     # A long smear fits into a chip by the brightest of each few samples.
-    shown = np.abs(chip.image[:, middle - half : middle + half]).reshape(chip.image.shape[0], -1, stride).max(axis=2)
+    line = chip.image.shape[0] // 2
+    patch = chip.image[max(0, line - half) : line + half, middle - half : middle + half]  # no farther along x′
+    shown = np.abs(patch).reshape(len(patch), -1, stride).max(axis=2)
     grey = np.rint(255 * np.clip(1 - _decibel(shown, peak) / FLOOR_DB, 0, 1)).astype(np.uint8)
     upright = grey.T[::-1]
     return PointImage(

@@ -195,7 +195,7 @@ def refocused(study: Study, sizes: Sizes, budget: float, *, holds_hidden: bool =
         if room * spread.smear > MAX_CELLS:
             reason = reasons.patch_too_large(room * spread.smear, MAX_CELLS)
             return {"verdict_autofocus": "not_evaluated", "reason_autofocus": reason}
-        across = math.ceil(2 * study.shared_lines(spread) / OVERSAMPLING) + _PEAK_CELLS
+        across = math.ceil(2 * study.shared_lines(spread) / (OVERSAMPLING * spread.finer)) + _PEAK_CELLS
         focused = study.focused(study.images(errors, min(RANGE_CELLS, across), room))
         residual = abs(_read_focused(study, focused).quadratic)
         hidden = focused.effect.hidden if holds_hidden else 0.0  # autofocus corrects nothing of it

@@ -34,14 +34,21 @@ _SCALED, _SCALINGS = 1e-4, 40  # of a budget; steps at most
 _HIDDEN = 0.1  # of the equal-loss phase: less than that is hidden, and a phase is measured better than a loss
 _ONE_PEAK = math.log(2)  # variance of a phase that takes half the peak's power [rad²]
 _SUMMED = 256  # pulses, and frequencies, of a direct sum
+_ROUND_CELLS = 6  # around the middle line, that tell moments apart which look alike along it
 _SLOWEST = 0.02  # of the fastest turn of Doppler: slower, a part of the aperture is not followed
 
 
 class Spread(NamedTuple):
-    """Resolution cells over which a response is smeared along its line, and over which it walks in range."""
+    """Resolution cells over which a response is smeared along its line, and over which it walks in range.
+
+    Where Doppler turns back (`is_round`) it spreads all ways, and both are the same. A range cell has `finer` times
+    as many pixels as one across.
+    """
 
     smear: int
     walk: int
+    is_round: bool = False
+    finer: float = 1.0
 
 
 class Responses(NamedTuple):
@@ -218,19 +225,21 @@ class Study:
         effect = self.collection.effect(errors)
         spread = self.spread(errors, effect)
         cells = min(MAX_CELLS, max(CELLS + spread.smear, math.ceil(room * spread.smear)))
-        chips = self.collection.pair(errors, effect.displacement, cells, range_cells + spread.walk)
+        high = cells if spread.is_round else range_cells + spread.walk
+        chips = self.collection.pair(errors, effect.displacement, cells, high)
         return Responses(errors, effect, spread, *chips)
 
     def read(self, images: Responses, *, is_focused: bool = False) -> ApertureReading:
         """Quadratic and cubic phase of a response, measured."""
-        walk = images.spread.walk
+        spread = images.spread
+        cells = spread.walk + (_ROUND_CELLS if spread.is_round else READ_CELLS if spread.walk else 0)
         return read_aperture(
             self.collection,
             images.errors,
             images.effect.displacement,
             images.chip,
             images.reference,
-            walk and walk + READ_CELLS,
+            round(cells * OVERSAMPLING * spread.finer / 2),
             None if is_focused else images.effect,
         )
 
@@ -286,9 +295,9 @@ class Study:
         (a, c, east, _), (b, d, north, _) = (gradient[:, 0] for gradient in exact.gradient)
         # A metre of range along equal Doppler leads by (d, −c) over the determinant.
         area, bends = abs(a * d - b * c), abs(float(exact.k[0]) * (d * east - c * north))
-        per_line = bends * self.collection.range_cell / OVERSAMPLING
+        per_line = bends * self.collection.range_cell / (OVERSAMPLING * spread.finer)
         shared = int(min(_SHARED_RAD * area / per_line if per_line else 1e6, 1e6))
-        return max(shared, round(spread.walk * OVERSAMPLING / 2))
+        return max(shared, round(spread.walk * OVERSAMPLING * spread.finer / 2))
 
     def spread(self, errors: Errors, effect: ExactEffect) -> Spread:
         """Where an error puts the parts of a response, by the range error that it leaves over the aperture.
@@ -303,7 +312,11 @@ class Study:
         left = flight.range_error((0.0, 0.0), effect.displacement)
         slopes = -look_sum(*(one.measured - point for one in flight.paths))[:, :2]
         lines = self.collection.range_lines(errors)
-        cells = lines.cells(effect.displacement, self.mission.radar.bandwidth, self.collection.wavelength)
+        cells = lines.cells(effect.displacement, self.mission.radar)
+        if lines.turns_back:  # each moment sees the point at a place of its own, along the turn of the line of sight
+            turn = np.hypot(*np.gradient(slopes, time, axis=0).T)
+            reach = 2 * math.ceil(min(float(np.abs(np.gradient(left, time) / turn).max()) / min(cells), 1e6))
+            return Spread(reach, reach, is_round=True)
         by_range = slopes[time.size // 2]
         doppler = slopes @ (np.array([by_range[1], -by_range[0]]) / np.hypot(*by_range))
         rate = np.gradient(doppler, time)
@@ -313,6 +326,7 @@ class Study:
         return Spread(
             2 * math.ceil(min(float(np.abs(places).max()) / cells[1], 1e6)),
             2 * math.ceil(min(float(np.abs(walk).max()) / self.collection.range_cell - 0.25, 64)),
+            finer=cells[0] / lines.sampled(effect.displacement, self.mission.radar)[0],
         )
 
 

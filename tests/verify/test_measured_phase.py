@@ -266,7 +266,8 @@ def test_a_taylor_window_is_honoured() -> None:
     uniform = point_collection(0)
     widths = {}
     for name, c in (("taylor", tapered), ("uniform", uniform)):
-        widths[name] = impulse_response(c.chip((0.0, 0.0), Errors()).cut, c.spacing[1])
+        chip = c.chip((0.0, 0.0), Errors())
+        widths[name] = impulse_response(chip.cut, chip.spacing[1])
     assert widths["taylor"].pslr_db == pytest.approx(-35.2, abs=0.5)
     assert widths["taylor"].irw_m / widths["uniform"].irw_m == pytest.approx(1.19 / 0.886, rel=0.02)
     errors = Errors().of("receiver", PathError(acceleration=(6e-4, 0.0, 0.0)))

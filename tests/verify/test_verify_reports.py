@@ -13,6 +13,7 @@ from bisar_budget.cli import cli
 from bisar_budget.findings.images import Verdict, VerifiedMission
 from bisar_budget.findings.status import exit_code
 from bisar_budget.report import Style
+from bisar_budget.report.formats import verification
 from bisar_budget.report.formats.verification import evidence, numbers
 from bisar_budget.verifier.limits import verify_mission
 from tests.conftest import TODAY, findings, mission_text
@@ -162,6 +163,20 @@ class TestCheckWithImages:
         judged = row_of(after, shown.id)
         assert (judged.status, after.status) == (row_of(found, shown.id).status, found.status)
         assert "optimistic limit: the image shows 0.417 rad at it, the budget is 0.392 rad" in judged.notes
+
+    @pytest.mark.parametrize(("quadratic", "name"), [(0.03, " of equal loss"), (0.416, "")])
+    def test_the_phase_that_is_judged_is_shown_under_its_name(self, quadratic: float, name: str) -> None:
+        """Beside a budget of 0.393 rad the quadratic part alone, 0.03 rad, was shown as beyond it."""
+        shown = Verdict(
+            id="receiver.velocity.y", model="full", boundary_error=0.0417, unit="m/s", budget_rad=0.3927,
+            predicted_qpe_rad=quadratic, measured_qpe_rad=quadratic, equal_loss_qpe_rad=0.3927,
+            measured_equal_loss_qpe_rad=0.417, verdict="optimistic",
+        )  # fmt: skip
+        judged = row_of(with_verdicts(findings(), _verified(shown)), shown.id)
+        assert f"the image shows 0.417 rad{name} at it, the budget is 0.392 rad" in str(judged.notes)
+        assert verification.numbers(shown)[3:] == ("0.393", "0.417")
+        remarks = " ".join(verification.geometry_remarks([shown]))
+        assert ("least quadratic part 0.030 of 0.417 rad, receiver.velocity.y" in remarks) == bool(name)
 
     def test_a_row_whose_sum_gates_fails_by_its_own_image_too(self) -> None:
         """By root-sum-square a row of its own is for information; its limit is what the image speaks of."""

@@ -107,9 +107,10 @@ def _chunk(kind: bytes, content: bytes) -> bytes:
 
 
 def _at_limit(verdict: Verdict) -> str:
-    limit, (predicted, measured) = format_limit(verdict.boundary_error, verdict.unit), verdict.judged_phases_rad
+    limit = format_limit(verdict.boundary_error, verdict.unit)
+    predicted, measured = map(_phase, verdict.judged_phases_rad)
     return (
-        f"At the limit, {limit}: predicted {_phase(predicted)}, measured {_phase(measured)}, "
+        f"At the limit, {limit}: predicted {predicted}, measured {measured}{verdict.of_equal_loss}, "
         f"budget {format_limit(verdict.budget_rad or 0.0, 'rad')}"
     )
 

@@ -275,9 +275,10 @@ def _shown(found: Imaged) -> str:
     if one is None:
         return f"{said}: no verdict, {found.reason}"
     words = [one.verdict.replace("_", " ")]
-    _, phase = one.judged_phases_rad
-    if phase is not None and one.budget_rad is not None:
-        words.append(f"its limit is {one.budget_rad:.3g} rad, the image shows {phase:.3g} rad")
+    _, measured = one.judged_phases_rad
+    if measured is not None and one.budget_rad is not None:
+        shows = f"the image shows {measured:.3g} rad{one.of_equal_loss}"
+        words.append(f"its limit is {one.budget_rad:.3g} rad, {shows}")
     elif one.measured_db is not None and one.requirement_db is not None:
         words.append(f"{one.requirement_db:.4g} dB is required, the image shows {one.measured_db:.4g} dB")
     if one.verdict_autofocus is not None:

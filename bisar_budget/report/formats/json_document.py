@@ -136,6 +136,12 @@ def _mission(mission: MissionFindings) -> dict[str, Any]:
             "transmitter": _platform(mission, "transmitter"),
             "receiver": _platform(mission, "receiver"),
         },
+        "resolution": {
+            "range_m": mission.resolution.range,
+            "cross_range_m": mission.resolution.cross_range,
+            "range_half_power_m": mission.resolution.range_half_power,
+            "cross_range_half_power_m": mission.resolution.cross_range_half_power,
+        },
         "budget": {
             "qpe_rad": {
                 "total": allocation.qpe_total,

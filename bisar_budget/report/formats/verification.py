@@ -89,7 +89,14 @@ def reasons_of(rows: Sequence[Verdict]) -> list[str]:
 
 
 def geometry_remarks(rows: Sequence[Verdict]) -> Iterator[str]:
-    """Say how far displacement and smear of the images are from the gating model's and from (31), at worst."""
+    """Say what phases are shown, and how far displacement and smear are from the gating model's and from (31)."""
+    hidden = [row for row in rows if row.of_equal_loss]
+    if hidden:
+        least = min(hidden, key=lambda row: (row.measured_qpe_rad or 0.0) / (row.measured_equal_loss_qpe_rad or 1.0))
+        yield (
+            "exact, image: the quadratic phase of equal loss, which the budget holds; least quadratic part "
+            f"{_phase(least.measured_qpe_rad)} of {_phase(least.measured_equal_loss_qpe_rad)} rad, {least.id}"
+        )
     by_25 = [row for row in rows if row.model == "published"]
     by_full = [row for row in rows if row.model != "published"]
     for rule, members, field in (

@@ -131,7 +131,9 @@ def head(mission: MissionFindings) -> Iterator[tuple[str, str]]:
     yield (
         "Resolution",
         f"{format_quantity(mission.resolution.range, 'm')} range, "
-        f"{format_quantity(mission.resolution.cross_range, 'm')} cross range (peak to null, on ground)",
+        f"{format_quantity(mission.resolution.cross_range, 'm')} cross range (peak to null, on ground); "
+        f"{format_quantity(mission.resolution.range_half_power, 'm')} and "
+        f"{format_quantity(mission.resolution.cross_range_half_power, 'm')} wide at half power",
     )
     split = allocation.qpe
     shares = f"transmitter {split.transmitter:.3g}, receiver {split.receiver:.3g}"

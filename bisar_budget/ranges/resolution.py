@@ -1,0 +1,142 @@
+"""Resolution on the ground: widths of the response of band and aperture to a point, without errors.
+
+A step x over the ground changes the phase at a frequency f and a slow time τ by 2πf·g(τ)·x/c, with g the sum of both
+lines of sight over the ground. The vectors 2πf·g/c are the wave-number support; the response to a step is the mean of
+e^(i·phase) over it. The cross-range width is that along the line of equal range at mid-aperture. The range width is
+that along the conjugate direction, in which the phase of a step is not correlated with the phase of a step along the
+line; it is stated as the distance across the line. For a short aperture the conjugate direction is the line of equal
+Doppler: the support is a parallelogram, first nulls lie at c/(B|s|) and λ/(T|ṡ⊥|), and half power is 0.886 as wide.
+"""
+
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from bisar_budget.constants import SPEED_OF_LIGHT
+from bisar_budget.geometry import BistaticGeometry
+from bisar_budget.image_plane import Band, nodes
+from bisar_budget.ranges.exact_ranges import ExactRanges, Floats
+
+SHORT = 0.05  # of half the support, by which its edges may bend: the closed widths are then right to 1 %
+_HALF_POWER = 0.5
+_HALF_POWER_OF_NULL = 0.88589  # full width at half power of a sinc, over the distance of its first null
+_BAND_NODES, _NODES = 16, 64  # for phases of ±20 rad, those of the last step
+# Steps, in half widths at half power of a parabola with the same bend. Of 3000 arcs of a circle none has its first
+# minimum beyond 6.
+_STEP, _STEPS = 0.25, 64
+_NEWTON = 8
+_CASES = 128  # sampled at once
+
+
+class Resolution(NamedTuple):
+    """Widths of the response on the ground, along range and across: to the first null, and in full at half power. [m]
+
+    A support that is no parallelogram may have no null: the first minimum counts.
+    """
+
+    range: Any
+    cross_range: Any
+    range_half_power: Any
+    cross_range_half_power: Any
+
+
+def resolution(exact: ExactRanges, geometry: BistaticGeometry, radar: Band, aperture_time_s: Any) -> Resolution:
+    """Resolution at the scene centre, (cases,)."""
+    cases, matrix = exact.half.size, exact.matrix
+    with np.errstate(all="ignore"):
+        azimuth = geometry.look_azimuth * np.ones(cases)
+        ahead, across = np.array((np.cos(azimuth), np.sin(azimuth))), np.array((-np.sin(azimuth), np.cos(azimuth)))
+        x, y = matrix.xy * across[0] + matrix.yy * across[1], -matrix.xx * across[0] - matrix.xy * across[1]
+        conjugate = np.array((x, y)) / (x * ahead[0] + y * ahead[1])
+        wavelength = SPEED_OF_LIGHT / radar.center_frequency
+        nulls = (
+            geometry.range_resolution(radar.bandwidth, SPEED_OF_LIGHT) * np.ones(cases),
+            geometry.cross_range_resolution(wavelength, aperture_time_s) * np.ones(cases),
+        )
+    widths = np.array((*nulls, *(_HALF_POWER_OF_NULL * null for null in nulls)))
+    relative_band = np.broadcast_to(np.asarray(radar.bandwidth / radar.center_frequency, dtype=float), (cases,))
+    long = np.flatnonzero(~_is_short(exact, relative_band, conjugate, across))
+    for first in range(0, long.size, _CASES):
+        some = long[first : first + _CASES]
+        slopes = _slopes(geometry, exact.half, some, max(_NODES, exact.sampling.places.size))
+        for axis, direction in enumerate((conjugate, across)):
+            widths[axis::2, some] = _widths(
+                exact.k[some], relative_band[some], np.einsum("anc,ac->nc", slopes, direction[:, some])
+            )
+    return Resolution(*widths)
+
+
+def cells_of_support(sight: Floats, axes: Floats, radar: Band) -> Floats:
+    """Cells that sample a response along axes (2, axes), for sums of lines of sight over the ground (times, 2). [m]
+
+    They are one over the extent of the wave-number support along each axis, corners included.
+    """
+    band = radar.center_frequency + np.array((-0.5, 0.5)) * radar.bandwidth
+    extent: Floats = np.ptp(np.multiply.outer(band, sight @ axes), axis=(0, 1))
+    return SPEED_OF_LIGHT / extent
+
+
+def _is_short(exact: ExactRanges, relative_band: Floats, conjugate: Floats, across: Floats) -> Any:
+    """Whether the support is a parallelogram, as far as that matters to widths."""
+    band = np.hypot(*exact.gradient[:, 0]) * relative_band / 2
+    _, _, *bends = np.abs(np.einsum("aon,an->on", exact.gradient, conjugate))
+    _, turn, *bends_across = np.abs(np.einsum("aon,an->on", exact.gradient, across))
+    return (sum(bends) <= SHORT * band) & (sum(bends_across) <= SHORT * turn)
+
+
+def _slopes(geometry: BistaticGeometry, half: Floats, some: Any, count: int) -> Floats:
+    """Sum of both lines of sight over the ground of some cases, at so many nodes, (2, nodes, some)."""
+    slopes = np.zeros((2, count, some.size))
+    for path in geometry.both:
+        x, y, z = path.of(some).place(nodes(count).places[:, None] * half[some])
+        slopes += np.array(np.broadcast_arrays(x, y)) / np.sqrt(x * x + y * y + z * z)
+    return slopes
+
+
+def _widths(k: Floats, relative_band: Floats, slopes: Floats) -> tuple[Floats, Floats]:
+    """Peak to first null, and full width at half power, by slopes (nodes, cases) of the range per metre. [m]"""
+    frequencies, of_band = np.polynomial.legendre.leggauss(_BAND_NODES)
+    wavenumbers = k * (1 + np.multiply.outer(frequencies, relative_band / 2))
+    mean = np.multiply.outer(of_band / 2, nodes(len(slopes)).fit[0])[..., None]
+    rates = wavenumbers[:, None] * slopes  # of phase [rad/m]
+    rates -= (mean * rates).sum(axis=(0, 1))
+    unit = math.sqrt(_HALF_POWER) / np.sqrt((mean * rates**2).sum(axis=(0, 1)))
+    rates *= unit
+
+    def power(step: Floats) -> tuple[Floats, Floats, Floats]:
+        """Power of the response at a step, and its first two derivatives."""
+        turned = mean * np.exp(1j * rates * step)
+        value, slope, bend = (((1j * rates) ** order * turned).sum(axis=(0, 1)) for order in (0, 1, 2))
+        first = 2 * (value.conj() * slope).real
+        return np.abs(value) ** 2, first, 2 * (np.abs(slope) ** 2 + (value.conj() * bend).real)
+
+    def above_half(step: Floats) -> tuple[Floats, Floats]:
+        level, slope, _ = power(step)
+        return level - _HALF_POWER, slope
+
+    turn, turned = np.exp(1j * rates * _STEP), mean.astype(complex)
+    last = float(_STEPS)
+    level, half, null = np.ones(unit.size), np.full(unit.size, last), np.full(unit.size, last)
+    for step in range(1, _STEPS):
+        turned = turned * turn
+        before, level = level, np.abs(turned.sum(axis=(0, 1))) ** 2
+        half = np.where((half == last) & (level < _HALF_POWER), step - 0.5, half)
+        null = np.where((null == last) & (half < last) & (level > before), step - 1.0, null)
+        if (null < last).all():
+            break
+    null, half = (
+        _settled(null * _STEP, _STEP, lambda step: power(step)[1:]),
+        _settled(half * _STEP, _STEP, above_half),
+    )
+    return unit * null, 2 * unit * half
+
+
+def _settled(step: Floats, reach: float, value: Callable[[Floats], tuple[Floats, Floats]]) -> Floats:
+    """Newton's method for where a value, given with its slope, is nothing within reach of a step."""
+    low, high = step - reach, step + reach
+    for _ in range(_NEWTON):
+        left, slope = value(step)
+        step = np.clip(step - left / slope, low, high)
+    return step
