@@ -21,6 +21,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize
 
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.geometry import FRAME_AXES, PlatformState
@@ -45,6 +46,10 @@ HIDDEN_END_RAD = math.pi  # beyond which an image has ended, where gradients spa
 TURN_RAD = 1.0  # of a line of sight; beyond, orders of the aperture have no meaning
 _CHANGE = 0.5  # of the area that gradients span, within one step
 _NEAR_FOLD = 0.3  # of that area without error; below, it may change by any factor
+_FADES_AT, _FADES_WITHIN = (
+    0.1,
+    0.3,
+)  # of that area, below which a peak may fade into another; of its displacement, where
 _SMALLEST = 2.0**-16  # of the way to the next size; where no step of that is found, the solution ends
 
 
@@ -331,10 +336,34 @@ class Lanes:
             if found[0]:
                 at, step = there, step * 1.5
             elif abs(step) < abs(whole) * _SMALLEST:
-                return at, False
+                wider = self._faded(lane, at, end)
+                if wider is None:
+                    return at, False
+                at, step = wider, whole / 2
             else:
                 step /= 2
         return at, True
+
+    def _faded(self, lane: int, at: "_Reached", end: float) -> "_Reached | None":
+        """Peak into which the peak of one lane fades at a fold, a ten-thousandth of the size on: where V leads down."""
+        if at.area[0] >= _FADES_AT * self.at_rest[lane]:
+            return None
+        size = at.size + np.sign(end) * min(abs(end - at.size[0]), 1e-4 * abs(at.size[0]))
+
+        def variance(place: Array) -> float:
+            left, _, _ = self._seen(size, place[None], [lane])
+            return float(self.wavenumber**2 * self._product(left[..., None], left[..., None])[0, 0, 0])
+
+        way = np.linalg.norm(at.place[0])
+        corners = at.place[0] + 0.01 * way * np.array(((0, 0), (1, 0), (0, 1)))
+        options = {"xatol": 1e-5, "fatol": 1e-16, "maxiter": 2000, "initial_simplex": corners}
+        place = minimize(variance, at.place[0], method="Nelder-Mead", options=options).x[None]
+        if (
+            np.linalg.norm(place - at.place) > _FADES_WITHIN * way
+            or self._phases(size, place, [lane])[2] > HIDDEN_END_RAD
+        ):
+            return None
+        return _Reached(size, place, *self._tangent(size, place, [lane]))
 
 
 def _responses(phases: Array, places: Array) -> Responses:
