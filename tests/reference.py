@@ -345,7 +345,7 @@ class Lanes:
         return at, True
 
     def _faded(self, lane: int, at: "_Reached", end: float) -> "_Reached | None":
-        """Peak into which the peak of one lane fades at a fold, a ten-thousandth of the size on: where V leads down."""
+        """Peak into which the peak of a lane fades at a fold, a ten-thousandth of the size on: where V leads down."""
         if at.area[0] >= _FADES_AT * self.at_rest[lane]:
             return None
         size = at.size + np.sign(end) * min(abs(end - at.size[0]), 1e-4 * abs(at.size[0]))
@@ -358,10 +358,8 @@ class Lanes:
         corners = at.place[0] + 0.01 * way * np.array(((0, 0), (1, 0), (0, 1)))
         options = {"xatol": 1e-5, "fatol": 1e-16, "maxiter": 2000, "initial_simplex": corners}
         place = minimize(variance, at.place[0], method="Nelder-Mead", options=options).x[None]
-        if (
-            np.linalg.norm(place - at.place) > _FADES_WITHIN * way
-            or self._phases(size, place, [lane])[2] > HIDDEN_END_RAD
-        ):
+        hidden = self._phases(size, place, [lane])[2]
+        if np.linalg.norm(place - at.place) > _FADES_WITHIN * way or hidden > HIDDEN_END_RAD:
             return None
         return _Reached(size, place, *self._tangent(size, place, [lane]))
 
