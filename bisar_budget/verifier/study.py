@@ -263,10 +263,12 @@ class Study:
     def shift(self, images: Responses, reading: ApertureReading) -> Shift:
         """Displacement of a response from where exact ranges put it, and the line of its smear.
 
-        It is where the image peaks, up to some 3 dB of loss.
+        It is where the image peaks, up to some 3 dB of loss, and always where Doppler turns back: there no slope over
+        the aperture says where a response lies along a line.
         """
         variance, others = _phase_variances(images.effect)
-        return measured_shift(images.chip, images.reference, reading if variance + others > _ONE_PEAK else None)
+        has_line = variance + others > _ONE_PEAK and not images.spread.is_round
+        return measured_shift(images.chip, images.reference, reading if has_line else None)
 
     def _expected_loss(self, images: Responses) -> float:
         """Minus the logarithm of the peak's power by exact ranges, under the window: a direct sum over the pulses."""
