@@ -35,7 +35,7 @@ from bisar_budget.effects.air_delays import (
 )
 from bisar_budget.effects.declared import DeclaredErrors
 from bisar_budget.effects.effect import PLATFORMS, Subject
-from bisar_budget.effects.random_effect import FEWEST_NODES, Moves, RandomError, SensorCases, factor
+from bisar_budget.effects.random_effect import FEWEST_NODES, MOST_NODES, Moves, RandomError, SensorCases, factor
 from bisar_budget.effects.vibration import slow_moves
 from bisar_budget.geometry import Vectors
 from bisar_budget.image_plane import nodes
@@ -174,7 +174,7 @@ def _at_random(
         elif kind == "propagation":
             places = tuple(map(PLATFORMS.index, legs_of(what.owner)))
             middles = [errors.exact.positions[place] for place in places]
-            count = max(FEWEST_NODES, errors.exact.fit.shape[1])
+            count = min(MOST_NODES, max(FEWEST_NODES, errors.exact.fit.shape[1]))
             between = _between(count, errors.exact.fit.shape[1])
             courses = zenith_courses(errors.mission, what.owner, 2 * errors.exact.half, count)
             courses = np.einsum("nm,fmc->fnc", between, courses)
@@ -198,11 +198,11 @@ def _at_nodes_of(errors: DeclaredErrors, moves: Sequence[Moves]) -> list[Moves]:
 
 @cache
 def _between(sensed: int, count: int) -> Floats:
-    """Takes courses at the nodes of sensors to as many or fewer, by the Legendre orders that these tell apart."""
+    """Takes courses at the nodes of sensors to other nodes, by the Legendre orders that both tell apart."""
     places, weights = np.polynomial.legendre.leggauss(sensed)
-    order = np.arange(count)
-    fit = (order + 0.5)[:, None] * np.polynomial.legendre.legvander(places, count - 1).T * weights
-    return np.asarray(np.polynomial.legendre.legvander(nodes(count).places, count - 1) @ fit)
+    order = np.arange(min(sensed, count))
+    fit = (order + 0.5)[:, None] * np.polynomial.legendre.legvander(places, order[-1]).T * weights
+    return np.asarray(np.polynomial.legendre.legvander(nodes(count).places, order[-1]) @ fit)
 
 
 def _of(array: Any, some: Places) -> Any:
