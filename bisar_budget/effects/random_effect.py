@@ -327,7 +327,8 @@ class SensorCases:
         """The same of a range error with these parts [m²]; `along` is what data have of a metre of it at the nodes.
 
         By orders 0 to 3, and what lies beyond spreads. Up to a turn of 1 rad of a line of sight that is right to 5 %
-        and 0.5 dB, over a full circle to 8 % and 1.2 dB (`tests/effects/test_long_noise.py`).
+        and 0.5 dB; over a full circle too, but for noise as steep as f⁻⁴, of which 1 dB more or less spreads, and for
+        the location by free clocks, 8 % (`tests/effects/test_long_noise.py`).
         """
         k = 2 * math.pi / np.asarray(self.mission.radar.wavelength)
         quadratic, cubic, left = (k * np.sqrt(part) for part in found[:3])
