@@ -76,7 +76,7 @@ def effects_of_process(exact: ExactRanges, weights: Floats, covariance: Floats, 
     bends = np.einsum("nm,amc->anc", higher, exact.slopes)
     weighted_bends = exact.mean * bends
     integrals = np.concatenate((weights, weighted_bends))
-    found = np.einsum("fnc,nmc,gmc->fgc", integrals, covariance, integrals, optimize=True)
+    found = np.einsum("fmc,gmc->fgc", np.einsum("fnc,nmc->fmc", integrals, covariance), integrals)
     of_bends = np.einsum("anc,bnc->abc", bends, weighted_bends)
     own = np.einsum("nm,nmc->c", exact.mean * higher, covariance)
     moved = 2 * (found[8, 2] + found[9, 3]) + np.einsum("abc,abc->c", of_bends, found[2:4, 2:4])
