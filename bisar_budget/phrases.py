@@ -1028,12 +1028,6 @@ def slower_than_three_cycles(
 
 
 @phrase
-def phase_of_vibration_over(quadratic: float, limit: float, cubic: float, cubic_limit: float | None) -> str:
-    """Said of a vibration below three cycles per aperture. [rad]"""
-    return f"also {_in_the_worst_phase(quadratic, limit, cubic, cubic_limit)}"
-
-
-@phrase
 def lines_together(entries: str, band: str, apart: float, amplitude: float) -> str:
     """Said of lines of one platform whose echoes add. [m]"""
     return (

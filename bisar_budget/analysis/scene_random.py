@@ -35,7 +35,7 @@ from bisar_budget.effects.air_delays import (
 )
 from bisar_budget.effects.declared import DeclaredErrors
 from bisar_budget.effects.effect import PLATFORMS, Subject
-from bisar_budget.effects.random_effect import NODES, Moves, RandomError, SensorCases, factor
+from bisar_budget.effects.random_effect import FEWEST_NODES, MOST_NODES, Moves, RandomError, SensorCases, factor
 from bisar_budget.effects.vibration import slow_moves
 from bisar_budget.geometry import Vectors
 from bisar_budget.image_plane import nodes
@@ -174,8 +174,9 @@ def _at_random(
         elif kind == "propagation":
             places = tuple(map(PLATFORMS.index, legs_of(what.owner)))
             middles = [errors.exact.positions[place] for place in places]
-            between = _between(errors.exact.fit.shape[1])
-            courses = zenith_courses(errors.mission, what.owner, 2 * errors.exact.half)
+            count = min(MOST_NODES, max(FEWEST_NODES, errors.exact.fit.shape[1]))
+            between = _between(count, errors.exact.fit.shape[1])
+            courses = zenith_courses(errors.mission, what.owner, 2 * errors.exact.half, count)
             courses = np.einsum("nm,fmc->fnc", between, courses)
             yield what, _Delay(places, what.axis, middles, size * metres_per_unit(errors.mission, what.axis), courses)
 
@@ -187,24 +188,21 @@ def _vibrating(errors: DeclaredErrors) -> Iterator[tuple[Subject, _Moving]]:
 
 def _at_nodes_of(errors: DeclaredErrors, moves: Sequence[Moves]) -> list[Moves]:
     """The same at the nodes of declared errors."""
-    between = _between(errors.exact.fit.shape[1])
-    return [
-        Moves(
-            one.place,
-            one.ways if one.ways.shape[2] == 1 else np.einsum("nm,axmc->axnc", between, one.ways),
-            np.einsum("nm,fmc->fnc", between, one.courses),
-        )
-        for one in moves
-    ]
+    found = []
+    for one in moves:
+        between = _between(one.courses.shape[1], errors.exact.fit.shape[1])
+        ways = one.ways if one.ways.shape[2] == 1 else np.einsum("nm,axmc->axnc", between, one.ways)
+        found.append(Moves(one.place, ways, np.einsum("nm,fmc->fnc", between, one.courses)))
+    return found
 
 
 @cache
-def _between(count: int) -> Floats:
-    """Takes courses at the nodes of sensors to fewer nodes, by the Legendre orders that these tell apart."""
-    places, weights = np.polynomial.legendre.leggauss(NODES)
-    order = np.arange(count)
-    fit = (order + 0.5)[:, None] * np.polynomial.legendre.legvander(places, count - 1).T * weights
-    return np.asarray(np.polynomial.legendre.legvander(nodes(count).places, count - 1) @ fit)
+def _between(sensed: int, count: int) -> Floats:
+    """Takes courses at the nodes of sensors to other nodes, by the Legendre orders that both tell apart."""
+    places, weights = np.polynomial.legendre.leggauss(sensed)
+    order = np.arange(min(sensed, count))
+    fit = (order + 0.5)[:, None] * np.polynomial.legendre.legvander(places, order[-1]).T * weights
+    return np.asarray(np.polynomial.legendre.legvander(nodes(count).places, order[-1]) @ fit)
 
 
 def _of(array: Any, some: Places) -> Any:

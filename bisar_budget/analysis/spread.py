@@ -167,10 +167,10 @@ def noise(analysis: "Analysis", model: str) -> list[SpreadPhase]:
 
 
 def rests(analysis: "Analysis", model: str) -> list[SpreadPhase]:
-    """List what errors of motion, clocks and slow vibrations leave beyond the cubic, at one sigma, where it shows.
+    """List what errors of motion, clocks, sensors and slow vibrations leave beyond the cubic, where it shows.
 
-    Short apertures leave next to nothing, a quarter of a circle does. The published model knows none; where a line of
-    sight turns by more than a radian the phase of equal loss holds it.
+    It is at one sigma. Short apertures leave next to nothing, a quarter of a circle does. The published model knows
+    none; where a line of sight turns by more than a radian the phase of equal loss holds it.
     """
     if model == "published":
         return []
@@ -182,6 +182,12 @@ def rests(analysis: "Analysis", model: str) -> list[SpreadPhase]:
             shows = (rms > SMALLEST_REST_RAD) & np.isfinite(rms) & ~errors.exact.is_turned
             if shows.any():
                 found.append(SpreadPhase(error.id, error.owner, np.where(shows, rms**2, math.nan)))
+    for sensor in analysis.random:
+        if sensor.declared is not None and not sensor.counted_in:
+            rms = np.asarray(sensor.full.rest * sensor.declared)
+            shows = rms > SMALLEST_REST_RAD
+            if shows.any():
+                found.append(SpreadPhase(sensor.id, sensor.owner, np.where(shows, rms**2, math.nan)))
     slow = {one.row_id: one.is_there for one in analysis.slow}
     for tone in analysis.slow_tones.values():
         rms = tone.declared.rest

@@ -108,10 +108,11 @@ class RandomRows:
     def _effects(self, model: str) -> RandomEffect:
         """Effects of a unit of each error, (errors, cases)."""
         effects = [error.effect(model) for error in self.errors]
-        quadratic, cubic, spread, east, north, hidden = (
-            self._table(column) for column in zip(*((*effect[:5], effect.hidden) for effect in effects), strict=True)
+        quadratic, cubic, spread, east, north, hidden, rest = (
+            self._table(column)
+            for column in zip(*((*effect[:5], effect.hidden, effect.rest) for effect in effects), strict=True)
         )
-        return RandomEffect(quadratic, cubic, spread, east, north, hidden=hidden)
+        return RandomEffect(quadratic, cubic, spread, east, north, hidden=hidden, rest=rest)
 
     def _sizes(self, model: str, effects: RandomEffect) -> Floats:
         """Size at which each error reaches each requirement, (requirements, errors, cases). [unit]"""
@@ -180,6 +181,7 @@ class RandomRows:
                 allowable_full=by_full,
                 qpe_full_rad=full.quadratic * declared,
                 equal_loss_qpe_rad=full.judged(1.0) * declared,
+                rest_rad=np.where(full.rest > 0, full.rest * declared, math.nan),
                 islr_db=islr_of(self.mission, (mine.spread * declared) ** 2),
             )
         columns = (is_over_other, sizes_of_other.argmin(axis=0), without_autofocus)

@@ -14,6 +14,7 @@ from bisar_budget.analysis.vibration_limits import Echo, VibrationLimits, highes
 from bisar_budget.budget.continued_masks import LEAST_USE
 from bisar_budget.budget.doubted_noise import doubted_noise_note, has_doubted_frequency
 from bisar_budget.budget.judged_rows import BOUND, FamilyRow, Judging, worded
+from bisar_budget.budget.near_phases import NearPhases, phase_over, phase_requirement
 from bisar_budget.effects.declared import OTHER_MODEL
 from bisar_budget.effects.effect import override_notes, subject
 from bisar_budget.effects.oscillator_acceleration import (
@@ -84,28 +85,25 @@ def spur_rows(judging: Judging, analysis: Analysis, model: str) -> Iterator["Spu
     for place, spur in enumerate(spurs_of(mission, analysis.geometry) if has_instruments(mission) else ()):
         what, phase, T = spur.subject, judging.array(spur.phase), mission.collection.aperture_time
         limits, is_over_other = by_platform.get(spur.name), np.zeros(judging.cases, dtype=bool)
-        is_over_phase = _is_over_phase(judging, analysis, spur.name, _phases_beside(spur.left, spur.free, T))
+        phases = _near_phases(judging, analysis, spur.name, _phases_beside(spur.left, spur.free, T))
+        level = phase / 2  # the amplitude of an echo over that of the response
         if limits is None:
-            judged = judging.row(what, phase / 2, None, doubt=is_over_phase, is_info=~is_over_phase)
+            judged = phases.row(judging, what, metric, level, None)
         else:
             limits = VibrationLimits(*(2 * math.pi / mission.radar.wavelength * limit for limit in limits))
             is_over_other = phase > limits.by(OTHER_MODEL[model]) * BOUND
             is_near = spur.left.slowest_echo(T) * T < ECHO_CYCLES
             is_in_doubt = has_doubted_frequency(mission, spur.name) & _is_used(phase, limits.by(model))
-            judged = judging.row(  # the amplitude of an echo over that of the response
-                what,
-                phase / 2,
-                judging.array(limits.by(model) / 2),
-                doubt=is_over_other | is_over_phase,
-                is_unknown=(is_near & (metric == "pslr")) | is_in_doubt,
-            )
-            published, full = (judging.array(limit / 2) for limit in limits)
+            is_unknown = (is_near & (metric == "pslr")) | is_in_doubt
+            allowed = judging.array(limits.by(model) / 2)
+            judged = phases.row(judging, what, metric, level, allowed, doubt=is_over_other, is_unknown=is_unknown)
+            published, full = (np.fmin(limit / 2, phases.limit(level)) for limit in limits)
             judged = judged._replace(allowable_published=published, allowable_full=full)
-        judged = judged.in_decibel().held_to(metric)
+        judged = judged.in_decibel()
         if metric == "islr":
             judged = judged._replace(islr_db=islr_of(mission, phase**2 / 2))
         is_there = (phase > 0) | (not spur.left.is_folded)
-        yield SpurRow(judged, place, is_over_other, is_over_phase, is_there=is_there)
+        yield SpurRow(judged, place, is_over_other, is_there=is_there)
 
 
 def _is_used(size: Any, limit: Any) -> Truths:
@@ -119,11 +117,10 @@ class SpurRow(FamilyRow):
 
     place: int
     is_over_other: Any
-    is_over_phase: Any
 
     def in_words(self, case: Case, model: str) -> Row:
         """The row of one case, by the model that judges it."""
-        mission, row, doubt, over = case.mission, self.judged, NOTHING, NOTHING
+        mission, row, doubt, over = case.mission, self.judged, NOTHING, phase_over(case, self.judged)
         spur = spurs_of(mission)[self.place]
         oscillator: Oscillator = getattr(mission.platforms, spur.name).oscillator
         T, missing = mission.collection.aperture_time, phrases.no_requirement_of("pslr")
@@ -131,12 +128,10 @@ class SpurRow(FamilyRow):
         on_mainlobe = phrases.echoes_on_the_mainlobe(near * T, ECHO_CYCLES)
         doubted = doubted_noise_note(mission, [spur.name]) if has_doubted_frequency(mission, spur.name) else NOTHING
         if not math.isnan(row.allowable[case.place]):
-            over = phrases.echoes_over(case.number(row.declared), case.number(row.allowable))
+            over = over or phrases.echoes_over(case.number(row.declared), case.number(row.allowable))
             if self.is_over_other[case.place]:
                 other = OTHER_MODEL[model]
                 doubt = phrases.other_model_allows(other, case.number(row.allowable_by(other)), "dB")
-        if self.is_over_phase[case.place]:
-            doubt = _phase_over(case, spur.name, _phases_beside(spur.left, spur.free, T))
         return worded(
             case,
             row,
@@ -155,6 +150,7 @@ class SpurRow(FamilyRow):
                 *_folds(spur.left, spur.free, T, f"{spur.name}.oscillator"),
                 *override_notes(spur.name, oscillator.overridden, "frequency"),
             ),
+            binding_requirement=phase_requirement(case, row),
             displacement_m=case.moved_by_tone(row.subject, model),
         )
 
@@ -190,9 +186,9 @@ def accelerated_rows(judging: Judging, analysis: Analysis, model: str) -> Iterat
         declared, limits = judging.array(one.sensitivity), by_platform.get(one.name)
         phase = declared * per_unit
         beside = _phases_beside(one.left, one.free * one.sensitivity, T)
-        is_over_phase = _is_over_phase(judging, analysis, one.name, beside)
+        phases = _near_phases(judging, analysis, one.name, beside)
         if limits is None:
-            judged = judging.row(one.subject, declared, None, doubt=is_over_phase, is_info=~is_over_phase)
+            judged = phases.row(judging, one.subject, metric, declared, None)
             is_over_other = np.zeros(judging.cases, dtype=bool)
         else:
             by_published, by_full = (
@@ -201,12 +197,12 @@ def accelerated_rows(judging: Judging, analysis: Analysis, model: str) -> Iterat
             published, full = (np.where(per_unit > 0, one, math.nan) for one in (by_published, by_full))
             allowable = full if model == "full" else published
             is_over_other = declared > (published if model == "full" else full) * BOUND
-            judged = judging.row(one.subject, declared, allowable, doubt=is_over_phase | is_over_other)
+            judged = phases.row(judging, one.subject, metric, declared, allowable, doubt=is_over_other)
+            published, full = (np.fmin(limit, phases.limit(declared)) for limit in (published, full))
             judged = judged._replace(allowable_published=published, allowable_full=full)
-        judged = judged.held_to(metric)
         if metric == "islr":
             judged = judged._replace(islr_db=islr_of(mission, phase**2 / 2))
-        yield AcceleratedRow(judged, place, is_over_other, is_over_phase, is_there=is_there)
+        yield AcceleratedRow(judged, place, is_over_other, is_there=is_there)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -215,21 +211,18 @@ class AcceleratedRow(FamilyRow):
 
     place: int
     is_over_other: Any
-    is_over_phase: Any
 
     def in_words(self, case: Case, model: str) -> Row:
         """The row of one case, by the model that judges it."""
-        mission, row, doubt, over = case.mission, self.judged, NOTHING, NOTHING
+        mission, row, doubt, over = case.mission, self.judged, NOTHING, phase_over(case, self.judged)
         one = accelerated_tones(mission)[self.place]
         T, missing = mission.collection.aperture_time, phrases.no_requirement_of("pslr")
         if not math.isnan(row.allowable[case.place]):
             echoes = (20 * math.log10(one.per_unit * case.number(size) / 2) for size in (row.declared, row.allowable))
-            over = phrases.echoes_over(*echoes) if row.declared[case.place] else NOTHING
+            over = over or (phrases.echoes_over(*echoes) if row.declared[case.place] else NOTHING)
             if self.is_over_other[case.place]:
                 other = OTHER_MODEL[model]
                 doubt = phrases.other_model_allows(other, case.number(row.allowable_by(other)), "s^2/m")
-        if self.is_over_phase[case.place]:
-            doubt = _phase_over(case, one.name, _phases_beside(one.left, one.free * one.sensitivity, T))
         oscillator: Oscillator = getattr(mission.platforms, one.name).oscillator
         return worded(
             case,
@@ -249,6 +242,7 @@ class AcceleratedRow(FamilyRow):
                 *_whose(mission, one.name),
                 *override_notes(one.name, oscillator.overridden, SENSITIVITY),
             ),
+            binding_requirement=phase_requirement(case, row),
             displacement_m=case.moved_by_tone(row.subject, model),
         )
 
@@ -264,18 +258,10 @@ def _phases_beside(left: LeftTone, free: Any, aperture_time: Any) -> tuple[Any, 
     return qpe, cubic
 
 
-def _is_over_phase(judging: Judging, analysis: Analysis, name: str, phases: tuple[Any, Any]) -> Truths:
-    """Whether these phases break what a platform's quadratic, or the cubic phase may be, in which cases."""
+def _near_phases(judging: Judging, analysis: Analysis, name: str, phases: tuple[Any, Any]) -> NearPhases:
+    """Quadratic and cubic phase of a platform's tone, to which its row is held. [rad]"""
     qpe, cubic = map(judging.array, phases)
-    allowed = analysis.mission.requirements.cubic_phase_error
-    is_over = qpe > analysis.allocation.qpe_allowed(name) * BOUND
-    return np.asarray(is_over if allowed is None else is_over | (cubic > allowed * BOUND))
-
-
-def _phase_over(case: Case, name: str, phases: tuple[Any, Any]) -> Note:
-    qpe, cubic = map(float, phases)
-    allowed = case.mission.requirements.cubic_phase_error
-    return phrases.phase_of_vibration_over(qpe, case.allocation.qpe_allowed(name), cubic, allowed)
+    return NearPhases.of(analysis.mission, analysis.allocation, name, qpe + cubic > 0, (qpe, cubic, qpe, qpe))
 
 
 def evidence(oscillator: Oscillator) -> str | None:

@@ -20,6 +20,7 @@ from bisar_budget.analysis.vibration_limits import (
     vibration_limits,
 )
 from bisar_budget.budget.judged_rows import BOUND, REQUIREMENTS, FamilyRow, Judged, Judging, worded
+from bisar_budget.budget.near_phases import NearPhases, phase_over, phase_requirement
 from bisar_budget.effects.declared import CUBIC, OTHER_MODEL, QUADRATIC
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.vibration import (
@@ -97,6 +98,7 @@ class Vibrations:
         is_there: Truths,
         *,
         doubt: Any = False,
+        phases: NearPhases | None = None,
         **others: Any,
     ) -> "VibrationRow":
         allowable, is_over_other = None, np.zeros(self.judging.cases, dtype=bool)
@@ -104,36 +106,41 @@ class Vibrations:
             allowable = self.array(limits.by(model))
             if declared is not None and not self.mission.has_direct_path:  # which the published model does not know
                 is_over_other = declared > limits.by(OTHER_MODEL[model]) * BOUND
-        judged = self.judging.row(what, declared, allowable, doubt=doubt | is_over_other, is_info=limits is None)
-        judged = judged._replace(cubic_rad=self.array(others.get("cubic", math.nan)))
+        if phases is None or declared is None:
+            judged = self.judging.row(what, declared, allowable, doubt=doubt | is_over_other, is_info=limits is None)
+            judged = judged.held_to(metric)
+        else:
+            judged = phases.row(self.judging, what, metric, declared, allowable, doubt=doubt | is_over_other)
         if self.judging.is_whole:
-            judged = judged._replace(qpe_full_rad=self.array(others.get("qpe", math.nan)))
             if limits is not None:
                 judged = self._with_limits(judged, limits)
+            if phases is not None and declared is not None:
+                limit = phases.limit(declared)
+                both = (np.fmin(by_model, limit) for by_model in (judged.allowable_published, judged.allowable_full))
+                published, full = (np.where(np.isinf(by_model), math.nan, by_model) for by_model in both)
+                judged = judged._replace(allowable_published=published, allowable_full=full)
             if declared is not None and metric == "islr":
                 variance = (self.to_phase * declared) ** 2
                 of_row = variance if what.axis == "wideband" else variance / 2
                 judged = judged._replace(islr_db=islr_of(self.mission, of_row))
-        return VibrationRow(judged.held_to(metric), limits, is_there=is_there, is_over_other=is_over_other, **others)
+        return VibrationRow(judged, limits, is_there=is_there, is_over_other=is_over_other, **others)
 
     def _with_limits(self, judged: Judged, limits: VibrationLimits) -> Judged:
         published, full = map(self.array, limits)
         return judged._replace(allowable_published=published, allowable_full=full)
 
     def _line(self, model: str, name: str, index: int, is_there: Truths) -> "VibrationRow":
-        """A vibration from one cycle per aperture on: as its echoes, or, where ISLR holds it, the power they take."""
+        """A vibration from one cycle per aperture on: as its echoes, or, where ISLR holds it, the power they take.
+
+        Below three cycles it is held to its quadratic and cubic phase as well.
+        """
         cycles, both = self.cycles[name][index], self._both[name][index]
-        allowed = self.mission.requirements.cubic_phase_error
-        is_near = cycles < ECHO_CYCLES
+        is_near, phases = cycles < ECHO_CYCLES, None
         what = subject(name, "vibration", "sinusoidal", entry=index)
-        qpe = cubic = judged = np.full(cycles.shape, math.nan)
         if is_near.any():
-            phases = self.slow_tones[what.id].declared
-            of_phases = (phases.quadratic, phases.cubic, phases.judged(self.allocation.autofocus_gain))
-            qpe, cubic, judged = np.where(is_near, of_phases, math.nan)
-        is_over_phase = judged > self.allocation.qpe_allowed(name) * BOUND
-        if allowed is not None:
-            is_over_phase |= cubic > allowed * BOUND
+            does, gain = self.slow_tones[what.id].declared, self.allocation.autofocus_gain
+            found = (does.quadratic, does.cubic, does.judged(1.0), does.judged(gain))
+            phases = NearPhases.of(self.mission, self.allocation, name, is_near, found)
         level = 20 * np.log10(echo_level(np.minimum(both, LARGEST_ECHO)))
         required = self.mission.requirements.pslr
         is_over_both = np.zeros(is_there.shape, dtype=bool) if required is None else level > required + _ROUNDING_DB
@@ -144,13 +151,14 @@ class Vibrations:
             self.amplitudes[name][index],
             self.tones.get(name),
             is_there,
-            doubt=is_over_phase | is_over_both,
+            doubt=is_over_both,
+            phases=phases,
             cycles=cycles,
-            qpe=qpe,
-            cubic=cubic,
+            qpe=math.nan if phases is None else phases.quadratic,
+            cubic=math.nan if phases is None else phases.cubic,
+            without_autofocus=0.0 if phases is None else phases.without_autofocus,
             both=both,
             level=level,
-            is_over_phase=is_over_phase,
             is_over_both=is_over_both,
         )
 
@@ -239,12 +247,11 @@ def _together(amplitudes: Floats, cycles: Floats) -> Iterator[tuple[Truths, Floa
 class VibrationRow(FamilyRow):
     """One row about vibration in many cases: a line, lines near each other, or the noise of a platform.
 
-    `members` are the lines near each other. `qpe` and `cubic` are the
-    quadratic and cubic phases that a motion below three cycles per aperture has in its worst phase [rad]: where
-    it `is_slow` it is judged by them, else `is_over_phase` says that they break what they may. `is_over_other`
-    says that the model that does not gate fails it. `both` is the peak phase of one line with an echo as high as
-    those of near frequencies on both platforms [rad], `level` the level of that echo [dB], and `is_over_both`
-    says that it is too high. Sizes of the row are `per_metre` times those in metres.
+    `members` are the lines near each other. `qpe` and `cubic` are the quadratic and cubic phases that a motion below
+    three cycles per aperture has in its worst phase [rad]: where it `is_slow` it is judged by them alone, else by its
+    echoes too. `is_over_other` says that the model that does not gate fails it. `both` is the peak phase of one line
+    with an echo as high as those of near frequencies on both platforms [rad], `level` the level of that echo [dB];
+    `is_over_both` says that it is too high. Sizes of the row are `per_metre` times those in metres.
     """
 
     limits: VibrationLimits | None = None
@@ -256,7 +263,6 @@ class VibrationRow(FamilyRow):
     both: Any = math.nan
     level: Any = math.nan
     is_over_other: Any = False
-    is_over_phase: Any = False
     is_over_both: Any = False
     without_autofocus: Any = 0.0
     per_metre: Any = 1.0
@@ -302,8 +308,6 @@ def _line_row(case: Case, one: VibrationRow, error: MotionError, model: str) -> 
         limit = allocation.qpe_allowed(owner)
         qpe, cubic, allowed = float(one.qpe[place]), float(one.cubic[place]), mission.requirements.cubic_phase_error
         more.insert(0, phrases.slower_than_three_cycles(float(one.cycles[place]), qpe, limit, cubic, allowed))
-        if one.is_over_phase[place]:
-            doubt = phrases.phase_of_vibration_over(qpe, limit, cubic, allowed)
     return _row(case, one, error, model, key, _seen(case, one, error, lines[index].displacement), more, doubt)
 
 
@@ -335,13 +339,15 @@ def _row(
         unit=_unit(case, one),
         path=("platforms", what.owner, "motion_error", "vibration", *key),
         equation=equation,
-        over=phrases.share_of_power_over(metric, equation),
+        over=phase_over(case, one.judged) or phrases.share_of_power_over(metric, equation),
         doubt=doubt,
         no_limit=missing,
         info=missing,
+        without_autofocus=case.number(one.without_autofocus),
         evidence=error.source,
         remarks=(*notes, *more),
         published_margin_db=margin,
+        binding_requirement=phase_requirement(case, one.judged),
         displacement_m=case.moved_by_tone(what, model),
     )
 
@@ -366,17 +372,9 @@ def _lines_together(error: MotionError, members: Sequence[int], declared: float)
 
 
 def _slow_row(case: Case, one: VibrationRow, error: MotionError, model: str) -> Row:
-    mission, allocation = case.mission, case.allocation
+    mission = case.mission
     what, combine = one.judged.subject, mission.allocation.combine
     cycles, qpe, cubic = map(case.number, (one.cycles, one.qpe, one.cubic))
-    is_cubic = one.judged.requirement(case) == CUBIC
-    if is_cubic:
-        over = phrases.slow_cubic_phase_over(cubic, mission.requirements.cubic_phase_error or 0.0)
-    else:
-        limit = allocation.qpe_allowed(what.owner)
-        over = phrases.slow_quadratic_phase_over(qpe, limit)
-        if qpe > limit:
-            over = over.then(allocation.passes_with(qpe, 0.0, what.owner, mission))
     entry = what.entry or 0
     return worded(
         case,
@@ -384,7 +382,7 @@ def _slow_row(case: Case, one: VibrationRow, error: MotionError, model: str) -> 
         unit=_unit(case, one),
         path=("platforms", what.owner, "motion_error", "vibration", "sinusoidal", entry, "amplitude"),
         equation="first principles",
-        over=over,
+        over=phase_over(case, one.judged),
         info=NOTHING if combine == "each" else phrases.aggregate_decides(combine),
         without_autofocus=case.number(one.without_autofocus),
         evidence=error.source,
@@ -392,6 +390,6 @@ def _slow_row(case: Case, one: VibrationRow, error: MotionError, model: str) -> 
             *_seen(case, one, error, error.vibration.sinusoidal[entry].displacement),
             phrases.slower_than_a_cycle(cycles, qpe, cubic),
         ),
-        binding_requirement=CUBIC if is_cubic else QUADRATIC,
+        binding_requirement=one.judged.requirement(case),
         displacement_m=case.moved_by_tone(what, model),
     )

@@ -8,7 +8,7 @@ advance the phase at the centre frequency by as much. An image finds its range b
 else by the phase. So its range error is that of the phase, −g, with the constant part of the group, +ḡ: the
 displacement Q⁻¹[ḡ, −g₁] and the phases of −g, with what the displacement adds. Derived here.
 
-With a correlation time the delay of the zenith changes within the aperture (`changing_delays`): the published model
+With a correlation time the delay of the zenith changes within the aperture (`range_processes`): the published model
 takes the parts of such a process along the line of sight of mid-aperture, the full one follows the leg.
 """
 
@@ -19,10 +19,10 @@ from typing import Any
 import numpy as np
 
 from bisar_budget.constants import EARTH_RADIUS
-from bisar_budget.effects.changing_delays import departure_at_nodes
 from bisar_budget.effects.combined import combined
 from bisar_budget.effects.effect import PLATFORMS, subject
-from bisar_budget.effects.random_effect import NODES, RandomEffect, RandomError, SensorCases, factor
+from bisar_budget.effects.random_effect import RandomEffect, RandomError, SensorCases, factor
+from bisar_budget.effects.range_processes import departure_at_nodes
 from bisar_budget.effects.spectra import gauss_markov
 from bisar_budget.geometry import BistaticGeometry, PlatformState, Vectors, norm
 from bisar_budget.mission.model import Mission
@@ -237,12 +237,12 @@ def changing_air(
     ]
 
 
-def zenith_courses(mission: Mission, owner: str, aperture_time: Floats) -> Floats:
-    """Independent courses of the zenith at `NODES` nodes, (courses, nodes, cases), together of variance 1."""
+def zenith_courses(mission: Mission, owner: str, aperture_time: Floats, count: int) -> Floats:
+    """Independent courses of the zenith at so many nodes, (courses, nodes, cases), together of variance 1."""
     correlation_time = correlation_time_of(mission, owner)
     if correlation_time is None:
-        return np.ones((1, NODES, 1))
+        return np.ones((1, count, 1))
     ratios, place = np.unique(aperture_time / (2 * correlation_time), return_inverse=True)
-    between = 1 + departure_at_nodes(NODES, ratios)
+    between = 1 + departure_at_nodes(count, ratios)
     courses = np.swapaxes(factor(np.moveaxis(between, 2, 0)), 1, 2)  # (ratios, courses, nodes)
     return np.moveaxis(courses, 0, 2)[..., place.ravel()]

@@ -26,14 +26,12 @@ import numpy as np
 from bisar_budget import evaluators
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.random_effect import (
-    NODES,
     Moves,
     RandomEffect,
     RandomError,
     SensorCases,
     factor,
     parts_of_largest,
-    sigmas,
 )
 from bisar_budget.effects.spectra import gauss_markov
 from bisar_budget.faults import KeyPath
@@ -138,14 +136,13 @@ def inertial_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
         if values is not None:
             declared, sizes = parts_of_largest(seen.vector(values))
             directions, about = directions * sizes[:, None], axes * sizes[:, None]
-        along, along_heard = seen.along(name, directions)
-        row, heard = (_at_mid_aperture(seen.mission, index, one) for one in (along, along_heard))
+        along = seen.along(name, directions)
+        row = _at_mid_aperture(seen.mission, index, along)
         if arm is not None and kind in TILTS:
             published, full = _with_arm(seen, place, kind, directions, about, arm)
         else:
-            (quadratic, cubic, east, north, hidden), covariance = _over_aperture(seen, place, kind, directions)
             published = RandomEffect(row[0], row[1], row[2] / seen.factor, *_moved_by_imu(seen, kind, along))
-            full = RandomEffect(quadratic, cubic, heard[2] / seen.factor, east, north, covariance, hidden)
+            full = _over_aperture(seen, place, kind, directions)
         yield RandomError(
             subject=subject(name, "imu", kind),
             unit=unit_of_figure,
@@ -164,13 +161,14 @@ def _moves_by_imu(
     """How a unit moves a platform: by the acceleration it makes, (axes, 3, cases) [m/s²/unit], and with an arm."""
     ways, half = directions[:, :, None], seen.exact.half
     if arm is None or kind not in TILTS:
-        return (Moves(place, ways, _courses(kind)[..., None] * half ** (_GROWS[kind] / 2)),)
+        courses = _courses(kind, len(seen.exact.times))
+        return (Moves(place, ways, courses[..., None] * half ** (_GROWS[kind] / 2)),)
     swings = swung(about, arm)
     if kind != "angle_random_walk":
         order, times = (2 if kind == "attitude" else 3), seen.exact.times
         grows, swing = times**order / math.factorial(order), times ** (order - 2)
         return Moves(place, ways, grows[None]), Moves(place, swings, swing[None])
-    twice, once = _courses_of_both_walks()
+    twice, once = _courses_of_both_walks(len(seen.exact.times))
     return Moves(place, ways, twice[..., None] * half**2.5), Moves(place, swings, once[..., None] * half**0.5)
 
 
@@ -183,57 +181,47 @@ def _at_mid_aperture(mission: Mission, index: int, along: Any) -> tuple[Any, ...
 def _moved_by_imu(seen: SensorCases, kind: str, along: Floats) -> list[Any]:
     """Sigmas of the displacement by a unit along so much of the line of sight of mid-aperture. [m]"""
     fit = seen.exact.fit[:2]
-    constant, linear = np.diagonal(fit @ _covariance_at_nodes(kind) @ fit.T)
+    if kind in NOISE:
+        orders = fit @ _walk_of(kind, len(seen.exact.times)).at_nodes @ fit.T
+        constant, linear = np.diagonal(orders)
+    else:
+        constant, linear = np.square(fit @ _courses(kind, len(seen.exact.times))[0])
     scale = along**2 * seen.exact.half ** _GROWS[kind]
     return seen.moved(constant * scale, linear * scale)
 
 
-def _over_aperture(seen: SensorCases, place: int, kind: str, directions: Floats) -> tuple[Sequence[Floats], Floats]:
-    """Sigmas by a unit over the exact paths: of quadratic and cubic phase [rad], of displacement east and north. [m]
+def _over_aperture(seen: SensorCases, place: int, kind: str, directions: Floats) -> RandomEffect:
+    """Effect of a unit by the full model over the exact paths; `directions` (axes, 3, cases) are its acceleration.
 
-    And their covariance, (4, 4, cases). That over the aperture is that over an aperture of 2 s, times a power of half
-    the aperture time.
+    What a unit moves over an aperture grows as a power of half the aperture time from that over an aperture of 2 s.
     """
-    moved = seen.weights[:, None] * seen.range_errors(place, directions[:, :, None])  # (4, axes, nodes, cases)
-    of_unit, scale = _covariance_at_nodes(kind), seen.exact.half ** _GROWS[kind]
-    covariance = np.einsum("fanc,ganc->fgc", moved, of_unit @ moved)
-    sizes = np.square((np.abs(moved) * np.sqrt(np.diagonal(of_unit))[:, None]).sum(axis=2)).sum(axis=1)
-    return sigmas(covariance * scale, sizes * scale)
+    count, along = len(seen.exact.times), seen.range_errors(place, directions[:, :, None])
+    scale = seen.exact.half ** _GROWS[kind]
+    if kind not in NOISE:
+        courses = along * (_courses(kind, count)[0, :, None] * np.sqrt(scale))
+        return seen.of_courses(courses, courses)[1]
+    walk = _walk_of(kind, count)
+    covariance = np.einsum("anc,amc->nmc", along, along) * walk.at_nodes[..., None] * scale
+    power = seen.exact.fit[0] @ np.square(along).sum(axis=0)
+    return seen.of_process(covariance, power * walk.beyond * scale)
+
+
+def _walk_of(kind: str, count: int) -> "_Walks":
+    """Position by the noise of a figure: a white acceleration, or the rate of a tilt that turns specific force."""
+    order = 1 if kind == "velocity_random_walk" else 2
+    return _walks(order, order, count)
 
 
 @cache
-def _covariance_at_nodes(kind: str) -> Floats:
-    """Covariance of the position error of a unit acceleration, or its noise, at the nodes of 2 s. [m²/unit²]
+def _courses(kind: str, count: int) -> Floats:
+    """Independent courses of the position by a unit acceleration, or its noise, over 2 s, (courses, nodes). [m/unit]
 
-    The error is zero at mid-aperture.
+    They are zero at mid-aperture.
     """
-    times = nodes(NODES).places
-    if not kind.endswith("random_walk"):
-        order = 3 if kind == "gyro_bias" else 2
-        history = np.array(times) ** order / math.factorial(order)
-        return np.multiply.outer(history, history)
-    walk = _velocity_walk if kind == "velocity_random_walk" else _angle_walk
-    return np.array([[walk(*sorted((abs(s), abs(t)))) if s * t > 0 else 0.0 for t in times] for s in times])
-
-
-@cache
-def _courses(kind: str) -> Floats:
-    """Independent courses that together have this covariance, (courses, nodes). [m/unit]"""
-    if kind.endswith("random_walk"):
-        return factor(_covariance_at_nodes(kind)).T
+    if kind in NOISE:
+        return factor(_walk_of(kind, count).at_nodes).T
     order = 3 if kind == "gyro_bias" else 2
-    return nodes(NODES).places[None] ** order / math.factorial(order)
-
-
-def _velocity_walk(early: float, late: float) -> float:
-    """White acceleration of density 1, twice integrated from zero: ∫(early − w)(late − w) dw."""
-    return early**2 * (3 * late - early) / 6
-
-
-def _angle_walk(early: float, late: float) -> float:
-    """White rate of a tilt of density 1, three times integrated: ∫(early − w)²(late − w)²/4 dw."""
-    lag = late - early
-    return (early**5 / 5 + lag * early**4 / 2 + lag**2 * early**3 / 3) / 4
+    return nodes(count).places[None] ** order / math.factorial(order)
 
 
 # ---------------------------------------------------------------------- lever arms
@@ -288,7 +276,7 @@ def lever_arm_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
         published, full = seen.of_motion(place, ways)
         what = subject(name, "lever_arm", "uncertainty")
         path = (*key, "lever_arm", "uncertainty")
-        moves = (Moves(place, ways, np.ones((1, NODES, 1))),)
+        moves = (Moves(place, ways, np.ones((1, len(times), 1))),)
         yield RandomError(what, "m", declared * seen.factor, path, published, full, spreads=False, moves=moves)
 
 
@@ -306,75 +294,75 @@ def _with_arm(
         grows = times**order / math.factorial(order)
         return seen.of_motion(place, directions[:, :, None] * grows + swings * times ** (order - 2))
     # The tilt walks, and twice integrated it is a position: two walks, of which each axis has its own.
-    moves = (seen.range_errors(place, one) for one in (directions[:, :, None], swings))
-    moved = [seen.weights[:, None] * one for one in moves]  # (4, axes, nodes, cases)
+    along = [seen.range_errors(place, one) for one in (directions[:, :, None], swings)]
     stated = seen.error(PLATFORMS[place]).lever_arm
     assert stated is not None
     at_middle = swung(about, arm_at(state, stated.arm, np.zeros((1, seen.cases))))[:, :, 0]
-    look, sight = (seen.vector(one) for one in (state.look, seen.sights[place]))
-    held, heard = ([np.einsum("ac,eac->ec", way, one) for one in (directions, at_middle)] for way in (look, sight))
-    fit, half, k = seen.exact.fit, seen.exact.half, seen.exact.k
-    whole, sizes, orders, left, left_heard = (np.zeros(()) for _ in range(5))
+    held = [np.einsum("ac,eac->ec", seen.vector(state.look), one) for one in (directions, at_middle)]
+    fit, half, k, count = seen.exact.fit, seen.exact.half, seen.exact.k, len(times)
+    covariance, beyond, orders, left = (np.zeros(()) for _ in range(4))
     for (i, a), (j, b) in product(enumerate((2, 0)), repeat=2):  # how often each is integrated
-        walk, scale = _walks(a, b), half ** (a + b + 1)
-        whole = whole + scale * np.einsum("fanc,nm,gamc->fgc", moved[i], walk.at_nodes, moved[j])
-        reach = np.sqrt(np.abs(np.diagonal(walk.at_nodes)))[:, None]
-        sizes = sizes + scale * np.einsum("fanc,famc->fc", *(np.abs(moved[one]) * reach for one in (i, j)))
-        orders = orders + scale * np.diagonal(fit @ walk.at_nodes @ fit.T)[:, None] * (held[i] * held[j]).sum(axis=0)
-        left = left + scale * walk.left * (held[i] * held[j]).sum(axis=0)
-        left_heard = left_heard + scale * walk.left * (heard[i] * heard[j]).sum(axis=0)
-    (quadratic, cubic, east, north, hidden), covariance = sigmas(np.asarray(whole), np.asarray(sizes))
+        walk, scale = _walks(a, b, count), half ** (a + b + 1)
+        moved = np.einsum("anc,amc->nmc", along[i], along[j])
+        covariance = covariance + scale * walk.at_nodes[..., None] * moved
+        beyond = beyond + scale * walk.beyond * (fit[0] @ np.einsum("nnc->nc", moved))
+        power = scale * (held[i] * held[j]).sum(axis=0)
+        orders = orders + np.diagonal(fit @ walk.at_nodes @ fit.T)[:, None] * power
+        left = left + walk.left * power
     constant, linear, own, own_cubic = np.maximum(orders, 0.0)
     # What spreads is a mean power, which has no coverage factor.
-    spread, spread_heard = (k * np.sqrt(np.maximum(one, 0.0)) / seen.factor for one in (left, left_heard))
+    spread = k * np.sqrt(np.maximum(left, 0.0)) / seen.factor
     published = RandomEffect(k * np.sqrt(own), k * np.sqrt(own_cubic), spread, *seen.moved(constant, linear))
-    return published, RandomEffect(quadratic, cubic, spread_heard, east, north, covariance, hidden)
+    return published, seen.of_process(np.asarray(covariance), beyond)
 
 
 class _Walks(NamedTuple):
     """Two integrals of one white noise of density 1, from the middle of an aperture of 2 s on, each way.
 
     Covariance of the first at the nodes with the second, (nodes, nodes), of their Legendre orders up to the last that
-    nodes tell apart; and the mean over the aperture of what they have in common beyond order 3.
+    nodes tell apart; and the mean over the aperture of what they have in common beyond order 3, and beyond the last.
     """
 
     at_nodes: Floats
     left: float
+    beyond: float
 
 
 @cache
-def _walks(first: int, second: int) -> _Walks:
-    """The noise integrated once more than so many times: 0 is a walk."""
-    places, weights = np.polynomial.legendre.leggauss(2 * NODES)
+def _walks(first: int, second: int, count: int) -> _Walks:
+    """The noise integrated once more than so many times, 0 is a walk, at so many nodes."""
+    places, weights = np.polynomial.legendre.leggauss(2 * count)
     start, weight = (1 + places) / 2, weights / 2  # on one side
-    number = np.arange(NODES)
+    number = np.arange(count)
 
     def order_of(times: int) -> Floats:
         """Order n of the integral by a unit of noise at each start, (n, starts)."""
         ahead = start[:, None] + (1 - start[:, None]) * start
         grown = ((ahead - start[:, None]) ** times / math.factorial(times)) * weight * (1 - start[:, None])
-        return np.asarray((2 * number[:, None] + 1) / 2 * np.einsum("snp,sn->ps", _legendre(ahead), grown))
+        return np.asarray((2 * number[:, None] + 1) / 2 * np.einsum("snp,sn->ps", _legendre(ahead, count), grown))
 
     both = np.einsum("is,js,s->ij", order_of(first), order_of(second), weight)
     both = both * (1 + (-1.0) ** np.add.outer(number, number))  # that of the other side is as large
     mean = 1 / ((first + second + 2) * (first + second + 1) * math.factorial(first) * math.factorial(second))
-    at_nodes = _legendre(nodes(NODES).places)
-    return _Walks(at_nodes @ both @ at_nodes.T, mean - float((np.diagonal(both) / (2 * number + 1))[:4].sum()))
+    at_nodes = _legendre(nodes(count).places, count)
+    powers = np.diagonal(both) / (2 * number + 1)
+    left, beyond = (max(mean - float(powers[:orders].sum()), 0.0) for orders in (4, count))
+    return _Walks(at_nodes @ both @ at_nodes.T, left, beyond)
 
 
 @cache
-def _courses_of_both_walks() -> tuple[Floats, Floats]:
+def _courses_of_both_walks(count: int) -> tuple[Floats, Floats]:
     """Independent courses of a walk of a tilt over an aperture of 2 s, integrated twice, and as it is.
 
     Both are (courses, nodes): course by course they are of one noise.
     """
-    both = np.block([[_walks(a, b).at_nodes for b in (2, 0)] for a in (2, 0)])
+    both = np.block([[_walks(a, b, count).at_nodes for b in (2, 0)] for a in (2, 0)])
     twice, once = np.split(factor(both).T, 2, axis=1)
     return twice, once
 
 
-def _legendre(places: Floats) -> Floats:
-    return np.asarray(np.polynomial.legendre.legvander(places, NODES - 1))
+def _legendre(places: Floats, count: int) -> Floats:
+    return np.asarray(np.polynomial.legendre.legvander(places, count - 1))
 
 
 # ---------------------------------------------------------------------- position noise
@@ -462,7 +450,7 @@ def _noise(seen: SensorCases, process: _Process, axes: Mapping[str, Floats], pat
     k = 2 * math.pi / seen.mission.radar.wavelength
     largest, sizes = parts_of_largest(seen.vector(process.sigma))
     found = gauss_markov(seen.aperture_time, process.correlation_time)
-    courses = seen.courses(found.covariance) if seen.has_edge else np.zeros((0, NODES, 1))
+    courses = seen.courses(found.covariance) if seen.has_edge else np.zeros((0, len(seen.exact.times), 1))
     sighted, moved, moves = list[Floats](), list[Floats](), list[Moves]()
     for name, of_platform in axes.items():
         place, directions = PLATFORMS.index(name), of_platform * sizes[:, None]

@@ -220,7 +220,8 @@ def _together(one: RandomEffect, other: RandomEffect) -> RandomEffect:
     quadratic, cubic, spread, east, north = (np.hypot(*both) for both in zip(one[:5], other[:5], strict=True))
     is_known = one.covariance is not None and other.covariance is not None
     covariance = one.covariance + other.covariance if is_known else None
-    return RandomEffect(quadratic, cubic, spread, east, north, covariance, np.hypot(one.hidden, other.hidden))
+    hidden, rest = np.hypot(one.hidden, other.hidden), np.hypot(one.rest, other.rest)
+    return RandomEffect(quadratic, cubic, spread, east, north, covariance, hidden, rest)
 
 
 def pieces_by_acceleration(mission: Mission, name: str) -> tuple[PowerLawPiece, ...]:

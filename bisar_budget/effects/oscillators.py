@@ -241,31 +241,33 @@ def _is_in_doubt(seen: SensorCases, oscillator: Oscillator) -> Truths:
     return found
 
 
+def states_both_terms(mission: Mission) -> bool:
+    """Whether the file states both terms of the clock, which then stand for those of free oscillators."""
+    timing = mission.timing_error
+    return not mission.has_direct_path and timing.constant is not None and timing.linear is not None
+
+
 def _of_clock(seen: SensorCases, found: Parts, tones: Parts) -> tuple[RandomEffect, RandomEffect]:
     """Effects by both models of a phase with these parts [rad²]; those of orders 0 and 1 where they are known.
 
-    Where the file states both terms of the clock, these stand for what a free oscillator displaces, but not for what
-    its slow `tones` do.
+    Where the file states both terms of the clock, these stand for orders 0 and 1 of a free oscillator, but not for
+    those of its slow `tones`. Orders 2 and 3 displace the image as the line of sight turns, and defocus less by that.
     """
-    k, timing = 2 * math.pi / np.asarray(seen.mission.radar.wavelength), seen.mission.timing_error
+    k, is_stated = 2 * math.pi / np.asarray(seen.mission.radar.wavelength), states_both_terms(seen.mission)
     quadratic, cubic, spread = np.sqrt(found.rows[:3] + tones.rows[:3])
-    is_stated = not seen.mission.has_direct_path and timing.constant is not None and timing.linear is not None
     is_known = np.isfinite(found.constant + found.linear)
     nothing = np.where(is_stated | (quadratic + cubic == 0), 0.0, math.nan)
-    counts = is_known & ~np.asarray(is_stated)
-    known = Parts(*np.where(counts, found.rows, 0.0) + tones.rows).times(1 / k**2)
+    counts = is_known & (not is_stated)
+    known = Parts(*np.where(counts, found.rows, found.of_high_orders.rows) + tones.rows).times(1 / k**2)
     is_placed = counts | is_stated
     east, north = (
         np.where(is_placed, one, nothing) for one in seen.moved(known.constant, known.linear, known.constant_linear)
     )
     published = RandomEffect(quadratic, cubic, spread, east, north)
-    (*phases, east, north, hidden), whole = seen.of_orders(known.covariance)
-    own = np.where(is_placed, whole, 0.0)
-    own[0, 0], own[1, 1] = quadratic**2, cubic**2
-    quadratic, cubic = (np.where(counts, *both) for both in zip(phases, (quadratic, cubic), strict=True))
+    (quadratic, cubic, east, north, hidden), whole = seen.of_orders(known.covariance)
+    whole[2:, :, ~is_placed] = whole[:, 2:, ~is_placed] = 0.0
     east, north = (np.where(is_placed, one, nothing) for one in (east, north))
-    hidden = np.where(counts, hidden, 0.0)
-    return published, RandomEffect(quadratic, cubic, spread, east, north, np.where(counts, whole, own), hidden)
+    return published, RandomEffect(quadratic, cubic, spread, east, north, whole, hidden)
 
 
 def _left_at_1_hz(seen: SensorCases, name: str, oscillator: Oscillator, *, is_below_mask: bool = False) -> Floats:

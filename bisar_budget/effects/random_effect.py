@@ -16,23 +16,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget.constants import ROUNDING
-from bisar_budget.effects.changing_delays import changing_effects
 from bisar_budget.effects.declared import ImagePlane, published_planes
-from bisar_budget.effects.effect import PLATFORMS, Subject, plain
+from bisar_budget.effects.effect import Subject, plain
+from bisar_budget.effects.range_processes import (
+    RangeEffects,
+    effect_weights,
+    effects_of_courses,
+    effects_of_gauss_markov,
+    effects_of_process,
+)
 from bisar_budget.effects.sources import exact_ranges
 from bisar_budget.effects.spectra import Parts
 from bisar_budget.faults import KeyPath
 from bisar_budget.geometry import BistaticGeometry, PlatformState
-from bisar_budget.image_plane import LEADING
+from bisar_budget.image_plane import LEADING, nodes_for
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
 from bisar_budget.phrases import NOTHING, Note
-from bisar_budget.ranges.exact_ranges import ExactRanges, Floats
+from bisar_budget.ranges.exact_ranges import QUADRATIC_OF_VARIANCE, ExactRanges, Floats
 
 if TYPE_CHECKING:
     from bisar_budget.effects.oscillators import Noise
 
-NODES = 16  # a walk has a covariance with an edge, which fewer nodes miss by a percent
+# Nodes at which errors at random are sampled: fewer tell too few orders of a process apart. More cost seconds, and
+# these follow nine circles; on a race track of 70 pieces 16 give every effect to 1e-3.
+FEWEST_NODES, MOST_NODES = 16, 64
 _CANCELS = ROUNDING * 1e-2  # of a square: below it, its root is rounding
 
 
@@ -43,7 +51,8 @@ class RandomEffect(NamedTuple):
     and `north` are the sigmas of the displacement [m/unit], not a number where it is not known, as of a free
     oscillator. `covariance` (4, 4, ...) is that of quadratic and cubic phase and displacement east and north, in the
     units of their products; no matrix where the published model has only their sizes. `hidden` is the quadratic phase
-    of as much loss as band and turn do not resolve, `ranges.exact_ranges`. [rad/unit]
+    of as much loss as band and turn do not resolve, `ranges.exact_ranges`. [rad/unit] `rest` is what an error without
+    noise, such as a bias, leaves beyond the cubic at one sigma: it spreads as that of any error of motion. [rad/unit]
     """
 
     quadratic: Any
@@ -53,6 +62,7 @@ class RandomEffect(NamedTuple):
     north: Any
     covariance: Any = None
     hidden: Any = 0.0
+    rest: Any = 0.0
 
     def judged(self, gain: Any) -> Any:
         """Phase that is held to a limit with the gain of autofocus in it: `Declared.judged`. [rad/unit]"""
@@ -69,7 +79,8 @@ class RandomEffect(NamedTuple):
         if covariance is not None:
             covariance = covariance[..., case if covariance.shape[-1] > 1 else 0]
         quadratic, cubic, spread, east, north = (plain(size, case) for size in self[:5])
-        return RandomEffect(quadratic, cubic, spread, east, north, covariance, plain(self.hidden, case))
+        hidden, rest = plain(self.hidden, case), plain(self.rest, case)
+        return RandomEffect(quadratic, cubic, spread, east, north, covariance, hidden, rest)
 
     def times(self, factor: Any) -> "RandomEffect":
         """The same with phases and displacement of a coverage factor."""
@@ -81,6 +92,7 @@ class RandomEffect(NamedTuple):
             self.north * factor,
             None if self.covariance is None else self.covariance * factor**2,
             self.hidden * factor,
+            self.rest,
         )
 
 
@@ -186,26 +198,22 @@ class SensorCases:
         path: PlatformState = getattr(self.geometry, name)
         return np.array([self.vector(axis) for axis in path.frame(frame or self.error(name).frame)])
 
-    def along(self, name: str, directions: Floats) -> tuple[Floats, Floats]:
-        """Root-sum-square of what directions (axes, 3, cases) have of the line of sight, and of what data hear."""
-        sights = (getattr(self.geometry, name).look, self.sights[PLATFORMS.index(name)])
-        parts = ((directions * self.vector(sight)).sum(axis=1) for sight in sights)
-        seen, heard = (np.asarray(np.sqrt(np.square(one).sum(axis=0))) for one in parts)
-        return seen, heard
+    def along(self, name: str, directions: Floats) -> Floats:
+        """Root-sum-square of what directions (axes, 3, cases) have of the line of sight of mid-aperture."""
+        look = self.vector(getattr(self.geometry, name).look)
+        return np.asarray(np.sqrt(np.square((directions * look).sum(axis=1)).sum(axis=0)))
 
     @cached_property
     def exact(self) -> ExactRanges:
-        """Exact ranges at as many nodes as walks need."""
-        return exact_ranges(self.mission, self.geometry, NODES, self.cases)
+        """Exact ranges at as many nodes as the paths and errors at random need."""
+        count = nodes_for(self.geometry, self.aperture_time, has_direct_path=self.mission.has_direct_path)
+        count = min(MOST_NODES, max(FEWEST_NODES, int(np.max(count))))
+        return exact_ranges(self.mission, self.geometry, count, self.cases)
 
     @cached_property
     def weights(self) -> Floats:
-        """Effects of a metre of range error at each node, (8, nodes, cases).
-
-        Quadratic and cubic phase [rad], displacement east and north [m], and four parts of the hidden phase. [rad]
-        """
-        exact = self.exact
-        return np.array((*exact.phase_weights, *exact.place_weights, *exact.hidden_weights))
+        """Those of `effect_weights`."""
+        return effect_weights(self.exact)
 
     @cached_property
     def plane(self) -> ImagePlane:
@@ -231,10 +239,13 @@ class SensorCases:
         constant, linear = orders[0], orders[1] / self.exact.half
         moved = [np.sqrt(np.square((u * constant + v * linear) * scale).sum(axis=0)) for u, v in ((a, b), (c, d))]
         published = RandomEffect(k * quadratic, k * cubic, 0.0 * k, *moved)
-        weighted = self.weights[:, None] * courses
-        effects, sizes = weighted.sum(axis=2), np.square(np.abs(weighted).sum(axis=2)).sum(axis=1)
-        (qpe, edge, east, north, hidden), covariance = sigmas(np.einsum("fec,gec->fgc", effects, effects), sizes)
-        return published, RandomEffect(qpe, edge, 0.0 * k, east, north, covariance, hidden)
+        whole = effects_of_courses(self.exact, self.weights, courses)
+        (qpe, edge, east, north, hidden), covariance = sigmas(whole.covariance, whole.sizes)
+        rest, is_turned = k * np.sqrt(whole.left), self.exact.is_turned
+        # Where a line of sight turns far, the phase of equal loss holds all that an error of motion leaves.
+        hidden = np.hypot(hidden, np.where(is_turned, QUADRATIC_OF_VARIANCE * rest, 0.0))
+        rest = np.where(is_turned, 0.0, rest) / self.factor
+        return published, RandomEffect(qpe, edge, 0.0 * k, east, north, covariance, hidden, rest)
 
     def of_gauss_markov(
         self, courses: Floats, correlation_time: Any, *, is_phase_advanced: bool = False
@@ -248,14 +259,22 @@ class SensorCases:
         correlation_time : float or (cases,)
             [s]
         is_phase_advanced : bool
-            See `changing_effects`.
+            See `effects_of_gauss_markov`.
         """
-        k, ratio = self.exact.k, self.exact.half / correlation_time
-        each = [changing_effects(self.exact, one, ratio, is_phase_advanced=is_phase_advanced) for one in courses]
-        covariance, sizes, left = (sum(parts) for parts in zip(*each, strict=True))
-        (quadratic, cubic, east, north, hidden), covariance = sigmas(covariance, sizes)
+        ratio = self.exact.half / correlation_time
+        return self._of_noise(
+            effects_of_gauss_markov(self.exact, self.weights, courses, ratio, is_phase_advanced=is_phase_advanced)
+        )
+
+    def of_process(self, covariance: Floats, beyond: Any) -> RandomEffect:
+        """Effect by the full model of a process of the range error: see `effects_of_process`."""
+        return self._of_noise(effects_of_process(self.exact, self.weights, covariance, beyond))
+
+    def _of_noise(self, found: RangeEffects) -> RandomEffect:
+        (quadratic, cubic, east, north, hidden), covariance = sigmas(found.covariance, found.sizes)
         # What spreads is a mean power, which has no coverage factor.
-        return RandomEffect(quadratic, cubic, k * np.sqrt(left) / self.factor, east, north, covariance, hidden)
+        spread = self.exact.k * np.sqrt(np.maximum(found.left, 0.0)) / self.factor
+        return RandomEffect(quadratic, cubic, spread, east, north, covariance, hidden)
 
     def of_motion(self, place: int, moved: Floats) -> tuple["RandomEffect", "RandomEffect"]:
         """The same of independent position errors of a platform, (errors, 3, nodes, cases). [m/unit]"""
@@ -305,12 +324,19 @@ class SensorCases:
         return np.asarray(np.einsum("no,cof->fnc", self.orders, of_orders))
 
     def of_parts(self, found: Parts, along: Any = 1.0) -> tuple["RandomEffect", "RandomEffect"]:
-        """The same of a range error with these parts [m²]; `along` is what data have of a metre of it."""
+        """The same of a range error with these parts [m²]; `along` is what data have of a metre of it at the nodes.
+
+        By orders 0 to 3, and what lies beyond spreads. Up to a turn of 1 rad of a line of sight that is right to 5 %
+        and 0.5 dB; over a full circle too, but for noise as steep as f⁻⁴, of which 1 dB more or less spreads, and for
+        the location by free clocks, 8 % (`tests/effects/test_long_noise.py`).
+        """
         k = 2 * math.pi / np.asarray(self.mission.radar.wavelength)
         quadratic, cubic, left = (k * np.sqrt(part) for part in found[:3])
         published = RandomEffect(quadratic, cubic, left, *self.moved(found.constant, found.linear))
-        (quadratic, cubic, east, north, hidden), covariance = self.of_orders(found.times(np.square(along)).covariance)
-        return published, RandomEffect(quadratic, cubic, left * along, east, north, covariance, hidden)
+        along = along + np.zeros_like(self.exact.times)
+        (quadratic, cubic, east, north, hidden), covariance = self.of_orders(found.covariance, along[None])
+        left = left * np.sqrt(self.exact.fit[0] @ np.square(along))
+        return published, RandomEffect(quadratic, cubic, left, east, north, covariance, hidden)
 
     def alike(self, value: Any) -> Iterator[tuple[Any, NDArray[np.intp]]]:
         """Tell apart cases in which a value, or what is in it, differs: the value of each group, and its cases."""

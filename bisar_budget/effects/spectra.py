@@ -65,6 +65,12 @@ class Parts(NamedTuple):
         """Those of a phase of so many times the power."""
         return Parts(*(part * power for part in self))
 
+    @property
+    def of_high_orders(self) -> "Parts":
+        """Those of a phase without its constant and linear part."""
+        nothing = 0.0 * self.quadratic
+        return Parts(self.quadratic, self.cubic, self.left, *(nothing,) * (len(self) - 3))
+
     def without_constant(self) -> "Parts":
         """Those of a phase whose constant part moves nothing."""
         nothing = 0.0 * self.quadratic

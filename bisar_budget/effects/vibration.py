@@ -382,15 +382,16 @@ def vibration_spectrum(seen: SensorCases, name: str) -> Iterator[RandomError]:
     if vibration.spectrum is None:
         return
     found = spectrum_parts(seen, vibration.spectrum, DISPLACED)
-    along = counted(seen.mission, name, 1.0, "islr", seen.geometry)
-    published, full = seen.of_parts(found.times(power_of(vibration)), along)
+    place = PLATFORMS.index(name)
+    x, y, z = (track / seen.exact.ranges[place] for track in seen.exact.tracks[place])  # it shakes along these
+    published, full = seen.of_parts(found.times(power_of(vibration)), seen.exact.along(place, (x, y, z)))
     path = ("platforms", name, "motion_error", "vibration", "spectrum")
     what = subject(name, "vibration", "spectrum")
     moves: tuple[Moves, ...] = ()
     if seen.has_edge:  # along the line of sight of the centre, and nothing is said of other motion
         way = seen.factor * seen.vector(getattr(seen.geometry, name).look)[None, :, None]
         courses = seen.courses(found.times(power_of(vibration)).covariance)
-        moves = (Moves(PLATFORMS.index(name), way, courses),)
+        moves = (Moves(place, way, courses),)
     yield RandomError(what, "dB", 1.0, path, published.times(seen.factor), full.times(seen.factor), moves=moves)
 
 

@@ -32,7 +32,7 @@ from bisar_budget.effects.oscillator_acceleration import (
     turn_courses,
 )
 from bisar_budget.effects.oscillator_tones import LeftTone, spurs_of
-from bisar_budget.effects.oscillators import noise_of
+from bisar_budget.effects.oscillators import noise_of, states_both_terms
 from bisar_budget.effects.random_effect import RandomError, parts_of_largest
 from bisar_budget.effects.random_errors import random_errors
 from bisar_budget.effects.spectra import PowerLawPiece, density
@@ -207,8 +207,9 @@ def drawn_errors(analysis: Analysis) -> Errors:
             moved[error.owner] = moved.get(error.owner, 0.0) + shaken
         elif error.published.spread or error.published.quadratic or error.full.displacement > 0:
             drawn = factor * phase_courses(mission, error, moments, 1, rng)[0]
-            is_set = error.full.displacement > 0
-            phase = phase + (drawn if is_set else drawn - Course(moments, drawn).smooth(1).values)
+            is_clock = not error.subject.axis
+            is_free = error.displaces_unknown or (is_clock and states_both_terms(mission))
+            phase = phase + (drawn - Course(moments, drawn).smooth(1).values if is_free else drawn)
     transmitter, receiver = (
         PathError(course=Course(flown, moved[name]) if name in moved else None) for name in PLATFORMS
     )

@@ -139,11 +139,37 @@ class TestSlow:
                 want = 2 * math.pi * 1e-5 / LAMBDA * self.worst(cycles, 2)
                 assert found.qpe_full_rad == pytest.approx(want, rel=2e-3)
 
-    @pytest.mark.parametrize(("factor", "status"), [(0.99, "pass"), (1.01, "warn")])
-    def test_a_quadratic_phase_over_its_limit_is_a_warning(self, factor: float, status: str) -> None:
-        """Where echoes are hardly bounded: π/8 of quadratic phase at one cycle and a half."""
+    @pytest.mark.parametrize(("factor", "status"), [(0.99, "pass"), (1.01, "fail")])
+    @pytest.mark.parametrize("combine", ["each", "rss"])
+    @pytest.mark.parametrize("needs", ["pslr", "islr"])
+    def test_a_quadratic_phase_over_its_limit_fails(self, needs: str, combine: str, factor: float, status) -> None:
+        """Where echoes are hardly bounded: π/8 of quadratic phase at one cycle and a half. It was a warning."""
         amplitude = factor * math.pi / 8 / self.worst(1.5, 2) * LAMBDA / (2 * math.pi)
-        found = vibrating(sinusoidal=[{"amplitude": amplitude, "frequency": 1.5 / T}], pslr="-1 dB")
+        lines = {"sinusoidal": [{"amplitude": amplitude, "frequency": 1.5 / T}]}
+        found = findings(
+            requirements={needs: "-1 dB"},
+            allocation={"combine": combine, "warn_above": 1.0, "model": "full"},
+            **{ERROR.format("transmitter"): lines},
+        )
+        one = row(found, "transmitter.vibration.sinusoidal.0")
+        assert (one.status, one.binding_requirement) == (status, "quadratic_phase_error")
+        assert one.utilization == pytest.approx(factor, rel=2e-3)
+        (quadratic,) = [each for each in found.requirements if each.key == "quadratic_phase_error"]
+        assert (quadratic.status, quadratic.row) == (status, "transmitter.vibration.sinusoidal.0")
+        assert quadratic.utilization == one.utilization
+        if status == "fail":
+            assert one.reason.startswith(f"QPE {one.qpe_full_rad:.3g} rad in the worst phase, 0.392 rad allowed")
+
+    @pytest.mark.parametrize(("n_pull", "status"), [(0.2, "fail"), (0.3, "pass_with_autofocus")])
+    def test_autofocus_corrects_it(self, n_pull: float, status: str) -> None:
+        """1.1 times π/8, which the gain of 4·n_pull has to reach."""
+        amplitude = 1.1 * math.pi / 8 / self.worst(1.5, 2) * LAMBDA / (2 * math.pi)
+        lines = {"sinusoidal": [{"amplitude": amplitude, "frequency": 1.5 / T}]}
+        found = findings(
+            requirements={"pslr": "-1 dB"},
+            autofocus={"n_pull": n_pull},
+            **{ERROR.format("transmitter"): lines},
+        )
         assert row(found, "transmitter.vibration.sinusoidal.0").status == status
 
     def test_it_is_in_no_sum(self) -> None:
@@ -285,8 +311,8 @@ def test_amplitude_shares_of_both_platforms_sum_to_one() -> None:
     assert sum(vibration.amplitude_share(split, p) for p in ("transmitter", "receiver")) == pytest.approx(1)
 
 
-@pytest.mark.parametrize(("allowed", "status"), [(0.99, "warn"), (1.01, "pass")])
-def test_a_slow_vibration_that_breaks_the_cubic_requirement_is_a_warning(allowed: float, status: str) -> None:
+@pytest.mark.parametrize(("allowed", "status"), [(0.99, "fail"), (1.01, "warn")])
+def test_a_slow_vibration_that_breaks_the_cubic_requirement_fails(allowed: float, status: str) -> None:
     """At 1.5 cycles per aperture the worst cubic is three times the worst quadratic: of sin(πnx), by a fit."""
     x = np.linspace(-1, 1, 4001)
     cubic = 2.5 * np.polynomial.legendre.legfit(x, np.sin(1.5 * math.pi * x), 9)[3]  # P₃ is 5x³/2 - …
@@ -297,9 +323,11 @@ def test_a_slow_vibration_that_breaks_the_cubic_requirement_is_a_warning(allowed
         findings(requirements=requirements, **{ERROR.format("transmitter"): lines}),
         "transmitter.vibration.sinusoidal.0",
     )
-    assert found.status == status
-    text = found.reason if status == "warn" else found.notes[-1]
-    assert f"or a cubic of {phase:.3g} rad, {format_limit(allowed * phase, 'rad')} allowed" in text
+    assert (found.status, found.binding_requirement) == (status, "cubic_phase_error")
+    limit = format_limit(allowed * phase, "rad")
+    assert f"or a cubic of {phase:.3g} rad, {limit} allowed" in found.notes[-1]
+    says = f"cubic phase {phase:.3g} rad in the worst phase, {limit} allowed" if status == "fail" else "above 80 %"
+    assert found.reason.startswith(says)
 
 
 @pytest.mark.parametrize(("window", "beyond"), [("uniform", 0.46), ("taylor", 0.03)])

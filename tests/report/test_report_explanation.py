@@ -175,6 +175,26 @@ def repeat_by_hand(mission: Mission) -> None:
             assert results["allowable"] == pytest.approx(row.allowable, rel=1e-5), row.id
 
 
+@pytest.mark.parametrize("needs", ["", "pslr: -5 dB", "islr: -5 dB, cubic_phase_error: 30 deg"])
+def test_a_tone_below_three_cycles_can_be_repeated_by_hand(needs: str) -> None:
+    """Vibration, spur and shaken oscillator at 1.5 and 1.8 cycles per aperture, held by their phases."""
+    text = mission_text(
+        platforms__receiver__motion_error={"vibration": {"sinusoidal": [{"amplitude": "0.5 mg", "frequency": 0.25}]}},
+        platforms__receiver__oscillator={
+            "frequency": "10 MHz",
+            "power_law": {"h0": "1e-30"},
+            "spurs": {"0.3 Hz": "-80 dBc"},
+            "acceleration_sensitivity": "1e-8 /g",
+        },
+        allocation={"model": "strictest"},
+    )
+    mission = parse_mission(f"{text}requirements: {{{needs}}}\n" if needs else text)
+    repeat_by_hand(mission)
+    found = check_mission(mission, TODAY)
+    vibration = next(row for row in found.rows if row.id == "receiver.vibration.sinusoidal.0")
+    assert vibration.binding_requirement == ("cubic_phase_error" if "cubic" in needs else "quadratic_phase_error")
+
+
 @pytest.mark.parametrize("model", ["published", "full"])
 @pytest.mark.parametrize("factor", [1, 2])
 def test_tones_and_sensors_under_a_link_can_be_repeated_by_hand(model: str, factor: int) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import yaml
 
+from bisar_budget.analysis.scene_random import _between
 from bisar_budget.budget.check import check_mission
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.mission.load import parse_mission
@@ -201,6 +202,13 @@ def test_noise_of_a_position_differs_by_its_parts(correlation_time: float) -> No
     courses = samples_of(0.05**2 * np.exp(-lag / correlation_time))
     exact = np.linalg.norm(difference(found, both_ways(courses)))
     assert declared(found) == pytest.approx(exact, rel=1e-2)  # orders beyond the cubic are left out
+
+
+@pytest.mark.parametrize(("sensed", "count"), [(16, 6), (16, 64), (64, 64), (64, 128)])
+def test_courses_go_to_other_nodes_by_the_orders_that_both_tell_apart(sensed: int, count: int) -> None:
+    """Under a full circle a scene has 64 nodes: of 16 it took orders that these do not tell apart."""
+    times, others = (np.polynomial.legendre.leggauss(number)[0] for number in (sensed, count))
+    assert _between(sensed, count) @ times**2 == pytest.approx(others**2, abs=1e-9)
 
 
 def test_noise_that_both_platforms_have_is_one_error() -> None:

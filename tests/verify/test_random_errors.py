@@ -36,7 +36,8 @@ def of(one: Study, row_id: str) -> RandomError:
 def off(error: RandomError, factor: float) -> RandomError:
     """An error whose formulas say so much less than is true."""
     effect = error.full
-    wrong = type(effect)._make((*(part * factor for part in effect[:5]), effect.covariance, effect.hidden * factor))
+    phases = effect._replace(covariance=0.0, rest=0.0)
+    wrong = type(effect)(*(part * factor for part in phases))._replace(covariance=effect.covariance, rest=effect.rest)
     return error._replace(full=wrong, published=wrong)
 
 
@@ -102,7 +103,7 @@ def test_the_limit_of_a_clock_is_in_decibels() -> None:
     found = verify_random(one, of(one, "receiver.oscillator"))
     assert (found.unit, found.verdict) == ("dB", "confirmed")
     factor = 10 ** (found.boundary_error / 20)
-    assert of(one, "receiver.oscillator").full.quadratic * factor == pytest.approx(found.budget_rad)
+    assert of(one, "receiver.oscillator").full.judged(1.0) * factor == pytest.approx(found.budget_rad)
 
 
 def test_one_time_series_is_flown_and_a_seed_names_it() -> None:

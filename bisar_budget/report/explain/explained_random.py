@@ -257,7 +257,6 @@ def _by_exact_ranges(mission: Mission, error: RandomError) -> Iterator[Step]:
     unit, full = error.published, error.full
     if full[:3] == unit[:3]:
         return
-    # What is left turns with the line of sight of mid-aperture; only a direct path changes it.
     count = 3 if full.spread != unit.spread else 2
     factors = (1.0, 1.0, _covered(mission, error))
     lines = [

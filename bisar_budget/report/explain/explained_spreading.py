@@ -30,12 +30,13 @@ from bisar_budget.constants import ROUNDING
 from bisar_budget.effects.declared import CUBIC
 from bisar_budget.effects.effect import subject
 from bisar_budget.effects.oscillator_acceleration import accelerated_tones, felt
-from bisar_budget.effects.oscillator_tones import spurs_of
+from bisar_budget.effects.oscillator_tones import LeftTone, spurs_of
+from bisar_budget.effects.vibration import ECHO_CYCLES, cubic_part, quadratic_part
 from bisar_budget.faults import printable
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import GroundVector
 from bisar_budget.mission.model import Mission
-from bisar_budget.report.explain.explained_error import combined, no_limit, place, stated
+from bisar_budget.report.explain.explained_error import combined, limit_steps, no_limit, place, stated
 from bisar_budget.report.explain.notation import Step, Sum, WorkedEquation, number, step, with_unit
 
 
@@ -218,19 +219,26 @@ def explained_spur(mission: Mission, allocation: Allocation, row: Row) -> Iterat
     yield step(f"Declared in {place(mission, path)}", f"{frequency:.6g} Hz: {level:.6g} dBc")
     f_0 = mission.radar.center_frequency
     values, formula = {"L": level, "f_0": f_0, "f_osc": oscillator.frequency or f_0}, "L + 20*log(f_0/f_osc)/log(10)"
-    left = next(one.echo for one in spurs_of(mission) if (one.name, one.entry) == (row.owner, entry))
+    spur = next(one for one in spurs_of(mission) if (one.name, one.entry) == (row.owner, entry))
+    left = spur.echo
     title = "At the centre frequency; an echo has the amplitude of the sideband"
     if left != 1:
         values, formula = {**values, "left": left}, f"{formula} + 20*log(left)/log(10)"
         title += ", times what the synchronization leaves of it"
     yield step(title, WorkedEquation("declared", formula, values, row.declared or 0.0, "dB"))
-    limits = tone_limits(mission, allocation)[1].get(row.owner)
-    if limits is None or row.allowable is None:
+    limits, sizes = tone_limits(mission, allocation)[1].get(row.owner), dict[str, float]()
+    if row.allowable is None:
         yield no_limit(row)
         return
-    phase, at_limit = _phase_at_limit(mission, row, limits, "φ")
-    yield at_limit
-    yield step("Its echoes", WorkedEquation("allowable", "20*log(φ/2)/log(10)", {"φ": phase}, row.allowable, "dB"))
+    yield from _worst_phases(spur.left, spur.free, mission)
+    yield from near_phases(mission, allocation, row, row.qpe_full_rad or 0.0, sizes)
+    if limits is not None:
+        phase, at_limit = _phase_at_limit(mission, row, limits, "φ")
+        yield at_limit
+        sizes["by_echoes"] = 20 * math.log10(phase / 2)
+        worked = WorkedEquation("by_echoes", "20*log(φ/2)/log(10)", {"φ": phase}, sizes["by_echoes"], "dB")
+        yield step("Its echoes", worked)
+    yield smallest_of(row, sizes)
 
 
 def _phase_at_limit(mission: Mission, row: Row, limits: VibrationLimits, symbol: str) -> tuple[float, Step]:
@@ -265,17 +273,74 @@ def explained_tone(mission: Mission, allocation: Allocation, row: Row) -> Iterat
     if one.phase:
         level = 20 * math.log10(one.phase / 2)
         yield step("Its echoes", WorkedEquation("l", "20*log(φ/2)/log(10)", {"φ": one.phase}, level, "dB"))
-    limits = tone_limits(mission, allocation)[1].get(name)
-    if limits is None or row.allowable is None:
+    limits, sizes = tone_limits(mission, allocation)[1].get(name), dict[str, float]()
+    if row.allowable is None:
         yield no_limit(row)
         return
-    phase, at_limit = _phase_at_limit(mission, row, limits, "φ_max")
-    yield at_limit
-    if one.phase:
+    yield from _worst_phases(one.left, one.free * one.sensitivity, mission)
+    yield from near_phases(mission, allocation, row, row.qpe_full_rad or 0.0, sizes)
+    if limits is not None:
+        phase, at_limit = _phase_at_limit(mission, row, limits, "φ_max")
+        yield at_limit
+        if not one.phase:
+            yield step("Allowable", Sum(f"allowable = {with_unit(row.allowable, row.unit)}"))
+            return
         values = {"Γ": one.sensitivity, "φ_max": phase, "φ": one.phase}
-        yield step("Allowable", WorkedEquation("allowable", "Γ*φ_max/φ", values, row.allowable, row.unit))
-    else:
-        yield step("Allowable", Sum(f"allowable = {with_unit(row.allowable, row.unit)}"))
+        sizes["by_echoes"] = one.sensitivity * phase / one.phase
+        yield step("Its echoes", WorkedEquation("by_echoes", "Γ*φ_max/φ", values, sizes["by_echoes"], row.unit))
+    yield smallest_of(row, sizes)
+
+
+def _worst_phases(left: LeftTone, free: float, mission: Mission) -> Iterator[Step]:
+    """Quadratic and cubic phase of the echoes of a tone that lie below three cycles per aperture."""
+    T = mission.collection.aperture_time
+    near = [
+        (free * float(share), float(frequency) * T)
+        for frequency, share in zip(left.frequencies, left.echoes(T), strict=True)
+        if frequency * T < ECHO_CYCLES and free * share
+    ]
+    if not near:
+        return
+    quadratic = "Quadratic phase in the worst phase, 7.5·j₂(πn)·φ of n cycles per aperture"
+    for title, symbols, part in (
+        (quadratic, ("QPE", "QPE_full"), quadratic_part),
+        ("Cubic phase likewise, 17.5·j₃(πn)·φ", ("cubic",), cubic_part),
+    ):
+        terms = " + ".join(f"{number(phase)}*{number(float(part(cycles)))}" for phase, cycles in near)
+        total = with_unit(math.fsum(phase * float(part(cycles)) for phase, cycles in near), "rad")
+        yield step(title, *(Sum(f"{symbol} = {terms} = {total}") for symbol in symbols))
+
+
+def near_phases(
+    mission: Mission, allocation: Allocation, row: Row, judged: float, sizes: dict[str, float]
+) -> Iterator[Step]:
+    """From the judged quadratic [rad] and the cubic phase of a tone below three cycles to the size they allow.
+
+    Nothing of a faster one. The size is put into `sizes`, by its symbol.
+    """
+    limit, allowed = allocation.qpe_allowed(row.owner), mission.requirements.cubic_phase_error
+    if not judged and not row.cubic_rad:
+        return
+    yield from limit_steps(allocation, row.owner, limit)
+    worked = [WorkedEquation("use_QPE", "judged/limit", {"judged": judged, "limit": limit}, judged / limit, "")]
+    use, symbol = judged / limit, "use_QPE"
+    if allowed is not None and row.cubic_rad is not None:
+        values = {"cubic": row.cubic_rad, "limit": allowed}
+        worked.append(WorkedEquation("use_cubic", "cubic/limit", values, row.cubic_rad / allowed, ""))
+        use, symbol = max((use, symbol), (row.cubic_rad / allowed, "use_cubic"))
+    yield step("Below three cycles per aperture its phases are held too, in the worst phase", *worked)
+    values, formula = {"declared": row.declared or 0.0, symbol: use}, f"declared/{symbol}"
+    size = values["declared"] / use
+    if row.unit == "dB":
+        formula, size = f"declared - 20*log({symbol})/log(10)", values["declared"] - 20 * math.log10(use)
+    sizes["by_phases"] = size
+    yield step("Size that uses all of it", WorkedEquation("by_phases", formula, values, size, row.unit))
+
+
+def smallest_of(row: Row, sizes: Mapping[str, float]) -> Step:
+    """The allowable of a tone, the smallest of sizes by their symbols."""
+    formula = f"min({', '.join(sizes)})" if len(sizes) > 1 else next(iter(sizes))
+    return step("Allowable", WorkedEquation("allowable", formula, sizes, row.allowable or 0.0, row.unit))
 
 
 def explained_power(mission: Mission, allocation: Allocation, row: Row) -> Iterator[Step]:

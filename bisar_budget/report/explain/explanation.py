@@ -11,7 +11,7 @@ from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.scene import at, differences_at
 from bisar_budget.analysis.spread import mainlobe_energy
 from bisar_budget.analysis.together import Together, cubics, quadratics
-from bisar_budget.analysis.vibration_limits import amplitude_share, echo_phase, slow_limits
+from bisar_budget.analysis.vibration_limits import amplitude_share, echo_phase, slow_limits, tone_limits
 from bisar_budget.budget.aggregates import effect_parts, untaken_effects
 from bisar_budget.budget.declarations import missing_declarations
 from bisar_budget.budget.doubts import (
@@ -68,6 +68,8 @@ from bisar_budget.report.explain.explained_spreading import (
     explained_spur,
     explained_tone,
     moved_by_tone,
+    near_phases,
+    smallest_of,
     use_of_amplitudes,
 )
 from bisar_budget.report.explain.notation import Step, Sum, WorkedEquation, number, step, with_unit
@@ -278,17 +280,28 @@ def _vibration(mission: Mission, allocation: Allocation, row: Row, tone: SlowTon
             yield from _line_of_sight(mission, platform, is_sinusoid, entry, row.declared)
     if row.evidence:
         yield step("Evidence", printable(row.evidence))
-    wavelength = mission.radar.wavelength
+    wavelength, sizes = mission.radar.wavelength, dict[str, float]()
     if tone is not None and row.qpe_full_rad is not None:
         words = "By exact ranges, each axis in its worst phase, with what the displacement adds"
         yield step(words, _of_axes("QPE_full", [one.quadratic for one in tone.declared.axes()]))
         if row.metric == QUADRATIC:
             yield from _slow_vibration(mission, allocation, row, tone)
             return
+        axes = tone.declared.axes()
+        yield step("By either model", _of_axes("QPE", [one.quadratic for one in axes]))
+        yield step("Cubic phase likewise", _of_axes("cubic", [one.cubic for one in axes]))
+        judged = tone.declared.judged(allocation.autofocus_gain).item()
+        yield from near_phases(mission, allocation, row, judged, sizes)
     by_echoes = row.metric == "pslr"
     requirement = mission.requirements.pslr if by_echoes else mission.requirements.islr
     if requirement is None or row.allowable_published is None or row.allowable_full is None:
+        if sizes:
+            yield smallest_of(row, sizes)
         return
+    by_models = row.allowable_published, row.allowable_full
+    if sizes:  # by its echoes alone
+        limits = tone_limits(mission, allocation)[1][platform]
+        by_models = float(limits.published), float(limits.full)
     name = row.metric.upper()
     ratio = 10 ** (requirement / 10)
     yield step(
@@ -303,7 +316,7 @@ def _vibration(mission: Mission, allocation: Allocation, row: Row, tone: SlowTon
     kind = "sinusoidal" if by_echoes else "wideband"
     yield step(
         f"Section V, {kind}, s is the {platform}’s share of power",
-        *_limit("published", published, values, row.allowable_published, is_power=is_power),
+        *_limit("published", published, values, by_models[0], is_power=is_power),
     )
     if by_echoes:
         part = amplitude_share(split, platform)
@@ -329,12 +342,14 @@ def _vibration(mission: Mission, allocation: Allocation, row: Row, tone: SlowTon
         values = {**values, "E": mainlobe_energy(mission)}
         known = []
     full = notation.FULL_VIBRATION[row.metric]
-    yield step(title, *known, *_limit("full", full, values, row.allowable_full, is_power=is_power))
-    limits = {"published": row.allowable_published, "full": row.allowable_full}
+    yield step(title, *known, *_limit("full", full, values, by_models[1], is_power=is_power))
+    sizes |= dict(zip(("published", "full"), by_models, strict=True))
     model = mission.gating_model
-    chosen = "min(published, full)" if model == "strictest" else model
+    chosen = ["published", "full"] if model == "strictest" else [model]
+    chosen += ["by_phases"] * ("by_phases" in sizes)
+    formula = f"min({', '.join(chosen)})" if len(chosen) > 1 else model
     yield step(
-        f"Allowable, allocation.model {model}", WorkedEquation("allowable", chosen, limits, row.allowable or 0.0, "m")
+        f"Allowable, allocation.model {model}", WorkedEquation("allowable", formula, sizes, row.allowable or 0.0, "m")
     )
 
 

@@ -1,0 +1,122 @@
+"""Phases of tones between one and three cycles per aperture: their rows are held to them beside their echoes.
+
+Such a tone is an echo and, in its worst phase, a quadratic and a cubic phase. No sum counts these phases, because
+PSLR or ISLR already holds the motion. So the row itself holds them: the quadratic phase to the platform's share,
+autofocus included, the cubic phase to the whole requirement.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from bisar_budget import phrases
+from bisar_budget.analysis.allocation import Allocation
+from bisar_budget.analysis.analysis import Case
+from bisar_budget.budget.judged_rows import BOUND, REQUIREMENTS, Judged, Judging
+from bisar_budget.effects.declared import CUBIC, QUADRATIC
+from bisar_budget.effects.effect import Subject
+from bisar_budget.mission.model import Mission
+from bisar_budget.phrases import NOTHING, Note
+from bisar_budget.ranges.exact_ranges import Floats, Truths
+
+
+class NearPhases(NamedTuple):
+    """Phases of a declared tone in its worst phase, in many cases; NaN where it is not so slow. [rad]
+
+    `use` is the part of the stricter limit that they use, `quadratic_use` that of the quadratic one, and
+    `without_autofocus` that of the quadratic one without the gain of autofocus.
+    """
+
+    use: Floats
+    quadratic_use: Floats
+    without_autofocus: Floats
+    quadratic: Floats
+    cubic: Floats
+    equal_loss: Floats
+
+    @classmethod
+    def of(
+        cls,
+        mission: Mission,
+        allocation: Allocation,
+        owner: str,
+        is_near: Truths,
+        phases: tuple[Any, Any, Any, Any],
+    ) -> "NearPhases":
+        """Phases of an owner's tone: quadratic and cubic, that of equal loss, and the judged one. [rad]"""
+        quadratic, cubic, equal_loss, judged = (np.where(is_near, phase, math.nan) for phase in phases)
+        use = quadratic_use = judged / allocation.qpe_allowed(owner)
+        allowed = mission.requirements.cubic_phase_error
+        if allowed is not None:
+            use = np.maximum(use, cubic / allowed)
+        without = np.nan_to_num(equal_loss / allocation.qpe_limit(owner))
+        return cls(use, quadratic_use, without, quadratic, cubic, equal_loss)
+
+    @property
+    def is_over(self) -> Truths:
+        """Whether they break a requirement."""
+        return np.asarray(self.use > BOUND)
+
+    def limit(self, declared: Floats) -> Floats:
+        """Size of the tone that uses all of the stricter limit; infinite where nothing limits it."""
+        with np.errstate(all="ignore"):
+            return np.where(self.use > 0, declared / self.use, math.inf)
+
+    def row(
+        self,
+        judging: Judging,
+        what: Subject,
+        metric: str,
+        declared: Floats,
+        by_echoes: Floats | None,
+        *,
+        doubt: Any = False,
+        is_unknown: Any = False,
+    ) -> Judged:
+        """Judge the tone by its echoes, up to `by_echoes` where a requirement holds them, and by its phases.
+
+        Where it `is_unknown` how high its echoes stand, what breaks a requirement by its phases fails all the same.
+        """
+        limit = self.limit(declared)
+        echoes = np.full(declared.shape, math.inf) if by_echoes is None else by_echoes
+        allowable = np.fmin(echoes, limit)
+        judged = judging.row(
+            what,
+            declared,
+            np.where(np.isinf(allowable), math.nan, allowable),
+            doubt=doubt,
+            without_autofocus=self.without_autofocus,
+            is_info=np.isnan(self.use) & (by_echoes is None),
+            is_unknown=is_unknown & ~self.is_over,
+        ).held_to(metric)
+        of_phase = np.where(self.use > self.quadratic_use, *map(REQUIREMENTS.index, (CUBIC, QUADRATIC)))
+        is_by_phase = np.isfinite(limit) & ~(echoes <= limit)
+        return judged._replace(
+            binding=np.where(is_by_phase, of_phase, judged.binding).astype(np.int8),
+            qpe_published_rad=self.quadratic,
+            qpe_full_rad=self.quadratic,
+            cubic_rad=self.cubic,
+            equal_loss_qpe_rad=self.equal_loss,
+            quadratic_use=self.quadratic_use,
+        )
+
+
+def phase_over(case: Case, judged: Judged) -> Note:
+    """Say by how much a tone breaks the requirement on a phase; nothing of one that something else limits."""
+    mission, allocation, owner = case.mission, case.allocation, judged.subject.owner
+    binding = phase_requirement(case, judged)
+    if binding is None:
+        return NOTHING
+    if binding == CUBIC:
+        allowed = mission.requirements.cubic_phase_error or 0.0
+        return phrases.slow_cubic_phase_over(case.number(judged.cubic_rad), allowed)
+    qpe, limit = case.number(judged.qpe_published_rad), allocation.qpe_allowed(owner)
+    over = phrases.slow_quadratic_phase_over(qpe, limit)
+    return over.then(allocation.passes_with(qpe, 0.0, owner, mission)) if qpe > limit else over
+
+
+def phase_requirement(case: Case, judged: Judged) -> str | None:
+    """The requirement on a phase that sets the allowable of a tone; None where its echoes do."""
+    binding = judged.requirement(case)
+    return binding if binding in (QUADRATIC, CUBIC) else None

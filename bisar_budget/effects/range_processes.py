@@ -1,0 +1,164 @@
+"""Errors of a range at random, along lines of sight that turn: what they do to the image.
+
+The error of a range is a course over the aperture times a random size, as of a bias, or a process that changes within
+the aperture: noise of a position, a walk, a delay of the air. Each effect on the image, a phase or a displacement, is
+an integral of weight times range error. So its variance is a double integral of the covariance of the range error.
+
+A process is resolved into Legendre orders, as many as the nodes tell apart. The weights are smooth and see no higher
+ones: these spread. Of the orders below, what lies beyond the cubic spreads too, with what the displacement of the
+image adds along a line of sight that turns.
+
+A Gauss–Markov process has variance 1 and correlation exp(−|t|/τ_c) = 1 + (exp(−|t|/τ_c) − 1): the first is an error
+that stays, the second departs from it, and vanishes for a long correlation time without rounding.
+
+Derived here; against time series in `tests/effects/test_changing_air.py`, against draws and direct sums in
+`tests/effects/test_long_noise.py`.
+"""
+
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from bisar_budget.image_plane import LEADING
+from bisar_budget.ranges.exact_ranges import ExactRanges, Floats
+
+_ORDERS = 4  # Legendre orders 0 to 3, which displace and defocus
+_OCTAVES = 44  # of lags below an aperture: half of it over the shortest correlation time that a file can state
+_NODES_PER_OCTAVE = 20  # follow the correlation within an octave of lags to 1e-10
+
+
+class RangeEffects(NamedTuple):
+    """Effects of range errors: covariance (8, 8, cases) of what `effect_weights` weigh, and mean square left. [m²]
+
+    `sizes` (8, cases) are squares of sums of magnitudes, against which a rest of cancelling terms is rounding.
+    """
+
+    covariance: Floats
+    sizes: Floats
+    left: Floats
+
+
+def effect_weights(exact: ExactRanges) -> Floats:
+    """Effects of a metre of range error at each node, (8, nodes, cases).
+
+    Quadratic and cubic phase [rad], displacement east and north [m], and four parts of the hidden phase. [rad]
+    """
+    return np.array((*exact.phase_weights, *exact.place_weights, *exact.hidden_weights))
+
+
+def effects_of_courses(exact: ExactRanges, weights: Floats, courses: Floats) -> RangeEffects:
+    """Effects of independent errors of variance 1, of one course each, (errors, nodes, cases). [m]"""
+    weighted = weights[:, None] * courses
+    effects = weighted.sum(axis=2)
+    sizes = np.square(np.abs(weighted).sum(axis=2)).sum(axis=1)
+    left = exact.left_of_small(courses, (effects[2], effects[3]))
+    _, beyond = exact.mean_squares(left, exact.fit @ left)
+    return RangeEffects(np.einsum("fec,gec->fgc", effects, effects), sizes, beyond.sum(axis=0))
+
+
+def effects_of_process(exact: ExactRanges, weights: Floats, covariance: Floats, beyond: Any) -> RangeEffects:
+    """Effects of a process.
+
+    Parameters
+    ----------
+    exact : ExactRanges
+        At nodes of Gauss and Legendre.
+    weights : (8, nodes, cases)
+        Those of `effect_weights`.
+    covariance : (nodes, nodes, cases)
+        Of the range error between the nodes, of the Legendre orders that these tell apart. [m²]
+    beyond : (cases,)
+        Mean square of the range error in higher orders, which spread. [m²]
+    """
+    orders = np.polynomial.legendre.legvander(exact.sampling.places, _ORDERS - 1) / LEADING
+    higher = np.eye(len(orders)) - orders @ exact.fit  # leaves what lies beyond the cubic
+    bends = np.einsum("nm,amc->anc", higher, exact.slopes)
+    weighted_bends = exact.mean * bends
+    integrals = np.concatenate((weights, weighted_bends))
+    found = np.einsum("fmc,gmc->fgc", np.einsum("fnc,nmc->fmc", integrals, covariance), integrals)
+    of_bends = np.einsum("anc,bnc->abc", bends, weighted_bends)
+    own = np.einsum("nm,nmc->c", exact.mean * higher, covariance)
+    moved = 2 * (found[8, 2] + found[9, 3]) + np.einsum("abc,abc->c", of_bends, found[2:4, 2:4])
+    spread = np.sqrt(np.maximum(np.einsum("nnc->nc", covariance), 0.0))
+    sizes = np.square((np.abs(weights) * spread).sum(axis=1))
+    return RangeEffects(found[:8, :8], sizes, own + moved + beyond)
+
+
+def effects_of_gauss_markov(
+    exact: ExactRanges, weights: Floats, courses: Floats, ratio: Floats, *, is_phase_advanced: bool
+) -> RangeEffects:
+    """Effects of independent Gauss–Markov processes.
+
+    Parameters
+    ----------
+    exact, weights
+        As for `effects_of_process`.
+    courses : (errors, nodes, cases)
+        Range error by a unit of each; of a delay that of the group. [m]
+    ratio : (cases,)
+        Half the aperture time over the correlation time.
+    is_phase_advanced : bool
+        Whether the phase has the other sign than the group, as free electrons make it: then the mean of the group
+        counts, and everything else with the other sign.
+    """
+    ratios, place = np.unique(np.broadcast_to(ratio, exact.half.shape), return_inverse=True)
+    departure = departure_at_nodes(len(exact.times), ratios)[..., place.ravel()]
+    courses = courses + np.zeros_like(exact.times)
+    covariance = np.einsum("enc,emc->nmc", courses, courses) * departure
+    # The correlation departs by nothing at no lag: what the orders have of it lacks in those beyond.
+    power, mean = exact.fit[0] @ np.square(courses).sum(axis=0), exact.fit[0]
+    beyond = -power * np.einsum("n,nnc->c", mean, departure)
+    if is_phase_advanced:
+        constant = np.einsum("n,nmc->mc", mean, covariance)
+        covariance = covariance - 2 * (constant[None] + constant[:, None]) + 4 * (mean @ constant)
+        courses = 2 * (mean @ courses)[:, None] - courses
+    staying = effects_of_courses(exact, weights, courses)
+    departing = effects_of_process(exact, weights, covariance, beyond)
+    whole = staying.covariance + departing.covariance
+    return RangeEffects(whole, staying.sizes, np.maximum(staying.left + departing.left, 0.0))
+
+
+def departure_at_nodes(count: int, ratios: Floats) -> Floats:
+    """The correlation exp(−|t|/τ_c) − 1 between nodes, by as many Legendre orders as they tell apart.
+
+    It has a bend at lag 0, which nodes would miss. Smooth weights see no higher orders than these.
+
+    Parameters
+    ----------
+    count : int
+        Nodes of Gauss and Legendre.
+    ratios : (cases,)
+        Half the aperture time over the correlation time.
+
+    Returns
+    -------
+    (count, count, cases) ndarray
+    """
+    lags, products = _lagged(count)
+    correlation = np.expm1(-np.multiply.outer(ratios, lags))
+    of_orders = (correlation @ products.reshape(lags.size, -1)).reshape(-1, count, count)
+    nodes = np.polynomial.legendre.leggauss(count)[0]
+    of_nodes = np.polynomial.legendre.legvander(nodes, count - 1) * (np.arange(count) + 0.5)
+    return np.asarray(np.einsum("nk,ckl,ml->nmc", of_nodes, of_orders, of_nodes, optimize=True))
+
+
+@cache
+def _lagged(count: int) -> tuple[Floats, Floats]:
+    """Lags u over 0 … 2, in half apertures, and ∫P_m(s)·P_n(s + u) ds of both signs of the lag, weighted for a sum.
+
+    Lags are denser towards 0, octave by octave: correlation times of any length are followed.
+    """
+    x, w = np.polynomial.legendre.leggauss(_NODES_PER_OCTAVE)
+    edges = np.concatenate(([0.0], 2.0 ** np.arange(1 - _OCTAVES, 2)))
+    width = np.diff(edges)
+    lags = (edges[:-1, None] + width[:, None] * (x + 1) / 2).ravel()
+    weights = (width[:, None] / 2 * w).ravel()
+    places, of_places = np.polynomial.legendre.leggauss(count)  # exact for products of two orders
+    half = 1 - lags[:, None] / 2
+    early = -1 + half * (places + 1)
+    values = np.polynomial.legendre.legvander(early, count - 1)
+    late = np.polynomial.legendre.legvander(early + lags[:, None], count - 1)
+    products = np.einsum("ls,lsm,lsn->lmn", half * of_places, values, late, optimize=True)
+    products = products + np.swapaxes(products, 1, 2)
+    return lags, products * weights[:, None, None]
