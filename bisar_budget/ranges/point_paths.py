@@ -52,6 +52,8 @@ class PathSettings:
         interval is then right to 1e-9.
     early_fraction : float
         Fraction of the first size at which the curvature of the path at its start is measured.
+    same_size_fraction : float
+        Difference between two sizes below which they count as one, as a fraction of the size.
     few_lanes_count : int
         Number of lanes from which a step tries one size per lane.
     """
@@ -65,6 +67,7 @@ class PathSettings:
     least_fold_fraction: float = 0.1
     end_fraction: float = 1e-6
     early_fraction: float = 0.125
+    same_size_fraction: float = 1e-5
     few_lanes_count: int = 256
 
 
@@ -78,7 +81,7 @@ def tries_several_sizes(lane_count: int, is_alike: bool) -> bool:
 
 def up_to(sizes: Floats, largest: Floats) -> Floats:
     """Limit sizes to a largest size, and round sizes just below the largest one up to it."""
-    return np.where(sizes > (1 - 1e-5) * largest, largest, sizes)
+    return np.where(sizes > (1 - SETTINGS.same_size_fraction) * largest, largest, sizes)
 
 
 class PointPaths:

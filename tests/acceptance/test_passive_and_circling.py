@@ -53,7 +53,7 @@ class Case:
     imaged: str
 
     def reached(self) -> float:
-        """What the reference says of the row: a phase of equal loss [rad], or a displacement [m]."""
+        """Value of the row by the reference: a phase of equal loss [rad], or a displacement [m]."""
         response = self.collection.least_variance_point()
         return float(np.hypot(*response.point)) if "location" in self.row else response.equal_loss_rad
 

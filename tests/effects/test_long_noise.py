@@ -193,7 +193,7 @@ def biased(times: np.ndarray, looks: Sequence[np.ndarray]) -> np.ndarray:
 
 
 def test_a_bias_over_a_full_circle_is_held_as_a_whole(tmp_path: Path) -> None:
-    """What it leaves beyond the cubic is half of its loss, and the phase of equal loss had nothing of it."""
+    """Half of the loss of a bias lies beyond the cubic phase; the phase of equal loss left that half out."""
     mission = logged(tmp_path, TURN_S, "imu: {accelerometer_bias: 1e-5 m/s^2}")
     wanted = shown(CIRCLE, TURN_S, biased)
     one = row(check_mission(mission, TODAY), "receiver.imu.accelerometer_bias")

@@ -223,7 +223,7 @@ def mission_file(collection: Collection, folder: FilePath) -> FilePath:
 
 
 def equal_loss_rad(found: Response, is_turned: bool) -> float:
-    """What the requirement judges: where a line of sight turns by more than a radian, all of the phase."""
+    """Phase that the requirement judges: all of it where a line of sight turns by more than a radian."""
     orders = 4 / 175 * found.cubic_rad**2 + found.rest_rad**2 if is_turned else 0.0
     return math.sqrt(found.equal_loss_rad**2 + 45 / 4 * orders)
 

@@ -402,7 +402,7 @@ def test_a_remark_of_many_rows_is_said_once() -> None:
 
 
 def test_phases_beside_a_budget_are_those_that_it_bounds() -> None:
-    """Of a narrow band: the quadratic part stood there, a third of the budget, and was called confirmed."""
+    """The report of a narrow band printed the quadratic part, a third of the budget, and called it confirmed."""
     narrow = Verdict(
         "receiver.velocity.y", "full", 0.0205, "m/s", budget_rad=0.3927, published_qpe_rad=0.242, full_qpe_rad=0.1157,
         predicted_qpe_rad=0.1157, measured_qpe_rad=0.117, equal_loss_qpe_rad=0.3927,
