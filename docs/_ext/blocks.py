@@ -1,10 +1,11 @@
 """Examples of a page, run as a reader would type them and held to what the page says of them.
 
 A console block has commands behind `$ ` and under each the output that it must print; `...` stands for lines that are
-left out. A command with nothing under it may print anything. One that does not exit with 0 is followed by
-`$ echo $?`, so that the page says with what. A YAML block is a mission file, or a section of one, and has to load;
-one with a `kind` is the file of a sensor or an oscillator. Python runs. The blocks of a page share a folder, in
-which `specs` is the project's, and a Python namespace.
+left out. Of a decimal number the first six digits are compared: the digits behind them differ between processors. A
+command with nothing under it may print anything. One that does not exit with 0 is followed by `$ echo $?`, so that
+the page says with what. A YAML block is a mission file, or a section of one, and has to load; one with a `kind` is
+the file of a sensor or an oscillator. Python runs. The blocks of a page share a folder, in which `specs` is the
+project's, and a Python namespace.
 """
 
 import difflib
@@ -26,6 +27,7 @@ from bisar_budget.cli import cli
 ROOT = Path(__file__).resolve().parent.parent.parent
 EXECUTED = ("console", "yaml", "python", "pycon")
 _TIMEOUT = 300  # s for one command: a build must end
+_COMPARED_DIGITS = 6
 
 # The least that a part of a mission file can be a part of.
 _WHOLE = """
@@ -164,8 +166,21 @@ def commands(text: str) -> Iterator[tuple[str, str]]:
 
 
 def _pattern(stated: str) -> str:
-    lines = ("(?:.*\n)*?" if line == "..." else re.escape(line) + "\n" for line in stated.splitlines())
+    lines = ("(?:.*\n)*?" if line == "..." else _line_pattern(line) + "\n" for line in stated.splitlines())
     return "".join(lines)
+
+
+def _line_pattern(line: str) -> str:
+    """The expression of a line, with any digits behind the sixth of a decimal number."""
+    return re.sub(r"(\d+)\\\.(\d+)", _number_pattern, re.escape(line))
+
+
+def _number_pattern(number: re.Match[str]) -> str:
+    whole, decimals = number.groups()
+    spare_count = len(f"{whole}{decimals}".lstrip("0")) - _COMPARED_DIGITS
+    if spare_count <= 0:
+        return number[0]
+    return rf"{whole}\.{decimals[: max(len(decimals) - spare_count, 0)]}\d*"
 
 
 def _environment() -> dict[str, str]:

@@ -46,6 +46,22 @@ class TestExamples:
         with pytest.raises(ExampleError, match="prints something else"):
             page.run("console", f"$ printf 'a\\nb\\n'\n{stated}")
 
+    @pytest.mark.parametrize(
+        "stated", ["2.8002236 s", "2.800220 s", "99.9999961 %", "0.00123456789", "1.5", "12345678.9"]
+    )
+    def test_digits_behind_the_sixth_are_not_compared(self, page: Page, stated: str) -> None:
+        """The last digits of a search are those of a processor: a page printed on another one would be refused."""
+        number, _, unit = stated.partition(" ")
+        printed = f"{number}7 {unit}".strip() if len(number) > 7 else stated
+        page.run("console", f"$ echo '{printed}'\n{stated}\n")
+
+    @pytest.mark.parametrize(
+        ("stated", "printed"), [("2.8002236", "2.8003236"), ("1.5", "1.51"), ("12345678.9", "12345679.9")]
+    )
+    def test_the_first_six_digits_are_compared(self, page: Page, stated: str, printed: str) -> None:
+        with pytest.raises(ExampleError, match="prints something else"):
+            page.run("console", f"$ echo {printed}\n{stated}\n")
+
     @pytest.mark.parametrize("text", ["$ false\n", "$ false\n$ echo a\na\n"])
     def test_an_exit_code_that_is_not_stated(self, page: Page, text: str) -> None:
         with pytest.raises(ExampleError, match="exits with 1"):
