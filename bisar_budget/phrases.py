@@ -269,6 +269,22 @@ def drift_is_not_stated(platforms: Sequence[str]) -> str:
 
 
 @phrase
+def one_clock_is_not_stated(stated: str, unstated: str) -> str:
+    """Said of the noise of two clocks in holdover, of which one oscillator is stated."""
+    return (
+        f"both clocks run free in holdover, and the file states the oscillator of the {stated} alone: "
+        f"add platforms.{unstated}.oscillator"
+    )
+
+
+@phrase
+def felt_vibration_lacks(platform: str, key: str) -> str:
+    """Said of an oscillator that is said to feel half of what its airframe does."""
+    own = f"platforms.{platform}.oscillator.vibration"
+    return f"{own} takes the place of the airframe's vibration, and has no {key} as the airframe has: add {own}.{key}"
+
+
+@phrase
 def not_declared_as_required(key: str, lacks: str = "") -> str:
     """Said of an error that the file should declare; `lacks` is what half of it needs to have an effect."""
     if lacks:

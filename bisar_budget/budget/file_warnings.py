@@ -212,7 +212,8 @@ def _of_instruments(case: Case) -> Iterator[_Warned]:
     if sync is not None and not sync.is_direct_path and (sync.interval or 0.0) > T:
         yield _Warned(("synchronization", "interval"), exchanges_are_rare(T))
     undriven = clocks_without_oscillator(mission)
-    if undriven and mission.requirements.location_error is None:  # else the location says that it is not judged
+    # Else the location says that it is not judged, and with one clock the noise.
+    if len(undriven) > 1 and mission.requirements.location_error is None:
         yield _Warned(("synchronization", "age"), nothing_drifts(undriven))
     for error in case.random:
         declared = error.subject.axis == "accelerometer_bias" and error.declared is not None

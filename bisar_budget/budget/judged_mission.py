@@ -22,6 +22,7 @@ from bisar_budget.budget.dispersion_row import dispersion_rows
 from bisar_budget.budget.doubts import RESIDUAL, doubted_platforms, is_in_doubt, strays
 from bisar_budget.budget.error_rows import ErrorRows, specification_rows
 from bisar_budget.budget.file_warnings import calm_oscillators
+from bisar_budget.budget.half_causes import HalfCause, half_causes
 from bisar_budget.budget.judged_requirements import (
     KEYS,
     RequirementState,
@@ -144,6 +145,8 @@ class _Judgement:
         of_all.doubt_air(air.untaken_rows())
         of_all.judge_place(is_misplaced)
         of_all.judge_spread(has_noise)
+        halves = list(half_causes(mission))
+        of_all.judge_halves(halves)
         before = of_all.status
         waivers = of_all.waivers(self.today)
         after = np.where(waivers >= 0, CODE["waived"], before)
@@ -160,7 +163,7 @@ class _Judgement:
             in_doubt=self._doubted_rows(rows),
             has_noise=has_noise,
             is_misplaced=is_misplaced,
-            rests_on_air=air.doubted_requirements(),
+            unjudged=air.doubted_requirements() | {key: True for half in halves for key in half.requirements},
         )
         return JudgedMission(
             analysis=analysis,
@@ -378,6 +381,11 @@ class RowStatuses:
         if self.mission.requirements.location_error is not None:
             which = [what.id == f"mission.{LOCATION}" for what in self.subjects]
             self._settle(which, is_misplaced & self._is_open, Why.NO_PLACE)
+
+    def judge_halves(self, halves: Sequence[HalfCause]) -> None:
+        """Rows that rest on a cause of which the file states one half are not evaluated."""
+        for half in halves:
+            self._settle([half.holds(what) for what in self.subjects], self._is_open, Why.HALF_A_CAUSE)
 
     def judge_spread(self, has_noise: Truths) -> None:
         """ISLR is not evaluated where nothing but a cubic phase makes it."""

@@ -104,7 +104,7 @@ def requirement_states(
     in_doubt: Truths,
     has_noise: Any,
     is_misplaced: Any,
-    rests_on_air: Mapping[str, Truths],
+    unjudged: Mapping[str, Any],
 ) -> list[RequirementState]:
     """Say how every requirement stands.
 
@@ -130,8 +130,9 @@ def requirement_states(
         Whether something that spreads, or a tone that ISLR holds, is declared: without it ISLR is not judged.
     is_misplaced : (n,) bool
         Whether a declared error displaces the image by an amount that no row holds.
-    rests_on_air : mapping of str to (n,) bool
-        Keys of the requirements that rest on air that stays in a long aperture, and in which cases.
+    unjudged : mapping of str to bool or (n,) bool
+        Keys of the requirements that are not evaluated, and in which cases: they rest on air that stays in a long
+        aperture, or on half a cause.
     """
     uses, found = np.nan_to_num(utilization, nan=0.0, posinf=np.inf), []
     is_open = before == RANK["not_evaluated"]
@@ -168,7 +169,7 @@ def requirement_states(
             is_unjudged = is_unjudged | ~np.asarray(has_noise)
         if key == LOCATION:
             is_unjudged = is_unjudged | np.asarray(is_misplaced)
-        is_unjudged = is_unjudged | rests_on_air.get(key, False)
+        is_unjudged = is_unjudged | unjudged.get(key, False)
         status = np.where(is_unjudged & (worst != RANK["fail"]), RANK["not_evaluated"], worst)
         is_unknown = (is_unknown & (worst == RANK["waived"])) | (status == RANK["not_evaluated"])
         if waived.get(key):

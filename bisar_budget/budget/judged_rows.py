@@ -61,6 +61,7 @@ class Why(IntEnum):
     NO_PLACE = 4
     NOTHING_SPREADS = 5
     AIR_STAYS = 6
+    HALF_A_CAUSE = 7
 
 
 class Judged(NamedTuple):

@@ -19,6 +19,7 @@ from bisar_budget.budget.declarations import (
     shifted_figures,
 )
 from bisar_budget.budget.doubts import RESIDUAL, input_doubts, is_in_doubt
+from bisar_budget.budget.half_causes import half_cause_of, half_causes
 from bisar_budget.budget.judged_mission import JudgedMission
 from bisar_budget.budget.judged_requirements import (
     EXAMPLES,
@@ -103,6 +104,9 @@ def _why(judged: JudgedMission, case: Case, one: Judged, row: Row) -> Note:
         return unknown_place(judged, case)
     if why is Why.AIR_STAYS:
         return judged.air.reason(case, row.id)
+    if why is Why.HALF_A_CAUSE:
+        halves = [half.note for half in half_causes(mission) if half.holds(one.subject)]
+        return halves[0].then(*halves[1:])
     if why is Why.NOTHING_SPREADS:
         return phrases.nothing_judges("islr")
     said = [row.reason] if row.status == "fail" and row.reason else []  # it is broken, and more of it not judged
@@ -156,7 +160,7 @@ def _entry(
     reason: Note | None = None
     if is_open and (decider is None or not decider.is_unjudged):
         reason = (unknown_place(judged, case) if key == LOCATION else NOTHING) or (
-            judged.air.reason_of_requirement(case, key) or phrases.nothing_judges(key)
+            judged.air.reason_of_requirement(case, key) or half_cause_of(mission, key) or phrases.nothing_judges(key)
         )
     elif decider is not None and status not in ("pass", "info"):
         reason = decider.reason

@@ -388,6 +388,7 @@ def _written(pieces: Sequence[PowerLawPiece]) -> list[str]:
 
 def _power_of_f(exponent: float) -> str:
     """Write a power of f; what is negative stands in brackets, so that nobody reads it as a difference."""
+    exponent = exponent or 0.0  # white noise has the power −0.0
     return f"f^{exponent:.6g}" if exponent >= 0 else f"f^(\u2212{-exponent:.6g})"
 
 

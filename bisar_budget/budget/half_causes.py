@@ -1,0 +1,74 @@
+"""Causes of which the file states one half: rows that rest on such a cause are not evaluated.
+
+Deleting the worse half of a cause must not turn a failing mission into a pass. Two causes have halves that nothing
+else in the file asks for: the clocks of a holdover, of which one oscillator is stated, and the vibration that an
+oscillator feels, of which `oscillator.vibration` states tones or noise alone while the airframe has both.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from bisar_budget import phrases
+from bisar_budget.effects.effect import PLATFORMS, Subject
+from bisar_budget.effects.oscillators import clocks_without_oscillator
+from bisar_budget.mission.model import Mission
+from bisar_budget.phrases import NOTHING, Note
+
+_HOLD_NOISE = ("quadratic_phase_error", "cubic_phase_error", "islr")
+_HOLD_TONES = (*_HOLD_NOISE, "pslr")
+
+
+@dataclass(frozen=True)
+class HalfCause:
+    """A cause of which the file states one half.
+
+    Attributes
+    ----------
+    platform : str
+        Platform of the oscillator that the file states.
+    requirements : tuple of str
+        Keys of the requirements that hold the effects of the cause.
+    note : Note
+        What to add to the file.
+    """
+
+    platform: str
+    requirements: tuple[str, ...]
+    note: Note
+
+    def holds(self, subject: Subject) -> bool:
+        """Whether a row rests on the cause: a row of the oscillator, or a sum of the mission."""
+        if subject.id in [f"mission.{key}" for key in self.requirements]:
+            return True
+        return subject.owner == self.platform and subject.id.startswith(f"{self.platform}.oscillator")
+
+
+def half_causes(mission: Mission) -> Iterator[HalfCause]:
+    """Find the causes of which the file states one half."""
+    unstated = clocks_without_oscillator(mission)
+    if len(unstated) == 1:
+        (stated,) = set(PLATFORMS) - set(unstated)
+        yield HalfCause(stated, _required(mission, _HOLD_NOISE), phrases.one_clock_is_not_stated(stated, unstated[0]))
+    for name in PLATFORMS[mission.has_direct_path :]:
+        platform = getattr(mission.platforms, name)
+        oscillator = platform.oscillator
+        if oscillator is None or oscillator.acceleration_sensitivity is None or oscillator.vibration is None:
+            continue
+        felt, airframe = oscillator.vibration, platform.motion_error.vibration
+        if not felt.is_stated:
+            continue
+        if felt.spectrum is None and (airframe.spectrum is not None or airframe.wideband is not None):
+            yield HalfCause(name, _required(mission, _HOLD_NOISE), phrases.felt_vibration_lacks(name, "spectrum"))
+        if airframe.sinusoidal and not felt.sinusoidal:
+            yield HalfCause(name, _required(mission, _HOLD_TONES), phrases.felt_vibration_lacks(name, "sinusoidal"))
+
+
+def _required(mission: Mission, keys: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the requirements that the file states."""
+    return tuple(key for key in keys if getattr(mission.requirements, key) is not None)
+
+
+def half_cause_of(mission: Mission, key: str) -> Note:
+    """Say what to add to the file where a requirement rests on half a cause; nothing where it rests on none."""
+    notes = [half.note for half in half_causes(mission) if key in half.requirements]
+    return notes[0].then(*notes[1:]) if notes else NOTHING
