@@ -20,7 +20,7 @@ from tests.design.test_sweep import assert_as_checked, grid, swept
 from tests.mission.test_path_files import aircraft, ephemeris, satellite
 from tests.paths.flown import flight
 from tests.paths.log_files import SIGMAS, gga, nmea, sentence, solution
-from tests.paths.orbit_files import EPOCH, TLE, oem
+from tests.paths.orbit_files import EPOCH, TLE, oem, omm_with_covariance
 from tests.paths.test_accuracy import START, triangle, with_covariance
 
 CENTER = "2026-06-01T05:19:30Z"
@@ -149,6 +149,50 @@ class TestACovarianceOfAnEphemeris:
         of_velocity = {row(found, f"transmitter.velocity.{axis}").status for axis in RIC}
         assert (of_velocity == {"not_evaluated"}) != is_judged
         assert (found.status == "not_evaluated") != is_judged
+
+
+class TestACovarianceOfMeanElements:
+    """An OMM states it at the epoch of its elements; 4 km are more than what is usual of elements 16 hours old."""
+
+    @pytest.mark.parametrize("form", ["text", "xml", "json", "csv"])
+    @pytest.mark.parametrize(("declared", "is_enough"), [("4 km", False), ("50 km", True)])
+    def test_50_km_are_no_4_km(self, form: str, declared: str, is_enough: bool, tmp_path: Path) -> None:
+        mission = self.orbiting(tmp_path, form, position=declared)
+        doubts = input_doubts(mission)
+        assert [(one.is_stated, one.note.split(":")[0]) for one in doubts] == (
+            [] if is_enough else [(True, "a.omm, covariance of 2026-05-31T10")]
+        )
+
+    def test_where_nothing_is_declared_it_is_the_error(self, tmp_path: Path) -> None:
+        error = self.orbiting(tmp_path, "json").platforms.transmitter.motion_error
+        assert error.position == pytest.approx((5e4, 5e4, 5e4))
+
+    def test_it_turns_with_the_orbit(self, tmp_path: Path) -> None:
+        """50 km along the track and 1 km across it: enough where they are declared so, not the other way round."""
+        for position, is_enough in ((["1 km", "50 km", "1 km"], True), (["50 km", "1 km", "50 km"], False)):
+            mission = self.orbiting(tmp_path, "json", (1e3, 5e4, 1e3), position=position)
+            assert (input_doubts(mission) == []) == is_enough
+
+    def test_without_an_element_of_its_matrix_it_is_refused(self, tmp_path: Path) -> None:
+        with pytest.raises(MissionError, match="a covariance must be a lower triangle of 6 rows"):
+            self.orbiting(tmp_path, "json", position="50 km", CY_X=None)
+
+    @staticmethod
+    def orbiting(
+        folder: Path,
+        form: str,
+        position_m: tuple[float, float, float] = (5e4, 5e4, 5e4),
+        position: Any = None,
+        **changed: Any,
+    ) -> Mission:
+        (folder / "a.omm").write_bytes(omm_with_covariance(form, triangle(position_m, 1.0), **changed))
+        error = {"frame": "ric", "velocity": "100 m/s"} | ({} if position is None else {"position": position})
+        text = satellite(
+            platforms__transmitter={"orbit": {"omm": "a.omm"}, "motion_error": error},
+            requirements={"location_error": "5000 km"},
+        )
+        (folder / "m.yaml").write_text(text)
+        return load_mission(str(folder / "m.yaml"))
 
 
 class TestALog:
