@@ -184,10 +184,13 @@ class _Sentences:
         of_talker = (f"{kind} {fix.quality.words}" for kind in _KINDS for fix in self.fixes.get((talker, kind), ()))
         return ", ".join(f"{count} of {words}" for words, count in Counter(of_talker).most_common(2))
 
+    def other_receivers(self, talker: str) -> set[str]:
+        """Talkers that have fixes of their own, besides one: what they say of datum and accuracy is of those."""
+        return {speaker for (speaker, _), fixes in self.fixes.items() if fixes} - {talker}
+
     def hold_to_datum(self, talker: str, name: str) -> None:
         """Refuse places of another datum than WGS-84, which a talker says itself, or another that has no places."""
-        others = {talker for (talker, _), fixes in self.fixes.items() if fixes} - {talker}
-        for speaker in self.datums.keys() - others:
+        for speaker in self.datums.keys() - self.other_receivers(talker):
             for line, datum in self.datums[speaker]:
                 if not datum.is_wgs84:
                     raise PathFileError(
@@ -201,9 +204,9 @@ class _Sentences:
         return self.dates.get(talker) or sorted(date for dates in self.dates.values() for date in dates)
 
     def accuracies_for(self, talker: str) -> Sequence[_Accuracy]:
-        """Errors that a talker states, or else all: of a receiver that states them under another name."""
-        own = self.accuracies.get(talker)
-        return own or sorted(gst for of_talker in self.accuracies.values() for gst in of_talker)
+        """Errors that a talker states, or else those of talkers without fixes: names of the same receiver."""
+        speakers = self.accuracies.keys() - self.other_receivers(talker)
+        return self.accuracies.get(talker) or sorted(gst for one in speakers for gst in self.accuracies[one])
 
     def lost_words(self) -> str:
         """How many sentences are left out whose checksum is wrong or whose date is none, for reports."""

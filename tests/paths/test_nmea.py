@@ -366,6 +366,15 @@ class TestALogSaysItsAccuracy:
         assert log.sigmas is not None
         assert log.sigmas[0] == pytest.approx([0.02, 0.01, 0.05] if is_own else [3, 2, 5])
 
+    @pytest.mark.parametrize("has_fixes", [True, False])
+    def test_the_gst_of_another_receiver_vouches_for_nothing(self, has_fixes: bool) -> None:
+        """A talker that has fixes of its own states the errors of those; one without is another name."""
+        lines = [rmc(0), gga(0, 48, 11, 3000, quality=1), gst(0, 0.01, 0.01, 0.02, talker="GP")]
+        lines += [gga(0, 48, 11, 3000, talker="GP")] if has_fixes else []
+        log = read("\n".join(lines), talker="GN")
+        assert (log.sigmas is None) == has_fixes
+        assert log.typical_sigmas == pytest.approx([3])
+
     @pytest.mark.parametrize(
         ("quality", "sigma_m", "words"),
         [
