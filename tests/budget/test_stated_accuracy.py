@@ -19,7 +19,7 @@ from tests.conftest import TODAY, row
 from tests.design.test_sweep import assert_as_checked, grid, swept
 from tests.mission.test_path_files import aircraft, ephemeris, satellite
 from tests.paths.flown import flight
-from tests.paths.log_files import SIGMAS, gga, nmea, sentence, solution
+from tests.paths.log_files import GPS_OF_OLD, SIGMAS, gga, gps_records, nmea, sentence, solution, topic, ulog
 from tests.paths.orbit_files import EPOCH, TLE, oem, omm_with_covariance
 from tests.paths.test_accuracy import START, triangle, with_covariance
 
@@ -203,6 +203,12 @@ class TestALog:
         if status != "pass":
             reason = row(found, "receiver.position.x").reason
             assert "2.4 m, 3.1 m, 6.2 m (east, north, up) is stated, 10 mm is declared" in str(reason)
+
+    @pytest.mark.parametrize(("position", "status"), [("1 cm", "not_evaluated"), ("31 m", "pass")])
+    def test_eph_of_px4(self, position: str, status: str, tmp_path: Path) -> None:
+        records = [{**one, "eph": 30.0} for one in gps_records(flight())]
+        found = self.logged(tmp_path, "a.ulg", ulog(topic("sensor_gps", GPS_OF_OLD, 1, records)), position)
+        assert (statuses(found, "receiver") == {"not_evaluated"}) == (status == "not_evaluated")
 
     def test_a_covariance_in_place_of_position_and_velocity(self, tmp_path: Path) -> None:
         (tmp_path / "a.pos").write_bytes(solution(flight(), sigmas=SIGMAS))
