@@ -327,7 +327,7 @@ def level_sigmas(horizontal: Floats | None, vertical: Floats | None) -> Floats |
 
 def known_sigmas(sigmas: Floats) -> Floats | None:
     """Sigmas (n, 3) of a log, NaN where one is not positive; None where no place has any. [m]"""
-    found = np.where((sigmas > 0).all(axis=1)[:, None], np.minimum(sigmas, _LARGEST_SIGMA_M), np.nan)
+    found = np.where(np.all(sigmas > 0, axis=1, keepdims=True), np.minimum(sigmas, _LARGEST_SIGMA_M), np.nan)
     return None if np.isnan(found).all() else found
 
 

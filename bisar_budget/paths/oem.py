@@ -365,7 +365,9 @@ def _matrix(matrix: MessageElement) -> CovarianceBlock:
 
 def named_covariance(leaves: Mapping[str, str], line: int) -> CovarianceBlock:
     """A covariance whose elements have keywords of their own; an element that is empty is not there."""
-    rows = [(line, [leaves[key] for key in of_row if leaves.get(key)]) for of_row in _TRIANGLE]
+    rows: list[tuple[int, Sequence[str]]] = [
+        (line, [leaves[key] for key in of_row if leaves.get(key)]) for of_row in _TRIANGLE
+    ]
     return CovarianceBlock(line, leaves.get("EPOCH", ""), leaves.get("COV_REF_FRAME", ""), rows)
 
 

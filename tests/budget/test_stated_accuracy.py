@@ -18,7 +18,7 @@ from tests.budget.test_input_doubt import statuses
 from tests.conftest import TODAY, row
 from tests.design.test_sweep import assert_as_checked, grid, swept
 from tests.mission.test_path_files import aircraft, ephemeris, satellite
-from tests.paths.flown import flight
+from tests.paths.flown import flight, geodetic_csv
 from tests.paths.log_files import GPS_OF_OLD, SIGMAS, gga, gps_records, nmea, sentence, solution, topic, ulog
 from tests.paths.orbit_files import EPOCH, TLE, oem, omm_with_covariance
 from tests.paths.test_accuracy import START, triangle, with_covariance
@@ -208,6 +208,13 @@ class TestALog:
     def test_eph_of_px4(self, position: str, status: str, tmp_path: Path) -> None:
         records = [{**one, "eph": 30.0} for one in gps_records(flight())]
         found = self.logged(tmp_path, "a.ulg", ulog(topic("sensor_gps", GPS_OF_OLD, 1, records)), position)
+        assert (statuses(found, "receiver") == {"not_evaluated"}) == (status == "not_evaluated")
+
+    @pytest.mark.parametrize(("position", "status"), [("1 cm", "not_evaluated"), ("10 m", "pass")])
+    def test_sigmas_of_a_csv(self, position: str, status: str, tmp_path: Path) -> None:
+        lines = geodetic_csv(flight()).decode().splitlines()
+        lines = [f"{lines[0]},sde(m),sdn(m),sdu(m)", *(f"{line},2.4,3.1,6.2" for line in lines[1:])]
+        found = self.logged(tmp_path, "a.csv", "\n".join(lines).encode(), position)
         assert (statuses(found, "receiver") == {"not_evaluated"}) == (status == "not_evaluated")
 
     def test_a_covariance_in_place_of_position_and_velocity(self, tmp_path: Path) -> None:
