@@ -230,6 +230,7 @@ class _Sentences:
             at[round(fix.seconds / _TIME_STEP_S)].append(index)
         between = (fixes[0].seconds, fixes[-1].seconds)
         alone, apart, alike = [], [], 0
+        worse: dict[int, _Quality] = {}
         for other in others:
             same = at.get(round(other.seconds / _TIME_STEP_S))
             if same is None:
@@ -241,7 +242,7 @@ class _Sentences:
             if fix.distance(other) > _SAME_PLACE_M:
                 apart.append((fix, other))
             if other.quality.typical_sigma_m > fix.quality.typical_sigma_m:
-                fixes[index] = fix._replace(quality=other.quality)
+                worse[index] = other.quality
         if len(apart) > most_left_out(alike):
             fix, other = max(apart, key=lambda pair: pair[0].distance(pair[1]))
             says = f"up to {format_quantity(fix.distance(other), 'm')} apart at the same time"
@@ -249,6 +250,8 @@ class _Sentences:
         elif len(alone) > alike:
             says, at_line = "at times of their own", alone[0].line
         else:
+            for index, quality in worse.items():
+                fixes[index] = fixes[index]._replace(quality=quality)
             return
         raise PathFileError(
             f"{name}:{at_line}: GGA and GNS of the talker {talker} are {says}: places of two solutions",

@@ -177,9 +177,9 @@ class TestTwoSolutionsOfOneTalker:
     )
     def test_other_places_are_refused(self, north_m: float, late_s: float, says: str) -> None:
         with pytest.raises(PathFileError, match=rf"GGA and GNS of the talker GN are {says}") as error:
-            self.both(north_m, late_s, quality=1)
+            self.both(north_m, late_s, modes="AA")
         assert error.value.hint == (
-            "Leave out the sentences of one solution: 501 of GGA quality 1, autonomous, 501 of GNS mode R, RTK fixed"
+            "Leave out the sentences of one solution: 501 of GGA quality 4, RTK fixed, 501 of GNS mode A, autonomous"
         )
 
     def test_gns_once_a_second_is_enough(self) -> None:
