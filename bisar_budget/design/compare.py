@@ -179,7 +179,8 @@ def _order(state: PartState) -> tuple[int, float, float, str]:
     """Sort key: what complies first, the smallest margin first; what is waived; the nearest miss; no mission last."""
     sign = -1 if state.complies else 1
     uses = (state.standing.utilization, state.own_utilization)
-    worst, own = (math.inf if use is None else sign * use for use in uses)
+    # Parts that use the same but for a millionth are a tie.
+    worst, own = (math.inf if use is None else sign * float(f"{use:.6g}") for use in uses)
     rank = 0 if state.complies else 1 if state.standing.status == "waived" else 2
     return rank, worst, own, state.id
 

@@ -721,7 +721,7 @@ class _PointSearch:
             turn = matrix.turned_from(exact.matrix, self.of)
             unseen = np.where(np.abs(turn) < AT_FOLD, OF_UNSEEN * UNSEEN_RAD, UNSEEN_RAD)
             is_done = is_apart & (k * step < unseen * nearest)
-            self._keep(is_done & (turn > -AT_FOLD), left, matrix.slopes, (step_east, step_north), turn)
+            self._keep(is_done & (turn > -FOLDED), left, matrix.slopes, (step_east, step_north), turn)
             going = np.flatnonzero(~is_done & (step < SHRINKS * before) & is_apart)
             if not going.size:
                 return
@@ -754,7 +754,7 @@ class _PointSearch:
             turn = matrix.turned_from(exact.matrix, self.of)
             is_done = falls & (k * (step[0] ** 2 + step[1] ** 2) < OF_UNSEEN * UNSEEN_RAD * nearest)
             is_done &= nearest >= MEETS * meets
-            self._keep(is_going & is_done & (turn > -AT_FOLD), left, matrix.slopes, step, turn)
+            self._keep(is_going & is_done & (turn > -FOLDED), left, matrix.slopes, step, turn)
             is_going &= ~is_done
             if not is_going.any():
                 return

@@ -1051,7 +1051,7 @@ def test_an_error_that_no_image_has_is_no_part_of_a_sum(format_name: str) -> Non
     errors = {"position": ["40 km", 0, 0], "velocity": "5 mm/s"}
     found = findings(platforms__receiver__motion_error=errors, allocation__model="full")
     (row,) = [row for row in found.rows if row.id == "receiver.position.x"]
-    assert "no ground point has this range history" in row.reason
+    assert "no ground point has the range history of so large an error" in row.reason
     text = render(format_name, Report(version="", missions=(found,)), Style(detail="full"))
     assert not re.search(r"\b(nan|inf)\b", re.sub("<style>.*?</style>", "", text, flags=re.DOTALL))
     assert "no image" in text
