@@ -18,15 +18,16 @@ import math
 import re
 from calendar import isleap
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
 from bisar_budget.extras import install_command
 from bisar_budget.faults import shown
 from bisar_budget.geometry import Vector
+from bisar_budget.paths.accuracy import EpochCovariance, StatedAccuracy, stated_of_orbit
 from bisar_budget.paths.flight import Orbit, PathDoubt, PathFileError, Sample, interpolate
-from bisar_budget.paths.instant import DAY, Instant, day_of_year, later, tai_less_utc
+from bisar_budget.paths.instant import DAY, Instant, day_of_year, later, tai, tai_less_utc
 from bisar_budget.paths.messages import (
     EARLIEST,
     LATEST,
@@ -39,6 +40,7 @@ from bisar_budget.paths.messages import (
     one_object,
     parse_markup,
 )
+from bisar_budget.paths.oem import named_covariance, read_covariance
 from bisar_budget.paths.orientation import UNKNOWN, Orientation, from_teme
 
 # CCSDS 502.0-B-3, EPHEMERIS_TYPE; 0 is SGP4 in all that is distributed, 4 is SGP4-XP. Two-line sets have a digit.
@@ -46,6 +48,7 @@ _PROPAGATED = ("", "0", "2", "SGP4")
 _DAY_OF_1950 = 33281  # modified Julian day of 1949-12-31, from which SGP4 counts days
 _NODES, _STEP_S = 8, 30.0
 _FRESH_DAYS = 7.0
+_AROUND_S = 60.0  # beyond the epoch and the aperture, where velocities are taken from places
 _FARTHEST_DAYS = 36525.0  # SGP4 steps through the time to a resonant orbit
 _AT_EPOCH_KM, _PER_DAY_KM = 1, (1, 3)
 _USUAL_PER_DAY_KM = 2.0  # middle of what the sources say
@@ -61,7 +64,10 @@ _FAILURES = {
 
 @dataclass(frozen=True, kw_only=True)
 class Elements:
-    """Mean elements of an object at an epoch, as SGP4 takes them: angles in rad, mean motion in rad/min."""
+    """Mean elements of an object at an epoch, as SGP4 takes them: angles in rad, mean motion in rad/min.
+
+    `covariance` is that of position and velocity at the epoch, where the message states one.
+    """
 
     name: str
     number: int
@@ -75,6 +81,7 @@ class Elements:
     drag: float  # B*, 1/Earth radii
     kind: str  # what they were read from
     where: str  # file and line or record
+    covariance: EpochCovariance | None = None
 
     @property
     def object(self) -> str:
@@ -205,15 +212,25 @@ def orbit_of(
             f" {'before' if days > 0 else 'after'} the aperture; SGP4 may place it {least:.0f} to {most:.0f} km off",
         )
 
+    def place(instant: Instant) -> Vector:
+        return from_teme(inertial(instant), instant, orientation)
+
+    def stated(instant: Instant) -> StatedAccuracy | None:
+        if elements.covariance is None:
+            return None
+        span = (min(instant, elements.epoch).after(-_AROUND_S), max(instant, elements.epoch).after(_AROUND_S))
+        return stated_of_orbit([elements.covariance], place, instant, span)
+
     words = f"{elements.kind} of {elements.object}, epoch {elements.epoch.as_text()}, SGP4{orientation.words}"
     return Orbit(
-        place=lambda instant: from_teme(inertial(instant), instant, orientation),
+        place=place,
         words=words + left_out,
         epoch=elements.epoch,
         doubts=doubts,
         doubt=doubt,
         remedy="Take elements whose epoch is nearer to collection.center_time",
         is_turned=True,
+        stated=stated,
     )
 
 
@@ -431,17 +448,19 @@ def read_omm(
             records = _from_json(text, name)
         else:
             records = _from_keywords(text, name) if begins.startswith(_VERSION) else _from_csv(text, name)
-    return orbit_of([_entry(message) for message in records], name, wanted, center, orientation)
+    return orbit_of([_entry(message, orientation) for message in records], name, wanted, center, orientation)
 
 
-def _entry(message: _Message) -> Entry:
+def _entry(message: _Message, orientation: Orientation) -> Entry:
     """Elements of a message, or what is wrong with it."""
     try:
         if message.problem:
             raise PathFileError(message.problem)
         for key in _MANDATORY if message.is_whole else ():
             _value(message.leaves, key, message.where)
-        return _from_message(message.leaves, message.where)
+        elements = _from_message(message.leaves, message.where)
+        covariance = _covariance(message.leaves, elements.epoch, orientation, message.where)
+        return elements if covariance is None else replace(elements, covariance=covariance)
     except PathFileError as error:
         stated = [message.leaves.get(key) for key in ("OBJECT_NAME", "NORAD_CAT_ID")]
         names = tuple(object_key(str(value)) for value in stated if value not in (None, ""))
@@ -452,7 +471,7 @@ def _entry(message: _Message) -> Entry:
 def _from_markup(data: bytes, name: str) -> Iterator[_Message]:
     for message in parse_markup(data, name).all("omm"):
         leaves = {}
-        for block in ("metadata", "meanElements", "tleParameters"):
+        for block in ("covarianceMatrix", "metadata", "meanElements", "tleParameters"):
             for found in message.all(block):
                 leaves.update({one.name: one.text.strip() for one in found.children})
         yield _Message(where=f"{name}:{message.line}", leaves=leaves, is_whole=True)
@@ -515,6 +534,21 @@ def _from_csv(text: str, name: str) -> Iterator[_Message]:
             yield _Message(where=where, leaves=dict(zip(header, line, strict=False)), problem=problem)
     except csv.Error as error:
         raise PathFileError(f"{name}:{lines.line_num}: is not CSV: {error}") from None
+
+
+_COVARIANCE = re.compile(r"C[XYZ](_DOT)?_[XYZ](_DOT)?", re.ASCII)
+
+
+def _covariance(
+    record: Mapping[str, Any], epoch: Instant, orientation: Orientation, where: str
+) -> EpochCovariance | None:
+    """The covariance that a message states at the epoch of its elements; None of one without."""
+    stated = {key: str(value).strip() for key, value in record.items() if _COVARIANCE.fullmatch(key)}
+    if not any(stated.values()):
+        return None
+    frame = str(record.get("COV_REF_FRAME") or "").strip()
+    block = named_covariance({**stated, "COV_REF_FRAME": frame}, 0)
+    return read_covariance(block, tai(epoch), "TEME", orientation, where)
 
 
 def _value(record: Mapping[str, Any], key: str, where: str) -> Any:

@@ -90,7 +90,7 @@ def read_eof(
         where=f"{name}:{lines[0]}",
         words=f"{shown(kind)} of {satellite}, {_HERMITE.words}{_dropped(repeated)}",
         interpolation=_HERMITE,
-        accuracy=StatedAccuracy(f"accuracy of {kind}", total=stated) if stated else None,
+        accuracy=lambda _: StatedAccuracy(f"accuracy of {kind}", total=stated) if stated else None,
         remarks=(flaws,) if flawed else (),
     )
     return orbit_through([segment], name, wanted, center, orientation)

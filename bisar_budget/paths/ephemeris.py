@@ -6,7 +6,7 @@ other years differ by, centimetres, is not seen.
 
 import math
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
@@ -58,8 +58,8 @@ class Segment:
 
     `names` are those that a mission may choose the object by. `first` and `last` are the useable times, of TAI.
     `turn` takes places to the Earth, from axes that are not fixed to it. `accuracy` is the figure that the file
-    states of itself, `covariances` are those that it states at epochs, `remarks` are warnings. Without an
-    `interpolation` the one that fits best is taken.
+    states of itself, at a time of TAI, `covariances` are those that it states at epochs, `remarks` are warnings.
+    Without an `interpolation` the one that fits best is taken.
     """
 
     object: str
@@ -72,7 +72,7 @@ class Segment:
     interpolation: Interpolation | None = None
     axes: str = "ITRF"
     turn: Turn | None = None
-    accuracy: StatedAccuracy | None = None
+    accuracy: Callable[[Instant], StatedAccuracy | None] = lambda _: None
     covariances: Sequence[EpochCovariance] = ()
     remarks: tuple[str, ...] = ()
 
@@ -154,7 +154,7 @@ class _Between:
 
     def stated(self, instant: Instant) -> StatedAccuracy | None:
         segment = self.segment
-        return stated_of_orbit(segment.covariances, self.place, instant, self.span) or segment.accuracy
+        return stated_of_orbit(segment.covariances, self.place, instant, self.span) or segment.accuracy(tai(instant))
 
     def doubt(self, instant: Instant) -> PathDoubt:
         own, turning = PathDoubt(self._off(instant), "interpolation of the ephemeris"), self.turning_doubt(instant)

@@ -7,8 +7,10 @@
 Time is `time [s]`, counted from anywhere, or stamps of ISO 8601: `utc` with a Z at the end, `gpst` or `tai` without.
 `time [UTC]` is the same as `utc`, and a `time` without a unit is in the scale that the mission file says. Places are
 `latitude`, `longitude` and `height` above the ellipsoid of WGS-84 or `altitude` above mean sea level, or Earth-fixed
-`x`, `y`, `z`, or `east`, `north`, `up` of the scene's centre. `geoid_separation` makes a height of an altitude. Other
-columns are not read. Cells are parted by commas, semicolons or tabs. Exporters have headers of their own, see below.
+`x`, `y`, `z`, or `east`, `north`, `up` of the scene's centre. `geoid_separation` makes a height of an altitude.
+`sigma_east`, `sigma_north`, `sigma_up`, or what other programs call them, are one-sigma errors of a place; a cell of
+them without a number above 0 says nothing. Other columns are not read. Cells are parted by commas, semicolons or
+tabs. Exporters have headers of their own, see below.
 """
 
 import csv
@@ -17,14 +19,14 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import NamedTuple, NoReturn
+from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget import units
 from bisar_budget.faults import InvalidValueError, fault_words, shown
-from bisar_budget.paths.earth import Floats, earth_fixed_places
+from bisar_budget.paths.earth import Floats, Geodetic, axes_at, earth_fixed_places, geodetic_places
 from bisar_budget.paths.flight import Log, PathFileError, hold_to_bytes
 from bisar_budget.paths.instant import DAY, GPS_EPOCH, SCALES, WEEK, Instant, parse_instant
 from bisar_budget.paths.log_places import (
@@ -36,6 +38,8 @@ from bisar_budget.paths.log_places import (
     hold_to_ellipsoid,
     hold_to_scale,
     is_wgs84,
+    known_sigmas,
+    level_sigmas,
     most_left_out,
     needs_separation,
     one_instance,
@@ -53,6 +57,38 @@ _GEODETIC = ("latitude", "longitude", "height")
 _KINDS = (_GEODETIC, ("x", "y", "z"), ("east", "north", "up"))
 _STAMPS = {"utc": "utc", "gpst": "gps", "gps": "gps", "tai": "tai"}  # names of columns, or units of a time
 _SPARE = ("altitude", "geoid_separation")
+_LEVEL = ("horizontal_accuracy", "vertical_accuracy")
+_SIGMAS = tuple(tuple(f"sigma_{axis}" for axis in kind) for kind in (_KINDS[2], _KINDS[1]))
+_ACCURACY = (*_LEVEL, *_SIGMAS[0], *_SIGMAS[1])
+# Names of such columns: `sde` of RTKLIB, `std_lat`, `height_sigma`; `hAcc` of u-blox, `eph` of PX4.
+_SIGMA = r"(?:sigma|σ|sd|std|stdev|stddev|std_dev|accuracy)"
+_ALONG = r"(east|north|up|e|n|u|longitude|latitude|height|altitude|lon|lat|alt|x|y|z)"
+_SIGMA_NAME = re.compile(f"{_SIGMA}_?{_ALONG}|{_ALONG}_{_SIGMA}").fullmatch
+_LEVEL_NAMES = {
+    "horizontal_accuracy": ("horizontal_accuracy", "accuracy_horizontal", "hacc", "h_acc", "eph", "accuracy"),
+    "vertical_accuracy": (
+        "vertical_accuracy",
+        "accuracy_vertical",
+        "vacc",
+        "v_acc",
+        "epv",
+        "height_accuracy",
+        "altitude_accuracy",
+        "accuracy_height",
+    ),
+}
+_AXES = {
+    "e": "east",
+    "lon": "east",
+    "longitude": "east",
+    "n": "north",
+    "lat": "north",
+    "latitude": "north",
+    "u": "up",
+    "alt": "up",
+    "altitude": "up",
+    "height": "up",
+}
 _DIMENSIONS = {"latitude": units.ANGLE, "longitude": units.ANGLE, "time": units.TIME}
 _HEADER = re.compile(r"([^\[\]()]*)(?:\[([^\[\]]*)\])?")
 _QUOTED = re.compile('"').search
@@ -96,7 +132,8 @@ class _Vendor(NamedTuple):
 class _Header:
     """Line of the header, what parts its cells and how many there are, and the columns that are read.
 
-    `numbers` are columns of numbers, `stamp` is one of instants of a `scale`, which need a zone, have none or either.
+    `numbers` are columns of numbers, `accuracy` those of errors, whose cells may be empty. `stamp` is one of instants
+    of a `scale`, which need a zone, have none or either.
     """
 
     line: int
@@ -107,10 +144,16 @@ class _Header:
     scale: str = "utc"
     zone: Callable[[str], object] = _ZONED
     vendor: _Vendor | None = None
+    accuracy: tuple[_Column, ...] = ()
+
+    @property
+    def columns(self) -> tuple[_Column, ...]:
+        """Columns of a table: numbers, then errors."""
+        return (*self.numbers, *self.accuracy)
 
     @property
     def names(self) -> tuple[str, ...]:
-        return tuple(column.name for column in self.numbers)
+        return tuple(column.name for column in self.columns)
 
     @property
     def axes(self) -> tuple[str, ...]:
@@ -118,7 +161,7 @@ class _Header:
         return next((kind for kind in _KINDS if kind[1] in self.names), _GEODETIC)
 
     def place(self, name: str) -> int | None:
-        """Place of a column among those of numbers; None where there is none."""
+        """Place of a column in a table; None where there is none."""
         return self.names.index(name) if name in self.names else None
 
 
@@ -168,6 +211,7 @@ def read_csv(data: bytes, name: str, keys: LogKeys = NOTHING_SAID) -> Log:
         lambda kept: _earth_fixed(places[:, kept], header),
         clock_words=clock_words,
         is_earth_fixed=is_earth_fixed,
+        sigmas=_sigmas(table, header, places),
         geodetic=tuple(places) if header.axes == _GEODETIC else None,
     )
     without_fix += found.empty
@@ -330,6 +374,29 @@ def _earth_fixed(coordinates: Floats, header: _Header) -> Floats:
     return earth_fixed_places(*coordinates) if header.axes == _GEODETIC else np.ascontiguousarray(coordinates.T)
 
 
+def _sigmas(table: _Table, header: _Header, places: Floats) -> Floats | None:
+    """One-sigma errors (n, 3) east, north, up of places (3, n), NaN where none is stated; None without any. [m]"""
+    figures = {
+        column.name: table.numbers[:, header.names.index(column.name)] * column.scale for column in header.accuracy
+    }
+    local, fixed = (
+        np.column_stack([figures[name] for name in names]) if figures.keys() >= set(names) else None
+        for names in _SIGMAS
+    )
+    if local is not None:
+        return known_sigmas(local)
+    if fixed is None:
+        return level_sigmas(*(figures.get(name) for name in _LEVEL))
+    if header.axes == _GEODETIC:
+        latitude, longitude = places[:2]
+    else:
+        latitude, longitude, _ = geodetic_places(places.T)
+    where: Any = (latitude, longitude, np.zeros_like(latitude))
+    axes: Floats = np.moveaxis(np.array(axes_at(Geodetic(*where)).axes), -1, 0)
+    known = np.where(np.all(fixed > 0, axis=1, keepdims=True), fixed, np.nan)
+    return known_sigmas(np.sqrt(np.einsum("nij,nj->ni", axes**2, known**2)))
+
+
 def _text(data: bytes, name: str) -> str:
     """Text of the file, with a line feed at the end of each line."""
     hold_to_bytes(data, LARGEST, name)
@@ -366,6 +433,44 @@ def _name_of(cell: str) -> tuple[str, str | None]:
     match = _HEADER.fullmatch(cell)
     name = (match[1] if match else re.split(r"[\[(]", cell)[0]).strip().strip('"').lower()
     return name.replace(" ", "_"), match[2].strip() if match and match[2] is not None else None
+
+
+def _accuracy_of(column: str) -> str | None:
+    """The error that a column states, by its name; None of other columns."""
+    for level, names in _LEVEL_NAMES.items():
+        if column in names:
+            return level
+    match = _SIGMA_NAME(column)
+    if match is None:
+        return None
+    axis = match[1] or match[2]
+    return f"sigma_{_AXES.get(axis, axis)}"
+
+
+def _accuracy_columns(
+    cells: Sequence[str], kind: Sequence[str], refuse: Callable[[str], NoReturn]
+) -> tuple[_Column, ...]:
+    """Columns of the errors of places of a kind."""
+    found: dict[str, _Column] = {}
+    for index, cell in enumerate(cells):
+        column, unit = _name_of(cell)
+        name = _accuracy_of(column)
+        if name is None:
+            continue
+        if name in found:
+            refuse(f"has two columns of {name}")
+        in_brackets = re.search(r"\(([^()]*)\)", cell)
+        found[name] = _measured(column, index, unit or (in_brackets[1] if in_brackets else None), refuse)._replace(
+            name=name
+        )
+    for names in _SIGMAS:
+        missing = [name for name in names if name not in found]
+        if 0 < len(missing) < len(names):
+            has = next(name for name in names if name in found)
+            refuse(f"has {has} and no {missing[0]}; write all of {', '.join(names)}")
+    if kind == _KINDS[2] and _SIGMAS[1][0] in found:
+        refuse(f"has {_SIGMAS[1][0]} beside east; write {', '.join(_SIGMAS[0])}")
+    return tuple(found.values())
 
 
 def _header(lines: Sequence[str], name: str, keys: LogKeys) -> _Header:
@@ -423,6 +528,7 @@ def _header(lines: Sequence[str], name: str, keys: LogKeys) -> _Header:
             f"{name}:{at + 1}: altitude counts from mean sea level, and there is no column geoid_separation; "
             "a height counts from the ellipsoid of WGS-84"
         )
+    accuracy = _accuracy_columns(cells, kind, refuse)
     index, unit = found[times[0]]
     scale = _STAMPS.get(times[0]) or _STAMPS.get((unit or "").lower())
     if times[0] in _STAMPS and unit and _STAMPS.get(unit.lower()) != scale:
@@ -434,9 +540,10 @@ def _header(lines: Sequence[str], name: str, keys: LogKeys) -> _Header:
         time = _measured("time", index, unit, refuse)
         if keys.time_scale is not None:
             refuse(f"time counts in {time.unit}; trajectory.time_scale says of instants in which scale they are")
-        return _Header(at + 1, delimiter, len(cells), (time, *axes))
+        return _Header(at + 1, delimiter, len(cells), (time, *axes), accuracy=accuracy)
     hold_to_scale(scale, keys, f"{name}:{at + 1}")
-    return _Header(at + 1, delimiter, len(cells), tuple(axes), _Column(times[0], place=index), scale, zone)
+    stamp = _Column(times[0], place=index)
+    return _Header(at + 1, delimiter, len(cells), tuple(axes), stamp, scale, zone, accuracy=accuracy)
 
 
 def _vendor_header(
@@ -460,7 +567,9 @@ def _vendor_header(
         hold_to_scale(scale, keys, where)
     elif keys.time_scale is not None:
         raise PathFileError(f"{where}: time counts since the start of the autopilot, and is in no scale")
-    return _Header(line, delimiter, len(cells), tuple(columns.values()), stamp, scale, _EITHER, vendor)
+    accuracy = tuple(columns.pop(name) for name in _ACCURACY if name in columns)
+    numbers = tuple(columns.values())
+    return _Header(line, delimiter, len(cells), numbers, stamp, scale, _EITHER, vendor, accuracy)
 
 
 def _example(scale: str) -> str:
@@ -500,7 +609,7 @@ class _Rows:
 def _all_rows(lines: list[str], header: _Header, name: str) -> _Rows:
     """Every row behind the header; a chunk of lines at a time, which is fast and needs little memory."""
     nothing = np.zeros(0)
-    empty = _Table(np.zeros(0, dtype=np.int64), np.zeros((0, len(header.numbers))), nothing, nothing)
+    empty = _Table(np.zeros(0, dtype=np.int64), np.zeros((0, len(header.columns))), nothing, nothing)
     rows = _Rows([empty], {}, most_left_out(len(lines) - header.line))
     is_any = False
     for first in range(header.line, len(lines), _CHUNK):
@@ -517,7 +626,7 @@ def _all_rows(lines: list[str], header: _Header, name: str) -> _Rows:
 def _read_rows(texts: list[str], lines: NDArray[np.int64], header: _Header, name: str, rows: _Rows) -> None:
     """Read some rows at once; where that fails, halve them until the rows that are none are found."""
     read = _plain_cells(texts, header) or _quoted_cells(texts, header)
-    if read is not None and np.isfinite(read[0]).all():
+    if read is not None and np.isfinite(read[0][:, : len(header.numbers)]).all():
         numbers, stamps = read
         instants = (np.zeros(len(lines)),) * 2 if stamps is None else _instants(stamps, header)
         if instants is not None:
@@ -563,7 +672,12 @@ def _plain_cells(texts: list[str], header: _Header) -> tuple[Floats, list[str] |
         return None
     try:
         numbers = np.loadtxt(
-            texts, delimiter=delimiter, comments=None, usecols=[one.place for one in header.numbers], ndmin=2
+            texts,
+            delimiter=delimiter,
+            comments=None,
+            usecols=[one.place for one in header.columns],
+            converters={one.place: _or_nan for one in header.accuracy} or None,
+            ndmin=2,
         )
     except ValueError:
         return None
@@ -582,10 +696,19 @@ def _quoted_cells(texts: list[str], header: _Header) -> tuple[Floats, list[str] 
         cells = [[row[column.place] for row in rows] for column in header.numbers]
         if any("".join(column).encode().translate(None, _IN_NUMBERS) for column in cells):
             return None
-        numbers = np.array([list(map(float, column)) for column in cells]).T
+        errors = [[_or_nan(row[column.place]) for row in rows] for column in header.accuracy]
+        numbers = np.array([list(map(float, column)) for column in cells] + errors).T
     except (csv.Error, ValueError):
         return None
     return numbers, None if header.stamp is None else [row[header.stamp.place].strip() for row in rows]
+
+
+def _or_nan(cell: str) -> float:
+    """The number of a cell; NaN of one that has none."""
+    try:
+        return float(cell)
+    except ValueError:
+        return math.nan
 
 
 def _instants(texts: list[str], header: _Header) -> tuple[Floats, Floats] | None:
@@ -670,6 +793,7 @@ def _vendor(words: str, signs: str, least_fix: int = 0, **columns: _Column) -> _
 
 _LATITUDE, _LONGITUDE = _Column("latitude", "deg", _DEGREE), _Column("longitude", "deg", _DEGREE)
 _FIX = _Column("fix")
+_HORIZONTAL, _VERTICAL = (_Column(name, "m") for name in _LEVEL)
 _UNIX = _Column("unix", "us", 1e-6)
 _VENDORS = (
     _Vendor(
@@ -694,6 +818,8 @@ _VENDORS = (
         alt_ellipsoid=_Column("height", "mm", 1e-3),
         alt=_Column("altitude", "mm", 1e-3),
         fix_type=_FIX,
+        eph=_HORIZONTAL,
+        epv=_VERTICAL,
     ),
     _vendor(
         "CSV of PX4's GPS topic",
@@ -705,6 +831,8 @@ _VENDORS = (
         altitude_ellipsoid_m=_Column("height", "m"),
         altitude_msl_m=_Column("altitude", "m"),
         fix_type=_FIX,
+        eph=_HORIZONTAL,
+        epv=_VERTICAL,
     ),
     _vendor(
         "CSV of PX4's global position",
@@ -716,6 +844,8 @@ _VENDORS = (
         lon=_LONGITUDE,
         alt_ellipsoid=_Column("height", "m"),
         alt=_Column("altitude", "m"),
+        eph=_HORIZONTAL,
+        epv=_VERTICAL,
     ),
     _vendor(
         "GPS rows of ArduPilot",
@@ -728,6 +858,8 @@ _VENDORS = (
         alt=_Column("altitude", "m"),
         status=_FIX,
         i=_Column("receiver"),
+        hacc=_HORIZONTAL,
+        vacc=_VERTICAL,
     ),
 )
 
@@ -741,19 +873,34 @@ def _vendor_of(cells: Sequence[str]) -> _Vendor | None:
 def _dataflash_as_csv(lines: list[str]) -> list[str]:
     """Lines of a dataflash log with its GPS rows alone, and their FMT row as the header; other lines as they are.
 
-    Each line keeps its number.
+    Each line keeps its number. HAcc and VAcc of the row GPA of the same time and receiver are two cells more.
     """
     if not any(line.startswith("FMT,") for line in lines[:100]):
         return lines
+    names: dict[str, list[str]] = {}
+    accuracies: dict[tuple[str, ...], str] = {}
+    for line in lines:
+        cells = [cell.strip() for cell in line.split(",")] if line.startswith(("FMT,", "GPA,")) else []
+        if cells[:1] == ["FMT"] and cells[3:4] in (["GPS"], ["GPA"]):
+            names.setdefault(cells[3], cells[5:])
+        elif cells and {"HAcc", "VAcc"}.issubset(names.get("GPA", ())) and len(cells) > len(names["GPA"]):
+            row = dict(zip(names["GPA"], cells[1:], strict=False))
+            accuracies[_time_and_receiver(row)] = f",{row['HAcc']},{row['VAcc']}"
+    more = ",HAcc,VAcc" if accuracies else ""
     found = []
     header = ""
     for line in lines:
         kept = ""
-        if line.startswith("GPS,"):
-            kept = line if header else ""
-        elif line.startswith("FMT,") and not header:
-            cells = [cell.strip() for cell in line.split(",")]
-            if cells[3:4] == ["GPS"]:
-                kept = header = ",".join(["GPS", *cells[5:]])
+        if line.startswith("GPS,") and header:
+            kept = line
+            if more:
+                row = dict(zip(names["GPS"], (cell.strip() for cell in line.split(",")[1:]), strict=False))
+                kept = line.rstrip() + accuracies.get(_time_and_receiver(row), ",,")
+        elif line.startswith("FMT,") and not header and line.split(",")[3].strip() == "GPS":
+            kept = header = ",".join(["GPS", *names["GPS"]]) + more
         found.append(kept)
     return found
+
+
+def _time_and_receiver(row: Mapping[str, str]) -> tuple[str, ...]:
+    return tuple(row.get(name, "") for name in ("TimeUS", "I"))

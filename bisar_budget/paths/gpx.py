@@ -4,7 +4,7 @@
     <geoidheight>46.9</geoidheight></trkpt>
 
 An elevation is above mean sea level; `geoidheight` is the height of the geoid above the ellipsoid. Times are in UTC,
-or have an offset from it.
+or have an offset from it. A `fix` of none or 2d states that a point has no place or no height.
 
 Source: http://www.topografix.com/GPX/1/1/, types wptType and trkType. The tree is that of `messages.parse_markup`: it
 refuses document types, bounds sizes and knows lines, where gpxpy does not.
@@ -23,6 +23,7 @@ from bisar_budget.paths.instant import Instant, parse_stamp
 from bisar_budget.paths.log_places import (
     LogKeys,
     LogRecords,
+    counted,
     from_sea_level,
     geodetic_log,
     hold_to_scale,
@@ -33,6 +34,7 @@ _ROOT = re.compile(rb"<(?:[\w.-]+:)?gpx[\s>]")
 _OFFSET = re.compile(
     r"([\d-]{10}T[\d:.]{8,21})([+-])(\d\d)(?::?([0-5]\d))?", re.ASCII
 )  # extended, or basic form of ISO 8601
+_WITHOUT_HEIGHT = ("none", "2d")
 _LISTED = 10  # tracks that an error names
 
 
@@ -97,16 +99,19 @@ def _track_words(tracks: Sequence[MessageElement], index: int) -> str:
 
 
 def _read_track(track: MessageElement, said: str, name: str, keys: LogKeys) -> Log:
-    """The log of a track; a point that cannot be used is left out."""
-    read, lines, broken = [], [], {}
+    """The log of a track; a point that cannot be used, or has no fix in three dimensions, is left out."""
+    read, lines, broken, without_fix = [], [], {}, 0
     for point in track.all("trkpt"):
+        if any(child.name == "fix" and child.text.strip().lower() in _WITHOUT_HEIGHT for child in point.children):
+            without_fix += 1
+            continue
         try:
             read.append(_point(point, name, keys))
             lines.append(point.line)
         except PathFileError as fault:
             broken[point.line] = fault
     if not lines:
-        raise broken[min(broken)]
+        raise broken[min(broken)] if broken else PathFileError(f"{name}: has no point with a fix in three dimensions")
     records = LogRecords(name, len(lines), lines, {line: str(fault) for line, fault in broken.items()})
     instants = [instant for instant, _ in read]
     start = instants[0]
@@ -117,6 +122,8 @@ def _read_track(track: MessageElement, said: str, name: str, keys: LogKeys) -> L
     heights = from_sea_level(elevations, None if has_none.all() else own, keys, name)
     segments = sum(1 for segment in track.all("trkseg") if any(segment.all("trkpt")))
     words = f"GPX track{said}" + (f" of {segments} segments" if segments > 1 else "")
+    if without_fix:
+        words += f", {counted(without_fix, 'point')} without a fix in three dimensions left out"
     times = np.array([instant.since(start) for instant in instants])
     places = (np.radians(degrees_north), np.radians(degrees_east), heights)
     return geodetic_log(records, words, times, start, "utc", places)

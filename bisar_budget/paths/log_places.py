@@ -22,6 +22,7 @@ _WGS84 = re.compile(
 _LEAPS_KNOWN = 61587  # MJD, 2027-07-01: Bulletin C 72 has no leap second before
 _CUT_SHARE = 1.5  # fixes with the same stamp, from which on a recorder is said to have cut fractions of seconds
 _WHOLE_S = 1e-6
+_LARGEST_SIGMA_M = 1e6  # of a place; a receiver without a fix writes more
 _LOWEST_M, _HIGHEST_M = -12e3, 100e3  # of what flies; below is the deepest trench
 
 
@@ -309,6 +310,25 @@ def needs_separation(problem: str) -> PathFileError:
         "accepted: trajectory.geoid_separation: 47 m and the like, the height of the geoid above the ellipsoid there",
         "0 m where the heights are above the ellipsoid",
     )
+
+
+def level_sigmas(horizontal: Floats | None, vertical: Floats | None) -> Floats | None:
+    """Sigmas (n, 3) east, north, up of figures without a direction on the level; None where none is known. [m]
+
+    The error may lie along one axis, which has all of it. Where one of the two figures is known alone, it counts
+    along every axis. A figure that is not positive is not known.
+    """
+    stated = [values for values in (horizontal, vertical) if values is not None]
+    if not stated:
+        return None
+    level, up = (np.where(a > 0, a, b) for a, b in ((stated[0], stated[-1]), (stated[-1], stated[0])))
+    return known_sigmas(np.column_stack([level, level, up]))
+
+
+def known_sigmas(sigmas: Floats) -> Floats | None:
+    """Sigmas (n, 3) of a log, NaN where one is not positive; None where no place has any. [m]"""
+    found = np.where(np.all(sigmas > 0, axis=1, keepdims=True), np.minimum(sigmas, _LARGEST_SIGMA_M), np.nan)
+    return None if np.isnan(found).all() else found
 
 
 def geodetic_log(

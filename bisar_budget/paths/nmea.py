@@ -27,11 +27,20 @@ import numpy as np
 
 from bisar_budget.extras import install_command
 from bisar_budget.faults import shown
-from bisar_budget.paths.earth import Floats
+from bisar_budget.paths.earth import EQUATORIAL_RADIUS, Floats
 from bisar_budget.paths.flight import Log, PathFileError, hold_to_bytes
 from bisar_budget.paths.instant import DAY, Instant, parse_instant
-from bisar_budget.paths.log_places import LogKeys, LogRecords, counted, from_sea_level, geodetic_log, hold_to_scale
+from bisar_budget.paths.log_places import (
+    LogKeys,
+    LogRecords,
+    counted,
+    from_sea_level,
+    geodetic_log,
+    hold_to_scale,
+    most_left_out,
+)
 from bisar_budget.paths.messages import number_in
+from bisar_budget.units import format_quantity
 
 LARGEST = 200_000_000  # bytes; ten hours at 10 Hz of eight sentences
 _LONGEST = 256  # characters of a sentence; the standard has 82
@@ -41,6 +50,7 @@ _CLOCK = re.compile(r"([01]\d|2[0-3])([0-5]\d)([0-5]\d(?:\.\d{1,9})?|60(?:\.0{1,
 _ANGLE = re.compile(r"(\d{1,3})([0-5]\d(?:\.\d{1,12})?)", re.ASCII)
 _NUMBER = re.compile(r"[+-]?\d{1,9}(?:\.\d{0,12})?", re.ASCII)
 _TIME_STEP_S = 1e-4  # less than between two fixes, more than a rounding of days
+_SAME_PLACE_M = 0.5  # of two sentences; four decimals of a minute are 0.2 m on each axis
 _KINDS = ("GGA", "GNS")  # of sentences with a place
 _DATES = ("RMC", "ZDA")
 _BESIDE = ("GST", "DTM")  # of sentences beside fixes; there may be one for each
@@ -49,7 +59,10 @@ _GST_REACH_S = 5.0  # from a fix to a GST that speaks for it; receivers write on
 
 
 class _Quality(NamedTuple):
-    """The quality that a receiver states of a fix: its words, and the one-sigma error that is usual then [m]."""
+    """The quality that a receiver states of a fix: its words, and the one-sigma error that is usual then [m].
+
+    The words begin with the sentence that states it.
+    """
 
     words: str
     typical_sigma_m: float
@@ -58,21 +71,21 @@ class _Quality(NamedTuple):
 # GGA: 0 is none, 7 is put in by hand, 8 is a simulator's. Dead reckoning is no better than an autonomous fix, a
 # precise fix no better than a differential one.
 _QUALITIES = {
-    "1": _Quality("quality 1, autonomous", 3.0),
-    "2": _Quality("quality 2, differential", 1.0),
-    "3": _Quality("quality 3, precise", 1.0),
-    "4": _Quality("quality 4, RTK fixed", 0.01),
-    "5": _Quality("quality 5, RTK float", 0.3),
-    "6": _Quality("quality 6, dead reckoning", 3.0),
+    "1": _Quality("GGA quality 1, autonomous", 3.0),
+    "2": _Quality("GGA quality 2, differential", 1.0),
+    "3": _Quality("GGA quality 3, precise", 1.0),
+    "4": _Quality("GGA quality 4, RTK fixed", 0.01),
+    "5": _Quality("GGA quality 5, RTK float", 0.3),
+    "6": _Quality("GGA quality 6, dead reckoning", 3.0),
 }
 # GNS, one of each system: N is none, M is put in by hand, S is a simulator's.
 _MODES = {
-    "A": _Quality("mode A, autonomous", 3.0),
-    "D": _Quality("mode D, differential", 1.0),
-    "P": _Quality("mode P, precise", 1.0),
-    "R": _Quality("mode R, RTK fixed", 0.01),
-    "F": _Quality("mode F, RTK float", 0.3),
-    "E": _Quality("mode E, dead reckoning", 3.0),
+    "A": _Quality("GNS mode A, autonomous", 3.0),
+    "D": _Quality("GNS mode D, differential", 1.0),
+    "P": _Quality("GNS mode P, precise", 1.0),
+    "R": _Quality("GNS mode R, RTK fixed", 0.01),
+    "F": _Quality("GNS mode F, RTK float", 0.3),
+    "E": _Quality("GNS mode E, dead reckoning", 3.0),
 }
 
 
@@ -89,6 +102,12 @@ class _Fix(NamedTuple):
     height: float
     separation: float
     quality: _Quality
+
+    def distance(self, other: "_Fix") -> float:
+        """Distance of another place, a short one. [m]"""
+        north = EQUATORIAL_RADIUS * (self.latitude - other.latitude)
+        turned = math.remainder(self.longitude - other.longitude, 2 * math.pi)
+        return math.hypot(north, EQUATORIAL_RADIUS * math.cos(self.latitude) * turned, self.height - other.height)
 
 
 class _Accuracy(NamedTuple):
@@ -128,7 +147,7 @@ def is_nmea(data: bytes) -> bool:
 def read_nmea(data: bytes, name: str, keys: LogKeys) -> Log:
     """Read a log of NMEA 0183 of at most `LARGEST` bytes, as every reader of `LOG_FORMATS` does; needs pynmea2.
 
-    Of GGA and GNS those count of which there are more.
+    Of GGA and GNS those count of which there are more; both must have the same places, and the worse quality counts.
     """
     hold_to_scale("utc", keys, name)
     hold_to_bytes(data, LARGEST, name)
@@ -136,6 +155,7 @@ def read_nmea(data: bytes, name: str, keys: LogKeys) -> Log:
     talker = found.talker_of_fixes(keys, name)
     found.hold_to_datum(talker, name)
     kind = max(_KINDS, key=lambda kind: len(found.fixes[talker, kind]))
+    found.hold_to_one_solution(talker, kind, name)
     return _log(talker, kind, found, name, keys)
 
 
@@ -181,13 +201,16 @@ class _Sentences:
 
     def _words(self, talker: str) -> str:
         """How many fixes of which quality a talker has, the most frequent first."""
-        of_talker = (f"{kind} {fix.quality.words}" for kind in _KINDS for fix in self.fixes.get((talker, kind), ()))
+        of_talker = (fix.quality.words for kind in _KINDS for fix in self.fixes.get((talker, kind), ()))
         return ", ".join(f"{count} of {words}" for words, count in Counter(of_talker).most_common(2))
+
+    def other_receivers(self, talker: str) -> set[str]:
+        """Talkers that have fixes of their own, besides one: what they say of datum and accuracy is of those."""
+        return {speaker for (speaker, _), fixes in self.fixes.items() if fixes} - {talker}
 
     def hold_to_datum(self, talker: str, name: str) -> None:
         """Refuse places of another datum than WGS-84, which a talker says itself, or another that has no places."""
-        others = {talker for (talker, _), fixes in self.fixes.items() if fixes} - {talker}
-        for speaker in self.datums.keys() - others:
+        for speaker in self.datums.keys() - self.other_receivers(talker):
             for line, datum in self.datums[speaker]:
                 if not datum.is_wgs84:
                     raise PathFileError(
@@ -196,14 +219,54 @@ class _Sentences:
                         "Let the receiver, or its converter, write WGS-84",
                     )
 
+    def hold_to_one_solution(self, talker: str, kind: str, name: str) -> None:
+        """Refuse GGA and GNS of two solutions; give fixes of a kind the worse quality of both at their time."""
+        other_kind = next(one for one in _KINDS if one != kind)
+        fixes, others = self.fixes[talker, kind], self.fixes[talker, other_kind]
+        if not others:
+            return
+        at: defaultdict[int, list[int]] = defaultdict(list)
+        for index, fix in enumerate(fixes):
+            at[round(fix.seconds / _TIME_STEP_S)].append(index)
+        between = (fixes[0].seconds, fixes[-1].seconds)
+        alone, apart, alike = [], [], 0
+        worse: dict[int, _Quality] = {}
+        for other in others:
+            same = at.get(round(other.seconds / _TIME_STEP_S))
+            if same is None:
+                alone += [other] if between[0] < other.seconds < between[1] else []
+                continue
+            index = min(same, key=lambda one: abs(fixes[one].line - other.line))  # a log may have several days
+            fix = fixes[index]
+            alike += 1
+            if fix.distance(other) > _SAME_PLACE_M:
+                apart.append((fix, other))
+            if other.quality.typical_sigma_m > fix.quality.typical_sigma_m:
+                worse[index] = other.quality
+        if len(apart) > most_left_out(alike):
+            fix, other = max(apart, key=lambda pair: pair[0].distance(pair[1]))
+            says = f"up to {format_quantity(fix.distance(other), 'm')} apart at the same time"
+            at_line = other.line
+        elif len(alone) > alike:
+            says, at_line = "at times of their own", alone[0].line
+        else:
+            for index, quality in worse.items():
+                fixes[index] = fixes[index]._replace(quality=quality)
+            return
+        raise PathFileError(
+            f"{name}:{at_line}: GGA and GNS of the talker {talker} are {says}: places of two solutions",
+            f"accepted: GGA and GNS of the same places, to {format_quantity(_SAME_PLACE_M, 'm')}",
+            f"Leave out the sentences of one solution: {self._words(talker)}",
+        )
+
     def dates_for(self, talker: str) -> Sequence[tuple[int, Instant]]:
         """Lines of dates and the dates: those of a talker, or else of all."""
         return self.dates.get(talker) or sorted(date for dates in self.dates.values() for date in dates)
 
     def accuracies_for(self, talker: str) -> Sequence[_Accuracy]:
-        """Errors that a talker states, or else all: of a receiver that states them under another name."""
-        own = self.accuracies.get(talker)
-        return own or sorted(gst for of_talker in self.accuracies.values() for gst in of_talker)
+        """Errors that a talker states, or else those of talkers without fixes: names of the same receiver."""
+        speakers = self.accuracies.keys() - self.other_receivers(talker)
+        return self.accuracies.get(talker) or sorted(gst for one in speakers for gst in self.accuracies[one])
 
     def lost_words(self) -> str:
         """How many sentences are left out whose checksum is wrong or whose date is none, for reports."""
@@ -283,7 +346,7 @@ def _log(talker: str, kind: str, found: _Sentences, name: str, keys: LogKeys) ->
         clock="" if dates else "day",
         sigmas=_sigmas(at, found.accuracies_for(talker), dates, fixes[len(fixes) // 2].seconds),
         typical_sigmas=np.array([quality.typical_sigma_m for quality in qualities]),
-        quality_words=lambda i: f"{kind} {qualities[i].words}",
+        quality_words=lambda i: qualities[i].words,
     )
 
 

@@ -42,11 +42,12 @@ _SECONDS = re.compile(r"\d\d(\.\d{1,12})?Z?", re.ASCII)
 _SYSTEMS = ("UTC", *TAI_LESS)
 _HIGHEST_DEGREE = 31
 _VECTOR = ("X", "Y", "Z", "X_DOT", "Y_DOT", "Z_DOT")
+_TRIANGLE = [[f"C{row}_{column}" for column in _VECTOR[: index + 1]] for index, row in enumerate(_VECTOR)]
 _CELESTIAL_AXES = (*_EQUINOX_OF_DATE, *_CELESTIAL)
 
 
 @dataclass
-class _CovarianceBlock:
+class CovarianceBlock:
     """Covariance of a message: its line, epoch, reference frame (empty: the ephemeris') and rows of its triangle."""
 
     line: int
@@ -65,7 +66,7 @@ class _EphemerisBlock:
     line: int
     metadata: Mapping[str, tuple[int, str]]
     rows: Sequence[tuple[int, str, Sequence[str]]]
-    covariances: Sequence[_CovarianceBlock] = ()
+    covariances: Sequence[CovarianceBlock] = ()
 
 
 def read_oem(
@@ -167,15 +168,18 @@ def _segment(block: _EphemerisBlock, name: str, orientation: Orientation) -> Seg
         interpolation=interpolation,
         axes=frame,
         turn=_turn(frame, orientation, at_line),
-        covariances=[_covariance(one, frame, system, orientation, name) for one in block.covariances],
+        covariances=[
+            read_covariance(one, _time(one.line, one.epoch, system, name), frame, orientation, name)
+            for one in block.covariances
+        ],
     )
 
 
-def _covariance(
-    block: _CovarianceBlock, frame: str, system: str, orientation: Orientation, name: str
+def read_covariance(
+    block: CovarianceBlock, time: Instant, frame: str, orientation: Orientation, name: str
 ) -> EpochCovariance:
-    """A covariance of the message, in metres and seconds."""
-    where = f"{name}:{block.line}"
+    """A covariance of a message of CCSDS at a time of TAI, in metres and seconds; `frame` is that of the message."""
+    where = f"{name}:{block.line}" if block.line else name
     if [len(cells) for _, cells in block.rows] != list(range(1, 7)):
         said = ", ".join(str(len(cells)) for _, cells in block.rows) or "no"
         raise PathFileError(
@@ -186,9 +190,8 @@ def _covariance(
         for column, cell in enumerate(cells):
             number = number_in(cell)
             if number is None or not math.isfinite(number):
-                raise PathFileError(
-                    f"{name}:{line}: must be a number of km**2, km**2/s or km**2/s**2 (got {shown(cell)})"
-                )
+                at = f"{name}:{line}" if line else name
+                raise PathFileError(f"{at}: must be a number of km**2, km**2/s or km**2/s**2 (got {shown(cell)})")
             values[index, column] = values[column, index] = 1e6 * number
     try:
         values = held_to_covariance(values)
@@ -200,7 +203,7 @@ def _covariance(
         axes = "earth"
     elif axes is None and own in _CELESTIAL_AXES:
         axes, turn = "stars", _turn(own, orientation, where)
-    return EpochCovariance(_time(block.line, block.epoch, system, name), values, axes, turn)
+    return EpochCovariance(time, values, axes, turn)
 
 
 def _not_stated(metadata: Mapping[str, tuple[int, str]]) -> str:
@@ -281,7 +284,7 @@ def _from_keywords(text: str, name: str) -> Iterator[_EphemerisBlock]:
     lines = ((at, line.strip()) for at, line in enumerate(text.split("\n"), 1))
     rows: list[tuple[int, str, Sequence[str]]] = []
     metadata: dict[str, tuple[int, str]] | None = None
-    covariances: list[_CovarianceBlock] = []
+    covariances: list[CovarianceBlock] = []
     began = 0
     state = "nothing"
     for at, line in lines:
@@ -326,11 +329,11 @@ def _from_keywords(text: str, name: str) -> Iterator[_EphemerisBlock]:
         yield _EphemerisBlock(began, metadata, rows, covariances)
 
 
-def _add_to_covariances(found: list[_CovarianceBlock], at: int, line: str, name: str) -> None:
+def _add_to_covariances(found: list[CovarianceBlock], at: int, line: str, name: str) -> None:
     """Take a line between COVARIANCE_START and COVARIANCE_STOP: an epoch, a frame or a row of a triangle."""
     key, equals, value = (part.strip() for part in line.partition("="))
     if key == "EPOCH" and equals:
-        found.append(_CovarianceBlock(at, value))
+        found.append(CovarianceBlock(at, value))
     elif not found:
         raise PathFileError(f"{name}:{at}: a covariance must begin with EPOCH (got {shown(line)})")
     elif equals:
@@ -355,13 +358,17 @@ def _from_markup(data: bytes, name: str) -> Iterator[_EphemerisBlock]:
             yield _EphemerisBlock(segment.line, metadata, rows, covariances)
 
 
-def _matrix(matrix: MessageElement) -> _CovarianceBlock:
+def _matrix(matrix: MessageElement) -> CovarianceBlock:
     """A covariance of XML, which names each element of the lower triangle: CX_X, CY_X, CY_Y, …"""
-    parts = {one.name: one for one in matrix.children}
-    names = [[f"C{row}_{column}" for column in _VECTOR[: index + 1]] for index, row in enumerate(_VECTOR)]
-    rows = [[parts[key].text.strip() for key in of_row if key in parts] for of_row in names]
-    epoch, frame = (parts[key].text.strip() if key in parts else "" for key in ("EPOCH", "COV_REF_FRAME"))
-    return _CovarianceBlock(matrix.line, epoch, frame, [(matrix.line, row) for row in rows])
+    return named_covariance({one.name: one.text.strip() for one in matrix.children}, matrix.line)
+
+
+def named_covariance(leaves: Mapping[str, str], line: int) -> CovarianceBlock:
+    """A covariance whose elements have keywords of their own; an element that is empty is not there."""
+    rows: list[tuple[int, Sequence[str]]] = [
+        (line, [leaves[key] for key in of_row if leaves.get(key)]) for of_row in _TRIANGLE
+    ]
+    return CovarianceBlock(line, leaves.get("EPOCH", ""), leaves.get("COV_REF_FRAME", ""), rows)
 
 
 def _state(state: MessageElement, name: str) -> tuple[int, str, Sequence[str]]:

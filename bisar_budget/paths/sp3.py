@@ -4,13 +4,17 @@ Sources: S. Hilla, The Extended Standard Product 3 Orbit Format (SP3-c), 2010, a
 of a satellite's centre of mass in the Earth-fixed axes that the header names.
 """
 
+import math
 import re
+from bisect import bisect_left
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import pairwise
 
 from bisar_budget.faults import shown
-from bisar_budget.paths.accuracy import StatedAccuracy
+from bisar_budget.geometry import Vector
+from bisar_budget.paths.accuracy import StatedAccuracy, diagonal
 from bisar_budget.paths.ephemeris import APART, OWN_VELOCITY, USUAL_DEGREE, Interpolation, Segment, orbit_through
 from bisar_budget.paths.ephemeris import velocity_off as off_places
 from bisar_budget.paths.flight import Orbit, PathFileError, Sample
@@ -37,6 +41,7 @@ class _Satellite:
     accuracy: float = 0.0  # m
     samples: list[Sample] = field(default_factory=list)
     lines: list[int] = field(default_factory=list)
+    deviations: list[Vector | None] = field(default_factory=list)  # standard deviations of each place, m
     breaks: set[int] = field(default_factory=set)
     predicted: Instant | None = None  # time of the first place that is, of TAI
 
@@ -84,11 +89,12 @@ class _Heading:
             raise PathFileError(f"{name}:1: must begin like #cP or #dV, as SP3 does (got {shown(first[:20])})")
         self.frame = shown(first[46:51].strip()) or "ITRF"
         self.system = "GPS"
+        self.base = 0.0  # of the exponents of standard deviations; 0 where there are none
         self.nameless = 0  # places whose satellite cannot be read
         self.broken: dict[int, str] = {}  # lines that cannot be used otherwise, and what is wrong with each
         ids: list[str] = []
         exponents: list[str] = []
-        has_system = False
+        has_system = has_base = False
         for at, line in enumerate(lines, 1):
             if line[:1] == "*":
                 self.begins = at
@@ -98,6 +104,9 @@ class _Heading:
                 exponents += cells
             elif line[:2] == "+ ":
                 ids += cells
+            elif line[:2] == "%f" and not has_base:
+                has_base = True
+                self.base = number_in(line[3:13]) or 0.0
             elif line[:2] == "%c" and not has_system:
                 has_system = True
                 self.system = line[9:12].strip().upper().replace("CCC", "GPS") or "GPS"
@@ -117,6 +126,22 @@ def _accuracy(exponent: str) -> float:
     """Accuracy of 2ⁿ mm; 0 is not known, and more than 2³⁰ mm is no orbit. [m]"""
     text = exponent.strip()
     return 1e-3 * 2 ** int(text) if re.fullmatch(r"\d{1,2}", text, re.ASCII) and 0 < int(text) <= 30 else 0.0
+
+
+def _deviations(line: str, base: float) -> Vector | None:
+    """Standard deviations of the place of a line, baseⁿ mm; None of a line that states none. [m]
+
+    Where an axis has none, it may be as bad as the worst of the others. Three zeros are what a line without has.
+    """
+    if base <= 1:
+        return None
+    cells = [line[first : first + 2].strip() for first in (61, 64, 67)]
+    stated = {axis: int(cell) for axis, cell in enumerate(cells) if re.fullmatch(r"\d{1,2}", cell, re.ASCII)}
+    if not any(stated.values()):
+        return None
+    worst = max(stated.values())
+    x, y, z = (1e-3 * base ** stated.get(axis, worst) for axis in range(3))
+    return (x, y, z)
 
 
 def _id(written: str) -> str:
@@ -205,10 +230,12 @@ def _place(
             return None
         satellite.samples.pop()  # nobody knows which of them it is
         satellite.lines.pop()
+        satellite.deviations.pop()
         satellite.breaks.add(len(satellite.samples))
         raise PathFileError(f"{where}: {satellite_id} has two places at one epoch")
     satellite.samples.append(Sample(time, (1000 * x, 1000 * y, 1000 * z), (0.0, 0.0, 0.0)))
     satellite.lines.append(at)
+    satellite.deviations.append(_deviations(line, header.base))
     return satellite, len(satellite.samples) - 1
 
 
@@ -271,7 +298,6 @@ def _segments(satellite: _Satellite, header: _Heading, name: str, center: Instan
         has_velocity = all(any(one.velocity) for one in part) and off_places(part) <= OWN_VELOCITY
         hermite = Interpolation(True, USUAL_DEGREE)
         used = hermite if has_velocity and len(part) >= hermite.nodes else None
-        stated = satellite.accuracy
         yield Segment(
             object=satellite.id,
             names=(object_key(satellite.id),),
@@ -281,6 +307,18 @@ def _segments(satellite: _Satellite, header: _Heading, name: str, center: Instan
             where=f"{name}:{satellite.lines[first]}",
             words=f"SP3 of {satellite.id}, {header.frame}{nameless}" + (f", {used.words}" if used else ""),
             interpolation=used,
-            accuracy=StatedAccuracy(f"accuracy of {satellite.id}", total=stated) if stated else None,
+            accuracy=partial(_stated, satellite, range(first, last)),
             remarks=(f"{name}: places of {satellite.id} around the aperture are predicted",) if is_predicted else (),
         )
+
+
+def _stated(satellite: _Satellite, stretch: range, time: Instant) -> StatedAccuracy | None:
+    """Accuracy at a time of TAI: that of the header, or deviations of the places around it where they are more."""
+    after = bisect_left(satellite.samples, time, stretch.start, stretch.stop, key=lambda one: one.time)
+    around = {min(max(index, stretch.start), stretch.stop - 1) for index in (after - 1, after)}
+    known = [deviations for index in around if (deviations := satellite.deviations[index]) is not None]
+    variances = [max(axis) ** 2 for axis in zip(*known, strict=True)]
+    if math.fsum(variances) > satellite.accuracy**2:
+        return StatedAccuracy(f"standard deviations of {satellite.id}", diagonal(variances))
+    total = satellite.accuracy
+    return StatedAccuracy(f"accuracy of {satellite.id}", total=total) if total else None

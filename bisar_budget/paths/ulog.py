@@ -2,8 +2,8 @@
 
 A ULog is messages of a size, a type and a payload: formats of topics (F), names of topics by a number (A), and
 records of them (D). The topics `vehicle_gps_position` and `sensor_gps` have their own UTC, and heights above the
-ellipsoid; `vehicle_global_position` counts from the start of the autopilot, and gets UTC from the GPS topic. Attitude
-is not read.
+ellipsoid; `vehicle_global_position` counts from the start of the autopilot, and gets UTC from the GPS topic. Both
+state standard deviations of each place, `eph` on the level and `epv` of the height. Attitude is not read.
 
 Source: PX4 user guide, "ULog File Format"; PX4-Autopilot msg/SensorGps.msg (latitude_deg and so on, before release
 1.14 lat in 1e-7 deg and alt in mm) and msg/versioned/VehicleGlobalPosition.msg. pyulog expands every topic of a file
@@ -28,6 +28,7 @@ from bisar_budget.paths.log_places import (
     geodetic_log,
     hold_to_ellipsoid,
     hold_to_scale,
+    level_sigmas,
     one_instance,
     unix_instant,
 )
@@ -54,6 +55,7 @@ _LONGEST = 10_000  # bytes of a message of an unknown type, which is skipped
 _GPS, _GLOBAL = ("vehicle_gps_position", "sensor_gps"), "vehicle_global_position"
 _LATEST = 1 << 60  # µs; the year 38 000
 _LEAST_FIX = 3  # in three dimensions
+_ACCURACY = ("eph", "epv")  # m
 _VALID = ("lat_lon_valid", "alt_valid")  # of the global position, since release 1.16
 _CLOCKS_APART_S = 1.0  # jitter of a message of the receiver; more, and its time is not that of the record
 
@@ -198,7 +200,9 @@ def _log(
         height = from_sea_level(topic.column(units.altitude) * units.metres, separations, keys, name)
     records = LogRecords(name, len(times))
     said = said if keys.instance is None else f", instance {keys.instance}"
-    return geodetic_log(records, f"ULog {topic.name}{said}", times, start, "utc", (latitude, longitude, height))
+    sigmas = level_sigmas(*(topic.column(field) if topic.has(field) else None for field in _ACCURACY))
+    places = (latitude, longitude, height)
+    return geodetic_log(records, f"ULog {topic.name}{said}", times, start, "utc", places, sigmas)
 
 
 # ---------------------------------------------------------------------- messages
@@ -287,10 +291,10 @@ def _layout(topic: str, fields: str, where: str) -> tuple[np.dtype[np.void], _Un
         raise PathFileError(
             f"{where}: {topic} has no field {missing[0] if missing else 'of a latitude and a height'}"
         )
-    optional = _VALID if topic == _GLOBAL else ()
+    optional = (*_ACCURACY, *(_VALID if topic == _GLOBAL else ()))
     wanted = [field for field in (*needed, *known[:4], *optional) if field in found]
     formats, offsets = zip(*(found[field] for field in wanted), strict=True)
     for field, kind in zip(wanted, formats, strict=True):
-        if np.dtype(kind).kind not in ("iuf" if field in known[:4] else "iu"):
+        if np.dtype(kind).kind not in ("iuf" if field in (*known[:4], *_ACCURACY) else "iu"):
             raise PathFileError(f"{where}: field {field} of {topic} has the type {kind}, which is no number of it")
     return np.dtype({"names": wanted, "formats": list(formats), "offsets": list(offsets)}), known

@@ -18,9 +18,9 @@ from tests.budget.test_input_doubt import statuses
 from tests.conftest import TODAY, row
 from tests.design.test_sweep import assert_as_checked, grid, swept
 from tests.mission.test_path_files import aircraft, ephemeris, satellite
-from tests.paths.flown import flight
-from tests.paths.log_files import SIGMAS, gga, nmea, sentence, solution
-from tests.paths.orbit_files import EPOCH, TLE, oem
+from tests.paths.flown import flight, geodetic_csv
+from tests.paths.log_files import GPS_OF_OLD, SIGMAS, gga, gps_records, nmea, sentence, solution, topic, ulog
+from tests.paths.orbit_files import EPOCH, TLE, oem, omm_with_covariance
 from tests.paths.test_accuracy import START, triangle, with_covariance
 
 CENTER = "2026-06-01T05:19:30Z"
@@ -151,6 +151,50 @@ class TestACovarianceOfAnEphemeris:
         assert (found.status == "not_evaluated") != is_judged
 
 
+class TestACovarianceOfMeanElements:
+    """An OMM states it at the epoch of its elements; 4 km are more than what is usual of elements 16 hours old."""
+
+    @pytest.mark.parametrize("form", ["text", "xml", "json", "csv"])
+    @pytest.mark.parametrize(("declared", "is_enough"), [("4 km", False), ("50 km", True)])
+    def test_50_km_are_no_4_km(self, form: str, declared: str, is_enough: bool, tmp_path: Path) -> None:
+        mission = self.orbiting(tmp_path, form, position=declared)
+        doubts = input_doubts(mission)
+        assert [(one.is_stated, one.note.split(":")[0]) for one in doubts] == (
+            [] if is_enough else [(True, "a.omm, covariance of 2026-05-31T10")]
+        )
+
+    def test_where_nothing_is_declared_it_is_the_error(self, tmp_path: Path) -> None:
+        error = self.orbiting(tmp_path, "json").platforms.transmitter.motion_error
+        assert error.position == pytest.approx((5e4, 5e4, 5e4))
+
+    def test_it_turns_with_the_orbit(self, tmp_path: Path) -> None:
+        """50 km along the track and 1 km across it: enough where they are declared so, not the other way round."""
+        for position, is_enough in ((["1 km", "50 km", "1 km"], True), (["50 km", "1 km", "50 km"], False)):
+            mission = self.orbiting(tmp_path, "json", (1e3, 5e4, 1e3), position=position)
+            assert (input_doubts(mission) == []) == is_enough
+
+    def test_without_an_element_of_its_matrix_it_is_refused(self, tmp_path: Path) -> None:
+        with pytest.raises(MissionError, match="a covariance must be a lower triangle of 6 rows"):
+            self.orbiting(tmp_path, "json", position="50 km", CY_X=None)
+
+    @staticmethod
+    def orbiting(
+        folder: Path,
+        form: str,
+        position_m: tuple[float, float, float] = (5e4, 5e4, 5e4),
+        position: Any = None,
+        **changed: Any,
+    ) -> Mission:
+        (folder / "a.omm").write_bytes(omm_with_covariance(form, triangle(position_m, 1.0), **changed))
+        error = {"frame": "ric", "velocity": "100 m/s"} | ({} if position is None else {"position": position})
+        text = satellite(
+            platforms__transmitter={"orbit": {"omm": "a.omm"}, "motion_error": error},
+            requirements={"location_error": "5000 km"},
+        )
+        (folder / "m.yaml").write_text(text)
+        return load_mission(str(folder / "m.yaml"))
+
+
 class TestALog:
     @pytest.mark.parametrize(("position", "status"), [("1 cm", "not_evaluated"), ("10 m", "pass")])
     def test_sigmas_of_metres(self, position: str, status: str, tmp_path: Path) -> None:
@@ -159,6 +203,19 @@ class TestALog:
         if status != "pass":
             reason = row(found, "receiver.position.x").reason
             assert "2.4 m, 3.1 m, 6.2 m (east, north, up) is stated, 10 mm is declared" in str(reason)
+
+    @pytest.mark.parametrize(("position", "status"), [("1 cm", "not_evaluated"), ("31 m", "pass")])
+    def test_eph_of_px4(self, position: str, status: str, tmp_path: Path) -> None:
+        records = [{**one, "eph": 30.0} for one in gps_records(flight())]
+        found = self.logged(tmp_path, "a.ulg", ulog(topic("sensor_gps", GPS_OF_OLD, 1, records)), position)
+        assert (statuses(found, "receiver") == {"not_evaluated"}) == (status == "not_evaluated")
+
+    @pytest.mark.parametrize(("position", "status"), [("1 cm", "not_evaluated"), ("10 m", "pass")])
+    def test_sigmas_of_a_csv(self, position: str, status: str, tmp_path: Path) -> None:
+        lines = geodetic_csv(flight()).decode().splitlines()
+        lines = [f"{lines[0]},sde(m),sdn(m),sdu(m)", *(f"{line},2.4,3.1,6.2" for line in lines[1:])]
+        found = self.logged(tmp_path, "a.csv", "\n".join(lines).encode(), position)
+        assert (statuses(found, "receiver") == {"not_evaluated"}) == (status == "not_evaluated")
 
     def test_a_covariance_in_place_of_position_and_velocity(self, tmp_path: Path) -> None:
         (tmp_path / "a.pos").write_bytes(solution(flight(), sigmas=SIGMAS))

@@ -94,6 +94,26 @@ def omm_text() -> bytes:
     return ("\n".join(lines) + "\n").encode()
 
 
+def omm_with_covariance(form: str, rows: Sequence[str], frame: str = "RTN", **changed: object) -> bytes:
+    """The message as text, xml, json or csv with the rows of a covariance; a key that is None is left out."""
+    axes = ("X", "Y", "Z", "X_DOT", "Y_DOT", "Z_DOT")
+    stated: dict[str, object] = {"COV_REF_FRAME": frame}
+    for row, cells in zip(axes, rows, strict=True):
+        stated.update({f"C{row}_{column}": cell for column, cell in zip(axes, cells.split(), strict=False)})
+    stated = {key: value for key, value in {**stated, **changed}.items() if value is not None}
+    if form == "text":
+        return omm_text() + "".join(f"{key} = {value}\n" for key, value in stated.items()).encode()
+    if form == "xml":
+        block = "".join(f"<{key}>{value}</{key}>" for key, value in stated.items())
+        return omm_xml().replace(b"</data>", f"<covarianceMatrix>{block}</covarianceMatrix></data>".encode())
+    if form == "json":
+        return omm_json(**stated)
+    rows_of_csv = omm_csv().decode().split("\r\n")
+    return "\r\n".join(
+        [f"{rows_of_csv[0]},{','.join(stated)}", f"{rows_of_csv[1]},{','.join(map(str, stated.values()))}", ""]
+    ).encode()
+
+
 RADIUS, TURN_RATE = 7_071_000.0, 1.0617e-3  # m, rad/s
 START = instant("2026-06-01T05:00:00Z")
 

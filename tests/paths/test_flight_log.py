@@ -5,6 +5,7 @@ import math
 import re
 from itertools import pairwise
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 import pytest
@@ -365,3 +366,63 @@ def test_the_flight_of_the_examples_can_be_flown() -> None:
     heights = [float(line.split(",")[3]) for line in lines if line.startswith("2026")]
     assert np.std(heights) == pytest.approx(maker.GUSTS[2], rel=0.4)
     assert max(abs(b - a) for a, b in pairwise(heights)) < 0.1
+
+
+class TestAccuracyColumns:
+    GEODETIC = "time [s],latitude [deg],longitude [deg],height [m]"
+    ROW = "{},48.0,11.0,3000.0"
+
+    def sigmas(self, columns: str, *cells: str, header: str = GEODETIC, row: str = ROW) -> Any:
+        lines = [f"{header},{columns}", *(f"{row.format(n)},{one}" for n, one in enumerate(cells))]
+        return read("\n".join(lines)).sigmas
+
+    @pytest.mark.parametrize(
+        "columns",
+        [
+            "sigma_north [m],sigma_east [m],sigma_up [m]",
+            "sdn(m),sde(m),sdu(m)",
+            "std_lat [m],std_lon [m],std_alt [m]",
+            "north sigma [m],east sigma [m],height sigma [m]",
+        ],
+    )
+    def test_names_of_the_same_errors(self, columns: str) -> None:
+        assert self.sigmas(columns, "1,2,3", "4,5,6") == pytest.approx(np.array([[2, 1, 3], [5, 4, 6]]))
+
+    @pytest.mark.parametrize("columns", ["hAcc [m],vAcc [m]", "horizontal accuracy [m],vertical accuracy [m]"])
+    def test_figures_on_the_level(self, columns: str) -> None:
+        assert self.sigmas(columns, "2,3", "4,5") == pytest.approx(np.array([[2, 2, 3], [4, 4, 5]]))
+
+    def test_units_count(self) -> None:
+        assert self.sigmas("accuracy [cm]", "200", "300") == pytest.approx(np.array([[2.0] * 3, [3.0] * 3]))
+
+    @pytest.mark.parametrize("quote", ["", '"'])
+    @pytest.mark.parametrize("cell", ["", "nan", "n/a", "0", "-1"])
+    def test_a_cell_that_says_nothing_is_no_fault(self, cell: str, quote: str) -> None:
+        found = self.sigmas("accuracy [m]", "2", f"{quote}{cell}{quote}")
+        assert found[0] == pytest.approx([2, 2, 2])
+        assert np.isnan(found[1]).all()
+        assert self.sigmas("accuracy [m]", cell, cell) is None
+
+    def test_earth_fixed_ones_are_turned(self) -> None:
+        """At the equator on the meridian of Greenwich x is up, y is east, z is north."""
+        found = self.sigmas(
+            "sdx(m),sdy(m),sdz(m)", "1,2,3", header="time [s],x [m],y [m],z [m]", row="{},6380000,0,0"
+        )
+        assert found == pytest.approx(np.array([[2, 3, 1]]))
+
+    @pytest.mark.parametrize(
+        ("columns", "says"),
+        [
+            ("sigma_east,sigma_north,sigma_up", "sigma_east has no unit; write 'sigma_east [m]'"),
+            ("sde(m),sdn(m)", "has sigma_east and no sigma_up; write all of sigma_east, sigma_north, sigma_up"),
+            ("sde(m),sigma_east [m]", "has two columns of sigma_east"),
+            ("std_lat [deg],std_lon [deg],std_alt [m]", "std_lat "),
+        ],
+    )
+    def test_columns_that_are_refused(self, columns: str, says: str) -> None:
+        with pytest.raises(PathFileError) as error:
+            self.sigmas(columns, ",".join("1" * (columns.count(",") + 1)))
+        assert says in str(error.value)
+
+    def test_dilutions_of_precision_are_no_errors(self) -> None:
+        assert self.sigmas("hdop,vdop,pdop", "1,2,3") is None

@@ -190,3 +190,22 @@ def test_elevations_need_the_separation_of_the_geoid() -> None:
     assert error.value.hint == "trajectory.time_scale: utc reads times without a zone"
     with pytest.raises(PathFileError, match=r"counts in UTC, and trajectory.time_scale says GPST"):
         read(gpx(SHORT), time_scale="gps")
+
+
+class TestFix:
+    @staticmethod
+    def of(fix: str, count: int) -> Log:
+        """A track of which points state a fix."""
+        text = gpx(FLOWN).decode().replace("</trkpt>", f"<fix>{fix}</fix></trkpt>", count)
+        return read(text.encode())
+
+    @pytest.mark.parametrize("fix", ["none", "2d"])
+    def test_a_point_without_a_height_is_left_out(self, fix: str) -> None:
+        log = self.of(fix, 100)
+        assert log.words == "GPX track, 100 points without a fix in three dimensions left out, 401 places over 8 s"
+        with pytest.raises(PathFileError, match="has no point with a fix in three dimensions"):
+            self.of(fix, 501)
+
+    @pytest.mark.parametrize("fix", ["3d", "dgps", "pps"])
+    def test_others_are_flown(self, fix: str) -> None:
+        assert len(self.of(fix, 501).times) == 501

@@ -145,6 +145,51 @@ class TestTwoReceivers:
         assert log.words == "NMEA 0183 GGA, 501 places over 10 s"
 
 
+class TestTwoSolutionsOfOneTalker:
+    """GGA and GNS of a receiver are one solution; a log may have those of two, under the same name."""
+
+    @staticmethod
+    def both(north_m: float = 0.0, late_s: float = 0.0, quality: int = 4, modes: str = "RR") -> Log:
+        lines = [rmc(0)]
+        for time, latitude, longitude, above in _places():
+            lines += [gga(time, latitude, longitude, above, quality=quality)]
+            lines += [gns(time + late_s, latitude + north_m / METRES_A_DEGREE, longitude, above, modes=modes)]
+        return read("\n".join(lines))
+
+    @pytest.mark.parametrize("north_m", [0.0, 0.3])
+    def test_the_same_places_are_read(self, north_m: float) -> None:
+        log = self.both(north_m)
+        assert log.words == "NMEA 0183 GGA, 501 places over 10 s"
+        assert log.typical_sigmas == pytest.approx(np.full(501, 0.01))
+
+    @pytest.mark.parametrize(
+        ("quality", "modes", "worse"),
+        [(4, "RA", "GNS mode A, autonomous"), (1, "RR", "GGA quality 1, autonomous")],
+    )
+    def test_the_worse_quality_counts(self, quality: int, modes: str, worse: str) -> None:
+        log = self.both(quality=quality, modes=modes)
+        assert log.typical_sigmas == pytest.approx(np.full(501, 3.0))
+        assert log.quality_words(7) == worse
+
+    @pytest.mark.parametrize(
+        ("north_m", "late_s", "says"),
+        [(11.0, 0.0, "up to 11 m apart at the same time"), (0.0, 0.01, "at times of their own")],
+    )
+    def test_other_places_are_refused(self, north_m: float, late_s: float, says: str) -> None:
+        with pytest.raises(PathFileError, match=rf"GGA and GNS of the talker GN are {says}") as error:
+            self.both(north_m, late_s, modes="AA")
+        assert error.value.hint == (
+            "Leave out the sentences of one solution: 501 of GGA quality 4, RTK fixed, 501 of GNS mode A, autonomous"
+        )
+
+    def test_gns_once_a_second_is_enough(self) -> None:
+        """Some fixes have both sentences, most have one."""
+        lines = [rmc(0)]
+        for number, place in enumerate(_places()):
+            lines += [gga(*place), *([gns(*place)] if number % 50 == 0 else [])]
+        assert len(read("\n".join(lines)).times) == 501
+
+
 def test_wrong_checksums_are_left_out_and_counted() -> None:
     lines = nmea(FLOWN).decode().splitlines()
     lines[300] = lines[300].replace(",N,", ",S,")
@@ -365,6 +410,15 @@ class TestALogSaysItsAccuracy:
         log = read("\n".join(lines))
         assert log.sigmas is not None
         assert log.sigmas[0] == pytest.approx([0.02, 0.01, 0.05] if is_own else [3, 2, 5])
+
+    @pytest.mark.parametrize("has_fixes", [True, False])
+    def test_the_gst_of_another_receiver_vouches_for_nothing(self, has_fixes: bool) -> None:
+        """A talker that has fixes of its own states the errors of those; one without is another name."""
+        lines = [rmc(0), gga(0, 48, 11, 3000, quality=1), gst(0, 0.01, 0.01, 0.02, talker="GP")]
+        lines += [gga(0, 48, 11, 3000, talker="GP")] if has_fixes else []
+        log = read("\n".join(lines), talker="GN")
+        assert (log.sigmas is None) == has_fixes
+        assert log.typical_sigmas == pytest.approx([3])
 
     @pytest.mark.parametrize(
         ("quality", "sigma_m", "words"),

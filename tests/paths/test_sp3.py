@@ -1,6 +1,7 @@
 """Orbits in SP3: GNSS satellites against epochs that were left out, every part of the format, and what is refused."""
 
 import math
+import re
 from fractions import Fraction
 from pathlib import Path
 
@@ -90,9 +91,51 @@ def test_what_is_said_of_it() -> None:
     doubt = orbit.doubt(NOON)
     assert doubt.size < 1e-3
     assert doubt.words == "interpolation of the ephemeris"
-    assert orbit.stated(NOON) == StatedAccuracy("accuracy of G05", total=0.004)  # 2² mm
     assert orbit.doubts(NOON) == ()
     assert orbit.place(epoch_of(epochs(TEXT)[48])) == pytest.approx(place_of(epochs(TEXT)[48], "G05"), abs=1e-6)
+
+
+class TestAccuracy:
+    """Of the header, 2² mm in the file, and of the places, whose exponents stand behind the clock, of base 1.25."""
+
+    DEVIATIONS = re.compile(r"^(PG05.{56}) *\d+ +\d+ +\d+", re.MULTILINE)
+    AT = epoch_of(epochs(TEXT)[48]).after(1.0)
+
+    def stated(self, exponents: str, header: str = " 2 ", base: str = "1.2500000") -> StatedAccuracy | None:
+        text = self.DEVIATIONS.sub(rf"\g<1> {exponents}", TEXT).replace("%f  1.2500000", f"%f  {base}", 1)
+        return read(text.replace("++         2 ", f"++        {header}", 1), at=self.AT).stated(self.AT)
+
+    def test_that_of_the_header(self) -> None:
+        """Lines without deviations, and lines whose deviations are less, 1.25³ mm on each axis."""
+        for exponents in ("        ", " 0  0  0", " 3  3  3"):
+            assert self.stated(exponents) == StatedAccuracy("accuracy of G05", total=0.004)
+
+    @pytest.mark.parametrize("header", [" 0 ", " 2 "])
+    def test_deviations_that_are_more_count(self, header: str) -> None:
+        """654 m on each axis, where the header says nothing or 4 mm."""
+        found = self.stated("60 59 58", header)
+        assert found is not None
+        assert found.words == "standard deviations of G05"
+        assert np.sqrt(np.diag(found.covariance)) == pytest.approx([1.25**60 / 1e3, 1.25**59 / 1e3, 1.25**58 / 1e3])
+
+    def test_an_axis_without_is_as_bad_as_the_worst(self) -> None:
+        found = self.stated("60    58", " 0 ")
+        assert found is not None
+        assert np.sqrt(np.diag(found.covariance))[1] == pytest.approx(1.25**60 / 1e3)
+
+    @pytest.mark.parametrize("base", ["0.0000000", "1.0000000", "   x     "])
+    def test_without_a_base_there_are_none(self, base: str) -> None:
+        assert self.stated("60 60 60", " 0 ", base) is None
+
+    def test_the_larger_one_of_the_two_places_around_counts(self) -> None:
+        blocks = epochs(TEXT)
+        line = next(line for line in blocks[49].splitlines() if line.startswith("PG05"))
+        text = TEXT.replace(line, self.DEVIATIONS.sub(r"\g<1> 60 60 60", line))
+        for index, is_near in ((47, False), (48, True), (49, True), (50, False)):
+            at = epoch_of(blocks[index]).after(1.0)
+            found = read(text, at=at).stated(at)
+            assert found is not None
+            assert (found.position_m > 1000) == is_near
 
 
 def test_one_satellite_has_to_be_named() -> None:

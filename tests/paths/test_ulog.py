@@ -48,6 +48,31 @@ def since_start(log: Log) -> float:
     return log.start.since(begins)
 
 
+class TestAccuracy:
+    @pytest.mark.parametrize("name", ["sensor_gps", "vehicle_global_position"])
+    @pytest.mark.parametrize(("eph", "epv"), [(30.0, 45.0), (0.02, 0.03)])
+    def test_eph_and_epv_are_sigmas(self, name: str, eph: float, epv: float) -> None:
+        """Whether they are 30 m beside a fix in three dimensions, or 2 cm."""
+        fields, records = (GPS_OF_NOW, gps_records) if name == "sensor_gps" else (GLOBAL, global_records)
+        stated = [{**one, "eph": eph, "epv": epv} for one in records(SHORT)]
+        log = read(ulog(topic(name, (*fields, ("float", "eph"), ("float", "epv")), 7, stated)))
+        assert log.sigmas == pytest.approx(np.tile([eph, eph, epv], (6, 1)))
+
+    @pytest.mark.parametrize("fields", [GPS_OF_OLD, (("float", "epv"), *GPS_OF_OLD)])
+    def test_eph_alone_counts_along_every_axis(self, fields: tuple) -> None:
+        stated = [{**one, "eph": 30.0} for one in gps_records(SHORT)]
+        assert read(ulog(topic("sensor_gps", fields, 7, stated))).sigmas == pytest.approx(np.full((6, 3), 30))
+
+    @pytest.mark.parametrize("eph", [0.0, -1.0, math.nan])
+    def test_what_is_not_positive_is_not_known(self, eph: float) -> None:
+        stated = [{**one, "eph": eph if number else 2.0} for number, one in enumerate(gps_records(SHORT))]
+        sigmas = read(ulog(topic("sensor_gps", GPS_OF_OLD, 7, stated))).sigmas
+        assert sigmas is not None
+        assert sigmas[0] == pytest.approx([2, 2, 2])
+        assert np.isnan(sigmas[1:]).all()
+        assert read(ulog(topic("sensor_gps", GPS_OF_OLD, 7, gps_records(SHORT)))).sigmas is None
+
+
 @pytest.mark.parametrize(
     ("name", "fields", "digits"),
     [("vehicle_gps_position", GPS_OF_OLD, OLD), ("sensor_gps", GPS_OF_OLD, OLD), ("sensor_gps", GPS_OF_NOW, NOW)],

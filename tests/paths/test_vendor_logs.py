@@ -3,6 +3,7 @@
 import math
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -277,3 +278,30 @@ def test_an_altitude_counts_from_the_sea() -> None:
     assert error.value.accepted.startswith("accepted: trajectory.geoid_separation: 47 m")
     with pytest.raises(PathFileError, match=r"gives the geoid separation itself"):
         read(own, **OF_SEA)
+
+
+class TestAccuracy:
+    @pytest.mark.parametrize(
+        ("fields", "records"), [(GPS_OF_NOW, gps_records), (GPS_OF_OLD, gps_records), (GLOBAL, global_records)]
+    )
+    def test_eph_and_epv_of_px4(self, fields: Any, records: Any) -> None:
+        stated = [{**one, "eph": 30.0, "epv": 45.0 if number else "nan"} for number, one in enumerate(records(SHORT))]
+        fields = tuple(one for one in fields if one[1] != "eph")
+        log = read(px4_csv(SHORT, (*fields, ("float", "eph"), ("float", "epv")), stated))
+        assert log.sigmas == pytest.approx(np.array([[30, 30, 30], *[[30, 30, 45]] * 5]))
+
+    def test_rows_gpa_of_ardupilot(self) -> None:
+        """Each is of the row GPS of its time and receiver; a row without one states nothing."""
+        lines = []
+        for line in dataflash(SHORT).decode().splitlines():
+            lines.append(line)
+            cells = line.split(", ")
+            if cells[0] == "GPS" and not (cells[2] == "0" and len(lines) > 12):
+                hacc, vacc = ("0.40", "0.80") if cells[2] == "0" else ("9.00", "9.00")
+                lines.append(f"GPA, {cells[1]}, {cells[2]}, 1.10, {hacc}, {vacc}, 0.2, 0, 1, 0, 0, 0, 0, 0")
+        log = read("\n".join(lines), **OF_SEA, instance=0)
+        assert log.sigmas is not None
+        assert log.sigmas[0] == pytest.approx([0.4, 0.4, 0.8])
+        assert np.isnan(log.sigmas[-1]).all()
+        assert read("\n".join(lines), **OF_SEA, instance=1).sigmas == pytest.approx(np.full((2, 3), 9.0))
+        assert read(dataflash(SHORT), **OF_SEA, instance=0).sigmas is None
