@@ -297,7 +297,8 @@ def shifted_figures(mission: Mission) -> Iterator[ShiftedFigure]:
         if oscillator is not None:
             felt = None if oscillator.vibration is None else oscillator.vibration.spectrum_level
             levels.append(("oscillator", "oscillator.level", oscillator.level, oscillator.source))
-            levels.append(("oscillator", "oscillator.vibration.spectrum_level", felt, oscillator.source))
+            # What it feels is the file's own spectrum: the source is that of the oscillator.
+            levels.append(("oscillator", "oscillator.vibration.spectrum_level", felt, None))
         for kind, key, level, its_source in levels:
             if level:
                 yield ShiftedFigure(f"{name}.{kind}", f"platforms.{name}.{key}", level, its_source)
