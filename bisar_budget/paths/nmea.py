@@ -6,9 +6,9 @@
 
 A height of a sentence is above mean sea level, and the geoid separation beside it makes one above the ellipsoid.
 Sentences may stand among other lines or behind something on their line. Fixes are those of one talker. A sentence
-whose checksum is wrong or missing is left out, and counted; of DTM only where another one is sound. GST states one-sigma
-errors of latitude, longitude and height. DTM states a datum, which has to be W84. Without a date, fixes have times of
-day.
+whose checksum is wrong or missing is left out, and counted; of DTM only where another one is sound. GST states
+one-sigma errors of latitude, longitude and height. DTM states a datum, which has to be W84. Without a date, fixes
+have times of day.
 
 Source: NMEA 0183 4.10 as RTKLIB 2.4.3 reads it (src/solution.c, decode_nmeagga, decode_nmearmc, decode_nmeazda: a
 time of day is within half a day of the date before it). The fields of GNS, GST and DTM are those of pynmea2, which
