@@ -314,10 +314,10 @@ class SolveResult(_Answer):
         if (parts := getattr(self.found, "parts", None)) is not None:
             waived = [one.standing.waived_by for one in parts if one.standing.status == "waived"]
             return f"{len(self.complying)} of {len(parts)} parts comply{_waived(waived)}"
-        waived = f", {waived_count(self.waived, self.waived_by)}" if self.waived else ""
+        beside = f", {waived_count(self.waived, self.waived_by)}" if self.waived else ""
         if self.value is None:
-            return f"{'every' if self.status == 'all' else 'no'} value of the range complies{waived}"
-        return f"{self.value:.6g} {self.unit}{waived}"
+            return f"{'every' if self.status == 'all' else 'no'} value of the range complies{beside}"
+        return f"{self.value:.6g} {self.unit}{beside}"
 
     def _repr_html_(self) -> str:
         found, rows = self.found, list[tuple[object, ...]]()
