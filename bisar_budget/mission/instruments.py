@@ -121,7 +121,7 @@ class LeverArm(NamedTuple):
 
     @staticmethod
     def any_of() -> tuple[str, ...]:
-        """What it says."""
+        """Keys of which it has one at least."""
         return ("arm", "uncertainty")
 
     @staticmethod

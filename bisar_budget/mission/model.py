@@ -184,7 +184,7 @@ class OtherError(NamedTuple):
 
     @staticmethod
     def any_of() -> tuple[str, ...]:
-        """Its effects."""
+        """Keys of its effects."""
         return OTHER_EFFECTS
 
     @staticmethod

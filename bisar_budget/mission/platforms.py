@@ -258,7 +258,7 @@ class OrbitSource(NamedTuple):
 
     @staticmethod
     def any_of() -> tuple[str, ...]:
-        """Its sources."""
+        """Keys of its sources."""
         return tuple(key for key in OrbitSource._fields if key not in ("object", "planned"))
 
     @staticmethod
