@@ -576,10 +576,11 @@ def _filled(kind: Any, key: str, definitions: Any, random: Random) -> Any:
     """A value of a part of the schema."""
     if "$ref" in kind:
         return _filled(definitions[kind["$ref"].rpartition("/")[2]], key, definitions, random)
-    if "anyOf" in kind and any("pattern" in form for form in kind["anyOf"]):  # a quantity, or a whole number
+    # A quantity, or a whole number.
+    if "anyOf" in kind and any({"pattern", "type"} <= form.keys() for form in kind["anyOf"]):
         return _filled(kind["anyOf"][0], key, definitions, random)
     for choices in ("allOf", "anyOf"):
-        if choices in kind:
+        if choices in kind and "type" not in kind:  # of a section it says which keys are needed
             return _filled(random.choice(kind[choices]), key, definitions, random)
     if "not" in kind:  # any single value
         return _value(random) if random.random() < 0.3 else f"{key} {random.randint(0, 9)}"

@@ -16,7 +16,6 @@ from bisar_budget.effects.navigation_errors import TILTS
 from bisar_budget.effects.oscillator_acceleration import is_unshaken
 from bisar_budget.findings.requirement import DeclaredKinds, ShiftedFigure
 from bisar_budget.findings.row import DECLARE
-from bisar_budget.mission.instruments import LeverArm
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import Platform
 from bisar_budget.mission.propagation import LEAST_ELEVATION_DEG, least_elevation_deg
@@ -46,10 +45,8 @@ def swings_nothing(platform: Platform) -> bool:
 
 
 def _lacks_an_attitude(mission: Mission, name: str) -> str:
-    platform: Platform = getattr(mission.platforms, name)
-    lever: LeverArm | None = platform.motion_error.lever_arm
-    is_uncertain = lever is not None and lever.uncertainty is not None and any(lever.uncertainty)
-    if is_uncertain or not swings_nothing(platform):
+    """Whatever the uncertainty of an arm, attitude errors swing all of it."""
+    if not swings_nothing(getattr(mission.platforms, name)):
         return ""
     return "imu.attitude, gyro_bias or angle_random_walk, which swings the arm"
 
@@ -297,7 +294,8 @@ def shifted_figures(mission: Mission) -> Iterator[ShiftedFigure]:
         if oscillator is not None:
             felt = None if oscillator.vibration is None else oscillator.vibration.spectrum_level
             levels.append(("oscillator", "oscillator.level", oscillator.level, oscillator.source))
-            levels.append(("oscillator", "oscillator.vibration.spectrum_level", felt, oscillator.source))
+            # What it feels is the file's own spectrum: the source is that of the oscillator.
+            levels.append(("oscillator", "oscillator.vibration.spectrum_level", felt, None))
         for kind, key, level, its_source in levels:
             if level:
                 yield ShiftedFigure(f"{name}.{kind}", f"platforms.{name}.{key}", level, its_source)

@@ -127,8 +127,6 @@ def _doubtful_paths(mission: Mission) -> Iterator[_Warned]:
     for name in PLATFORMS:
         platform: Platform = getattr(mission.platforms, name)
         path = platform.path
-        if path is not None and path.is_planned:
-            yield _Warned(("platforms", name, "orbit", "planned"), orbit_is_planned(name))
         if path is not None and (name not in owners or path.samples):
             yield from (
                 _Warned(("platforms", name, platform.way), path_is_doubtful(name, doubt), is_doubt=True)
@@ -155,12 +153,6 @@ def fit_changes_allowables(platform: str, acceleration: float, change: float, ro
         f" sigma, along the line of sight), which changes allowables {by} ({row_id}): a longer or a better log makes"
         " them sure"
     )
-
-
-@phrase
-def orbit_is_planned(platform: str) -> str:
-    """Said of an orbit that is flown as it stands."""
-    return f"platforms.{platform}.orbit.planned: the orbit is the plan: neither its age nor its interpolation counts"
 
 
 @phrase

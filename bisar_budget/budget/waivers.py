@@ -13,6 +13,7 @@ from typing import NamedTuple
 from bisar_budget.budget import file_warnings
 from bisar_budget.budget.declarations import shifted_figures
 from bisar_budget.budget.judged_requirements import KEYS
+from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.faults import KeyPath, printable
 from bisar_budget.findings.requirement import JudgedRequirement, Outside, Override
 from bisar_budget.findings.row import DECLARE, AppliedWaiver, Row
@@ -20,6 +21,8 @@ from bisar_budget.findings.status import BROKEN
 from bisar_budget.mission.model import Mission
 from bisar_budget.phrases import Note
 from bisar_budget.resources import resource
+
+_PLANNED = "the orbit is the plan: neither its age nor its interpolation counts"
 
 
 class Waived(NamedTuple):
@@ -129,7 +132,15 @@ def overrides(mission: Mission, outside: Outside, today: date) -> tuple[Override
         found.append(Override("--date", today.isoformat(), outside.day_origin))
     found += [Override("--set", f"{change.key}={change.text}", outside.set_origin) for change in mission.changes]
     levels = (Override(one.key, one.level, one.off) for one in shifted_figures(mission))
-    return (*found, *_own_parts(mission), *levels)
+    return (*found, *_own_parts(mission), *levels, *_planned_orbits(mission))
+
+
+def _planned_orbits(mission: Mission) -> Iterator[Override]:
+    """Orbits that are flown as they stand: a verdict then rests on the plan, not on what the file knows of it."""
+    for name in PLATFORMS:
+        orbit = getattr(mission.platforms, name).orbit
+        if orbit is not None and orbit.planned:
+            yield Override(f"platforms.{name}.orbit.planned", "true", _PLANNED)
 
 
 def _own_parts(mission: Mission) -> Iterator[Override]:

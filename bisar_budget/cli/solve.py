@@ -88,8 +88,8 @@ def solve(
     Every such value of the range is found, what binds on both sides of it is named, and both sides are checked as
     they are written. A pair of values closer than the places looked at is found only if the worst utilization turns
     there. Of platforms.receiver.motion_error.sensor and the like every part of the catalogue is tried. Exit code: 0,
-    1 if no value of the range or no part complies or if the image refutes the limit (--verify), 2 for wrong usage or
-    an unusable mission file.
+    also where nothing complies and something is waived; 1 if no value of the range and no part complies or is waived,
+    or if the image refutes the limit (--verify); 2 for wrong usage or an unusable mission file.
     """
     from bisar_budget.front import questions
     from bisar_budget.report.formats import answers

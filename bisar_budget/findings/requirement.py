@@ -100,7 +100,9 @@ class ShiftedFigure:
     @property
     def off(self) -> str:
         """Where from the figures are shifted."""
-        return "off the data sheet" if self.source is None else f"off {printable(self.source)}"
+        if self.source is not None:
+            return f"off {printable(self.source)}"
+        return "off the file's own spectrum" if self.key.endswith("spectrum_level") else "off the data sheet"
 
 
 class DeclaredKinds(NamedTuple):

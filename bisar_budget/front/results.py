@@ -306,7 +306,7 @@ class SolveResult(_Answer):
     found: "Solution | Comparison"
 
     def __repr__(self) -> str:
-        """Key and value, on one line."""
+        """Key and value, or that all or none of the range complies, and what is waived, on one line."""
         return f"<solve of {self.found.key} for {self.found.name!r}: {self._said}>"
 
     @property
@@ -314,7 +314,10 @@ class SolveResult(_Answer):
         if (parts := getattr(self.found, "parts", None)) is not None:
             waived = [one.standing.waived_by for one in parts if one.standing.status == "waived"]
             return f"{len(self.complying)} of {len(parts)} parts comply{_waived(waived)}"
-        return "none" if self.value is None else f"{self.value:.6g} {self.unit}"
+        beside = f", {waived_count(self.waived, self.waived_by)}" if self.waived else ""
+        if self.value is None:
+            return f"{'every' if self.status == 'all' else 'no'} value of the range complies{beside}"
+        return f"{self.value:.6g} {self.unit}{beside}"
 
     def _repr_html_(self) -> str:
         found, rows = self.found, list[tuple[object, ...]]()

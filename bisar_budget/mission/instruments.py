@@ -120,6 +120,11 @@ class LeverArm(NamedTuple):
     source: Source = None
 
     @staticmethod
+    def any_of() -> tuple[str, ...]:
+        """Keys of which it has one at least."""
+        return ("arm", "uncertainty")
+
+    @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
         """Hold it to saying something."""
         if values.keys() >= {"arm", "uncertainty"} and values["arm"] is None and values["uncertainty"] is None:

@@ -183,6 +183,11 @@ class OtherError(NamedTuple):
     source: Annotated[str | None, Key(Text())] = None
 
     @staticmethod
+    def any_of() -> tuple[str, ...]:
+        """Keys of its effects."""
+        return OTHER_EFFECTS
+
+    @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
         """Hold it to an effect."""
         if values.keys() >= set(OTHER_EFFECTS) and all(values[one] is None for one in OTHER_EFFECTS):

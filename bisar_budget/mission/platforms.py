@@ -257,9 +257,14 @@ class OrbitSource(NamedTuple):
     ] = None
 
     @staticmethod
+    def any_of() -> tuple[str, ...]:
+        """Keys of its sources."""
+        return tuple(key for key in OrbitSource._fields if key not in ("object", "planned"))
+
+    @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
         """Hold it to one source."""
-        ways = [key for key in OrbitSource._fields if key not in ("object", "planned")]
+        ways = OrbitSource.any_of()
         given = [way for way in ways if values.get(way) is not None]
         if len(given) != 1 and values.keys() >= set(ways):
             said = f"mixes {' with '.join(given)}" if given else "is empty"

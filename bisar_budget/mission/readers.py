@@ -136,14 +136,36 @@ class Quantity(Reader):
             definitions[name] = _quantity_schema(self.dimension)
         accepted: dict[str, Any] = {"$ref": f"#/definitions/{name}"}
         words = ("exclusiveMinimum", "minimum", "exclusiveMaximum", "maximum")
-        bounds = {word: bound for word, bound in zip(words, self.bounds, strict=True) if math.isfinite(bound)}
-        return {"allOf": [accepted], **bounds} if bounds and not self.dimension.usual else accepted
+        bounds: dict[str, Any] = {}
+        if not self.dimension.usual:
+            bounds = {word: bound for word, bound in zip(words, self.bounds, strict=True) if math.isfinite(bound)}
+        bounds |= self._sides_of_zero()
+        return {"allOf": [accepted], **bounds} if bounds else accepted
+
+    def _sides_of_zero(self) -> dict[str, Any]:
+        """JSON Schema of the sign that a number has with any unit, where bounds leave one sign alone or no zero."""
+        gt, ge, lt, le = self.bounds
+        if self.dimension.offsets:  # of which a unit moves the zero
+            return {}
+        refused = [*(["-"] if max(gt, ge) >= 0 else []), *([r"\+?"] if min(lt, le) <= 0 else [])]
+        patterns = [rf"(?!{sign}{_NOT_ZERO})" for sign in refused]
+        has_zero = gt < 0 < lt and ge <= 0 <= le
+        if not has_zero:
+            patterns.append(rf"(?![+-]?{_ZERO})")
+        bare = {"not": {"const": 0}} if not has_zero and self.dimension.usual else {}
+        return {"pattern": rf"^\s*{''.join(patterns)}", **bare} if patterns else {}
+
+
+# Mantissas behind a sign, and what of a number ends them. A power of a hundred or more may come to zero.
+_NOT_ZERO = r"[0.]*[1-9][\d.]*(?:[eE][+-]?\d{1,2})?(?![\d.eE])"
+_ZERO = r"[0.]+(?:[eE][+-]?\d+)?(?![\d.eE])"
+_SHORT = ("dps", "mdps", "dph", "micro-g", "milli-g")  # spellings of units that are read
 
 
 def _quantity_schema(dimension: Dimension) -> dict[str, Any]:
     """JSON Schema of a kind of quantity: text that begins with a number and has no unit of another kind behind it."""
     number = r"[+-]?(?!0\d)(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
-    known = {unit for other in units.DIMENSIONS for unit in other.units if unit}
+    known = {unit for other in units.DIMENSIONS for unit in other.units if unit}.union(_SHORT)
     foreign = sorted(unit for unit in known if dimension.scales.keys().isdisjoint((unit, units.normal_unit(unit))))
     of_others = "|".join(re.sub(r"([\^$.*+?()|/])", r"\\\1", unit) for unit in foreign)
     text: dict[str, Any] = {"type": "string", "pattern": rf"^\s*(?!{number}\s*(?:{of_others})\s*$){number}"}
@@ -466,6 +488,7 @@ class Section(Reader):
     A section's own `problems(values)` says what is wrong between its values. It is given those that are right,
     defaults included, so that a fault in one place does not hide one between two others. A key with an empty section
     or list, where that is no fault, is read as if the file did not have it: it declares nothing and hides nothing.
+    Of the keys that its `any_of()` lists a section needs one; `problems` says so, and the schema.
     """
 
     def __init__(self, kind: type[Any]) -> None:
@@ -478,6 +501,7 @@ class Section(Reader):
         self.defaults: dict[str, Any] = kind._field_defaults
         self.required = [name for name in self.keys if name not in self.defaults]
         self.problems = getattr(kind, "problems", None)
+        self.any_of: tuple[str, ...] = getattr(kind, "any_of", tuple)()
 
     def read(self, value: Any, path: KeyPath, report: Report) -> Any:
         """Read every key, report every fault."""
@@ -549,6 +573,7 @@ class Section(Reader):
             "type": "object",
             "properties": properties,
             **({"required": self.required} if self.required else {}),
+            **({"anyOf": [{"required": [name]} for name in self.any_of]} if self.any_of else {}),
             "additionalProperties": False,
         }
 

@@ -5,6 +5,7 @@ every scalar stays the text that stands in the file: YAML 1.1 would read `9.6e9`
 `on` as true and `010` as eight.
 """
 
+import re
 from collections.abc import Callable
 from itertools import pairwise
 from typing import Any
@@ -14,6 +15,7 @@ from yaml import AliasEvent, MappingEndEvent, ScalarEvent
 
 from bisar_budget.faults import Fault, KeyPath, MissionError, Problem, SetValue, file_fault, printable, shown, upwards
 from bisar_budget.mission.readers import INVALID, MISSING
+from bisar_budget.units import unit_behind
 
 MAX_BYTES = 1 << 20  # a mission file has a few kilobytes
 MAX_DEPTH = 20  # containers inside each other; the schema needs 9
@@ -22,6 +24,7 @@ MAX_VALUES = 100_000  # the longest lists that the schema takes come to a third
 MAX_FAULTS = 200  # nobody mends more at once, and each costs a line of every report
 
 _PARSER = yaml.CSafeLoader if yaml.__with_libyaml__ else yaml.SafeLoader
+_NUMERAL = re.compile(r"[+-]?\.?\d", re.ASCII)  # begins a number
 NULLS = ("", "~", "null", "Null", "NULL")
 
 
@@ -144,7 +147,7 @@ class Tree:
             self.fault(mark, (), TOO_DEEP)
             raise UnusableError
         elif kind is yaml.MappingStartEvent:
-            value = self._mapping(next_event, path)
+            value = self._mapping(next_event, path, is_flow=bool(event.flow_style))
         else:
             value = []
             items: list[Any] = []
@@ -180,8 +183,10 @@ class Tree:
                 )
                 self.fault(item.start_mark, (*path, index), problem, given=given, accepted=accepted)
 
-    def _mapping(self, next_event: Callable[[], Any], path: KeyPath) -> dict[str, Any]:
+    def _mapping(self, next_event: Callable[[], Any], path: KeyPath, *, is_flow: bool) -> dict[str, Any]:
         mapping: dict[str, Any] = {}
+        split: dict[str, list[str]] = {}  # by key: texts that commas of a flow mapping part from its value
+        name = ""
         while type(event := next_event()) is not MappingEndEvent:
             mark = event.start_mark
             if type(event) is not ScalarEvent:
@@ -189,20 +194,41 @@ class Tree:
                 raise UnusableError
             key = event.value
             here = (*path, key)
+            item = next_event()
+            if is_flow and _is_bare(event, item) and isinstance(mapping.get(name), str):
+                split.setdefault(name, [mapping[name]]).append(key)
+                continue
             if key in mapping:
                 first = self.keys[here].start_mark.line + 1
                 problem = f"is a duplicate key; the first is in line {first}"
                 self.fault(mark, here, problem, accepted="accepted: each key once")
-                self.node(next_event, next_event(), (*path, f"{key} (again)"))
+                self.node(next_event, item, (*path, f"{key} (again)"))
                 continue
             self.keys[here] = event
-            event = next_event()
-            if type(event) is ScalarEvent and event.tag is None and event.value not in NULLS:
-                self.values[here] = event  # as `node` would: most values are such
-                mapping[key] = event.value
+            name = "" if _NUMERAL.match(key) else key
+            if type(item) is ScalarEvent and item.tag is None and item.value not in NULLS:
+                self.values[here] = item  # as `node` would: most values are such
+                mapping[key] = item.value
             else:
-                mapping[key] = self.node(next_event, event, here)
+                mapping[key] = self.node(next_event, item, here)
+        for key, texts in split.items():
+            self._without_brackets((*path, key), texts)
+            mapping[key] = INVALID
         return mapping
+
+    def _without_brackets(self, path: KeyPath, texts: list[str]) -> None:
+        """Refuse `{position: 1 m, 2 m, 3 m}`, of which YAML makes three keys."""
+        is_sure = len(texts) == 3 and all(unit_behind(text) or text == "0" for text in texts)
+        hint = f"Did you mean [{', '.join(texts)}]?" if is_sure else "A decimal is written with a point"
+        accepted = "accepted: one value, or [a, b, c]"
+        given = shown(", ".join(texts))
+        self.fault(self.values[path].start_mark, path, "has commas", given=given, accepted=accepted, hint=hint)
+
+
+def _is_bare(key: Any, item: Any) -> bool:
+    """Whether a key of a mapping is a number, with a unit or without, that has no value."""
+    is_empty = type(item) is ScalarEvent and not item.style and not item.value
+    return is_empty and not key.style and bool(_NUMERAL.match(key.value))
 
 
 _STARTS = {

@@ -6,8 +6,9 @@
 
 A height of a sentence is above mean sea level, and the geoid separation beside it makes one above the ellipsoid.
 Sentences may stand among other lines or behind something on their line. Fixes are those of one talker. A sentence
-whose checksum is wrong or missing is left out, and counted. GST states one-sigma errors of latitude, longitude and
-height. DTM states a datum, which has to be W84. Without a date, fixes have times of day.
+whose checksum is wrong or missing is left out, and counted; of DTM only where another one is sound. GST states
+one-sigma errors of latitude, longitude and height. DTM states a datum, which has to be W84. Without a date, fixes
+have times of day.
 
 Source: NMEA 0183 4.10 as RTKLIB 2.4.3 reads it (src/solution.c, decode_nmeagga, decode_nmearmc, decode_nmeazda: a
 time of day is within half a day of the date before it). The fields of GNS, GST and DTM are those of pynmea2, which
@@ -164,7 +165,7 @@ class _Sentences:
     """Sentences of a log that are read: fixes by talker and kind, other ones by talker, dates and datums with lines.
 
     `broken` are messages about fixes that cannot be used, by their lines, `undated` those about dates that are none.
-    `lost` counts sentences with a wrong checksum.
+    `lost` counts sentences with a wrong checksum, `doubtful_datums` are what such a DTM says.
     """
 
     fixes: defaultdict[tuple[str, str], list[_Fix]]
@@ -172,6 +173,7 @@ class _Sentences:
     dates: defaultdict[str, list[tuple[int, Instant]]]
     accuracies: defaultdict[str, list[_Accuracy]]
     datums: defaultdict[str, list[tuple[int, _Datum]]]
+    doubtful_datums: defaultdict[str, list[tuple[int, _Datum]]]
     undated: list[str]
     lost: Counter[tuple[str, str]]
 
@@ -210,11 +212,15 @@ class _Sentences:
 
     def hold_to_datum(self, talker: str, name: str) -> None:
         """Refuse places of another datum than WGS-84, which a talker says itself, or another that has no places."""
-        for speaker in self.datums.keys() - self.other_receivers(talker):
-            for line, datum in self.datums[speaker]:
+        # A datum that no sound sentence states counts as it reads: left out, its places would pass for WGS-84.
+        datums = {**self.doubtful_datums, **self.datums}
+        for speaker in datums.keys() - self.other_receivers(talker):
+            is_sound = speaker in self.datums
+            for line, datum in datums[speaker]:
                 if not datum.is_wgs84:
+                    says = "says" if is_sound else "with a wrong checksum or none says"
                     raise PathFileError(
-                        f"{name}:{line}: DTM says that the places are of {datum.words}",
+                        f"{name}:{line}: DTM {says} that the places are of {datum.words}",
                         "accepted: WGS-84, W84 without offsets",
                         "Let the receiver, or its converter, write WGS-84",
                     )
@@ -283,7 +289,14 @@ def _sentences(data: bytes, name: str) -> _Sentences:
     except ImportError:
         raise PathFileError(f"{name}: needs the package pynmea2: {install_command('logs')}") from None
     found = _Sentences(
-        defaultdict(list), defaultdict(dict), defaultdict(list), defaultdict(list), defaultdict(list), [], Counter()
+        fixes=defaultdict(list),
+        broken=defaultdict(dict),
+        dates=defaultdict(list),
+        accuracies=defaultdict(list),
+        datums=defaultdict(list),
+        doubtful_datums=defaultdict(list),
+        undated=[],
+        lost=Counter(),
     )
     # Bytes of another protocol between sentences are no text.
     for number, text in enumerate(data.decode("latin-1").split("\n"), 1):
@@ -299,6 +312,9 @@ def _sentences(data: bytes, name: str) -> _Sentences:
             fields = [field.strip() for field in data_fields] + [""] * 14
         except (ParseError, ValueError):
             found.lost[talker, kind] += 1
+            if kind == "DTM":
+                datum = _dtm(_unchecked_fields(sentence), name, number)
+                found.doubtful_datums[talker] += [] if datum is None else [(number, datum)]
             continue
         try:
             read_one = _READERS[kind](fields, f"{name}:{number}: {kind}", number)
@@ -394,6 +410,11 @@ def _checked_fields(sentence: str) -> list[str]:
     if match is None or reduce(xor, match[1].encode()) != int(match[2], 16):
         raise ValueError("wrong checksum")
     return match[1].split(",")[1:]
+
+
+def _unchecked_fields(sentence: str) -> list[str]:
+    """The same, whatever its checksum; empty ones behind them."""
+    return [field.strip() for field in sentence.partition("*")[0].split(",")[1:]] + [""] * 14
 
 
 def _refused(where: str, says: str, given: str) -> NoReturn:

@@ -90,7 +90,7 @@ def arm(imu: dict[str, Any] | None = None, **lever: Any) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("imu", [None, {"accelerometer_bias": "1 ug"}])
-@pytest.mark.parametrize("lever", [{}, {"uncertainty": 0}])
+@pytest.mark.parametrize("lever", [{}, {"uncertainty": 0}, {"uncertainty": "0.001 um"}, {"uncertainty": "5 mm"}])
 def test_an_arm_that_nothing_swings_declares_no_lever_arm(imu: dict[str, Any] | None, lever: dict[str, Any]) -> None:
     asked = {"requirements": NEEDS | {"declare": ["receiver.lever_arm"]}}
     found = findings(**declared(**asked, **arm(imu, **lever)))
@@ -105,11 +105,12 @@ def test_an_arm_that_nothing_swings_declares_no_lever_arm(imu: dict[str, Any] | 
         ({"attitude": "0.01 deg"}, {}),
         ({"gyro_bias": 0}, {}),
         ({"angle_random_walk": "0.01 deg/sqrt(h)"}, {}),
-        (None, {"uncertainty": "1 mm"}),
+        ({"attitude": "0.01 deg"}, {"uncertainty": "1 mm"}),
+        (None, {"arm": [0, 0, 0], "uncertainty": "1 mm"}),
         (None, {"arm": [0, 0, 0]}),
     ],
 )
-def test_an_arm_that_swings_or_is_uncertain_does(imu: dict[str, Any] | None, lever: dict[str, Any]) -> None:
+def test_an_arm_that_swings_or_has_no_length_does(imu: dict[str, Any] | None, lever: dict[str, Any]) -> None:
     asked = {"requirements": NEEDS | {"declare": ["receiver.lever_arm"]}}
     found = findings(**declared(**asked, **arm(imu, **lever)))
     assert requirement(found, "declare").status == "pass"

@@ -58,3 +58,17 @@ def test_what_must_be_declared_says_what_a_level_shifts(key: str) -> None:
     assert f"off the data sheet: {kind} (receiver) -100 dB" in text
     (shifted,) = json.loads(render("json", Report(version="0", missions=(found,)), Style()))["missions"][0]["shifted"]
     assert (shifted["kind"], shifted["level_db"]) == (f"receiver.{kind}", -100.0)
+
+
+def test_the_vibration_of_an_oscillator_is_not_that_of_its_data_sheet() -> None:
+    """Its spectrum is the file's own; the source beside it is the oscillator's, whose own level is off it."""
+    felt = {"vibration": SPECTRUM | {"spectrum_level": "-3 dB"}, "acceleration_sensitivity": "1e-9 /g"}
+    oscillator = {"sensor": "sit5358", "level": "-2 dB", **felt}
+    own, its_vibration = findings(platforms__receiver__oscillator=oscillator).overrides
+    assert (own.name, own.value) == ("platforms.receiver.oscillator.level", "-2 dB")
+    assert own.origin.startswith("off SiTime SiT5358")
+    assert its_vibration == (
+        "platforms.receiver.oscillator.vibration.spectrum_level",
+        "-3 dB",
+        "off the file's own spectrum",
+    )

@@ -14,6 +14,7 @@ from bisar_budget.faults import MissionError
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.mission.load import load_mission
 from bisar_budget.mission.model import Mission
+from bisar_budget.report import FORMATS
 from tests.budget.test_input_doubt import statuses
 from tests.conftest import TODAY, row
 from tests.design.test_sweep import assert_as_checked, grid, swept
@@ -25,6 +26,19 @@ from tests.paths.test_accuracy import START, triangle, with_covariance
 
 CENTER = "2026-06-01T05:19:30Z"
 RIC = ("radial", "in_track", "cross_track")
+PLAN = "the orbit is the plan: neither its age nor its interpolation counts"
+_PASSES = ("passes", "--from", "2026-06-01", "--days", "1")
+COMMANDS = [
+    ("check", "-q"),
+    *(("check", "--format", name) for name in FORMATS),
+    ("check", "--explain", "transmitter.velocity.x"),
+    *((*_PASSES, "--format", name) for name in ("text", "csv", "json", "ics")),
+    ("sweep", "--vary", "collection.aperture_time=1s:2s:2"),
+    ("solve", "--for", "collection.aperture_time"),
+    ("sensitivity",),
+    ("allocate", "--set", "allocation.combine=rss"),
+    ("verify", "--only", "transmitter.velocity.x"),
+]
 
 
 def orbiting(
@@ -292,14 +306,25 @@ class TestAPlannedOrbit:
         assert input_doubts(mission) == []
         found = check_mission(mission, TODAY)
         assert statuses(found, "transmitter") == {"not_declared"}
+        (said,) = found.overrides
+        assert said == ("platforms.transmitter.orbit.planned", "true", PLAN)
+        assert not any("planned" in one.message for one in found.warnings)
         for form in ("text", "json", "markdown", "html"):
-            assert "its age and its interpolation do not count" in " ".join(
-                run("check", tmp_path / "m.yaml", "--format", form, "-v").stdout.split()
-            )
-        said = [one.message for one in found.warnings if "orbit.planned" in one.message]
-        assert said == [
-            "platforms.transmitter.orbit.planned: the orbit is the plan: neither its age nor its interpolation counts"
-        ]
+            text = run("check", tmp_path / "m.yaml", "--format", form, "-v").stdout
+            assert "its age and its interpolation do not count" in " ".join(text.split())
+
+    @pytest.mark.parametrize("command", COMMANDS, ids=" ".join)
+    def test_every_command_says_so_in_every_format(
+        self, command: tuple[str, ...], tmp_path: Path, run: Callable[..., Any]
+    ) -> None:
+        name, *options = command
+        self.mission(tmp_path, 0.5, planned=True)
+        said = run(name, tmp_path / "m.yaml", *options).stdout.replace("\n ", "").replace("\\", "")
+        assert PLAN.replace(" ", "") in "".join(said.split()), said
+
+    def test_an_orbit_that_is_no_plan_is_not_called_so(self, tmp_path: Path, run: Callable[..., Any]) -> None:
+        self.mission(tmp_path, 0.5, planned=False)
+        assert PLAN not in run("check", tmp_path / "m.yaml", "--format", "json").stdout
 
     def test_without_the_key_it_counts(self, tmp_path: Path) -> None:
         """3 days of age, 7 km, against 5 m of location: with the line `planned: false` as without it."""

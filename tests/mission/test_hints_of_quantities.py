@@ -42,6 +42,32 @@ def test_three_values_without_brackets_where_a_list_is_needed() -> None:
 
 
 @pytest.mark.parametrize(
+    ("written", "offered"),
+    [
+        ("1 m, 2 m, 3 m", "Did you mean [1 m, 2 m, 3 m]?"),
+        ("1 m, 1 m, 1 m", "Did you mean [1 m, 1 m, 1 m]?"),
+        ("-1 m, 0, .5 m, velocity: 0", "Did you mean [-1 m, 0, .5 m]?"),
+        ("1, 2, 3 km", "A decimal is written with a point"),
+        ("1,234 m", "A decimal is written with a point"),
+    ],
+)
+def test_three_values_without_brackets_in_a_flow_mapping(written: str, offered: str) -> None:
+    """YAML makes a key of each; block style offers the same."""
+    text = mission_text() + f"\ncommon_motion_error: {{position: {written}}}\n"
+    with pytest.raises(MissionError) as caught:
+        parse_mission(text)
+    (fault,) = caught.value.faults
+    assert (fault.key, fault.hint) == ("common_motion_error.position", offered)
+    if "Did" in offered:
+        parse_mission(text.replace(written, offered[len("Did you mean ") : -1]))
+
+
+def test_a_key_without_a_value_is_no_number() -> None:
+    with pytest.raises(MissionError, match=r"velocity: has no value"):
+        parse_mission(mission_text() + "\ncommon_motion_error: {position: 1 m, velocity}\n")
+
+
+@pytest.mark.parametrize(
     ("amplitude", "offered"),
     [
         ("5 mil", "5 mil is 127 \N{MICRO SIGN}m"),

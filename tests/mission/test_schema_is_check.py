@@ -184,6 +184,18 @@ def test_an_orbit_of_a_number_and_times_without_quotes() -> None:
         {"platforms__receiver__motion_error": {"frame": "body"}},
         {"platforms__receiver__oscillator": {"phase_noise": {"1 Hz": "-80 dB"}}},
         {"requirements__islr": 20},
+        {"requirements__pslr": "30 dB"},
+        {"requirements__pslr": "0 dB"},
+        {"requirements__location_error": "0 m"},
+        {"requirements__quadratic_phase_error": 0},
+        {"collection__aperture_time": "-2 s"},
+        {"collection__aperture_time": "0.0e3 s"},
+        {"platforms__receiver__motion_error": {"position": "1 dps"}},
+        {"platforms__receiver__motion_error": {"lever_arm": {}}},
+        {"platforms__receiver__motion_error": {"lever_arm": {"uncertainty": "-1 mm"}}},
+        {"platforms__receiver__motion_error": {"lever_arm": {"source": "drawing"}}},
+        {"platforms__receiver__orbit": {"planned": True}},
+        {"other_errors": [{"name": "a"}]},
         {"requirements__declare": ["position", "position"]},
         {"waivers": [{"id": "*", "until": "tomorrow", "reason": "r"}]},
         {"waivers": [{"id": "*", "until": "2027-01-01"}]},
@@ -197,3 +209,25 @@ def test_both_refuse(changes: dict[str, Any]) -> None:
     text = mission_text(**changes)
     assert not hold(text, "refused")
     assert not any(is_accepted(text, loader) for loader in LOADERS.values())
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"requirements__pslr": "-0.5 dB"},
+        {"requirements__pslr": "-30 dB"},
+        {"requirements__location_error": "0.05 m"},
+        {"requirements__location_error": "5e-2 m"},
+        {"collection__aperture_time": " +0.6 s"},
+        {"scene__height_error": "-0 m"},
+        {"scene__height_error": 0},
+        {"platforms__receiver__motion_error": {"position": "-1 m", "imu": {"gyro_bias": "1 dps"}}},
+        {"platforms__receiver__motion_error": {"imu": {"accelerometer_bias": "1 micro-g"}}},
+        {"platforms__receiver__motion_error": {"lever_arm": {"uncertainty": "0 mm"}}},
+        {"platforms__receiver__motion_error": {"time_tag": "-1 ms"}},
+        {"other_errors": [{"name": "a", "islr": "-40 dB"}]},
+        {"platforms__receiver__oscillator": {"power_law": {"h0": "1e-27"}, "level": "-3 dB"}},
+    ],
+)
+def test_both_take_the_sound_neighbour(changes: dict[str, Any]) -> None:
+    assert hold(mission_text(**changes), "taken")

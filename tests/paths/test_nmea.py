@@ -369,6 +369,19 @@ class TestADatum:
             read(nmea(SHORT).decode() + sentence(f"GPDTM,{datum}"))
         assert str(error.value) == f"a.nmea:19: DTM says that the places are of {words}"
 
+    @pytest.mark.parametrize("ending", ["*00", "", "*"])
+    def test_its_checksum_excuses_no_other_datum(self, ending: str) -> None:
+        """Left out like other broken sentences it would make its places those of WGS-84."""
+        broken = self.USER.partition("*")[0] + ending
+        fixes = nmea(SHORT).decode()
+        with pytest.raises(PathFileError, match=r"a\.nmea:1: DTM with a wrong checksum or none says .*\(999\)"):
+            read(broken + "\n" + fixes)
+        sound = sentence("GPDTM,W84,,0.0,N,0.0,E,0.0,W84")
+        for neighbour in (sound.partition("*")[0] + ending, f"{broken}\n{sound}"):
+            log = read(neighbour + "\n" + fixes)
+            assert len(log.times) == 6
+            assert "1 sentence with a wrong checksum left out" in log.words
+
     def test_that_of_a_receiver_that_is_not_chosen_does_not_count(self) -> None:
         lines = "\n".join([self.USER, *TestTwoReceivers.MIXED.splitlines()])
         assert len(read(lines, talker="GN").times) == 250

@@ -258,6 +258,22 @@ def test_a_solution_is_where_it_complies_without_the_waiver(run: Run, waived: Pa
         ).stdout.split()
     )
     assert re.search(rf"no value of the range complies, \d+ waived \({WAIVER}\)", said)
+    usage = " ".join(run("solve", "--help").stdout.split())
+    assert "Exit code: 0, also where nothing complies and something is waived; 1 if" in usage
+
+
+def test_a_solution_in_python_counts_it_apart(waived: Path) -> None:
+    mission = bb.load(str(waived))
+    for between, said in (
+        (("1 m", "3 m"), rf"no value of the range complies, \d+ waived \({WAIVER}\)"),
+        (("1 m", "100 m"), rf"11\.01\d* m, \d+ waived \({WAIVER}\)"),
+        (("20 m", "100 m"), "every value of the range complies"),
+    ):
+        found = bb.solve(mission, "requirements.location_error", between=between, date=DAY)
+        assert re.fullmatch(f"<solve of requirements.location_error for 'Located badly': {said}>", repr(found))
+    other = bb.loads(text())
+    found = bb.solve(other, "requirements.location_error", between=("1 m", "3 m"), date=DAY)
+    assert repr(found).endswith(": no value of the range complies>")
 
 
 def test_parts_that_are_waived_stand_apart(run: Run, waived: Path) -> None:

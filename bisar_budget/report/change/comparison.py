@@ -16,6 +16,7 @@ from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.model import Mission, Requirements, Waiver
 from bisar_budget.mission.parts import figure_text
 from bisar_budget.report.change.fallen_effects import SUMS, fallen_effects
+from bisar_budget.report.change.lost_doubts import lost_doubts
 from bisar_budget.report.words.sentences import dotted, percent
 from bisar_budget.settings import TABLE
 
@@ -154,6 +155,7 @@ def loosenings(before: MissionFindings, after: MissionFindings) -> Iterator[Loos
     yield from gone
     yield from _distributions(*missions)
     yield from _fallen(before, after, [one.id for one in gone])
+    yield from (Loosened(*lost) for lost in lost_doubts(*missions))
     yield from _sources(before, after)
 
 

@@ -16,7 +16,7 @@ from bisar_budget.paths.instant import DAY, Instant
 from bisar_budget.report import Style
 from bisar_budget.report.formats.csv_table import csv_text
 from bisar_budget.report.formats.json_document import document_text, outside_item
-from bisar_budget.report.words.heading import title_lines
+from bisar_budget.report.words.heading import overrides_words, title_lines
 from bisar_budget.report.words.identity import digest
 from bisar_budget.report.words.sentences import (
     percent,
@@ -112,10 +112,11 @@ def direction(one: SatellitePass) -> str:
 def as_csv(passes: Passes, style: Style) -> str:
     """Write a line for each pass, values in SI and radians, empty where there is none."""
     whose = [passes.file, passes.name, passes.platform]
-    lines: list[list[object]] = [["file", "name", "platform", *_item(_NO_PASS)]]
+    outside = overrides_words(passes) or None
+    lines: list[list[object]] = [["file", "name", "platform", *_item(_NO_PASS), "overrides"]]
     for one in passes.found:
         values = _item(one) | {"waived_by": "; ".join(one.waived_by) or None}
-        lines.append([*whose, *values.values()])
+        lines.append([*whose, *values.values(), outside])
     return csv_text(lines)
 
 
@@ -378,6 +379,8 @@ def _description(one: SatellitePass, passes: Passes) -> Iterator[str]:
         yield f"{sentence(said)}{use}"
     if one.reason:
         yield sentence(printable(one.reason))
+    if outside := overrides_words(passes):
+        yield f"Overrides: {outside}"
 
 
 def _escaped(text: str) -> str:

@@ -1,0 +1,99 @@
+"""Doubts about paths that a change takes away although the declared errors stay.
+
+A path is in doubt by what its source states of itself, by the age and the interpolation of an orbit, by the noise of
+a log. Newer elements and better logs end such a doubt; a key that takes it away does not, nor does a source that
+states less of itself under the same name.
+"""
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+from bisar_budget.budget.doubts import RESIDUAL, InputDoubt, input_doubts
+from bisar_budget.effects.effect import MOTION_UNITS
+from bisar_budget.mission.model import Mission
+from bisar_budget.mission.platforms import SMOOTHED, FlownPath, Platform
+from bisar_budget.units import format_quantity
+
+_CHOICES = ("object", "talker", "track", "instance")  # keys that name a source within a file
+_NOT_OF_FORM = (*_CHOICES, "planned")  # keys of an orbit beside its source
+
+
+class LostDoubt(NamedTuple):
+    """A doubt of the earlier mission that the later one has no more: the key that took it away, before and after."""
+
+    key: str
+    before: str
+    after: str
+
+
+def lost_doubts(before: Mission, after: Mission) -> Iterator[LostDoubt]:
+    """List doubts of the earlier paths that the later declared errors do not cover, and that are gone."""
+    doubts = {_name(doubt) for doubt in input_doubts(before)}
+    if not doubts:
+        return
+    kept = {_name(doubt) for doubt in input_doubts(after)}
+    for owner in dict.fromkeys(owner for owner, *_ in sorted(doubts)):
+        old, new = (getattr(mission.platforms, owner) for mission in (before, after))
+        flown = {owner: new._replace(path=old.path)}
+        for doubt in input_doubts(after._replace(platforms=after.platforms._replace(**flown))):
+            name = _name(doubt)
+            if doubt.owner != owner or name not in doubts or name in kept:
+                continue
+            for key, now in _takes(doubt, old, new):
+                yield LostDoubt(f"platforms.{owner}.{key}", _words(doubt), now)
+
+
+def _name(doubt: InputDoubt) -> tuple[str, str, bool, bool]:
+    return doubt.owner, doubt.kind, doubt.is_stated, doubt.is_of_log
+
+
+def _words(doubt: InputDoubt) -> str:
+    is_phase = doubt.kind == RESIDUAL
+    size = format_quantity(doubt.doubt, "rad" if is_phase else MOTION_UNITS[doubt.kind])
+    return f"{'path' if is_phase else doubt.kind} in doubt by {size}"
+
+
+def _takes(doubt: InputDoubt, old: Platform, new: Platform) -> Iterator[tuple[str, str]]:
+    """Keys that take a doubt away, and how; none where it is another source, or a better one."""
+    was, now = old.path, new.path
+    if was is None:
+        return
+    if now is None or new.way not in ("orbit", "trajectory"):
+        yield old.way, "path stated without a source"
+    elif now.is_planned and not was.is_planned and not doubt.is_stated:
+        yield "orbit.planned", "true"
+    elif doubt.is_of_log and now.log_noise is not None and now.log_noise.processed == SMOOTHED:
+        yield "trajectory.processed", SMOOTHED
+    elif doubt.is_stated and was.accuracy is not None and now.accuracy is None:
+        yield "trajectory.accuracy", "none"
+    elif doubt.is_stated and _source(old) == _source(new) and not _is_sourced_anew(doubt, old, new):
+        for file in _changed(was, now):
+            yield _key(old), f"content of {file} states less of itself"
+
+
+def _source(platform: Platform) -> tuple[Any, ...]:
+    """Names of what a path is taken from."""
+    stated, path = getattr(platform, platform.way), platform.path
+    files = () if path is None else (path.file, path.accuracy and path.accuracy[0])
+    return (_key(platform), *files, *(getattr(stated, choice, None) for choice in _CHOICES))
+
+
+def _key(platform: Platform) -> str:
+    """Key that names the file of a path."""
+    stated = getattr(platform, platform.way)
+    form = next(key for key in stated._fields if key not in _NOT_OF_FORM and getattr(stated, key) is not None)
+    return f"{platform.way}.{form}"
+
+
+def _is_sourced_anew(doubt: InputDoubt, old: Platform, new: Platform) -> bool:
+    """Whether the declared error has another source, by its name."""
+    named = new.motion_error.evidence(doubt.kind)
+    return bool(named) and named != old.motion_error.evidence(doubt.kind)
+
+
+def _changed(was: FlownPath, now: FlownPath) -> Iterator[str]:
+    """Files with other contents than before."""
+    if was.file is not None and was.sha256 != now.sha256:
+        yield was.file
+    if was.accuracy is not None and was.accuracy != now.accuracy:
+        yield was.accuracy[0]
