@@ -263,18 +263,9 @@ def clocks_are_not_set(row_ids: Sequence[str]) -> str:
 
 @phrase
 def drift_is_not_stated(platforms: Sequence[str]) -> str:
-    """Said of the location, beside clocks in holdover without an oscillator."""
+    """Said of what rests on clocks in holdover, of which the file does not state every oscillator."""
     keys = " and ".join(f"platforms.{name}.oscillator" for name in platforms)
     return f"in holdover a clock drifts as its oscillator does, and the file does not state it: add {keys}"
-
-
-@phrase
-def one_clock_is_not_stated(stated: str, unstated: str) -> str:
-    """Said of the noise of two clocks in holdover, of which one oscillator is stated."""
-    return (
-        f"both clocks run free in holdover, and the file states the oscillator of the {stated} alone: "
-        f"add platforms.{unstated}.oscillator"
-    )
 
 
 @phrase

@@ -16,7 +16,6 @@ from bisar_budget.budget.fit_noise import MOST_CHANGE, allowable_noise
 from bisar_budget.constants import FASTEST_FLIGHT
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.oscillator_acceleration import is_unshaken
-from bisar_budget.effects.oscillators import clocks_without_oscillator
 from bisar_budget.faults import KeyPath, changes_words
 from bisar_budget.findings.mission import FileWarning
 from bisar_budget.findings.row import Row
@@ -203,10 +202,6 @@ def _of_instruments(case: Case) -> Iterator[_Warned]:
     T = mission.collection.aperture_time
     if sync is not None and not sync.is_direct_path and (sync.interval or 0.0) > T:
         yield _Warned(("synchronization", "interval"), exchanges_are_rare(T))
-    undriven = clocks_without_oscillator(mission)
-    # Else the location says that it is not judged, and with one clock the noise.
-    if len(undriven) > 1 and mission.requirements.location_error is None:
-        yield _Warned(("synchronization", "age"), nothing_drifts(undriven))
     for error in case.random:
         declared = error.subject.axis == "accelerometer_bias" and error.declared is not None
         if declared and getattr(mission.platforms, error.owner).motion_error.acceleration is not None:
@@ -268,13 +263,6 @@ def _unused_correlations(mission: Mission) -> Iterator[_Warned]:
         covariance = getattr(mission.platforms, name).motion_error.covariance
         if covariance is not None and covariance.has_correlations():
             yield _Warned(("platforms", name, "motion_error", "covariance"), correlations_not_used(name))
-
-
-@phrase
-def nothing_drifts(platforms: Sequence[str]) -> str:
-    """Said of clocks that were set, of which no oscillator is stated."""
-    keys = " and ".join(f"platforms.{name}.oscillator" for name in platforms)
-    return f"synchronization.age: clocks drift as their oscillators do, and the file has no {keys}"
 
 
 @phrase

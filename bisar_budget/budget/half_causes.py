@@ -1,8 +1,8 @@
 """Causes of which the file states one half: rows that rest on such a cause are not evaluated.
 
 Deleting the worse half of a cause must not turn a failing mission into a pass. Two causes have halves that nothing
-else in the file asks for: the clocks of a holdover, of which one oscillator is stated, and the vibration that an
-oscillator feels, of which `oscillator.vibration` states tones or noise alone while the airframe has both.
+else in the file asks for: the clocks of a holdover, which need both oscillators, and the vibration that an oscillator
+feels, of which `oscillator.vibration` states tones or noise alone while the airframe has both.
 """
 
 from collections.abc import Iterator
@@ -16,6 +16,7 @@ from bisar_budget.phrases import NOTHING, Note
 
 _HOLD_NOISE = ("quadratic_phase_error", "cubic_phase_error", "islr")
 _HOLD_TONES = (*_HOLD_NOISE, "pslr")
+_HOLD_CLOCKS = (*_HOLD_NOISE, "location_error")
 
 
 @dataclass(frozen=True)
@@ -24,31 +25,31 @@ class HalfCause:
 
     Attributes
     ----------
-    platform : str
-        Platform of the oscillator that the file states.
+    platforms : tuple of str
+        Platforms whose oscillators the file states.
     requirements : tuple of str
         Keys of the requirements that hold the effects of the cause.
     note : Note
         What to add to the file.
     """
 
-    platform: str
+    platforms: tuple[str, ...]
     requirements: tuple[str, ...]
     note: Note
 
     def holds(self, subject: Subject) -> bool:
-        """Whether a row rests on the cause: a row of the oscillator, or a sum of the mission."""
+        """Whether a row rests on the cause: a row of a stated oscillator, or a sum of the mission."""
         if subject.id in [f"mission.{key}" for key in self.requirements]:
             return True
-        return subject.owner == self.platform and subject.id.startswith(f"{self.platform}.oscillator")
+        return subject.owner in self.platforms and subject.id.startswith(f"{subject.owner}.oscillator")
 
 
 def half_causes(mission: Mission) -> Iterator[HalfCause]:
     """Find the causes of which the file states one half."""
     unstated = clocks_without_oscillator(mission)
-    if len(unstated) == 1:
-        (stated,) = set(PLATFORMS) - set(unstated)
-        yield HalfCause(stated, _required(mission, _HOLD_NOISE), phrases.one_clock_is_not_stated(stated, unstated[0]))
+    if unstated:
+        stated = tuple(name for name in PLATFORMS if name not in unstated)
+        yield HalfCause(stated, _required(mission, _HOLD_CLOCKS), phrases.drift_is_not_stated(unstated))
     for name in PLATFORMS[mission.has_direct_path :]:
         platform = getattr(mission.platforms, name)
         oscillator = platform.oscillator
@@ -57,10 +58,13 @@ def half_causes(mission: Mission) -> Iterator[HalfCause]:
         felt, airframe = oscillator.vibration, platform.motion_error.vibration
         if not felt.is_stated:
             continue
+        held_by: dict[str, tuple[str, ...]] = {}
         if felt.spectrum is None and (airframe.spectrum is not None or airframe.wideband is not None):
-            yield HalfCause(name, _required(mission, _HOLD_NOISE), phrases.felt_vibration_lacks(name, "spectrum"))
+            held_by["spectrum"] = _HOLD_NOISE
         if airframe.sinusoidal and not felt.sinusoidal:
-            yield HalfCause(name, _required(mission, _HOLD_TONES), phrases.felt_vibration_lacks(name, "sinusoidal"))
+            held_by["sinusoidal"] = _HOLD_TONES
+        for key, requirements in held_by.items():
+            yield HalfCause((name,), _required(mission, requirements), phrases.felt_vibration_lacks(name, key))
 
 
 def _required(mission: Mission, keys: tuple[str, ...]) -> tuple[str, ...]:

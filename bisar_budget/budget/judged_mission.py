@@ -41,7 +41,6 @@ from bisar_budget.budget.waivers import holding_place
 from bisar_budget.constants import FASTEST_FLIGHT
 from bisar_budget.effects.declared import END_OF_IMAGE, LOCATION, MODELS
 from bisar_budget.effects.effect import PLATFORMS, subject
-from bisar_budget.effects.oscillators import clocks_without_oscillator
 from bisar_budget.findings.row import DECLARE, SPECIFICATION
 from bisar_budget.findings.status import BROKEN, STATUS
 from bisar_budget.geometry import BistaticGeometry, norm
@@ -133,10 +132,8 @@ class _Judgement:
         untaken = untaken_effects(analysis)
         drifting = unplaced(analysis.together("full"))
         nowhere = np.zeros(self.cases, dtype=bool)
-        # A clock in holdover whose oscillator the file does not state drifts by nobody knows how much.
-        is_unknown = np.full(self.cases, bool(clocks_without_oscillator(mission)))
         paths = [is_doubtful for (_, kind), is_doubtful in self._in_doubt.items() if kind != RESIDUAL]
-        is_misplaced = np.any([nowhere, is_unknown, *drifting.values(), *paths], axis=0)
+        is_misplaced = np.any([nowhere, *drifting.values(), *paths], axis=0)
         has_noise = self._has_noise()
         air = staying_air(analysis, rows)
         of_all.doubt_air(air.doubted_rows())

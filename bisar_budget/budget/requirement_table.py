@@ -30,7 +30,6 @@ from bisar_budget.budget.judged_requirements import (
 from bisar_budget.budget.judged_rows import FamilyRow, Judged, Why, statuses
 from bisar_budget.budget.waivers import Waived
 from bisar_budget.effects.declared import LOCATION, MODELS, QUADRATIC
-from bisar_budget.effects.oscillators import clocks_without_oscillator
 from bisar_budget.findings.requirement import DecidingShare, JudgedRequirement
 from bisar_budget.findings.row import DECLARE, AppliedWaiver, Row, holding, in_order
 from bisar_budget.phrases import NOTHING, Note
@@ -119,13 +118,10 @@ def _why(judged: JudgedMission, case: Case, one: Judged, row: Row) -> Note:
 
 
 def unknown_place(judged: JudgedMission, case: Case) -> Note:
-    """Say what displaces the image by an amount that no row holds: clocks, by their setting or drift, or a path."""
+    """Say what displaces the image by an amount that no row holds: clocks, by their setting, or a path."""
     clocks = [row_id for row_id, is_there in judged.unplaced.items() if is_there[case.place]]
     if clocks:
         return phrases.clocks_are_not_set(clocks)
-    unstated = clocks_without_oscillator(case.mission)
-    if unstated:
-        return phrases.drift_is_not_stated(unstated)
     doubts = [one for one in input_doubts(case.mission) if one.kind != RESIDUAL]
     return doubts[0].note if doubts else NOTHING
 

@@ -34,7 +34,10 @@ OSCILLATOR = {
     "aging": "1e-10 /day",
     "level": "3 dB",
     "acceleration_sensitivity": "1e-9 /g",
-    "vibration": {"sinusoidal": [{"amplitude": "10 um", "frequency": "20 Hz"}]},
+    "vibration": {
+        "sinusoidal": [{"amplitude": "10 um", "frequency": "20 Hz"}],
+        "spectrum": {"20 Hz": "1e-9 g^2/Hz", "1 kHz": "1e-9 g^2/Hz"},
+    },
     "source": "data sheet",
 }
 MOTION = {
