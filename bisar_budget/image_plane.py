@@ -12,7 +12,7 @@ line look alike: there is no image plane. Derived here; `ranges.exact_ranges` fi
 import math
 from dataclasses import dataclass
 from functools import cache, cached_property, reduce
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,7 +48,8 @@ class Band(Protocol):
         """Width of the band, evenly filled."""
 
 
-class Sampling(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Sampling:
     """When a history is sampled: slow times over −1 … 1, in half apertures, (samples,); and the weights that fit it.
 
     The weights (4, samples) give the mean, which is the P₀ part, the P₁ part at the edge, and the quadratic and the
@@ -58,6 +59,7 @@ class Sampling(NamedTuple):
     places: Floats
     fit: Floats
 
+    @cached_property
     def to_ends(self) -> Floats:
         """Weights (2, samples) that carry a smooth history from the samples to both ends of the aperture."""
         degree = min(self.places.size, OF_ENDS) - 1
@@ -215,7 +217,8 @@ def spans_ground(geometry: BistaticGeometry, radar: Band, aperture_time_s: Any, 
     image plane; what has none is within a degree of parallel over the whole aperture.
     """
     half = np.array(np.broadcast_to(np.asarray(aperture_time_s, dtype=float) / 2, (cases,)))
-    places, fit = nodes(int(np.max(nodes_for(geometry, 2 * half), initial=FEWEST_NODES)))
+    sampling = nodes(int(np.max(nodes_for(geometry, 2 * half), initial=FEWEST_NODES)))
+    places, fit = sampling.places, sampling.fit
     slopes, turning = np.zeros((2, places.size, cases)), np.zeros(cases)
     for path in geometry.both:
         x, y, z = path.place(places[:, None] * half)

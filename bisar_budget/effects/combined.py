@@ -72,8 +72,11 @@ def correlated_errors(mission: Mission) -> tuple[Correlated, ...]:
 
 def squared(correlation: Sequence[Sequence[Any]], parts: Sequence[Any] | Floats) -> Any:
     """Square of the sum of correlated parts: Σ ρᵢⱼvᵢvⱼ; what rounding leaves below zero is zero."""
-    rows = [sum(rho * v for rho, v in zip(row, parts, strict=True)) for row in correlation]
-    return np.maximum(0.0, sum(v * row for v, row in zip(parts, rows, strict=True)))
+    values = np.array(np.broadcast_arrays(*parts))
+    if any(np.ndim(rho) for row in correlation for rho in row):  # of cases that differ
+        correlation = [np.broadcast_arrays(*row, values[0])[:-1] for row in correlation]
+        return np.maximum(0.0, np.einsum("ijc,ic,jc->c", correlation, values, values))
+    return np.maximum(0.0, np.einsum("ij,i...,j...->...", correlation, values, values))
 
 
 # ---------------------------------------------------------------------- what combines

@@ -403,7 +403,7 @@ class ExactRanges:
         if self.fit.shape[1] > FEWEST_NODES:  # with fewer nodes no platform gets so far
             for track, ranges in zip(self.tracks, self.ranges, strict=True):
                 looks = np.stack(np.broadcast_arrays(*(part / ranges for part in track)))
-                looks = np.concatenate((looks, self.sampling.to_ends() @ looks), axis=1)
+                looks = np.concatenate((looks, self.sampling.to_ends @ looks), axis=1)
                 for later in looks.swapaxes(0, 1):
                     least = np.minimum(least, np.einsum("an,amn->mn", later, looks).min(axis=0))
         return np.asarray(least < math.cos(MAX_TURN_RAD))

@@ -130,7 +130,7 @@ def test_the_quadratic_phase_is_that_of_a_quadratic_fitted_over_the_aperture() -
 @pytest.mark.parametrize("count", [6, 10, 16, 32, 64])
 def test_the_weights_fit_legendre_polynomials(count: int) -> None:
     """A polynomial of 2·count − 4 is fitted exactly: its value, slope, and edges by NumPy's own conversion."""
-    places, rows = nodes(count)
+    places, rows = nodes(count).places, nodes(count).fit
     series = np.random.default_rng(count).normal(size=2 * count - 3)
     legendre = np.polynomial.legendre.poly2leg(series)[:4]
     fitted = [row @ np.polynomial.polynomial.polyval(places, series) for row in rows]
