@@ -15,6 +15,8 @@ ROUNDING = 1e-12
 # weights between ±1.66955 cells, over all of it. Computed here, tested against direct transforms.
 MAINLOBE_ENERGY = {"uniform": 0.9028233335802807, "taylor": 0.9981912855769113}
 
+ONE_PEAK_DB = 3.0  # loss of the peak beyond which the point of least phase variance is 4 % or more beside the peak
+
 MIN_GRADIENT_ANGLE_DEG = 1.0  # between range and Doppler gradients on the ground
 MIN_GROUND_GRADIENT = 0.02  # of the range on the ground, m per m; the published model has no image plane with less
 

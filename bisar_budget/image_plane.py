@@ -62,11 +62,13 @@ class Sampling:
     @cached_property
     def to_ends(self) -> Floats:
         """Weights (2, samples) that carry a smooth history from the samples to both ends of the aperture."""
+        return self.weights_at(np.array((-1.0, 1.0)))
+
+    def weights_at(self, places: Floats) -> Floats:
+        """Weights (places, samples) that carry a smooth history from the samples to other places over −1 … 1."""
         degree = min(self.places.size, OF_ENDS) - 1
         polynomials = np.polynomial.legendre.legvander(self.places, degree)
-        return np.asarray(
-            np.polynomial.legendre.legvander(np.array((-1.0, 1.0)), degree) @ np.linalg.pinv(polynomials)
-        )
+        return np.asarray(np.polynomial.legendre.legvander(places, degree) @ np.linalg.pinv(polynomials))
 
 
 LEADING = np.array((1.0, 1.0, 1.5, 2.5))  # coefficient of xⁿ in the Legendre polynomial Pₙ

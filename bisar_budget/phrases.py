@@ -1184,6 +1184,15 @@ def sight_turns(platform: str, half_turn: float) -> str:
 
 
 @phrase
+def image_has_no_one_peak(loss_db: float) -> str:
+    """Said of a collection whose declared errors take much of the peak. [dB]"""
+    return (
+        f"{loss_db:.3g} dB by the declared errors: beyond 3 dB an image has no one peak, and phases and "
+        "displacements are those of the point at which the phase over band and aperture varies least"
+    )
+
+
+@phrase
 def direct_path_is_the_clock() -> str:
     """Said of a collection."""
     return (

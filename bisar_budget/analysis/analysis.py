@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bisar_budget.analysis.allocation import Allocation, allocate, autofocus_gain_of
+from bisar_budget.analysis.peak_loss import peak_loss_db
 from bisar_budget.analysis.spread import Tone, tones
 from bisar_budget.analysis.together import Together
 from bisar_budget.analysis.tone_displacement import ToneDisplacement, tone_displacements
@@ -28,7 +29,7 @@ from bisar_budget.image_plane import nodes_for
 from bisar_budget.mission.model import Mission, has_random_errors
 from bisar_budget.mission.stacked import picked
 from bisar_budget.phrases import Note
-from bisar_budget.ranges.exact_ranges import ExactRanges
+from bisar_budget.ranges.exact_ranges import ExactRanges, Floats
 from bisar_budget.ranges.resolution import Resolution, resolution
 
 __all__ = ["Analysis", "Case", "Model", "by_nodes"]
@@ -96,6 +97,11 @@ class Analysis:
     def resolution(self) -> Resolution:
         """Widths of the response without errors, (cases,)."""
         return resolution(self.exact, self.geometry, self.mission.radar, self.mission.collection.aperture_time)
+
+    @cached_property
+    def peak_loss_db(self) -> Floats:
+        """Loss of the peak by all declared errors, (cases,). [dB]"""
+        return peak_loss_db(self)
 
     @cached_property
     def errors(self) -> DeclaredErrors:
@@ -214,6 +220,12 @@ class Case:
     def resolution(self) -> Resolution:
         """Widths of its response without errors."""
         return Resolution._make(map(self.number, self.analysis.resolution))
+
+    @cached_property
+    def peak_loss_db(self) -> float | None:
+        """Loss of its peak by all declared errors; None where there is no image, or nothing is declared. [dB]"""
+        loss = self.number(self.analysis.peak_loss_db)
+        return loss if math.isfinite(loss) else None
 
     @cached_property
     def allocation(self) -> Allocation:

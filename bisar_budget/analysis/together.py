@@ -123,20 +123,22 @@ class Together:
         return {group.id: self._hidden_of(group) for group in self.groups if stated >= set(group.ids)}
 
     def _hidden_of(self, group: Correlated) -> Floats:
-        """Hidden phase of the six errors of a covariance. [rad]
-
-        A root of their correlations makes independent errors of them, whose squares add up.
-        """
+        """Hidden phase of the six errors of a covariance: the squares of independent errors add up. [rad]"""
         errors = {error.subject.id: error for error in self.motion}
         left = []
         for row_id in group.ids:
             block, place = self.errors.block_of(errors[row_id])
             left.append(block.left_per_unit([place])[0] * np.nan_to_num(block.declared[place]))
-        correlation = np.array([[self.errors.array(rho) for rho in row] for row in group.correlation])
-        roots = factor(np.moveaxis(correlation, 2, 0))
-        independent = np.einsum("cij,inc->jnc", roots, np.array(left))
-        hidden, _ = self.errors.exact.unresolved(independent)
+        hidden, _ = self.errors.exact.unresolved(self.independent(group, np.array(left)))
         return np.asarray(np.sqrt(np.square(hidden).sum(axis=0)))
+
+    def independent(self, group: Correlated, left: Floats) -> Floats:
+        """Range errors at the nodes of independent errors that together are those of a covariance. [m]
+
+        Those of its six errors are (6, nodes, cases). A root of their correlations turns them.
+        """
+        correlation = np.array([[self.errors.array(rho) for rho in row] for row in group.correlation])
+        return np.asarray(np.einsum("cij,inc->jnc", factor(np.moveaxis(correlation, 2, 0)), left))
 
     def combined(self, phases: Phases, rule: str = "") -> Floats:
         """Combine phases by the mission's rule, or another. [rad]"""

@@ -105,6 +105,7 @@ def _findings(judged: JudgedMission, case: Case, today: date, outside: Outside) 
         aperture_time=mission.collection.aperture_time,
         scene_radius=mission.scene.radius,
         resolution=case.resolution,
+        peak_loss_db=case.peak_loss_db,
         allocation=case.allocation,
         rows=tuple(rows),
         requirements=requirements,

@@ -17,6 +17,7 @@ import numpy as np
 
 from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Case
+from bisar_budget.constants import ONE_PEAK_DB
 from bisar_budget.effects.effect import MOTION_UNITS, PLATFORMS, Subject
 from bisar_budget.effects.navigation_errors import residual_subject
 from bisar_budget.findings.row import Row
@@ -386,6 +387,8 @@ def collection_notes(case: Case) -> Iterator[Note]:
         turn = norm(state.look_rate) * mission.collection.aperture_time / 2
         if turn > _TURNING_RAD:
             yield phrases.sight_turns(name, turn)
+    if case.peak_loss_db is not None and case.peak_loss_db > ONE_PEAK_DB:
+        yield phrases.image_has_no_one_peak(case.peak_loss_db)
     if mission.has_direct_path:
         yield phrases.direct_path_is_the_clock()
     sync = mission.synchronization

@@ -53,6 +53,7 @@ class MissionFindings(NamedTuple):
     aperture_time: float
     scene_radius: float | None
     resolution: Resolution
+    peak_loss_db: float | None  # by all declared errors; None where there is no image, or nothing is declared
     allocation: Allocation
     rows: tuple[Row, ...]
     warnings: tuple[FileWarning, ...]

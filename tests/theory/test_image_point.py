@@ -254,6 +254,8 @@ def test_check_has_the_point_and_the_loss_of_the_image(kind: str, tmp_path: File
         if not is_turned:
             lost += 4 / 175 * row.cubic_rad**2 + row.rest_rad**2
         assert -10 * math.log10(math.exp(-lost)) == pytest.approx(-found[worse].peak_db, abs=0.02), (kind, seed)
+        loss_db = result.to_dict()["missions"][0]["peak_loss_db"]
+        assert loss_db == pytest.approx(max(-one.peak_db for one in found), rel=1e-3, abs=1e-3), (kind, seed)
 
 
 def reversed_error(error: Path) -> Path:

@@ -142,6 +142,7 @@ def _mission(mission: MissionFindings) -> dict[str, Any]:
             "range_half_power_m": mission.resolution.range_half_power,
             "cross_range_half_power_m": mission.resolution.cross_range_half_power,
         },
+        "peak_loss_db": mission.peak_loss_db,
         "budget": {
             "qpe_rad": {
                 "total": allocation.qpe_total,

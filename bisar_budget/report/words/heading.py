@@ -4,6 +4,8 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Protocol
 
+from bisar_budget import phrases
+from bisar_budget.constants import ONE_PEAK_DB
 from bisar_budget.faults import SetValue, changes_words, printable
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.requirement import Override
@@ -21,6 +23,7 @@ _MODELS_AT_LENGTH = {
     "full": "full (exact ranges, displacement included)",
     "strictest": "strictest (the stricter of published and full for each row)",
 }
+_LEAST_LOSS_DB = 0.01  # less is not told apart
 _NARROW_DEG = 30.0  # between range and Doppler gradients; below it the verdict says what that does
 
 
@@ -135,6 +138,9 @@ def head(mission: MissionFindings) -> Iterator[tuple[str, str]]:
         f"{format_quantity(mission.resolution.range_half_power, 'm')} and "
         f"{format_quantity(mission.resolution.cross_range_half_power, 'm')} wide at half power",
     )
+    if mission.peak_loss_db is not None:
+        before = "" if allocation.n_pull is None else ", before autofocus"
+        yield "Peak loss", f"{_peak_loss(mission.peak_loss_db)}{before}"
     split = allocation.qpe
     shares = f"transmitter {split.transmitter:.3g}, receiver {split.receiver:.3g}"
     shares += f", clock {split.clock:.3g}" if split.clock is not None else ""
@@ -155,6 +161,14 @@ def head(mission: MissionFindings) -> Iterator[tuple[str, str]]:
         )
     if mission.coverage_factor != 1:
         yield "Coverage", f"navigation and clock: declared is {mission.coverage_factor:g} times the file's value"
+
+
+def _peak_loss(loss_db: float) -> str:
+    if loss_db > ONE_PEAK_DB:
+        return str(phrases.image_has_no_one_peak(loss_db))
+    return (
+        f"{f'{loss_db:.2g}' if loss_db >= _LEAST_LOSS_DB else f'below {_LEAST_LOSS_DB:g}'} dB by the declared errors"
+    )
 
 
 def path_words(path: FlownPath) -> str:

@@ -1,0 +1,94 @@
+"""Loss of the peak of the image by all declared errors, in many cases at once.
+
+At the image point an error of motion or of a clock leaves a range error ρ over the aperture. The peak keeps
+|⟨exp(ikρf/f₀)⟩|² of its power, with ⟨ ⟩ the mean over aperture and band: a direct sum. A random error keeps exp(-σ²)
+of the power, with σ² the variance of its phase; so does a tone of any phase. Losses of independent errors add in
+decibels, as the variances of their phases do to second order. Derived here; against images formed by direct sums:
+`tests/theory/test_image_point.py`.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bisar_budget.analysis.spread import CUBIC_POWER, noise, rests
+from bisar_budget.effects.combined import combined
+from bisar_budget.effects.declared import DeclaredErrors
+from bisar_budget.effects.effect import ErrorSource
+from bisar_budget.image_plane import OF_ENDS, nodes
+from bisar_budget.ranges.exact_ranges import QUADRATIC_OF_VARIANCE, ExactRanges, Floats
+
+if TYPE_CHECKING:
+    from bisar_budget.analysis.analysis import Analysis
+
+_SUMMED_NODES = 128  # for phases up to some 100 rad
+_DB_OF_VARIANCE = 10 / math.log(10)
+
+
+@np.errstate(invalid="ignore")
+def peak_loss_db(analysis: "Analysis") -> Floats:
+    """Loss of the peak, (cases,). [dB]
+
+    The mission's rule combines the losses of the errors: root-sum-square adds their decibels, a sum the roots, and
+    with each error alone the largest counts. Not a number where an error leaves no image, or nothing is declared.
+    """
+    errors, together = analysis.errors, analysis.together("full")
+    losses = list(_losses_of_motion(analysis, together.motion))
+    of_motion = {error.subject.id for error in together.motion}
+    variances: dict[str, Floats] = {}
+    for phase in together.phases:
+        if phase.row_id not in of_motion:
+            cubic = 0.0 if phase.cubic_rad is None else np.where(errors.exact.is_turned, 0.0, phase.cubic_rad)
+            variance = (phase.judged(1.0) / QUADRATIC_OF_VARIANCE) ** 2 + CUBIC_POWER * cubic**2
+            variances[phase.row_id] = errors.array(variance)
+    for spread in (*noise(analysis, "full"), *rests(analysis, "full")):
+        if spread.row_id not in of_motion:
+            variances[spread.row_id] = variances.get(spread.row_id, 0.0) + np.nan_to_num(
+                errors.array(spread.variance)
+            )
+    losses += [_DB_OF_VARIANCE * variance for variance in variances.values()]
+    losses += [errors.array(_DB_OF_VARIANCE * np.where(t.is_there, t.phase**2 / 2, 0.0)) for t in analysis.tones]
+    if not losses:
+        return errors.array(math.nan)
+    return np.square(errors.array(combined([np.sqrt(loss) for loss in losses], together.rule)))
+
+
+def _losses_of_motion(analysis: "Analysis", motion: Sequence[ErrorSource]) -> list[Floats]:
+    """Losses by errors of motion and of clocks, of the worse sign each. [dB]
+
+    The six errors of a covariance count as the independent errors that they are made of.
+    """
+    errors, together = analysis.errors, analysis.together("full")
+    if not motion:
+        return []
+    left = _range_errors_left(errors, motion)
+    places = {error.subject.id: place for place, error in enumerate(motion)}
+    losses = dict(zip(places, peak_losses(errors.exact, left).max(axis=1), strict=True))
+    for group in analysis.groups if together.rule == "rss" else ():
+        if places.keys() >= set(group.ids):
+            independent = together.independent(group, left[[places[row_id] for row_id in group.ids], 0])
+            losses |= dict(zip(group.ids, peak_losses(errors.exact, independent), strict=True))
+    return list(losses.values())
+
+
+def _range_errors_left(errors: DeclaredErrors, motion: Sequence[ErrorSource]) -> Floats:
+    """Range errors left by declared errors at their image points, (errors, signs, nodes, cases). [m]"""
+    does = [errors.does("full", error) for error in motion]
+    east, north = np.moveaxis(np.array([(effect.displacement, effect.opposite) for effect in does]), 2, 0)
+    size = np.array([errors.array(error.declared) for error in motion])
+    lanes = errors.lanes(*motion, signs=(1.0, -1.0))
+    left = errors.exact.left_over(lanes, np.repeat(size[:, None], 2, axis=1).ravel(), (east.ravel(), north.ravel()))
+    return np.moveaxis(left.reshape(len(left), len(motion), 2, errors.cases), 0, 2)
+
+
+def peak_losses(exact: ExactRanges, left: Floats) -> Floats:
+    """Losses of the peak by range errors that are left at the nodes, (..., nodes, cases) [m]; (..., cases). [dB]"""
+    sampling = exact.sampling
+    if sampling.places.size <= OF_ENDS:  # few nodes carry a smooth range error, and not the turns of its phase
+        left, sampling = sampling.weights_at(nodes(_SUMMED_NODES).places) @ left, nodes(_SUMMED_NODES)
+    phase, relative_band = exact.k * left, np.sqrt(12 * exact.band)
+    of_band = np.sinc(phase * relative_band / (2 * math.pi))  # the mean over the band, in closed form
+    amplitude = np.abs(np.einsum("n,...nc->...c", sampling.fit[0], np.exp(1j * phase) * of_band))
+    return np.asarray(np.maximum(-20 * np.log10(amplitude), 0.0))  # less than rounding leaves is none
