@@ -1187,8 +1187,8 @@ def sight_turns(platform: str, half_turn: float) -> str:
 def image_has_no_one_peak(loss_db: float) -> str:
     """Said of a collection whose declared errors take much of the peak. [dB]"""
     return (
-        f"{loss_db:.3g} dB by the declared errors: beyond 3 dB an image has no one peak, and phases and "
-        "displacements are those of the point at which the phase over band and aperture varies least"
+        f"{loss_db:.3g} dB by the declared errors; beyond 3 dB an image has no one peak, and phase and location are "
+        "those of the point with the least phase variance"
     )
 
 
