@@ -1246,6 +1246,12 @@ def unknown_drift_is_not_drawn(platforms: Sequence[str]) -> str:
 
 
 @phrase
+def hidden_phase_is_not_drawn(row_ids: Sequence[str]) -> str:
+    """Said of Monte Carlo, of sensors and clocks whose phase a narrow band or a long aperture hides."""
+    return f"{', '.join(row_ids)}: the quadratic phase is drawn, the phase that band and turn hide is in check alone"
+
+
+@phrase
 def mean_power_is_not_drawn() -> str:
     """Said of Monte Carlo."""
     return "what sensors and clocks spread is a mean power: ISLR is not drawn"

@@ -17,7 +17,7 @@ import numpy as np
 from bisar_budget import phrases
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Analysis, Model
-from bisar_budget.analysis.together import Together, cubics, quadratics
+from bisar_budget.analysis.together import Together, cubics
 from bisar_budget.constants import MAX_DRAWS
 from bisar_budget.effects.effect import PLATFORMS, ErrorSource
 from bisar_budget.effects.oscillators import clocks_without_oscillator
@@ -36,6 +36,7 @@ _MATERIAL = 0.1  # of the probability to fail: a difference that is sure but sma
 
 _DIGITS = 9  # of sampled sigmas: further ones differ between processors, and mean nothing
 _PARTS = ("", ".cubic", ".east", ".north")  # variables of a random error, beside its quadratic phase
+_HIDDEN_FRACTION = 0.1  # of the quadratic phase: a hidden phase of a tenth adds half a percent
 _NOTHING_LEFT = 1e-12  # of a variance: what rounding leaves of one that others account for
 _ANGLES = 4096  # of a mean over a circle of a smooth function
 
@@ -183,7 +184,7 @@ class _Predictions:
         """Size that a rule of `allocation.combine` holds to the limit, coverage factor included; None: no image."""
         members = [one for one in self.together.phases if one.owner in judged.owners]
         if judged.columns == (0,):
-            size = self.together.combined(quadratics(members), rule)
+            size = self.together.judged(members, rule)
         elif judged.columns == (1,):
             size = self.together.combined(cubics(members), rule)
         else:
@@ -286,6 +287,11 @@ def _doubts(found: Requirement, holds: int, draws: int, predictions: _Prediction
         )
 
 
+def _hides_phase(error: RandomError) -> bool:
+    """Whether band and turn hide more of an error's phase than a tenth of its quadratic phase."""
+    return bool(np.any(error.full.hidden > _HIDDEN_FRACTION * np.abs(error.full.quadratic)))
+
+
 def _notes(mission: Mission, analysis: Analysis, *, is_exact: bool, is_placed: bool) -> Iterator[Note]:
     """Say what is drawn by a rule of ours, and what is not drawn."""
     if is_exact:
@@ -298,6 +304,9 @@ def _notes(mission: Mission, analysis: Analysis, *, is_exact: bool, is_placed: b
     bounds += [error.id for error in analysis.random if not error.is_covered]
     if bounds:
         yield phrases.drawn_as_bounds(bounds)
+    hidden = [error.id for error in analysis.random if error.declared and _hides_phase(error)]
+    if hidden:
+        yield phrases.hidden_phase_is_not_drawn(hidden)
     vibrations = [getattr(mission.platforms, name).motion_error.vibration for name in PLATFORMS]
     if analysis.displacing_tones or any(one.wideband for one in vibrations):
         yield phrases.vibration_is_not_drawn()
