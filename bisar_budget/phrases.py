@@ -269,6 +269,13 @@ def drift_is_not_stated(platforms: Sequence[str]) -> str:
 
 
 @phrase
+def noise_between_pulses_is_not_stated(platforms: Sequence[str]) -> str:
+    """Said of two clocks that exchange pulses, of which the file states one oscillator."""
+    keys = " and ".join(f"platforms.{name}.oscillator" for name in platforms)
+    return f"between exchanged pulses both clocks run free, and the file states one oscillator: add {keys}"
+
+
+@phrase
 def felt_vibration_lacks(platform: str, key: str) -> str:
     """Said of an oscillator that is said to feel half of what its airframe does."""
     own = f"platforms.{platform}.oscillator.vibration"

@@ -51,7 +51,12 @@ def _lacks_an_attitude(mission: Mission, name: str) -> str:
     return "imu.attitude, gyro_bias or angle_random_walk, which swings the arm"
 
 
-def _lacks_a_vibration(mission: Mission, name: str) -> str:
+def _lacks_half_of_a_vibration(mission: Mission, name: str) -> str:
+    """Vibration acts on an oscillator by its sensitivity to acceleration: neither does anything alone."""
+    platform: Platform = getattr(mission.platforms, name)
+    if platform.oscillator is not None and platform.oscillator.acceleration_sensitivity is None:
+        is_shaken = platform.motion_error.vibration.is_stated
+        return "oscillator.acceleration_sensitivity, by which vibration acts on it" if is_shaken else ""
     if not is_unshaken(mission, name):
         return ""
     return (
@@ -142,7 +147,7 @@ _KINDS_OF_PLATFORMS: Mapping[str, _OfPlatform] = {
         "oscillator",
         lambda platform: platform.oscillator is not None,
         lambda platform: platform.oscillator is not None and bool(platform.oscillator.source),
-        _lacks_a_vibration,
+        _lacks_half_of_a_vibration,
     ),
     "time_tag": _OfPlatform(
         "motion_error.time_tag",

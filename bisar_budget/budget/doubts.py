@@ -391,8 +391,3 @@ def collection_notes(case: Case) -> Iterator[Note]:
         yield phrases.image_has_no_one_peak(case.peak_loss_db)
     if mission.has_direct_path:
         yield phrases.direct_path_is_the_clock()
-    sync = mission.synchronization
-    if sync is not None and sync.is_holdover:
-        missing = [key for key in ("time_error", "frequency_error") if getattr(sync, key) is None]
-        if missing:
-            yield phrases.setting_is_perfect(missing)

@@ -7,6 +7,7 @@ of; the line of the key is looked up here, once.
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
+from bisar_budget import phrases
 from bisar_budget.analysis.allocation import ROOM, caps, rounded_down
 from bisar_budget.analysis.analysis import Case
 from bisar_budget.budget.declarations import swings_nothing
@@ -202,6 +203,10 @@ def _of_instruments(case: Case) -> Iterator[_Warned]:
     T = mission.collection.aperture_time
     if sync is not None and not sync.is_direct_path and (sync.interval or 0.0) > T:
         yield _Warned(("synchronization", "interval"), exchanges_are_rare(T))
+    if sync is not None and sync.is_holdover and mission.requirements.location_error is not None:
+        missing = [key for key in ("time_error", "frequency_error") if getattr(sync, key) is None]
+        if missing:
+            yield _Warned(("synchronization",), phrases.setting_is_perfect(missing))
     for error in case.random:
         declared = error.subject.axis == "accelerometer_bias" and error.declared is not None
         if declared and getattr(mission.platforms, error.owner).motion_error.acceleration is not None:
@@ -212,7 +217,8 @@ def _of_lever_arms(mission: Mission) -> Iterator[_Warned]:
     """Arms that nothing swings, as far as the file says."""
     for name in PLATFORMS:
         if swings_nothing(getattr(mission.platforms, name)):
-            yield _Warned(("platforms", name, "motion_error", "lever_arm", "arm"), nothing_swings_the_arm(name))
+            key = ("platforms", name, "motion_error", "lever_arm", "arm")
+            yield _Warned(key, nothing_swings_the_arm(name), is_doubt=True)
 
 
 @phrase

@@ -1,8 +1,8 @@
 """Causes of which the file states one half: rows that rest on such a cause are not evaluated.
 
 Deleting the worse half of a cause must not turn a failing mission into a pass. Two causes have halves that nothing
-else in the file asks for: the clocks of a holdover, which need both oscillators, and the vibration that an oscillator
-feels, of which `oscillator.vibration` states tones or noise alone while the airframe has both.
+else in the file asks for: two clocks, which need both oscillators, and the vibration that an oscillator feels, of
+which `oscillator.vibration` states tones or noise alone while the airframe has both.
 """
 
 from collections.abc import Iterator
@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 from bisar_budget import phrases
 from bisar_budget.effects.effect import PLATFORMS, Subject
-from bisar_budget.effects.oscillators import clocks_without_oscillator
 from bisar_budget.mission.model import Mission
 from bisar_budget.phrases import NOTHING, Note
 
@@ -46,10 +45,7 @@ class HalfCause:
 
 def half_causes(mission: Mission) -> Iterator[HalfCause]:
     """Find the causes of which the file states one half."""
-    unstated = clocks_without_oscillator(mission)
-    if unstated:
-        stated = tuple(name for name in PLATFORMS if name not in unstated)
-        yield HalfCause(stated, _required(mission, _HOLD_CLOCKS), phrases.drift_is_not_stated(unstated))
+    yield from _half_clocks(mission)
     for name in PLATFORMS[mission.has_direct_path :]:
         platform = getattr(mission.platforms, name)
         oscillator = platform.oscillator
@@ -65,6 +61,19 @@ def half_causes(mission: Mission) -> Iterator[HalfCause]:
             held_by["sinusoidal"] = _HOLD_TONES
         for key, requirements in held_by.items():
             yield HalfCause((name,), _required(mission, requirements), phrases.felt_vibration_lacks(name, key))
+
+
+def _half_clocks(mission: Mission) -> Iterator[HalfCause]:
+    """Find clocks whose oscillators the file does not state: of a holdover, or one of two that exchange pulses."""
+    sync = mission.synchronization
+    stated = tuple(name for name in PLATFORMS if getattr(mission.platforms, name).oscillator is not None)
+    unstated = tuple(name for name in PLATFORMS if name not in stated)
+    if sync is None or sync.is_direct_path or not unstated:
+        return
+    if sync.is_holdover:
+        yield HalfCause(stated, _required(mission, _HOLD_CLOCKS), phrases.drift_is_not_stated(unstated))
+    elif stated:
+        yield HalfCause(stated, _required(mission, _HOLD_NOISE), phrases.noise_between_pulses_is_not_stated(unstated))
 
 
 def _required(mission: Mission, keys: tuple[str, ...]) -> tuple[str, ...]:

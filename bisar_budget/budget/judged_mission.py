@@ -17,7 +17,7 @@ from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.analysis.scene import SceneEdges, scene_edges
 from bisar_budget.analysis.spread import noise, rests
 from bisar_budget.budget.aggregates import Aggregates, JudgedScene, unplaced, untaken_effects
-from bisar_budget.budget.declarations import DECLARATIONS, is_asked_for, missing_declarations
+from bisar_budget.budget.declarations import DECLARATIONS, is_asked_for, missing_declarations, swings_nothing
 from bisar_budget.budget.dispersion_row import dispersion_rows
 from bisar_budget.budget.doubts import RESIDUAL, doubted_platforms, is_in_doubt, strays
 from bisar_budget.budget.error_rows import ErrorRows, specification_rows
@@ -300,7 +300,8 @@ class _Judgement:
                 floor[~np.broadcast_to(is_said, floor.shape)] = CODE["warn"]
             if platform.acceleration is None and not platform.is_of_the_earth:
                 floor[np.broadcast_to(np.asarray(norm(path.velocity)) > FASTEST_FLIGHT, floor.shape)] = CODE["warn"]
-        if calm_oscillators(self.mission):
+        platforms = (getattr(self.mission.platforms, name) for name in PLATFORMS)
+        if calm_oscillators(self.mission) or any(map(swings_nothing, platforms)):
             floor[:] = CODE["warn"]
         is_random = any(one.declared is not None for one in analysis.random)
         if not (analysis.errors.stated or self._vibrates or is_random):

@@ -70,8 +70,7 @@ def is_unshaken(mission: Mission, name: str) -> bool:
     is_heard = name == "receiver" or not mission.has_direct_path
     if one is None or not is_heard or not np.any(one.sensitivity) or one.vibration.is_stated:
         return False
-    state: PlatformState = getattr(mission.geometry, name)
-    return state.is_quadratic and not any(map(np.any, state.acceleration))
+    return not flies_a_turn(mission, name)
 
 
 class AcceleratedTone(NamedTuple):
@@ -210,9 +209,10 @@ def _falls(mission: Mission, state: PlatformState) -> Any:
 
 
 def flies_a_turn(mission: Mission, name: str) -> bool:
-    """Whether an oscillator feels the path of its platform."""
-    state: PlatformState = getattr(mission.platforms, name).state
-    return bool(not state.is_quadratic or norm(state.acceleration) > _FELT) and not _falls(mission, state)
+    """Whether an oscillator feels the path of its platform, in any case."""
+    state: PlatformState = getattr(mission.geometry, name)
+    bends = not state.is_quadratic or norm(state.acceleration) > _FELT
+    return bool(np.any(bends & ~np.asarray(_falls(mission, state))))
 
 
 def _together(one: RandomEffect, other: RandomEffect) -> RandomEffect:

@@ -87,6 +87,39 @@ def test_a_location_that_fails_on_half_of_its_causes_stays_broken() -> None:
     assert requirement(found, "location_error").status == "fail"
 
 
+# ---------------------------------------------------------------------- clocks that exchange pulses
+EXCHANGED = {"method": "linear", "interval": "10 s", "error": "1 deg"}
+
+
+@pytest.mark.parametrize(("stated", "status"), [("transmitter", "not_evaluated"), ("receiver", "not_evaluated")])
+def test_between_pulses_the_noise_rests_on_both_clocks(stated: str, status: str) -> None:
+    """The other clock may be the worse one; the file passed with a warning about the interval."""
+    found = findings(**declared(synchronization=EXCHANGED, requirements={}, **with_clocks(stated)))
+    phase = requirement(found, "quadratic_phase_error")
+    assert found.status == phase.status == status
+    (other,) = set(BOTH) - {stated}
+    assert phase.reason is not None
+    assert phase.reason.endswith(f"add platforms.{other}.oscillator")
+
+
+@pytest.mark.parametrize("stated", [BOTH, ()], ids=str)
+def test_with_both_oscillators_or_with_none_the_pulses_alone_are_judged(stated: tuple[str, ...]) -> None:
+    """Without any the file lists the oscillators among the kinds that it does not declare."""
+    found = findings(**declared(synchronization=EXCHANGED, requirements={}, **with_clocks(*stated)))
+    assert requirement(found, "quadratic_phase_error").status == "pass"
+    assert ("receiver.oscillator" in found.kinds.missing) is not bool(stated)
+
+
+@pytest.mark.parametrize(("figures", "missing"), [(("time_error",), "frequency_error"), ((), "time_error")])
+def test_a_location_says_that_clocks_are_taken_to_be_set_right(figures: tuple[str, ...], missing: str) -> None:
+    setting = {key: value for key, value in HOLDOVER.items() if key in (*figures, "method", "age", "averaging")}
+    found = findings(**declared(synchronization=setting, **with_clocks(*BOTH)))
+    (warning,) = [one for one in found.warnings if one.message.code == "setting-is-perfect"]
+    assert f"synchronization.{missing}" in warning.message
+    sound = findings(**declared(synchronization=HOLDOVER, **with_clocks(*BOTH)))
+    assert not [one for one in sound.warnings if one.message.code == "setting-is-perfect"]
+
+
 # ---------------------------------------------------------------------- a lever arm
 def arm(imu: dict[str, Any] | None = None, **lever: Any) -> dict[str, Any]:
     error: dict[str, Any] = {**ERROR, "lever_arm": {"arm": ["5 m"] * 3, **lever}}
@@ -101,6 +134,15 @@ def test_an_arm_that_nothing_swings_declares_no_lever_arm(imu: dict[str, Any] | 
     assert requirement(found, "declare").status == "not_evaluated"
     assert "imu.attitude" in str(row(found, "mission.declare").reason)
     assert "receiver.lever_arm" in found.kinds.missing
+
+
+@pytest.mark.parametrize(("imu", "status"), [(None, "warn"), ({"attitude": "0.001 deg"}, "pass")])
+def test_an_arm_that_nothing_swings_is_a_doubt(imu: dict[str, Any] | None, status: str) -> None:
+    """Deleting `imu` took the failing row of a long arm away, and `--strict` passed."""
+    changes = declared(requirements={}, **arm(imu))
+    assert findings(**changes).status == status
+    judged = judged_mission(Analysis(parse_mission(mission_text(**changes))), TODAY)
+    assert statuses(judged.status).tolist() == [status]
 
 
 @pytest.mark.parametrize(
@@ -147,6 +189,31 @@ def test_where_the_oscillator_must_be_declared_that_is_half_of_it(asked: str) ->
     for oscillator in (shaken, SENSITIVE | {"acceleration_sensitivity": 0}):
         sound = findings(**changes | {"requirements": needs, "platforms__receiver__oscillator": oscillator})
         assert requirement(sound, "declare").status == "pass"
+
+
+TURNS = {f"platforms__receiver__{key}": value for key, value in (("acceleration", ["1e-9 m/s^2", 0, 0]),)}
+
+
+def test_an_acceleration_that_an_oscillator_does_not_feel_shakes_nothing() -> None:
+    """A path that bends by 1e-9 m/s² counted as a turn, and the oscillator as declared."""
+    changes = declared(platforms__receiver__oscillator=SENSITIVE, timing_error={"constant": 0, "linear": 0}, **TURNS)
+    assert findings(**changes).status == "warn"
+    felt = {"platforms__receiver__acceleration": ["1 m/s^2", 0, 0]}
+    assert not [one for one in findings(**changes | felt).warnings if "judges nothing" in one.message]
+
+
+@pytest.mark.parametrize(
+    ("sensitivity", "status"), [({}, "not_evaluated"), ({"acceleration_sensitivity": "1e-10 /g"}, "pass")]
+)
+def test_an_oscillator_that_vibrates_needs_its_sensitivity(sensitivity: dict[str, Any], status: str) -> None:
+    """Where `declare` asks for the oscillator: vibration acts on it, by nobody knows how much."""
+    tone = {"sinusoidal": [{"amplitude": "0.01 um", "frequency": "50 Hz"}]}
+    changes = declared(platforms__receiver__oscillator=CLOCK | sensitivity, timing_error={"constant": 0, "linear": 0})
+    changes |= {"platforms__receiver__motion_error": ERROR | {"vibration": tone}}
+    needs = NEEDS | {"declare": ["receiver.oscillator"], "pslr": "-20 dB"}
+    found = findings(**changes | {"requirements": needs})
+    assert requirement(found, "declare").status == status
+    assert ("acceleration_sensitivity" in str(row(found, "mission.declare").reason)) is (status != "pass")
 
 
 # ---------------------------------------------------------------------- the kinds of error
