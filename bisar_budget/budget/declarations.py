@@ -55,7 +55,10 @@ def _lacks_half_of_a_vibration(mission: Mission, name: str) -> str:
     """Vibration acts on an oscillator by its sensitivity to acceleration: neither does anything alone."""
     platform: Platform = getattr(mission.platforms, name)
     if platform.oscillator is not None and platform.oscillator.acceleration_sensitivity is None:
-        is_shaken = platform.motion_error.vibration.is_stated
+        vibration = platform.motion_error.vibration
+        sizes = [tone.amplitude for tone in vibration.sinusoidal]
+        sizes += [] if vibration.wideband is None else [vibration.wideband.rms]
+        is_shaken = vibration.spectrum is not None or any(np.any(size) for size in sizes)
         return "oscillator.acceleration_sensitivity, by which vibration acts on it" if is_shaken else ""
     if not is_unshaken(mission, name):
         return ""

@@ -378,6 +378,14 @@ def _difference(row: Row) -> float:
 _TURNING_RAD = 0.1  # half the turn of a line of sight; the quartic term is 1 % of the quadratic there
 
 
+def missing_settings(mission: Mission) -> list[str]:
+    """List the errors that setting left of clocks in holdover, and that the file does not state."""
+    sync = mission.synchronization
+    if sync is None or not sync.is_holdover:
+        return []
+    return [key for key in ("time_error", "frequency_error") if getattr(sync, key) is None]
+
+
 def collection_notes(case: Case) -> Iterator[Note]:
     """Say where the published model leaves the collection, and where an image shows less than the full one."""
     mission = case.mission
@@ -391,3 +399,5 @@ def collection_notes(case: Case) -> Iterator[Note]:
         yield phrases.image_has_no_one_peak(case.peak_loss_db)
     if mission.has_direct_path:
         yield phrases.direct_path_is_the_clock()
+    if mission.requirements.location_error is None and (missing := missing_settings(mission)):
+        yield phrases.setting_is_perfect(missing)  # a location rests on it, and a warning says so

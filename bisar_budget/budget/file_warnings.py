@@ -12,7 +12,7 @@ from bisar_budget.analysis.allocation import ROOM, caps, rounded_down
 from bisar_budget.analysis.analysis import Case
 from bisar_budget.budget.declarations import swings_nothing
 from bisar_budget.budget.doubted_noise import noise_doubts
-from bisar_budget.budget.doubts import input_doubts
+from bisar_budget.budget.doubts import input_doubts, missing_settings
 from bisar_budget.budget.fit_noise import MOST_CHANGE, allowable_noise
 from bisar_budget.constants import FASTEST_FLIGHT
 from bisar_budget.effects.effect import PLATFORMS
@@ -203,10 +203,8 @@ def _of_instruments(case: Case) -> Iterator[_Warned]:
     T = mission.collection.aperture_time
     if sync is not None and not sync.is_direct_path and (sync.interval or 0.0) > T:
         yield _Warned(("synchronization", "interval"), exchanges_are_rare(T))
-    if sync is not None and sync.is_holdover and mission.requirements.location_error is not None:
-        missing = [key for key in ("time_error", "frequency_error") if getattr(sync, key) is None]
-        if missing:
-            yield _Warned(("synchronization",), phrases.setting_is_perfect(missing))
+    if mission.requirements.location_error is not None and (missing := missing_settings(mission)):
+        yield _Warned(("synchronization",), phrases.setting_is_perfect(missing))
     for error in case.random:
         declared = error.subject.axis == "accelerometer_bias" and error.declared is not None
         if declared and getattr(mission.platforms, error.owner).motion_error.acceleration is not None:
