@@ -54,7 +54,7 @@ class Aggregates:
         else:
             owners = ("transmitter", "receiver", "clock", "mission")
             has_clock = self.allocation.qpe.clock is not None  # else it counts with the receiver
-            yield from (self._quadratic(mine, theirs, one) for one in owners if one != "clock" or has_clock)
+            yield from (self._quadratic(mine, theirs, owner) for owner in owners if owner != "clock" or has_clock)
         yield self._cubic(mine, theirs)
         yield self._location(mine, theirs)
         if self.allocation.n_pull is not None:
@@ -62,41 +62,47 @@ class Aggregates:
 
     def _quadratic(self, mine: Together, theirs: Together, owner: str) -> "Aggregate":
         split, limit, gain = self.allocation.qpe, self.allocation.qpe_limit(owner), self.allocation.autofocus_gain
-        members, of_other = mine.owed(split, owner), theirs.owed(split, owner)
-        size, by_other, equal_loss = mine.judged(members), theirs.judged(of_other), mine.judged(members, gain=1.0)
-        published, full = (members, of_other) if mine.model == "published" else (of_other, members)
+        members, their_members = mine.owed(split, owner), theirs.owed(split, owner)
+        size, size_by_theirs, equal_loss = (
+            mine.judged(members),
+            theirs.judged(their_members),
+            mine.judged(members, gain=1.0),
+        )
+        published, full = (members, their_members) if mine.model == "published" else (their_members, members)
         of_full = self.together("full").combined(quadratics(full))
-        found = self._row(
+        aggregate = self._row(
             subject(owner, QUADRATIC),
             self._is_declared(members),
             mine.judged_parts(members),
             size,
             limit * gain,
             theirs,
-            by_other,
+            size_by_theirs,
             without_autofocus=equal_loss / limit,
             continued=("quadratic", self._of_owners(split, owner)),
             qpe_published_rad=self.together("published").combined(quadratics(published)),
             qpe_full_rad=np.where(np.isfinite(of_full), of_full, math.nan),
         )
-        return found.of_equal_loss(equal_loss, self.together("full").judged(full, gain=1.0))
+        return aggregate.of_equal_loss(equal_loss, self.together("full").judged(full, gain=1.0))
 
     def _largest_quadratic(self, mine: Together, theirs: Together) -> "Aggregate":
         """A warning where each error stands alone and all together exceed the total; else there is no row."""
-        what, phases = subject("mission", QUADRATIC), mine.judged_parts(mine.phases)
+        row_subject, phases = subject("mission", QUADRATIC), mine.judged_parts(mine.phases)
         size, of_all = mine.judged(mine.phases), mine.judged(mine.phases, "rss")
         limit = self.allocation.qpe_total * self.allocation.autofocus_gain
-        found = self._row(what, True, phases, size, limit, theirs, of_all=of_all)
-        is_there = found.is_over_of_all & (found.judged.status == CODE["warn"])  # else its own row says what fails
-        nothing = self.judging.row(what, None, None)
-        return replace(found, judged=found.judged.where(~is_there, nothing), is_there=is_there)
+        aggregate = self._row(row_subject, True, phases, size, limit, theirs, of_all=of_all)
+        is_there = aggregate.is_over_of_all & (
+            aggregate.judged.status == CODE["warn"]
+        )  # else its own row says what fails
+        nothing = self.judging.row(row_subject, None, None)
+        return replace(aggregate, judged=aggregate.judged.where(~is_there, nothing), is_there=is_there)
 
     def _cubic(self, mine: Together, theirs: Together) -> "Aggregate":
         phases, limit = cubics(mine.phases), self.needs.cubic_phase_error
         size = mine.combined(phases)
         return self._row(
             subject("mission", CUBIC),
-            self._is_declared(one for one in mine.phases if one.cubic_rad is not None),
+            self._is_declared(phase for phase in mine.phases if phase.cubic_rad is not None),
             phases,
             size,
             limit,
@@ -143,20 +149,20 @@ class Aggregates:
 
     def _is_declared(self, members: Iterable[DeclaredPhase]) -> Truths:
         """Cases in which any of these is declared."""
-        found = np.zeros(self.judging.cases, dtype=bool)
-        for one in members:
-            found |= one.is_there
-        return found
+        is_declared = np.zeros(self.judging.cases, dtype=bool)
+        for member in members:
+            is_declared |= member.is_there
+        return is_declared
 
     def _row(
         self,
-        what: Subject,
+        row_subject: Subject,
         is_declared: Any,
         phases: Phases,
         size: Floats,
         limit: Any,
         theirs: Together,
-        by_other: Any = math.nan,
+        size_by_theirs: Any = math.nan,
         of_all: Any = math.nan,
         *,
         without_value: str = "",
@@ -178,15 +184,15 @@ class Aggregates:
         by_model: dict[str, Any] = {}
         if limit is not None:
             limit = self.array(limit)
-            models = ("published", "full") if what.kind == QUADRATIC else ("published",)
+            models = ("published", "full") if row_subject.kind == QUADRATIC else ("published",)
             by_model = {f"allowable_{model}": limit for model in models}
-            is_over_by_other = self.errors.doubts(theirs.model, by_other > limit * BOUND)
+            is_over_by_other = self.errors.doubts(theirs.model, size_by_theirs > limit * BOUND)
             is_over_of_all = of_all > limit * BOUND
             rests_on = rests_on_masks(continued[1], continued[0], size, limit)
             is_in_doubt = rests_on_doubted_noise(continued[1], continued[0], OTHER_MODEL[theirs.model], limit)
             is_in_doubt = is_in_doubt & ~(size > limit * BOUND) & (not never_fails)
         judged = self.judging.row(
-            what,
+            row_subject,
             size,
             limit,
             doubt=is_over_by_other | is_over_of_all | rests_on,
@@ -197,13 +203,13 @@ class Aggregates:
         )._replace(**fields, **by_model)
         has_value = is_declared & np.isfinite(size)
         if not has_value.all():
-            nothing = self.judging.row(what, None, limit)._replace(**by_model)
+            nothing = self.judging.row(row_subject, None, limit)._replace(**by_model)
             status = CODE[without_value or ("fail" if limit is not None else "not_declared")]
             nothing = nothing._replace(status=np.where(is_declared, status, nothing.status))
             judged = judged.where(~has_value, nothing)
         rule = "sum" if never_fails else self.combine
-        by_others = (by_other, of_all, is_over_by_other, is_over_of_all)
-        return Aggregate(judged, rule, phases, *by_others, without_autofocus, rests_on, continued, is_in_doubt)
+        doubts = (size_by_theirs, of_all, is_over_by_other, is_over_of_all)
+        return Aggregate(judged, rule, phases, *doubts, without_autofocus, rests_on, continued, is_in_doubt)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -244,23 +250,23 @@ class Aggregate(FamilyRow):
 
     def in_words(self, case: Case, model: str) -> Row:
         """The row of one case, by the model that judges it."""
-        mission, what = case.mission, self.judged.subject
-        groups, combine, owner = case.analysis.groups, mission.allocation.combine, what.owner
+        mission, row_subject = case.mission, self.judged.subject
+        groups, combine, owner = case.analysis.groups, mission.allocation.combine, row_subject.owner
         numbers = map(case.number, (self.judged.declared, self.judged.allowable))
-        size, limit = (None if math.isnan(one) else one for one in numbers)
-        said, over, notes = _said_of(what, self.rule), NOTHING, tuple[Note, ...]()
-        if combine != "each" and what.kind != PULL_IN:
+        size, limit = (None if math.isnan(number) else number for number in numbers)
+        wording, over, notes = _wording_of(row_subject, self.rule), NOTHING, tuple[Note, ...]()
+        if combine != "each" and row_subject.kind != PULL_IN:
             notes = correlation_notes(combine, [group for group in groups if owner in (group.platform, "mission")])
         if size is None:
             over = phrases.no_ground_point()
         elif limit is not None and size > limit * BOUND:
-            over = phrases.aggregate_over(said.what, size, limit, said.unit, *_largest(case, model, self))
-        if what.kind == QUADRATIC:
+            over = phrases.aggregate_over(wording.what, size, limit, wording.unit, *_largest(case, model, self))
+        if row_subject.kind == QUADRATIC:
             if over and size is not None and combine != "each":
                 over = over.then(self._passes_with(case, model))
-        elif over and size is not None and what.kind != LOCATION:
-            over = over.then(phrases.no_gain() if what.kind == CUBIC else phrases.one_total())
-        doubt = over if what.kind == PULL_IN else NOTHING
+        elif over and size is not None and row_subject.kind != LOCATION:
+            over = over.then(phrases.no_gain() if row_subject.kind == CUBIC else phrases.one_total())
+        doubt = over if row_subject.kind == PULL_IN else NOTHING
         doubted = NOTHING
         if case.number(self.is_in_doubt):
             owners = {error.owner for error in self.continued[1]}
@@ -268,11 +274,11 @@ class Aggregate(FamilyRow):
         return worded(
             case,
             self.judged,
-            unit=said.unit,
-            path=said.path,
-            equation=said.equation[model != "published"],
+            unit=wording.unit,
+            path=wording.path,
+            equation=wording.equation[model != "published"],
             over=over,
-            doubt=doubt or _doubt(case, OTHER_MODEL[model], self, said, limit),
+            doubt=doubt or _doubt(case, OTHER_MODEL[model], self, wording, limit),
             no_limit=phrases.no_requirement(),
             not_evaluated=doubted or case.degeneracy(model) or phrases.no_image_to_place(),
             info=phrases.no_requirement(),
@@ -299,7 +305,7 @@ def effect_parts(analysis: Analysis, model: str) -> dict[str, Phases]:
             (phase.row_id, np.sqrt(np.nan_to_num(array(phase.variance))))
             for phase in (*noise(analysis, model), *rests(analysis, model))
         ],
-        "tone": [(one.subject.id, array(one.is_there * one.phase)) for one in analysis.tones],
+        "tone": [(tone.subject.id, array(tone.is_there * tone.phase)) for tone in analysis.tones],
     }
 
 
@@ -315,34 +321,34 @@ def untaken_effects(analysis: Analysis, instead: Sequence[RandomError] = ()) -> 
         (analysis.together(model), _exchanged(effect_parts(analysis, model), instead, model))
         for model in analysis.gates
     ]
-    found = []
+    effects = []
     for kind, keys in TAKEN_BY.items():
         if any(getattr(needs, key) is not None for key in keys):
             continue
         sum_of_all: Any = 0.0
-        parts: dict[str, Floats] = {}
+        sizes: dict[str, Floats] = {}
         for together, of_kinds in by_model:
             sum_of_all = np.fmax(sum_of_all, together.combined(of_kinds[kind], together.rule_of_all))
             for row_id, size in of_kinds[kind]:
-                parts[row_id] = np.fmax(parts.get(row_id, 0.0), np.abs(size))
-        if not parts:
+                sizes[row_id] = np.fmax(sizes.get(row_id, 0.0), np.abs(size))
+        if not sizes:
             continue
         # One without an image fails by itself.
         total = np.where(np.isfinite(sum_of_all), sum_of_all, 0.0)
-        parts = {row_id: np.where(np.isfinite(size), size, 0.0) for row_id, size in parts.items()}
-        largest = np.max(list(parts.values()), axis=0)
+        sizes = {row_id: np.where(np.isfinite(size), size, 0.0) for row_id, size in sizes.items()}
+        largest = np.max(list(sizes.values()), axis=0)
         is_above = (total >= level) & (largest > 0)
-        count = np.sum([size > 0 for size in parts.values()], axis=0)
+        count = np.sum([size > 0 for size in sizes.values()], axis=0)
         least = np.minimum(MAKES_UP * largest, level / np.maximum(count, 1))
-        makers = {row_id: is_above & (size >= least) & (size > 0) for row_id, size in parts.items()}
-        found.append(UntakenEffect(kind, total, (total > 0) & ~is_above, makers, least, parts))
-    return found
+        makers = {row_id: is_above & (size >= least) & (size > 0) for row_id, size in sizes.items()}
+        effects.append(UntakenEffect(kind, total, (total > 0) & ~is_above, makers, least, sizes))
+    return effects
 
 
-def _exchanged(parts: Mapping[str, Phases], errors: Sequence[RandomError], model: str) -> dict[str, Phases]:
+def _exchanged(phases_by_kind: Mapping[str, Phases], errors: Sequence[RandomError], model: str) -> dict[str, Phases]:
     """Parts of effects with those of random errors in place of the parts that have their ids. [rad]"""
     ids = {error.id for error in errors}
-    exchanged = {kind: [part for part in phases if part[0] not in ids] for kind, phases in parts.items()}
+    exchanged = {kind: [phase for phase in phases if phase[0] not in ids] for kind, phases in phases_by_kind.items()}
     for error in errors:
         for kind in ("cubic", "spread"):
             exchanged[kind].append((error.id, part_of(error.effect(model), kind) * np.asarray(error.declared)))
@@ -352,7 +358,7 @@ def _exchanged(parts: Mapping[str, Phases], errors: Sequence[RandomError], model
 # ---------------------------------------------------------------------- displacements that no row holds
 def unplaced(together: Together) -> dict[str, Truths]:
     """Find the clocks that displace the image by an amount that the file leaves open, and in which cases."""
-    return {one.subject.id: together.errors.array(one.displaces_unknown) > 0 for one in together.random}
+    return {error.subject.id: together.errors.array(error.displaces_unknown) > 0 for error in together.random}
 
 
 # ---------------------------------------------------------------------- in words
@@ -367,28 +373,28 @@ class _Words(NamedTuple):
 
 _EQUATIONS = {"sum": "sum of the rows", "rss": "root-sum-square of the rows", "each": "largest of the rows"}
 _PATHS: dict[str, KeyPath] = {"mission": ("platforms",), "clock": ("timing_error",)}
-_SAID = {
+_WORDINGS = {
     CUBIC: _Words("cubic phase", "rad", ("requirements", CUBIC), ("Table I, cubic column", "full model")),
     LOCATION: _Words("displacement of the image", "m", ("requirements", LOCATION), ("(25)", "full model")),
     PULL_IN: _Words("QPE", "rad", ("autofocus", "n_pull"), ("Section VI", "Section VI")),
 }
 
 
-def _said_of(what: Subject, rule: str) -> _Words:
-    if what.kind in _SAID:
-        return _SAID[what.kind]
-    path = _PATHS.get(what.owner, ("platforms", what.owner, "motion_error"))
+def _wording_of(row_subject: Subject, rule: str) -> _Words:
+    if row_subject.kind in _WORDINGS:
+        return _WORDINGS[row_subject.kind]
+    path = _PATHS.get(row_subject.owner, ("platforms", row_subject.owner, "motion_error"))
     return _Words("QPE", "rad", path, (_EQUATIONS[rule], _EQUATIONS[rule]))
 
 
-def _largest(case: Case, model: str, one: Aggregate) -> tuple[str, float, Note]:
+def _largest(case: Case, model: str, aggregate: Aggregate) -> tuple[str, float, Note]:
     """Which part is the largest, its size, and what it rests on beside the file."""
-    together, kind = case.analysis.together(model), one.judged.subject.kind
+    together, kind = case.analysis.together(model), aggregate.judged.subject.kind
     if kind == LOCATION:
-        parts = [(row_id, math.hypot(*move)) for row_id, move in together.displacement_parts(case.place)]
+        sizes = [(row_id, math.hypot(*move)) for row_id, move in together.displacement_parts(case.place)]
     else:
-        parts = together.phase_parts(one.phases, one.rule, case.place)
-    row_id, largest = parts[int(first_highest(np.abs([size for _, size in parts])))]
+        sizes = together.phase_parts(aggregate.phases, aggregate.rule, case.place)
+    row_id, largest = sizes[int(first_highest(np.abs([size for _, size in sizes])))]
     if kind in (LOCATION, PULL_IN):
         return row_id, largest, NOTHING
     extrapolated = {error.id: error.extrapolated for error in case.random}
@@ -405,21 +411,21 @@ def _folded_spur(case: Case, row_id: str, size: float, kind: str) -> Note:
     return NOTHING
 
 
-def _doubt(case: Case, other: str, one: Aggregate, said: _Words, limit: float | None) -> Note:
+def _doubt(case: Case, other: str, aggregate: Aggregate, wording: _Words, limit: float | None) -> Note:
     """Reason that makes a pass a warning: all errors together, or the model that does not gate."""
     if limit is None:
         return NOTHING
-    if case.number(one.is_over_of_all):
-        what = "displacement" if one.judged.subject.kind == LOCATION else said.what
-        return phrases.all_together_over(what, case.number(one.of_all), limit, said.unit)
-    if not case.number(one.is_over_by_other):
-        if not case.number(one.rests_on):
+    if case.number(aggregate.is_over_of_all):
+        effect_name = "displacement" if aggregate.judged.subject.kind == LOCATION else wording.what
+        return phrases.all_together_over(effect_name, case.number(aggregate.of_all), limit, wording.unit)
+    if not case.number(aggregate.is_over_by_other):
+        if not case.number(aggregate.rests_on):
             return NOTHING
-        part, errors = one.continued
+        effect_kind, errors = aggregate.continued
         of_case = [error for error in case.random if error.id in {each.id for each in errors}]
-        return continuation_note(case, of_case, part, case.number(one.judged.declared))
-    phrase = phrases.other_model_is_beyond if one.judged.subject.kind == PULL_IN else phrases.other_model_fails
-    return phrase(other, case.number(one.by_other), limit, said.unit)
+        return continuation_note(case, of_case, effect_kind, case.number(aggregate.judged.declared))
+    phrase = phrases.other_model_is_beyond if aggregate.judged.subject.kind == PULL_IN else phrases.other_model_fails
+    return phrase(other, case.number(aggregate.by_other), limit, wording.unit)
 
 
 # ---------------------------------------------------------------------- the scene's edge
@@ -441,16 +447,16 @@ class JudgedScene:
 
     def row(self, judging: Judging, model: str) -> "SceneRow":
         """Judge the edges by a model; to the published one an error is the same all over the scene."""
-        what, edges = subject("mission", "spatial_variance"), self.edges
+        row_subject, edges = subject("mission", "spatial_variance"), self.edges
         total = judging.array(self.analysis.allocation.qpe_total)
         allowable = None if model == "published" else total
-        nothing = judging.row(what, None, allowable)._replace(allowable_full=total)
+        nothing = judging.row(row_subject, None, allowable)._replace(allowable_full=total)
         if edges is None:
             return SceneRow(nothing, self)
         doubt = edges.has_doubt
         if model == "published":
             doubt = doubt | (edges.difference > total * BOUND)
-        judged = judging.row(what, edges.difference, allowable, doubt=doubt)._replace(
+        judged = judging.row(row_subject, edges.difference, allowable, doubt=doubt)._replace(
             qpe_published_rad=np.zeros(judging.cases), qpe_full_rad=edges.difference, allowable_full=total
         )
         nothing.status[:] = CODE["not_evaluated"]
@@ -469,7 +475,7 @@ class SceneRow(FamilyRow):
         doubt, degeneracy, notes = NOTHING, NOTHING, tuple[Note, ...]()
         if edge is not None:
             doubt, degeneracy = edge.doubt, edge.degeneracy
-            drifting = [one.subject.id for one in case.analysis.random if case.number(one.displaces_unknown)]
+            drifting = [error.subject.id for error in case.analysis.random if case.number(error.displaces_unknown)]
             if not degeneracy:
                 open_drift = (phrases.drift_is_open_at_the_edge(drifting),) if drifting else ()
                 notes = (*edge.notes(total), *open_drift)

@@ -74,18 +74,20 @@ def check_missions(
     if len(missions) == 1:
         yield 0, check_mission(missions[0], today, outside=outside)
         return
-    for alike, places in stacked(missions):
-        for start in range(0, places.size, _TOGETHER):
-            some = places[start : start + _TOGETHER]
-            if some.size == 1:
-                yield int(some[0]), check_mission(missions[some[0]], today, outside=outside)
+    for alike, indices in stacked(missions):
+        for start in range(0, indices.size, _TOGETHER):
+            block = indices[start : start + _TOGETHER]
+            if block.size == 1:
+                yield int(block[0]), check_mission(missions[block[0]], today, outside=outside)
                 continue
-            part = picked(alike, np.arange(start, start + some.size))
-            for nodes, same, of_same, geometry in by_nodes(part, some.size, part.geometry):
-                analysis = Analysis(of_same, same.size, geometry=geometry, nodes=nodes, is_whole=True)
+            block_mission = picked(alike, np.arange(start, start + block.size))
+            for nodes, same_nodes, mission_of_nodes, geometry in by_nodes(
+                block_mission, block.size, block_mission.geometry
+            ):
+                analysis = Analysis(mission_of_nodes, same_nodes.size, geometry=geometry, nodes=nodes, is_whole=True)
                 judged = judged_mission(analysis, today)
-                for place, index in enumerate(some[same].tolist()):
-                    yield index, _findings(judged, Case(analysis, missions[index], place), today, outside)
+                for case_index, index in enumerate(block[same_nodes].tolist()):
+                    yield index, _findings(judged, Case(analysis, missions[index], case_index), today, outside)
 
 
 def _findings(judged: JudgedMission, case: Case, today: date, outside: Outside) -> MissionFindings:
@@ -129,14 +131,14 @@ def _findings(judged: JudgedMission, case: Case, today: date, outside: Outside) 
 
 
 def _place(mission: Mission) -> str:
-    scene, instant, said = mission.scene, mission.collection.center_time, []
+    scene, instant, texts = mission.scene, mission.collection.center_time, []
     if scene.latitude is not None and scene.longitude is not None:
         for angle, (positive, negative) in ((scene.latitude, "NS"), (scene.longitude, "EW")):
-            said.append(f"{abs(math.degrees(angle)):.5f}° {positive if angle >= 0 else negative}")
-        said.append(f"{format_quantity(scene.height or 0.0, 'm', 4)} above the ellipsoid")
+            texts.append(f"{abs(math.degrees(angle)):.5f}° {positive if angle >= 0 else negative}")
+        texts.append(f"{format_quantity(scene.height or 0.0, 'm', 4)} above the ellipsoid")
     if instant is not None:
-        said.append(f"mid-aperture {instant.as_text()}")
-    return ", ".join(said)
+        texts.append(f"mid-aperture {instant.as_text()}")
+    return ", ".join(texts)
 
 
 def _flown_paths(mission: Mission) -> tuple[tuple[str, FlownPath], ...]:
@@ -158,9 +160,9 @@ def _unused_keys(mission: Mission) -> Iterator[Note]:
         "collection.pulses": mission.collection.pulses is not None,
         "simulation": mission.simulation is not None,
     }
-    given = [key for key, is_given in keys.items() if is_given]
-    if given:
-        yield phrases.keys_not_used(given)
+    unused = [key for key, is_stated in keys.items() if is_stated]
+    if unused:
+        yield phrases.keys_not_used(unused)
 
 
 # ---------------------------------------------------------------------- many files
@@ -179,14 +181,14 @@ class Draws(NamedTuple):
     share: "Share | None" = None
 
 
-def without_analysis(found: Found) -> Found:
+def without_analysis(findings: Found) -> Found:
     """Keep all that is found, but not the analysis: a thousand would fill memory."""
-    return found if isinstance(found, UnusableMission) else found._replace(analysis=None)
+    return findings if isinstance(findings, UnusableMission) else findings._replace(analysis=None)
 
 
-def whole(found: Found) -> Found:
+def whole(findings: Found) -> Found:
     """Keep everything, in one process: an analysis is larger than what it takes to make it again."""
-    return found
+    return findings
 
 
 def check_files(
@@ -227,18 +229,18 @@ def check_files(
     chunks, count = _chunks(files), cores()
     is_shared = drawn is not None and drawn.share is not None
     if len(chunks) == 1 or count == 1 or "-" in files or keep is whole or is_shared:
-        return [one for chunk in chunks for one in of(chunk)]
+        return [findings for chunk in chunks for findings in of(chunk)]
     from bisar_budget.workers import worker_pool
 
-    own, *others = (chunks[start::count] for start in range(min(count, len(chunks))))
+    own_chunks, *worker_chunks = (chunks[start::count] for start in range(min(count, len(chunks))))
     kept: list[list[Kept]] = [[]] * len(chunks)
-    with worker_pool(len(others)) as pool:
-        waiting = [pool.submit(_with_files_read, part, of) for part in others]
-        kept[::count] = [of(chunk) for chunk in own]
-        for start, part in enumerate(waiting, 1):
-            kept[start::count], files_read = part.result()
+    with worker_pool(len(worker_chunks)) as pool:
+        waiting = [pool.submit(_with_files_read, chunks_of_worker, of) for chunks_of_worker in worker_chunks]
+        kept[::count] = [of(chunk) for chunk in own_chunks]
+        for start, result in enumerate(waiting, 1):
+            kept[start::count], files_read = result.result()
             FILES_READ.update(files_read)
-    return [one for of_chunk in kept for one in of_chunk]
+    return [findings for of_chunk in kept for findings in of_chunk]
 
 
 def _chunks(files: Sequence[str]) -> list[Sequence[str]]:
@@ -247,7 +249,7 @@ def _chunks(files: Sequence[str]) -> list[Sequence[str]]:
     What is found of a mission differs, in its last digits, by what is checked together with it.
     """
     count = 1 if len(files) < MANY else 2 * math.ceil(len(files) / (2 * AT_ONCE))
-    ends = [place * len(files) // count for place in range(count + 1)]
+    ends = [chunk * len(files) // count for chunk in range(count + 1)]
     return [files[start:stop] for start, stop in pairwise(ends)]
 
 
@@ -270,16 +272,16 @@ def _kept(
     gc.disable()
     kept: dict[int, Kept] = {}
     missions: dict[int, Mission] = {}
-    for place, file in enumerate(files):
+    for file_index, file in enumerate(files):
         try:
-            missions[place] = load_mission(file, model, changes)
+            missions[file_index] = load_mission(file, model, changes)
         except MissionError as error:
-            kept[place] = keep(UnusableMission(file=file, faults=error.faults, data=error.data))
-    places = list(missions)
-    for index, found in check_missions(list(missions.values()), today, outside=outside):
+            kept[file_index] = keep(UnusableMission(file=file, faults=error.faults, data=error.data))
+    indices = list(missions)
+    for index, findings in check_missions(list(missions.values()), today, outside=outside):
         if drawn is not None:
             from bisar_budget.sampling.probability import monte_carlo
 
-            found = found._replace(monte_carlo=monte_carlo(found.analysed(), *drawn))
-        kept[places[index]] = keep(found)
-    return [kept[place] for place in range(len(files))]
+            findings = findings._replace(monte_carlo=monte_carlo(findings.analysed(), *drawn))
+        kept[indices[index]] = keep(findings)
+    return [kept[file_index] for file_index in range(len(files))]

@@ -48,7 +48,7 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.ranges.exact_ranges import Truths
 
 _BROKEN = [CODE[name] for name in BROKEN]
-_GATES = np.array([one.gates for one in STATUS.values()])
+_GATES = np.array([status.gates for status in STATUS.values()])
 _OWNERS = (*PLATFORMS, "clock", "mission")
 
 
@@ -87,9 +87,9 @@ class JudgedMission:
         """Waivers by their ids, in the order of the file, and the cases in which each covers anything, or a row."""
         rows = [row_id is None or row.subject.id == row_id for row in self.rows]
         requirements = self.waived_requirements if row_id is None else ()
-        for place, waiver in enumerate(self.analysis.mission.waivers):
-            own = (is_waived for is_waived, own in requirements if own == place)
-            yield waiver.id, np.any([(self.waivers[rows] == place).any(axis=0), *own], axis=0)
+        for waiver_index, waiver in enumerate(self.analysis.mission.waivers):
+            covered = (is_waived for is_waived, index in requirements if index == waiver_index)
+            yield waiver.id, np.any([(self.waivers[rows] == waiver_index).any(axis=0), *covered], axis=0)
 
     @cached_property
     def status(self) -> Codes:
@@ -110,7 +110,7 @@ def judged_mission(analysis: Analysis, today: date) -> JudgedMission:
         Day on which waivers are judged, UTC.
     """
     with np.errstate(all="ignore"):
-        return _Judgement(analysis, today).found()
+        return _Judgement(analysis, today).judge()
 
 
 class _Judgement:
@@ -119,10 +119,11 @@ class _Judgement:
         self.cases, self.shown = analysis.cases, analysis.shown
         self.judging = Judging(self.cases, self.mission.allocation.warn_above, analysis.is_whole)
 
-    def found(self) -> JudgedMission:
+    def judge(self) -> JudgedMission:
+        """Judge every row and every requirement."""
         analysis, mission = self.analysis, self.mission
         families = {model: list(self._families(model)) for model in analysis.gates}
-        by_model = [self._rows(model, found) for model, found in families.items()]
+        by_model = [self._rows(model, rows_of_model) for model, rows_of_model in families.items()]
         rows = [*self._undeclared(by_model[-1]), *_stricter(*reversed(by_model))]
         if mission.requirements.declare:
             rows.insert(0, Judged.of_none(DECLARATIONS, self.cases)._replace(metric=DECLARE))
@@ -137,7 +138,7 @@ class _Judgement:
         has_noise = self._has_noise()
         air = staying_air(analysis, rows)
         of_all.doubt_air(air.doubted_rows())
-        own = of_all.status.copy()
+        by_themselves = of_all.status.copy()
         of_all.judge_effects(untaken)
         of_all.doubt_air(air.untaken_rows())
         of_all.judge_place(is_misplaced)
@@ -151,12 +152,12 @@ class _Judgement:
         states = requirement_states(
             mission,
             # A requirement judges effects by itself, and is waived where its row is.
-            np.where((after == CODE["waived"]) & np.isin(own, _BROKEN), CODE["waived"], own),
+            np.where((after == CODE["waived"]) & np.isin(by_themselves, _BROKEN), CODE["waived"], by_themselves),
             np.array([row.utilization for row in rows]),
             of_all.judges(),
             np.array([row.quadratic_use for row in rows]),
-            {key: place >= 0 for key, place in of_requirements.items()},
-            before=own,
+            {key: waiver_index >= 0 for key, waiver_index in of_requirements.items()},
+            before=by_themselves,
             in_doubt=self._doubted_rows(rows),
             has_noise=has_noise,
             is_misplaced=is_misplaced,
@@ -172,9 +173,9 @@ class _Judgement:
             unplaced=drifting,
             air=air,
             scene=self._scene,
-            floor=np.min([self._floor(), *(one.status for one in states)], axis=0),
+            floor=np.min([self._floor(), *(state.status for state in states)], axis=0),
             waivers=waivers,
-            waived_requirements=[(one.status == CODE["waived"], of_requirements[one.key]) for one in states],
+            waived_requirements=[(state.status == CODE["waived"], of_requirements[state.key]) for state in states],
         )
 
     # ---------------------------------------------------------------- rows of the families
@@ -201,20 +202,20 @@ class _Judgement:
 
     def _rows(self, model: str, families: Sequence[FamilyRow]) -> dict[str, Judged]:
         """Rows by their ids: one may be of another family in some of the cases, and is in none of them nowhere."""
-        found: dict[str, Judged] = {}
+        rows: dict[str, Judged] = {}
         by_model = np.full(self.cases, MODELS.index(model), np.int8)
-        for one in families:
-            judged = one.judged._replace(model=by_model)
+        for row in families:
+            judged = row.judged._replace(model=by_model)
             row_id = judged.subject.id
-            if one.is_there is True or np.all(one.is_there):
-                found[row_id] = judged
-            elif np.any(one.is_there):
-                found[row_id] = (
-                    found.get(row_id, Judged.of_none(judged.subject, self.cases))
-                    .where(one.is_there, judged)
+            if row.is_there is True or np.all(row.is_there):
+                rows[row_id] = judged
+            elif np.any(row.is_there):
+                rows[row_id] = (
+                    rows.get(row_id, Judged.of_none(judged.subject, self.cases))
+                    .where(row.is_there, judged)
                     ._replace(metric=judged.metric)
                 )
-        return found
+        return rows
 
     @cached_property
     def _errors(self) -> ErrorRows:
@@ -233,11 +234,11 @@ class _Judgement:
     @property
     def _vibrates(self) -> bool:
         motions = (getattr(self.mission.platforms, name).motion_error.vibration for name in PLATFORMS)
-        return any(one.sinusoidal or one.wideband for one in motions)
+        return any(vibration.sinusoidal or vibration.wideband for vibration in motions)
 
     @property
     def _shows_vibration(self) -> bool:
-        return self.shown is None or any(what.kind == "vibration" for what in self.shown.values())
+        return self.shown is None or any(row_subject.kind == "vibration" for row_subject in self.shown.values())
 
     @cached_property
     def _random(self) -> RandomRows:
@@ -259,15 +260,23 @@ class _Judgement:
         """Platforms with a path, by a kind of error, and in which cases that is in doubt by more than is declared."""
         return doubted_platforms(self.mission, self.cases)
 
-    def _undeclared(self, known: Mapping[str, Judged]) -> Iterator[Judged]:
+    def _undeclared(self, judged_rows: Mapping[str, Judged]) -> Iterator[Judged]:
         """Rows that are shown, and of position errors of paths in doubt, that no case declares."""
-        wanted = dict(self.shown or {})
+        subjects = dict(self.shown or {})
         for (name, kind), is_doubtful in self._in_doubt.items():
             is_shown = is_doubtful.any() and kind != RESIDUAL  # which has a family of its own
-            own = (subject(name, kind, axis) for axis in "xyz") if is_shown else ()
-            wanted |= {one.id: one for one in own if is_in_doubt(one, name, self.mission, kind)}
-        there = {*known, DECLARATIONS.id}
-        return (Judged.of_none(one, self.cases) for row_id, one in wanted.items() if row_id not in there)
+            axes = (subject(name, kind, axis) for axis in "xyz") if is_shown else ()
+            subjects |= {
+                axis_subject.id: axis_subject
+                for axis_subject in axes
+                if is_in_doubt(axis_subject, name, self.mission, kind)
+            }
+        there = {*judged_rows, DECLARATIONS.id}
+        return (
+            Judged.of_none(axis_subject, self.cases)
+            for row_id, axis_subject in subjects.items()
+            if row_id not in there
+        )
 
     def _has_noise(self) -> Truths:
         """Cases that declare something that spreads, or a tone that ISLR holds.
@@ -276,18 +285,20 @@ class _Judgement:
         """
         array, gates = self.judging.array, self.analysis.gates
         level = negligible_rad(self.mission)
-        found = [~np.isnan(array(one.variance)) for model in gates for one in noise(self.analysis, model)]
-        found += [np.sqrt(array(one.variance)) >= level for model in gates for one in rests(self.analysis, model)]
+        has_any = [~np.isnan(array(phase.variance)) for model in gates for phase in noise(self.analysis, model)]
+        has_any += [
+            np.sqrt(array(phase.variance)) >= level for model in gates for phase in rests(self.analysis, model)
+        ]
         if self.mission.requirements.pslr is None:
-            found += [np.broadcast_to(one.is_there, (self.cases,)) for one in self.analysis.tones]
-        return np.asarray(np.any([np.zeros(self.cases, bool), *found], axis=0))
+            has_any += [np.broadcast_to(phase.is_there, (self.cases,)) for phase in self.analysis.tones]
+        return np.asarray(np.any([np.zeros(self.cases, bool), *has_any], axis=0))
 
     def _doubted_rows(self, rows: Sequence[Judged]) -> Truths:
         """Rows of oscillators whose noise is not what the file states, (rows, cases)."""
         doubted = {error.id: error.is_in_doubt for error in self.analysis.random if np.any(error.is_in_doubt)}
         in_doubt = np.zeros((len(rows), self.cases), dtype=bool)
-        for place, row in enumerate(rows) if doubted else ():
-            in_doubt[place] = doubted.get(row.subject.id, False)
+        for row_index, row in enumerate(rows) if doubted else ():
+            in_doubt[row_index] = doubted.get(row.subject.id, False)
         return in_doubt
 
     def _floor(self) -> Codes:
@@ -296,14 +307,14 @@ class _Judgement:
         for name, path in zip(PLATFORMS, analysis.geometry.both, strict=True):
             platform = getattr(self.mission.platforms, name)
             if platform.path is not None and platform.path.doubts:
-                is_said = strays(self.mission, name) & (not platform.path.samples)
-                floor[~np.broadcast_to(is_said, floor.shape)] = CODE["warn"]
+                strays_from_log = strays(self.mission, name) & (not platform.path.samples)
+                floor[~np.broadcast_to(strays_from_log, floor.shape)] = CODE["warn"]
             if platform.acceleration is None and not platform.is_of_the_earth:
                 floor[np.broadcast_to(np.asarray(norm(path.velocity)) > FASTEST_FLIGHT, floor.shape)] = CODE["warn"]
         platforms = (getattr(self.mission.platforms, name) for name in PLATFORMS)
         if calm_oscillators(self.mission) or any(map(swings_nothing, platforms)):
             floor[:] = CODE["warn"]
-        is_random = any(one.declared is not None for one in analysis.random)
+        is_random = any(error.declared is not None for error in analysis.random)
         if not (analysis.errors.stated or self._vibrates or is_random):
             floor[:] = CODE["not_evaluated"]
         return floor
@@ -320,77 +331,78 @@ class RowStatuses:
         self.subjects = [row.subject for row in rows]
         self.status, self.why = np.array([row.status for row in rows]), np.array([row.why for row in rows])
 
-    def _settle(self, which: Sequence[bool], is_so: Any, why: Why) -> None:
+    def _settle(self, rows: Sequence[bool], is_so: Any, why: Why) -> None:
         """Some rows are not evaluated, where it is so, (rows, cases) or (cases,)."""
-        these = np.array(which, dtype=bool)[:, None] & is_so
-        self.status = np.where(these, CODE["not_evaluated"], self.status)
-        self.why = np.where(these, np.int8(why), self.why)
+        are_settled = np.array(rows, dtype=bool)[:, None] & is_so
+        self.status = np.where(are_settled, CODE["not_evaluated"], self.status)
+        self.why = np.where(are_settled, np.int8(why), self.why)
 
     def require_declarations(self, geometry: BistaticGeometry) -> None:
         """Errors that should be declared and are not are not evaluated; the first row says whether all are there."""
         if not self.mission.requirements.declare:
             return
         still = np.array([np.broadcast_to(path.is_still, self.status.shape[1:]) for path in geometry.both])
-        for which in np.unique(still, axis=1).T:  # nearly always one: a platform that moves does in every case
-            these = (still == which[:, None]).all(axis=0)
-            names = [name for name, is_still in zip(PLATFORMS, which, strict=True) if is_still]
+        # There is nearly always one combination: a platform that moves does so in every case.
+        for still_platforms in np.unique(still, axis=1).T:
+            cases = (still == still_platforms[:, None]).all(axis=0)
+            names = [name for name, is_still in zip(PLATFORMS, still_platforms, strict=True) if is_still]
             missing = missing_declarations(self.mission, names)
-            self.status[0, these] = CODE["not_evaluated" if missing else "pass"]
-            owed = [any(is_asked_for(what, one) for one in missing) for what in self.subjects]
-            self._settle(owed, these & (self.status == CODE["not_declared"]), Why.NOT_DECLARED_AS_REQUIRED)
+            self.status[0, cases] = CODE["not_evaluated" if missing else "pass"]
+            owed = [any(is_asked_for(row_subject, error) for error in missing) for row_subject in self.subjects]
+            self._settle(owed, cases & (self.status == CODE["not_declared"]), Why.NOT_DECLARED_AS_REQUIRED)
 
     def doubt_inputs(self, in_doubt: Mapping[tuple[str, str], Truths]) -> None:
         """Errors of a path that is in doubt by more than the file declares are not evaluated."""
         for (name, kind), is_doubtful in in_doubt.items():
             if is_doubtful.any():
-                owed = [is_in_doubt(what, name, self.mission, kind) for what in self.subjects]
+                owed = [is_in_doubt(row_subject, name, self.mission, kind) for row_subject in self.subjects]
                 self._settle(owed, is_doubtful & (self.status != CODE["fail"]), Why.INPUT_IN_DOUBT)
 
     def doubt_air(self, doubted: Mapping[str, Truths]) -> None:
         """Rows, by their ids, that rest on air that stays are not evaluated."""
         for row_id, is_doubted in doubted.items():
             if is_doubted.any():
-                which = [what.id == row_id for what in self.subjects]
+                rows = [row_subject.id == row_id for row_subject in self.subjects]
                 is_new = self.why != Why.EFFECT_NOT_TAKEN  # which names the requirement to add
-                self._settle(which, is_doubted & self._is_open & is_new, Why.AIR_STAYS)
+                self._settle(rows, is_doubted & self._is_open & is_new, Why.AIR_STAYS)
 
     def judge_effects(self, untaken: Sequence[UntakenEffect]) -> None:
         """Rows that make up an effect that no requirement takes are not evaluated.
 
         One that no requirement limits, with a negligible effect, judges nothing: `info`.
         """
-        for place, row in enumerate(self.rows):
-            row_id, status = row.subject.id, self.status[place]
-            of_row = [one for one in untaken if row_id in one.parts]
+        for row_index, row in enumerate(self.rows):
+            row_id, status = row.subject.id, self.status[row_index]
+            of_row = [effect for effect in untaken if row_id in effect.parts]
             if not of_row:
                 continue
-            for one in of_row:
-                is_unlimited = np.isnan(row.allowable) & (one.parts[row_id] > 0)
+            for effect in of_row:
+                is_unlimited = np.isnan(row.allowable) & (effect.parts[row_id] > 0)
                 status = np.where(is_unlimited & (status == CODE["pass"]), CODE["info"], status)
                 is_better = (status != CODE["fail"]) & (status != CODE["not_declared"])
-                status = np.where(one.makers[row_id] & is_better, CODE["not_evaluated"], status)
+                status = np.where(effect.makers[row_id] & is_better, CODE["not_evaluated"], status)
             is_judged = (status == CODE["not_evaluated"]) | (status == CODE["fail"])
-            is_made = is_judged & np.any([one.makers[row_id] for one in of_row], axis=0)
-            self.status[place] = status
-            self.why[place] = np.where(is_made, np.int8(Why.EFFECT_NOT_TAKEN), self.why[place])
+            makes_up = is_judged & np.any([effect.makers[row_id] for effect in of_row], axis=0)
+            self.status[row_index] = status
+            self.why[row_index] = np.where(makes_up, np.int8(Why.EFFECT_NOT_TAKEN), self.why[row_index])
 
     def judge_place(self, is_misplaced: Truths) -> None:
         """Where the image is displaced by an amount that no row holds, the location is not evaluated."""
         if self.mission.requirements.location_error is not None:
-            which = [what.id == f"mission.{LOCATION}" for what in self.subjects]
-            self._settle(which, is_misplaced & self._is_open, Why.NO_PLACE)
+            rows = [row_subject.id == f"mission.{LOCATION}" for row_subject in self.subjects]
+            self._settle(rows, is_misplaced & self._is_open, Why.NO_PLACE)
 
     def judge_halves(self, halves: Sequence[HalfCause]) -> None:
         """Rows that rest on a cause of which the file states one half are not evaluated."""
         for half in halves:
-            self._settle([half.holds(what) for what in self.subjects], self._is_open, Why.HALF_A_CAUSE)
+            self._settle([half.holds(row_subject) for row_subject in self.subjects], self._is_open, Why.HALF_A_CAUSE)
 
     def judge_spread(self, has_noise: Truths) -> None:
         """ISLR is not evaluated where nothing but a cubic phase makes it."""
         if not has_noise.all():
-            which = [what.kind == "islr" for what in self.subjects]
+            rows = [row_subject.kind == "islr" for row_subject in self.subjects]
             is_new = ~np.isin(self.why, (Why.INPUT_IN_DOUBT, Why.AIR_STAYS))
-            self._settle(which, ~has_noise & self._is_open & is_new, Why.NOTHING_SPREADS)
+            self._settle(rows, ~has_noise & self._is_open & is_new, Why.NOTHING_SPREADS)
 
     @property
     def _is_open(self) -> Truths:
@@ -398,16 +410,16 @@ class RowStatuses:
 
     def waivers(self, today: date) -> NDArray[np.intp]:
         """Place in the file of the first waiver that holds and covers each row that is broken; -1: none does."""
-        places = np.full(self.status.shape, -1)
+        indices = np.full(self.status.shape, -1)
         if not self.mission.waivers:
-            return places
+            return indices
         is_missing = self.why == Why.NOT_DECLARED_AS_REQUIRED
         of_missing = holding_place(self.mission, today, [DECLARATIONS.id])
-        for row, what in enumerate(self.subjects):
-            own = holding_place(self.mission, today, [what.id])
-            both = [place for place in (own, of_missing) if place >= 0]
-            places[row] = np.where(is_missing[row], min(both, default=-1), own)
-        return np.where(np.isin(self.status, _BROKEN), places, -1)
+        for row, row_subject in enumerate(self.subjects):
+            waiver_of_row = holding_place(self.mission, today, [row_subject.id])
+            both = [waiver_index for waiver_index in (waiver_of_row, of_missing) if waiver_index >= 0]
+            indices[row] = np.where(is_missing[row], min(both, default=-1), waiver_of_row)
+        return np.where(np.isin(self.status, _BROKEN), indices, -1)
 
     def judges(self) -> Codes:
         """Place in `KEYS` of the requirement that judges each row, -1: none, since it is not declared."""
@@ -418,29 +430,29 @@ class RowStatuses:
 
     def rows_with(self, status: Codes) -> tuple[Judged, ...]:
         """The rows with these statuses; one that has become `info` uses nothing."""
-        found = []
+        rows = []
         for row, code, why in zip(self.rows, status, self.why, strict=True):
             is_info = (code == CODE["info"]) & (row.status != code)
             use = np.where(is_info, np.nan, row.utilization) if is_info.any() else row.utilization
-            found.append(row._replace(status=code, why=why, utilization=use))
-        return tuple(found)
+            rows.append(row._replace(status=code, why=why, utilization=use))
+        return tuple(rows)
 
 
 def _stricter(full: Mapping[str, Judged], published: Mapping[str, Judged] | None = None) -> list[Judged]:
     """Rows of complete checks: of two each time the one with the stricter verdict, then the higher utilization."""
     if published is None:
         return list(full.values())
-    found, others = [], dict(published)
-    for row_id, one in full.items():
-        other = others.pop(row_id, None)
-        if other is None:
-            found.append(one)
+    stricter, only_published = [], dict(published)
+    for row_id, by_full in full.items():
+        by_published = only_published.pop(row_id, None)
+        if by_published is None:
+            stricter.append(by_full)
             continue
-        use = [np.nan_to_num(row.utilization, nan=0.0) for row in (one, other)]
-        size = [np.where(np.isnan(row.allowable), np.inf, row.allowable) for row in (one, other)]
-        tie = other.status == one.status
-        is_same = is_as_high(use[0], use[1]) & is_as_high(use[1], use[0])
-        is_other = (other.status < one.status) | (tie & ~is_same & (use[1] > use[0]))
-        is_other |= tie & is_same & ~is_as_high(size[1], size[0])
-        found.append(one.where(is_other, other))
-    return [*found, *others.values()]  # an aggregate that only one of them has
+        use = [np.nan_to_num(row.utilization, nan=0.0) for row in (by_full, by_published)]
+        size = [np.where(np.isnan(row.allowable), np.inf, row.allowable) for row in (by_full, by_published)]
+        tie = by_published.status == by_full.status
+        is_equal = is_as_high(use[0], use[1]) & is_as_high(use[1], use[0])
+        takes_published = (by_published.status < by_full.status) | (tie & ~is_equal & (use[1] > use[0]))
+        takes_published |= tie & is_equal & ~is_as_high(size[1], size[0])
+        stricter.append(by_full.where(takes_published, by_published))
+    return [*stricter, *only_published.values()]  # an aggregate that only one of them has
