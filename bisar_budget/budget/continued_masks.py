@@ -21,32 +21,32 @@ LEAST_USE = 0.1  # of a limit, up to which it does not matter what a row rests o
 Part = str  # quadratic, cubic, spread or displacement
 
 
-def part_of(effect: RandomEffect, part: Part) -> Any:
+def part_of(effect: RandomEffect, effect_kind: Part) -> Any:
     """One of the sizes of an effect: a phase, an rms or a displacement, by a unit."""
-    return getattr(effect, part)
+    return getattr(effect, effect_kind)
 
 
-def continued_power(errors: Iterable[RandomError], part: Part) -> Any:
+def continued_power(errors: Iterable[RandomError], effect_kind: Part) -> Any:
     """Power of a part of what declared errors have below the first points of masks; 0 where none has any."""
     power: Any = 0.0
     for error in errors:
         if error.continued is not None and error.declared is not None:
-            power = power + np.nan_to_num(np.square(part_of(error.continued, part) * error.declared))
+            power = power + np.nan_to_num(np.square(part_of(error.continued, effect_kind) * error.declared))
     return power
 
 
-def rests_on_masks(errors: Iterable[RandomError], part: Part, size: Any, limit: Any) -> Any:
+def rests_on_masks(errors: Iterable[RandomError], effect_kind: Part, size: Any, limit: Any) -> Any:
     """Whether a size, with its limit, rests on what lies below the first points of masks, in which cases."""
-    power = continued_power(errors, part)
+    power = continued_power(errors, effect_kind)
     with np.errstate(all="ignore"):
         return (power > MOST_OF_POWER * np.square(size)) & (size > LEAST_USE * np.asarray(limit))
 
 
-def continuation_note(case: Case, errors: Sequence[RandomError], part: Part, size: float) -> Note:
+def continuation_note(case: Case, errors: Sequence[RandomError], effect_kind: Part, size: float) -> Note:
     """Say how much of a row lies below the first points of masks, and how far down a mask should reach."""
     makers = [error for error in errors if error.continued is not None and error.declared is not None]
     if not makers or not size:
         return NOTHING
-    percent = 100 * min(1.0, float(np.max(continued_power(makers, part))) / size**2)
+    percent = 100 * min(1.0, float(np.max(continued_power(makers, effect_kind))) / size**2)
     least = COVERED_CYCLES / case.mission.collection.aperture_time
     return phrases.rests_on_the_continuation([error.owner for error in makers], percent, least)

@@ -357,6 +357,6 @@ def _missing(mission: Mission, still: Container[str]) -> Iterator[Missing]:
                 yield Missing(name, kind, key, lacks)
 
 
-def is_asked_for(what: Subject, missing: Missing) -> bool:
+def is_asked_for(row_subject: Subject, missing: Missing) -> bool:
     """Whether a row is about what is asked for and missing."""
-    return what.owner == missing.owner and (what.kind == missing.kind or missing.kind == "timing")
+    return row_subject.owner == missing.owner and (row_subject.kind == missing.kind or missing.kind == "timing")

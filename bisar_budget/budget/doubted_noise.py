@@ -19,12 +19,12 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.phrases import NOTHING, Note
 
 
-def rests_on_doubted_noise(errors: Iterable[RandomError], part: Part, model: str, limit: Any) -> Any:
+def rests_on_doubted_noise(errors: Iterable[RandomError], effect_kind: Part, model: str, limit: Any) -> Any:
     """Whether oscillators in doubt use more than a tenth of a limit by a part of their effects, in which cases."""
     power: Any = 0.0
     for error in errors:
         if error.declared is not None and np.any(error.is_in_doubt):
-            size = part_of(error.effect(model), part) * np.asarray(error.declared)
+            size = part_of(error.effect(model), effect_kind) * np.asarray(error.declared)
             power = power + np.where(error.is_in_doubt, np.nan_to_num(np.square(size)), 0.0)
     with np.errstate(all="ignore"):
         return np.sqrt(power) > LEAST_USE * np.asarray(limit)

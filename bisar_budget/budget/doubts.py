@@ -61,7 +61,7 @@ class InputDoubt:
 
 def input_doubts(mission: Mission) -> list[InputDoubt]:
     """Platforms whose paths are in doubt by more than the file declares."""
-    found = []
+    doubts = []
     for name in PLATFORMS:
         platform: Platform = getattr(mission.platforms, name)
         path, declared = platform.path, declared_position_error(platform.motion_error)
@@ -70,34 +70,34 @@ def input_doubts(mission: Mission) -> list[InputDoubt]:
         if np.any(strays(mission, name)):
             key = f"platforms.{name}.motion_error.position"
             note = phrases.input_in_doubt(path.doubt_m, path.doubt_of, declared, key)
-            found.append(InputDoubt(name, path.doubt_m, declared or 0.0, note))
+            doubts.append(InputDoubt(name, path.doubt_m, declared or 0.0, note))
         for kind in KINDS:
-            found += [
+            doubts += [
                 _stated_doubt(platform, name, kind, stated)
                 for stated in path.stated
                 if np.any(states_more(mission, name, kind, stated))
             ]
         if np.any(is_coarse(mission, name)):
-            found.append(_coarse_grid(platform, name))
+            doubts.append(_coarse_grid(platform, name))
         if np.any(leaves_unsaid(mission, name)):
             phase, key = float(residual_phase(mission, name)), f"platforms.{name}.trajectory.processed"
             note = phrases.log_leaves_too_much(phase, MOST_RESIDUAL_RAD, key)
-            found.append(InputDoubt(name, phase, MOST_RESIDUAL_RAD, note, RESIDUAL, is_of_log=True))
-    return found
+            doubts.append(InputDoubt(name, phase, MOST_RESIDUAL_RAD, note, RESIDUAL, is_of_log=True))
+    return doubts
 
 
 def doubted_platforms(mission: Mission, cases: int) -> dict[tuple[str, str], Truths]:
     """Cases in which a platform's path is in doubt by more than the file declares, by owner and kind of error."""
-    found = {}
+    doubted = {}
     for name in PLATFORMS:
         path: FlownPath | None = getattr(mission.platforms, name).path
         if path is not None:
             for kind in KINDS:
                 doubts = [strays(mission, name), is_coarse(mission, name)] if kind == "position" else []
                 doubts += [states_more(mission, name, kind, stated) for stated in path.stated]
-                found[name, kind] = np.any([np.broadcast_to(doubt, (cases,)) for doubt in (False, *doubts)], axis=0)
-            found[name, RESIDUAL] = np.array(np.broadcast_to(leaves_unsaid(mission, name), (cases,)))
-    return found
+                doubted[name, kind] = np.any([np.broadcast_to(doubt, (cases,)) for doubt in (False, *doubts)], axis=0)
+            doubted[name, RESIDUAL] = np.array(np.broadcast_to(leaves_unsaid(mission, name), (cases,)))
+    return doubted
 
 
 # ---------------------------------------------------------------------- how far the truth may be from a path
@@ -126,20 +126,22 @@ def declared_position_error(error: MotionError) -> Any:
     Numbers of the mission may be arrays (cases,), and so may be the result.
     """
     stated = error.stated("position")
-    sizes = [*(stated or ()), *(sigma for one in error.random for sigma in one.sigma)]
+    sizes = [*(stated or ()), *(sigma for process in error.random for sigma in process.sigma)]
     return sum(size**2 for size in sizes) ** 0.5 if sizes else None
 
 
-def is_in_doubt(what: Subject, owner: str, mission: Mission, kind: str = "position") -> bool:
+def is_in_doubt(row_subject: Subject, owner: str, mission: Mission, kind: str = "position") -> bool:
     """Whether a row is of a kind of error of a platform, along the axes that the file states it in.
 
     What a smooth path leaves of a log spreads: its own row, and those of the powers that spread.
     """
     if kind == RESIDUAL:
-        return what == residual_subject(owner) or (what.kind == "islr" and what.owner in (owner, "mission"))
+        return row_subject == residual_subject(owner) or (
+            row_subject.kind == "islr" and row_subject.owner in (owner, "mission")
+        )
     error: MotionError = getattr(mission.platforms, owner).motion_error
     frame = "scene" if error.stated(kind) is None else error.frame
-    return what.owner == owner and what.kind == kind and what.frame == frame
+    return row_subject.owner == owner and row_subject.kind == kind and row_subject.frame == frame
 
 
 # ---------------------------------------------------------------------- what the source of a path states
@@ -152,21 +154,21 @@ def states_more(mission: Mission, name: str, kind: str, stated: StatedAccuracy) 
     position error where the file declares none.
     """
     platform: Platform = getattr(mission.platforms, name)
-    own = _stated_covariance(stated, kind)
+    stated_covariance = _stated_covariance(stated, kind)
     declared = _declared_covariance(platform, kind)
     if stated.covariance is None:
         is_more = kind == "position" and stated.total**2 > np.trace(declared, axis1=-2, axis2=-1) * (1 + _EQUAL)
         return np.asarray(is_more) & (stated.total > LEAST_M)
-    if own is None:
+    if stated_covariance is None:
         return False
     share = _TYPICAL_SHARE**2 if stated.is_typical else 1.0
     seen = LEAST_M**2 if kind == "position" else 0.0
-    left = declared * (1 + _EQUAL) + seen * np.eye(3) - share * own
-    scale = np.trace(own, axis1=-2, axis2=-1)
-    is_more = np.linalg.eigvalsh(left)[..., 0] < -1e-9 * scale
+    excess = declared * (1 + _EQUAL) + seen * np.eye(3) - share * stated_covariance
+    scale = np.trace(stated_covariance, axis1=-2, axis2=-1)
+    is_more = np.linalg.eigvalsh(excess)[..., 0] < -1e-9 * scale
     is_open = stated.is_typical and platform.motion_error.stated(kind) is None and not platform.motion_error.random
     if is_more.any() and (kind == "velocity" or is_open):
-        is_more = is_more & _matters(mission, name, kind, own)
+        is_more = is_more & _matters(mission, name, kind, stated_covariance)
     return is_more
 
 
@@ -188,9 +190,9 @@ def _declared_covariance(platform: Platform, kind: str) -> Floats:
     correlation = np.eye(3).tolist() if error.covariance is None else error.covariance.block(kind)
     along = [[sizes[i] * sizes[j] * correlation[i][j] for j in range(3)] for i in range(3)]
     if kind == "position":
-        for one in error.random:
+        for process in error.random:
             for axis in range(3):
-                along[axis][axis] = along[axis][axis] + one.sigma[axis] ** 2
+                along[axis][axis] = along[axis][axis] + process.sigma[axis] ** 2
     axes = _stack(platform.state.frame(error.frame))
     return np.asarray(np.swapaxes(axes, -1, -2) @ _stack(along) @ axes)
 
@@ -205,27 +207,32 @@ def _stated_doubt(platform: Platform, name: str, kind: str, stated: StatedAccura
     """The errors that a source states and that the file declares, along the axis where they differ most."""
     error = platform.motion_error
     key = f"platforms.{name}.motion_error.{kind if error.covariance is None else 'covariance'}"
-    own, declared = _stated_covariance(stated, kind), _declared_covariance(platform, kind)
+    stated_covariance, declared = _stated_covariance(stated, kind), _declared_covariance(platform, kind)
     unit_name = MOTION_UNITS[kind]
     is_declared = error.stated(kind) is not None or (kind == "position" and bool(error.random))
-    if own is None:
+    if stated_covariance is None:
         total = float(np.trace(declared)) ** 0.5
         both = phrases.StatedError(stated.words, kind, (stated.total,), (total,), unit_name, key, is_declared)
         note = phrases.input_states_more(both)
         return InputDoubt(name, stated.total, total, note, kind, is_stated=True)
     axes = _stack(platform.state.frame(error.frame))
     names: Sequence[str] = FRAME_AXES[error.frame]
-    sizes = [np.sqrt(np.diag(axes @ one @ axes.T)).tolist() for one in (own, declared)]
+    sizes = [np.sqrt(np.diag(axes @ covariance @ axes.T)).tolist() for covariance in (stated_covariance, declared)]
     share = _TYPICAL_SHARE if stated.is_typical else 1.0
-    if all(share * size <= known * (1 + _EQUAL) + LEAST_M for size, known in zip(*sizes, strict=True)):
+    if all(
+        share * size <= declared_size * (1 + _EQUAL) + LEAST_M for size, declared_size in zip(*sizes, strict=True)
+    ):
         # Along each axis enough is declared, but not between them.
-        values, directions = np.linalg.eigh(declared - share**2 * own)
+        values, directions = np.linalg.eigh(declared - share**2 * stated_covariance)
         worst = directions[:, int(values.argmin())]
-        sizes, names = [[float(worst @ one @ worst) ** 0.5] for one in (own, declared)], ("between the axes",)
-    place = max(range(len(sizes[0])), key=lambda axis: share * sizes[0][axis] - sizes[1][axis])
+        sizes, names = (
+            [[float(worst @ covariance @ worst) ** 0.5] for covariance in (stated_covariance, declared)],
+            ("between the axes",),
+        )
+    worst_axis = max(range(len(sizes[0])), key=lambda axis: share * sizes[0][axis] - sizes[1][axis])
     phrase = phrases.input_usually_has_more if stated.is_typical else phrases.input_states_more
     note = phrase(phrases.StatedError(stated.words, kind, sizes[0], sizes[1], unit_name, key, is_declared, names))
-    return InputDoubt(name, sizes[0][place], sizes[1][place], note, kind, is_stated=True)
+    return InputDoubt(name, sizes[0][worst_axis], sizes[1][worst_axis], note, kind, is_stated=True)
 
 
 # ---------------------------------------------------------------------- what a smooth path leaves of a log
@@ -261,8 +268,8 @@ def is_coarse(mission: Mission, name: str) -> Any:
     grid = _stack(log.grid)
     squares = np.swapaxes(grid, -1, -2) @ grid
     declared = _declared_covariance(platform, "position")
-    left = MOST_GRID_SHARE**2 * declared * (1 + _EQUAL) + LEAST_M**2 * np.eye(3) - squares
-    coarse = np.linalg.eigvalsh(left)[..., 0] < 0
+    excess = MOST_GRID_SHARE**2 * declared * (1 + _EQUAL) + LEAST_M**2 * np.eye(3) - squares
+    coarse = np.linalg.eigvalsh(excess)[..., 0] < 0
     if coarse.any() and platform.motion_error.stated("position") is None and not platform.motion_error.random:
         coarse = coarse & _matters(mission, name, "position", squares / 12)
     return coarse
@@ -284,10 +291,10 @@ def _coarse_grid(platform: Platform, name: str) -> InputDoubt:
     grid, declared = np.array(platform.path.log_noise.grid), _declared_covariance(platform, "position")
     steps = np.sqrt(np.sum((grid @ axes.T) ** 2, axis=0))
     sigmas = np.sqrt(np.diag(axes @ declared @ axes.T))
-    place = int(np.argmax(steps - MOST_GRID_SHARE * sigmas))
+    worst_axis = int(np.argmax(steps - MOST_GRID_SHARE * sigmas))
     is_declared = error.stated("position") is not None or bool(error.random)
-    key, axis = f"platforms.{name}.trajectory.processed", FRAME_AXES[error.frame][place]
-    step, sigma = float(steps[place]), float(sigmas[place])
+    key, axis = f"platforms.{name}.trajectory.processed", FRAME_AXES[error.frame][worst_axis]
+    step, sigma = float(steps[worst_axis]), float(sigmas[worst_axis])
     note = phrases.log_is_coarse(step, sigma if is_declared else None, axis, key)
     return InputDoubt(name, step, sigma, note, is_of_log=True)
 

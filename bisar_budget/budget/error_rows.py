@@ -42,26 +42,26 @@ class ErrorRows:
 
     def rows(self, gating: str) -> Iterator["ErrorRow"]:
         """Rows by one model, which the other may doubt."""
-        for place in range(len(self.errors.blocks)):
-            yield from self._of_block(place, gating)
+        for block_index in range(len(self.errors.blocks)):
+            yield from self._of_block(block_index, gating)
 
-    def _of_block(self, place: int, gating: str) -> Iterator["ErrorRow"]:
-        errors, block, is_whole = self.errors, self.errors.blocks[place], self.judging.is_whole
-        other = OTHER_MODEL[gating]
+    def _of_block(self, block_index: int, gating: str) -> Iterator["ErrorRow"]:
+        errors, block, asks_for_all = self.errors, self.errors.blocks[block_index], self.judging.is_whole
+        other_model = OTHER_MODEL[gating]
         needs, sources = errors.mission.requirements, block.sources
         limit = np.array([self.limits[source.owner] for source in sources])
-        held = (limit, needs.cubic_phase_error, needs.location_error)
+        limits = (limit, needs.cubic_phase_error, needs.location_error)
         # Searches start from what declared errors are known to do.
-        mine, theirs = errors.of_block(gating, place), errors.of_block(other, place)
-        searched = (None, None, None) if self.is_of_sums else held
-        allowed = block.allowed(gating, searched, is_whole=is_whole)
+        mine, theirs = errors.of_block(gating, block_index), errors.of_block(other_model, block_index)
+        searched = (None, None, None) if self.is_of_sums else limits
+        allowed = block.allowed(gating, searched, is_whole=asks_for_all)
         published, full = (mine, theirs) if gating == "published" else (theirs, mine)
         is_again = np.array([[not source.is_independent] for source in sources])
         judged = self.judging.row(
             sources[0].subject,
             np.abs(block.declared),
             allowed.smallest,
-            doubt=errors.doubts(other, _is_over(theirs, self.gain, held, block.is_motion)),
+            doubt=errors.doubts(other_model, _is_over(theirs, self.gain, limits, block.is_motion)),
             without_autofocus=np.where(self.gain > 1, mine.equal_loss / (limit / self.gain), 0.0),
             is_info=is_again | (errors.mission.allocation.combine != "each"),
         )
@@ -73,9 +73,9 @@ class ErrorRows:
             equal_loss_qpe_rad=np.where(np.isfinite(full.qpe) & block.is_motion, full.equal_loss, math.nan),
             rest_rad=np.where(np.isfinite(full.qpe) & block.is_motion, full.rest, math.nan),
         )
-        if is_whole:
-            by_other = block.allowed(other, (limit, None, None), is_whole=True)
-            quadratic = {gating: allowed.quadratic, other: by_other.quadratic}
+        if asks_for_all:
+            allowed_by_other = block.allowed(other_model, (limit, None, None), is_whole=True)
+            quadratic = {gating: allowed.quadratic, other_model: allowed_by_other.quadratic}
             judged = judged._replace(
                 allowable_published=quadratic["published"],
                 allowable_full=quadratic["full"],
@@ -89,15 +89,15 @@ class ErrorRows:
             yield ErrorRow(judged.at(row, source.subject), source, self.limits[source.owner])
 
 
-def _is_over(does: Declared, gain: Any, held: tuple[Floats, float | None, float | None], is_motion: Any) -> Any:
+def _is_over(does: Declared, gain: Any, limits: tuple[Floats, float | None, float | None], is_motion: Any) -> Any:
     """Whether any effect of errors is over what it is held to."""
-    limit, cubic, location = held
-    found = does.judged(gain) / limit > BOUND
+    limit, cubic, location = limits
+    is_over = does.judged(gain) / limit > BOUND
     if cubic is not None:
-        found |= is_motion & (np.abs(does.cubic) / cubic > BOUND)
+        is_over |= is_motion & (np.abs(does.cubic) / cubic > BOUND)
     if location is not None:
-        found |= np.hypot(*does.farthest) / location > BOUND
-    return found
+        is_over |= np.hypot(*does.farthest) / location > BOUND
+    return is_over
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,7 +110,7 @@ class ErrorRow(FamilyRow):
     def in_words(self, case: Case, gating: str) -> Row:
         """The row of one case, by the model that judges it."""
         mission, row, source = case.mission, self.judged, self.source
-        model, other = case.analysis.models(gating)
+        model, other_model = case.analysis.models(gating)
         gain, status = case.allocation.autofocus_gain, row.status[case.place]
         limit = case.number(self.limit)
         over = doubt = info = NOTHING
@@ -125,7 +125,7 @@ class ErrorRow(FamilyRow):
             if status == CODE["fail"]:
                 over = _over(case, model, row, source, mine, limit)
             elif status == CODE["warn"]:
-                doubt = _doubt(case, other, source, limit)
+                doubt = _doubt(case, other_model, source, limit)
             elif not source.is_independent:
                 info = _stated_elsewhere(case, source)
             else:
@@ -171,19 +171,19 @@ def _over(case: Case, model: Model, row: Judged, source: ErrorSource, mine: Decl
 def _doubt(case: Case, other: Model, source: ErrorSource, limit: float) -> Note:
     """Say that the model that does not gate fails the declared error, and why it thinks otherwise; else nothing."""
     needs, theirs = case.mission.requirements, case.does(other, source)
-    held = [(float(theirs.judged(case.allocation.autofocus_gain)), limit, QUADRATIC)]
+    uses = [(float(theirs.judged(case.allocation.autofocus_gain)), limit, QUADRATIC)]
     if source.is_motion and needs.cubic_phase_error is not None:
-        held.append((abs(theirs.cubic), needs.cubic_phase_error, CUBIC))
+        uses.append((abs(theirs.cubic), needs.cubic_phase_error, CUBIC))
     if source.is_motion and needs.location_error is not None:
         moved = 0.0 if theirs.farthest is None else math.hypot(*theirs.farthest)
-        held.append((moved, needs.location_error, LOCATION))
-    size, allowed, binding = max(held, key=lambda one: one[0] / one[1])
+        uses.append((moved, needs.location_error, LOCATION))
+    size, allowed, binding = max(uses, key=lambda use: use[0] / use[1])
     if size <= allowed * BOUND or other.is_blind:
         return NOTHING
     if binding == QUADRATIC and other.is_published:
         return phrases.other_model_fails(other.name, size, allowed, *EFFECTS[binding], source.equation)
-    said = phrases.other_model_fails(other.name, size, allowed, *EFFECTS[binding])
-    return said.then(_cause(source)) if binding == QUADRATIC else said
+    note = phrases.other_model_fails(other.name, size, allowed, *EFFECTS[binding])
+    return note.then(_cause(source)) if binding == QUADRATIC else note
 
 
 def _cause(source: ErrorSource) -> Note:
@@ -209,12 +209,14 @@ def specification_rows(judging: Judging, analysis: Analysis) -> Iterator["Specif
     An error that is specified and not declared is not evaluated. All of a specification may be used, without warning.
     """
     for number in analysis.mission.specifications.values():
-        most, found = judging.array(number.value), judging.array(largest_at(analysis.mission, number))
-        what = subject(_owner(number.key), SPECIFICATION, name_of_error(number.key))
+        most, largest_declared = judging.array(number.value), judging.array(largest_at(analysis.mission, number))
+        row_subject = subject(_owner(number.key), SPECIFICATION, name_of_error(number.key))
         of_amplitudes = _amplitude if number.is_level else np.asarray
-        judged = judging._replace(warn_above=1.0).row(what, of_amplitudes(found), of_amplitudes(most))
-        status = np.where(np.isnan(found), CODE["not_evaluated"], judged.status).astype(np.int8)
-        judged = judged._replace(status=status, declared=found, allowable=most, metric=SPECIFICATION)
+        judged = judging._replace(warn_above=1.0).row(
+            row_subject, of_amplitudes(largest_declared), of_amplitudes(most)
+        )
+        status = np.where(np.isnan(largest_declared), CODE["not_evaluated"], judged.status).astype(np.int8)
+        judged = judged._replace(status=status, declared=largest_declared, allowable=most, metric=SPECIFICATION)
         yield SpecificationRow(judged, number)
 
 

@@ -54,9 +54,9 @@ def file_warnings(
         What is to be said of waivers.
     """
     mission = case.mission
-    found = (
+    warnings = (
         *_of_the_whole(mission, rows),
-        *(_Warned(*one) for one in waivers),
+        *(_Warned(*warning) for warning in waivers),
         *_unused_correlations(mission),
         *straight_orbits(mission),
         *_doubtful_paths(mission),
@@ -68,16 +68,18 @@ def file_warnings(
         *_of_autofocus(mission, case.resolution),
         *_nothing_declared(rows),
     )
-    return tuple(FileWarning(None if one.key is None else mission.line(one.key), *one[1:]) for one in found)
+    return tuple(
+        FileWarning(None if warning.key is None else mission.line(warning.key), *warning[1:]) for warning in warnings
+    )
 
 
 # ---------------------------------------------------------------------- what is checked
 def _of_the_whole(mission: Mission, rows: Sequence[Row]) -> Iterator[_Warned]:
     if mission.changes:
         yield _Warned(None, another_mission(changes_words(mission.changes)), is_of_options=True)
-    known = {row.id for row in rows} if mission.requirement_ids else set()
+    row_ids = {row.id for row in rows} if mission.requirement_ids else set()
     for row_id in mission.requirement_ids:
-        if row_id not in known:
+        if row_id not in row_ids:
             yield _Warned(("requirement_ids", row_id), id_of_no_row(row_id))
     if mission.earth_orientation is not None and all(platform.orbit is None for platform in mission.platforms):
         yield _Warned(("earth_orientation",), no_orbit_to_turn())
@@ -123,7 +125,7 @@ def nothing_declared() -> str:
 # ---------------------------------------------------------------------- how platforms fly
 def _doubtful_paths(mission: Mission) -> Iterator[_Warned]:
     """Paths in doubt where rows do not say it; a place that strays is no part of a log's residual."""
-    owners = {one.owner for one in input_doubts(mission) if not one.is_stated}
+    owners = {doubt.owner for doubt in input_doubts(mission) if not doubt.is_stated}
     for name in PLATFORMS:
         platform: Platform = getattr(mission.platforms, name)
         path = platform.path
@@ -182,7 +184,7 @@ def straight_orbits(mission: Mission) -> Iterator[_Warned]:
 @phrase
 def satellite_flies_straight(platform: str, speed: float, acceleration: Sequence[float], has_axes: bool) -> str:
     """Said of a satellite's path without the acceleration of its orbit. [m/s, m/s²]"""
-    parts = ", ".join(f"{part + 0.0:.3f} m/s^2" for part in acceleration)
+    components = ", ".join(f"{component + 0.0:.3f} m/s^2" for component in acceleration)
     if has_axes:
         how = "(gravity of a flattened Earth, less what its rotation adds)"
     else:
@@ -192,7 +194,7 @@ def satellite_flies_straight(platform: str, speed: float, acceleration: Sequence
         )
     return (
         f"platforms.{platform}: {speed / 1e3:.3g} km/s is the speed of a satellite, and the path is straight. "
-        f"A circular orbit has acceleration: [{parts}] {how}"
+        f"A circular orbit has acceleration: [{components}] {how}"
     )
 
 
@@ -304,8 +306,8 @@ def _of_autofocus(mission: Mission, resolution: Resolution) -> Iterator[_Warned]
         cells = n_pull / limit.walk / 2
         yield _Warned(key, walks_over_range_cells(n_pull, cells, rounded_down(limit.walk)))
     if radius is not None and limit.scene is not None and n_pull > limit.scene:
-        smear, held = 4 * n_pull * resolution.cross_range, rounded_down(limit.scene)
-        yield _Warned(key, smears_beyond_the_scene(n_pull, smear, algorithm, ROOM[algorithm], radius, held))
+        smear, largest_n_pull = 4 * n_pull * resolution.cross_range, rounded_down(limit.scene)
+        yield _Warned(key, smears_beyond_the_scene(n_pull, smear, algorithm, ROOM[algorithm], radius, largest_n_pull))
 
 
 @phrase
@@ -319,13 +321,13 @@ def walks_over_range_cells(n_pull: float, cells: float, cap: str) -> str:
 
 @phrase
 def smears_beyond_the_scene(
-    n_pull: float, smear: float, algorithm: str, room: float, radius: float, held: str
+    n_pull: float, smear: float, algorithm: str, room: float, radius: float, largest_n_pull: str
 ) -> str:
     """Said of a pull-in range that the scene's size does not leave. [m]"""
     return (
         f"autofocus.n_pull: an error of {n_pull:g}π rad smears a point over {format_quantity(smear, 'm')}; "
         f"{algorithm} needs {room:g} times that. A scene of {format_quantity(2 * radius, 'm')} across holds "
-        f"n_pull {held}"
+        f"n_pull {largest_n_pull}"
     )
 
 

@@ -34,9 +34,9 @@ TAKEN_BY = {"cubic": (CUBIC, "islr"), "spread": ("islr",), "tone": ("pslr", "isl
 EXAMPLES = {CUBIC: "22.5 deg", "islr": "-20 dB", "pslr": "-30 dB"}  # of lines to add
 
 _NONE = np.int8(len(STATUS))  # of a row that judges nothing
-IS_JUDGED = np.array([one.is_judged for one in STATUS.values()])
+IS_JUDGED = np.array([status.is_judged for status in STATUS.values()])
 # Whether a status leaves a requirement met, with or without a warning; the last is that of `_NONE`.
-IS_MET = np.array([*(one.complies for one in STATUS.values()), False])
+IS_MET = np.array([*(status.complies for status in STATUS.values()), False])
 
 
 class UntakenEffect(NamedTuple):
@@ -75,10 +75,10 @@ def first_highest(uses: Floats) -> NDArray[np.intp]:
     return np.asarray(is_as_high(uses, uses.max(axis=0)).argmax(axis=0))
 
 
-def is_as_high(uses: Any, others: Any) -> Truths:
+def is_as_high(uses: Any, other_uses: Any) -> Truths:
     """Whether utilizations are as high as others, but for rounding."""
     with np.errstate(invalid="ignore"):  # one that is endless is as high as itself
-        return np.asarray((uses >= others - ALIKE * np.abs(others)) | (uses == others))
+        return np.asarray((uses >= other_uses - ALIKE * np.abs(other_uses)) | (uses == other_uses))
 
 
 def negligible_rad(mission: Mission) -> Any:
@@ -134,13 +134,13 @@ def requirement_states(
         Keys of the requirements that are not evaluated, and in which cases: they rest on air that stays in a long
         aperture, or on half a cause.
     """
-    uses, found = np.nan_to_num(utilization, nan=0.0, posinf=np.inf), []
+    uses, states = np.nan_to_num(utilization, nan=0.0, posinf=np.inf), []
     is_open = before == RANK["not_evaluated"]
     for key in required_keys(mission):
         mine = IS_JUDGED[codes] & (judges == KEYS.index(key))
         levels, used = np.where(mine, codes, _NONE), uses
         if key == QUADRATIC:  # a row that another requirement binds is held to this one too
-            is_other = IS_JUDGED[codes] & ~mine & ~np.isnan(quadratic_use)
+            is_of_other = IS_JUDGED[codes] & ~mine & ~np.isnan(quadratic_use)
             by_autofocus = np.where(codes == RANK["pass_with_autofocus"], codes, RANK["pass"])
             broken = np.where(
                 codes == RANK["waived"], codes, RANK["fail"]
@@ -148,9 +148,9 @@ def requirement_states(
             breaks = np.nan_to_num(quadratic_use) > BOUND
             rests_on = in_doubt & is_open & (np.nan_to_num(quadratic_use) > LEAST_USE)
             kept = np.where(rests_on, codes, by_autofocus)
-            levels = np.where(is_other, np.where(breaks, broken, kept), levels)
-            used = np.where(is_other, quadratic_use, uses)
-            mine = mine | is_other
+            levels = np.where(is_of_other, np.where(breaks, broken, kept), levels)
+            used = np.where(is_of_other, quadratic_use, uses)
+            mine = mine | is_of_other
         else:  # autofocus corrects a quadratic phase alone
             levels = np.where(levels == RANK["pass_with_autofocus"], RANK["pass"], levels)
         worst = levels.min(axis=0)
@@ -174,5 +174,5 @@ def requirement_states(
         is_unknown = (is_unknown & (worst == RANK["waived"])) | (status == RANK["not_evaluated"])
         if waived.get(key):
             status = np.where(np.isin(status, [RANK[name] for name in BROKEN]), RANK["waived"], status)
-        found.append(RequirementState(key, status.astype(np.int8), decider, user, utilization, mine, is_unknown))
-    return found
+        states.append(RequirementState(key, status.astype(np.int8), decider, user, utilization, mine, is_unknown))
+    return states

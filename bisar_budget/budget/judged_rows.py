@@ -91,30 +91,30 @@ class Judged(NamedTuple):
     is_of_ranges: bool = False  # `qpe_full_rad` is that of exact ranges
 
     @classmethod
-    def of_none(cls, what: Subject, cases: int) -> "Judged":
+    def of_none(cls, row_subject: Subject, cases: int) -> "Judged":
         """A row that is not declared in any case."""
         status = np.full(cases, RANK["not_declared"], np.int8)
-        return cls._with(what, status, *(np.full(cases, math.nan) for _ in range(3)))
+        return cls._with(row_subject, status, *(np.full(cases, math.nan) for _ in range(3)))
 
     @classmethod
     def _with(
-        cls, what: Subject, status: Codes, declared: Floats, allowable: Floats, utilization: Floats
+        cls, row_subject: Subject, status: Codes, declared: Floats, allowable: Floats, utilization: Floats
     ) -> "Judged":
         none, zero = np.full(status.shape, math.nan), np.zeros(status.shape, dtype=np.int8)
-        return cls(what, status, declared, allowable, utilization, zero - 1, zero, zero, *(none,) * 9)
+        return cls(row_subject, status, declared, allowable, utilization, zero - 1, zero, zero, *(none,) * 9)
 
-    def _of_columns(self, of_one: Callable[[Any], Any], names: Sequence[str]) -> "Judged":
-        columns: dict[str, Any] = {name: of_one(getattr(self, name)) for name in names}
+    def _of_columns(self, change: Callable[[Any], Any], names: Sequence[str]) -> "Judged":
+        columns: dict[str, Any] = {name: change(getattr(self, name)) for name in names}
         return self._replace(**columns)
 
-    def at(self, place: int, what: Subject) -> "Judged":
+    def at(self, row_index: int, row_subject: Subject) -> "Judged":
         """One of several rows that were judged together, (rows, cases), by its place."""
-        return self._of_columns(lambda column: column[place], _COLUMNS)._replace(subject=what)
+        return self._of_columns(lambda column: column[row_index], _COLUMNS)._replace(subject=row_subject)
 
-    def where(self, is_other: Any, other: "Judged") -> "Judged":
+    def where(self, takes_other: Any, other: "Judged") -> "Judged":
         """This row, but in some cases the other."""
         columns: dict[str, Any] = {
-            name: np.where(is_other, getattr(other, name), getattr(self, name)) for name in _COLUMNS
+            name: np.where(takes_other, getattr(other, name), getattr(self, name)) for name in _COLUMNS
         }
         return self._replace(**columns)
 
@@ -136,13 +136,13 @@ class Judged(NamedTuple):
 
     def requirement(self, case: Case) -> str | None:
         """The requirement that sets the allowable in a case; None: its metric does."""
-        place = self.binding[case.place]
-        return None if place < 0 else REQUIREMENTS[place]
+        requirement_index = self.binding[case.place]
+        return None if requirement_index < 0 else REQUIREMENTS[requirement_index]
 
     def numbers(self, case: int) -> dict[str, float | None]:
         """Its numbers in a case, by the names of the columns; None where there is none."""
-        found = [column.item(case) for column in _columns_of_numbers(self)]
-        return {name: None if math.isnan(number) else number for name, number in zip(NUMBERS, found, strict=True)}
+        columns = [column.item(case) for column in _columns_of_numbers(self)]
+        return {name: None if math.isnan(number) else number for name, number in zip(NUMBERS, columns, strict=True)}
 
     @property
     def qpe_exact_rad(self) -> Floats:
@@ -183,7 +183,7 @@ class Judging(NamedTuple):
 
     def row(
         self,
-        what: Subject,
+        row_subject: Subject,
         declared: Floats | None,
         allowable: Floats | None,
         *,
@@ -201,7 +201,7 @@ class Judging(NamedTuple):
         none = np.full(shape, math.nan)
         allowed = none if allowable is None else allowable
         if declared is None:
-            return Judged._with(what, np.full(shape, CODE["not_declared"]), none, allowed, none)
+            return Judged._with(row_subject, np.full(shape, CODE["not_declared"]), none, allowed, none)
         is_silent = np.isnan(declared)
         with np.errstate(all="ignore"):
             use = np.where(np.isnan(allowed) & ~is_silent, 0.0, declared / allowed)
@@ -226,7 +226,7 @@ class Judging(NamedTuple):
             ],
             CODE["pass"],
         ).astype(np.int8)
-        return Judged._with(what, status, declared, allowed, use)
+        return Judged._with(row_subject, status, declared, allowed, use)
 
 
 # ---------------------------------------------------------------------- one case in words
@@ -255,12 +255,12 @@ def worded(
     not_evaluated: Note = NOTHING,  # why a declared value cannot be judged
     info: Note = NOTHING,  # why the row judges nothing
     without_autofocus: float = 0.0,  # utilization without its gain
-    **others: Any,  # further fields of the row
+    **more_fields: Any,  # further fields of the row
 ) -> Row:
     """Put a row as judged, in one case, into words: they follow from its status, and decide nothing."""
     mission, status, numbers = case.mission, statuses(row.status[case.place]), row.numbers(case.place)
     allowable, utilization, full = numbers["allowable"], numbers["utilization"], numbers["qpe_full_rad"]
-    reason, remarks = no_limit if allowable is None else NOTHING, tuple[Note, ...](others.pop("remarks", ()))
+    reason, remarks = no_limit if allowable is None else NOTHING, tuple[Note, ...](more_fields.pop("remarks", ()))
     if status == "info":
         reason = reason or info
     elif status == "not_evaluated":
@@ -284,4 +284,4 @@ def worded(
         "equation": equation,
         "requirement_id": mission.requirement_ids.get(row.subject.id),
     }
-    return Row(row.subject, row.metric, unit, **(fields | others))
+    return Row(row.subject, row.metric, unit, **(fields | more_fields))

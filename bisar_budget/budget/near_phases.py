@@ -66,7 +66,7 @@ class NearPhases(NamedTuple):
     def row(
         self,
         judging: Judging,
-        what: Subject,
+        row_subject: Subject,
         metric: str,
         declared: Floats,
         by_echoes: Floats | None,
@@ -82,7 +82,7 @@ class NearPhases(NamedTuple):
         echoes = np.full(declared.shape, math.inf) if by_echoes is None else by_echoes
         allowable = np.fmin(echoes, limit)
         judged = judging.row(
-            what,
+            row_subject,
             declared,
             np.where(np.isinf(allowable), math.nan, allowable),
             doubt=doubt,

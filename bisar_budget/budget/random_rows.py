@@ -86,8 +86,10 @@ def sizes_at(effect: RandomEffect, limits: Limits) -> list[Any]:
     """Size at which an error reaches each requirement, in the order of `HELD`; infinite where it does not. [unit]"""
     with np.errstate(all="ignore"):
         return [
-            math.inf if limit is None else np.where(np.asarray(part) > 0, limit / np.asarray(part), math.inf)
-            for part, limit in zip((*effect[:3], effect.displacement), limits, strict=True)
+            math.inf
+            if limit is None
+            else np.where(np.asarray(effect_part) > 0, limit / np.asarray(effect_part), math.inf)
+            for effect_part, limit in zip((*effect[:3], effect.displacement), limits, strict=True)
         ]
 
 
@@ -100,10 +102,10 @@ class RandomRows:
 
     def _table(self, values: Sequence[Any]) -> Floats:
         """Numbers, or numbers of cases, as (values, cases)."""
-        found = np.empty((len(values), self.judging.cases))
-        for row, value in zip(found, values, strict=True):
+        table = np.empty((len(values), self.judging.cases))
+        for row, value in zip(table, values, strict=True):
             row[:] = value
-        return found
+        return table
 
     def _effects(self, model: str) -> RandomEffect:
         """Effects of a unit of each error, (errors, cases)."""
@@ -117,13 +119,15 @@ class RandomRows:
     def _sizes(self, model: str, effects: RandomEffect) -> Floats:
         """Size at which each error reaches each requirement, (requirements, errors, cases). [unit]"""
         gain, owners = self.allocation.autofocus_gain, [error.owner for error in self.errors]
-        by_owner = {one: limits_for(self.mission, self.allocation, one, model, gain) for one in {*owners}}
+        by_owner = {
+            owner_name: limits_for(self.mission, self.allocation, owner_name, model, gain) for owner_name in {*owners}
+        }
         columns = zip(*(by_owner[owner] for owner in owners), strict=True)
         limits = Limits(*(None if column[0] is None else self._table(column) for column in columns))
         sizes = np.full((len(HELD), len(owners), self.judging.cases), math.inf)
         coverage = self._table([error.coverage(self.mission) for error in self.errors])
-        held = held_effect(self.mission, effects, coverage, gain)
-        for row, size in zip(sizes, sizes_at(held, limits), strict=True):
+        judged_effects = held_effect(self.mission, effects, coverage, gain)
+        for row, size in zip(sizes, sizes_at(judged_effects, limits), strict=True):
             row[:] = size
         return sizes
 
@@ -131,26 +135,26 @@ class RandomRows:
         """Rows of every error by a model, `published` or `full`, declared or not."""
         if not self.errors:
             return
-        other = OTHER_MODEL[model]
-        mine, theirs = self._effects(model), self._effects(other)
-        sizes, sizes_of_other = self._sizes(model, mine), self._sizes(other, theirs)
-        declared = self._table([math.nan if one.declared is None else one.declared for one in self.errors])
+        other_model = OTHER_MODEL[model]
+        mine, theirs = self._effects(model), self._effects(other_model)
+        sizes, sizes_of_other = self._sizes(model, mine), self._sizes(other_model, theirs)
+        declared = self._table([math.nan if error.declared is None else error.declared for error in self.errors])
         allocation, smallest, combine = self.allocation, sizes.min(axis=0), self.mission.allocation.combine
         gain = allocation.autofocus_gain
-        is_open = self._table([_is_open(self.mission, one) for one in self.errors]) > 0
+        is_open = self._table([_is_open(self.mission, error) for error in self.errors]) > 0
         is_limited = np.isfinite(smallest) & ~is_open
         binds = np.where(is_open, HELD.index(ISLR), np.where(is_limited, sizes.argmin(axis=0), -1))
         allowable = np.where(is_limited, smallest, math.nan)
         qpe, limit = (
             mine.judged(1.0) * declared,
-            self._table([allocation.qpe_limit(one.owner) for one in self.errors]),
+            self._table([allocation.qpe_limit(error.owner) for error in self.errors]),
         )
         within = qpe / limit
         without_autofocus = np.where((gain > 1) & (qpe > 0) & is_limited, within, 0.0)
         is_over_other = declared > sizes_of_other.min(axis=0) * BOUND
         published, full = (mine, theirs) if model == "published" else (theirs, mine)
         is_continued = self._rests_on_masks(mine, sizes)
-        in_doubt = self._table([one.is_in_doubt for one in self.errors]) > 0
+        in_doubt = self._table([error.is_in_doubt for error in self.errors]) > 0
         with np.errstate(all="ignore"):
             use = declared / allowable
         is_in_doubt = in_doubt & (use > LEAST_USE) & ~(use > BOUND)
@@ -160,7 +164,8 @@ class RandomRows:
             allowable,
             doubt=is_over_other | is_continued,
             without_autofocus=without_autofocus,
-            is_info=(self._table([combine != "each" or bool(one.counted_in) for one in self.errors]) > 0) & ~is_open,
+            is_info=(self._table([combine != "each" or bool(error.counted_in) for error in self.errors]) > 0)
+            & ~is_open,
             is_unknown=is_open | is_in_doubt,
         )._replace(
             binding=np.array([-1, *map(REQUIREMENTS.index, HELD)], np.int8)[binds + 1],
@@ -174,7 +179,8 @@ class RandomRows:
         judged = judged._replace(utilization=np.where(is_open, math.nan, judged.utilization))
         if self.judging.is_whole:
             by_published, by_full = (
-                np.where(one.judged(gain) > 0, limit * gain / one.judged(gain), math.nan) for one in (published, full)
+                np.where(error.judged(gain) > 0, limit * gain / error.judged(gain), math.nan)
+                for error in (published, full)
             )
             judged = judged._replace(
                 allowable_published=by_published,
@@ -185,20 +191,24 @@ class RandomRows:
                 islr_db=islr_of(self.mission, (mine.spread * declared) ** 2),
             )
         columns = (is_over_other, sizes_of_other.argmin(axis=0), without_autofocus)
-        for place, (error, *others) in enumerate(zip(self.errors, *columns, strict=True)):
-            row = judged.at(place, error.subject)
-            yield RandomRow(row.in_decibel() if error.unit == "dB" else row, place, *others)
+        for error_index, (error, *columns_of_error) in enumerate(zip(self.errors, *columns, strict=True)):
+            row = judged.at(error_index, error.subject)
+            yield RandomRow(row.in_decibel() if error.unit == "dB" else row, error_index, *columns_of_error)
 
     def _rests_on_masks(self, effects: RandomEffect, sizes: Floats) -> Truths:
         """Whether the use of a requirement by an error rests on noise below the first point of its mask."""
-        found = np.zeros(sizes.shape[1:], dtype=bool)
+        rests_on_mask = np.zeros(sizes.shape[1:], dtype=bool)
         for row, error in enumerate(self.errors):
-            for part, limit in zip(("quadratic", "cubic", "spread", "displacement"), sizes, strict=True):
+            for effect_kind, limit in zip(("quadratic", "cubic", "spread", "displacement"), sizes, strict=True):
                 if error.continued is not None and error.declared is not None:
-                    size = part_of(effects, part)[row] * error.declared
-                    reached = limit[row] * part_of(effects, part)[row]  # of the requirement, by the size that has it
-                    found[row] |= np.isfinite(limit[row]) & rests_on_masks([error], part, size, reached)
-        return found
+                    size = part_of(effects, effect_kind)[row] * error.declared
+                    reached = (
+                        limit[row] * part_of(effects, effect_kind)[row]
+                    )  # of the requirement, by the size that has it
+                    rests_on_mask[row] |= np.isfinite(limit[row]) & rests_on_masks(
+                        [error], effect_kind, size, reached
+                    )
+        return rests_on_mask
 
     # ---------------------------------------------------------------- powers together
     def islr_rows(self, model: str) -> Iterator["IslrRow"]:
@@ -206,28 +216,32 @@ class RandomRows:
         mission, split = self.mission, self.allocation.islr
         owners = ("transmitter", "receiver", *(["clock"] if split.clock is not None else []), "mission")
         members = powers_held_by_islr(self.analysis, owners, model)
-        powers = [self._table([one.variance for one in of_owner]) for of_owner in members]
-        is_known = [~np.isnan(of_owner) for of_owner in powers]
-        variance = np.array([one.sum(axis=0, where=known) for one, known in zip(powers, is_known, strict=True)])
-        stated = {one.subject.id for one in stated_powers(mission)}
-        is_held = [one.row_id.endswith("vibration.wideband") or one.row_id in stated for one in members[-1]]
-        is_there = np.array([is_known[-1][~np.array(is_held, dtype=bool)].any(axis=0)] * len(owners))
+        powers = [self._table([phase.variance for phase in of_owner]) for of_owner in members]
+        has_variance = [~np.isnan(of_owner) for of_owner in powers]
+        variance = np.array(
+            [phase.sum(axis=0, where=has_phase) for phase, has_phase in zip(powers, has_variance, strict=True)]
+        )
+        stated = {phase.subject.id for phase in stated_powers(mission)}
+        is_held_by_shares = [
+            phase.row_id.endswith("vibration.wideband") or phase.row_id in stated for phase in members[-1]
+        ]
+        is_there = np.array([has_variance[-1][~np.array(is_held_by_shares, dtype=bool)].any(axis=0)] * len(owners))
         # Where only vibration spreads, its own rows hold it to the shares; what is stated has none.
         is_there[-1] = True
-        is_declared = np.array([known.any(axis=0) for known in is_known]) & is_there
+        is_declared = np.array([has_phase.any(axis=0) for has_phase in has_variance]) & is_there
         shares = np.sqrt(self._table([split.of(owner) for owner in owners]))
         limit, limit_of_other = (
-            shares * spread_limit(mission, self.allocation, "mission", one) for one in (model, OTHER_MODEL[model])
+            shares * spread_limit(mission, self.allocation, "mission", phase) for phase in (model, OTHER_MODEL[model])
         )
         rms = np.sqrt(variance)
-        masked = [[one for one in self.errors if split.includes(one.owner, owner)] for owner in owners]
+        masked = [[phase for phase in self.errors if split.includes(phase.owner, owner)] for owner in owners]
         rests_on = np.array([
-            np.broadcast_to(rests_on_masks(some, "spread", size, most), size.shape)
-            for some, size, most in zip(masked, rms, limit, strict=True)
+            np.broadcast_to(rests_on_masks(errors_of_owner, "spread", size, most), size.shape)
+            for errors_of_owner, size, most in zip(masked, rms, limit, strict=True)
         ])  # fmt: skip
         is_in_doubt = np.array([
-            np.broadcast_to(rests_on_doubted_noise(some, "spread", model, most), most.shape)
-            for some, most in zip(masked, limit, strict=True)
+            np.broadcast_to(rests_on_doubted_noise(errors_of_owner, "spread", model, most), most.shape)
+            for errors_of_owner, most in zip(masked, limit, strict=True)
         ])  # fmt: skip
         judged = self.judging.row(
             subject("mission", ISLR),
@@ -247,17 +261,19 @@ class RandomRows:
             islr_db=islr_of(mission, variance),
         ).held_to(ISLR)
         of_rows = (members, variance, limit, limit_of_other)
-        for place, (owner, *others) in enumerate(zip(owners, *of_rows, strict=True)):
-            yield IslrRow(judged.at(place, subject(owner, ISLR)), *others, is_there=is_there[place])
+        for owner_index, (owner, *columns_of_owner) in enumerate(zip(owners, *of_rows, strict=True)):
+            yield IslrRow(
+                judged.at(owner_index, subject(owner, ISLR)), *columns_of_owner, is_there=is_there[owner_index]
+            )
 
     def stated_rows(self, model: str) -> Iterator["StatedRow"]:
         """Rows of errors from elsewhere that state their ISLR: each may have all that is required."""
         mission = self.mission
         allowed = spread_limit(mission, self.allocation, "mission", model)
-        for one in stated_powers(mission):
-            rms = self.judging.array(one.rms(model, mainlobe_energy(mission)))
+        for power in stated_powers(mission):
+            rms = self.judging.array(power.rms(model, mainlobe_energy(mission)))
             judged = self.judging.row(
-                one.subject,
+                power.subject,
                 rms,
                 self.judging.array(allowed),
                 is_info=mission.allocation.combine != "each" or allowed is None,
@@ -301,7 +317,7 @@ class RandomRow(FamilyRow):
             doubt = _doubt(mission, error, gating, HELD[self.bound_by_other[case.place]], limit)
         elif error.continued is not None:
             doubt = _continuation(case, error, gating)
-        equation, evidence, notes = _said(mission, error)
+        equation, evidence, notes = _wording(mission, error)
         return worded(
             case,
             self.judged,
@@ -344,18 +360,18 @@ class IslrRow(FamilyRow):
     def in_words(self, case: Case, gating: str) -> Row:
         """The row of one case, by the model that judges it."""
         level = _levels(case.mission, gating)
-        other, over, doubt = OTHER_MODEL[gating], NOTHING, NOTHING
-        variance, limit, by_other = map(case.number, (self.variance, self.limit, self.limit_of_other))
-        if math.sqrt(variance) > by_other * BOUND:
-            doubt = phrases.other_model_allows(other, level(by_other), "dB")
+        other_model, over, doubt = OTHER_MODEL[gating], NOTHING, NOTHING
+        variance, limit, limit_by_other = map(case.number, (self.variance, self.limit, self.limit_of_other))
+        if math.sqrt(variance) > limit_by_other * BOUND:
+            doubt = phrases.other_model_allows(other_model, level(limit_by_other), "dB")
         elif self.judged.status[case.place] == CODE["warn"]:
-            makers = [one for one in case.random if one.id in {each.row_id for each in self.members}]
+            makers = [member for member in case.random if member.id in {each.row_id for each in self.members}]
             if case.number(rests_on_masks(makers, "spread", math.sqrt(variance), limit)):
                 doubt = continuation_note(case, makers, "spread", math.sqrt(variance))
         owners = {each.owner for each in self.members}
         if self.judged.status[case.place] == CODE["fail"]:
-            known = [one for one in self.members if not math.isnan(case.number(one.variance))]
-            largest = max(known, key=lambda one: case.number(one.variance))
+            with_variance = [member for member in self.members if not math.isnan(case.number(member.variance))]
+            largest = max(with_variance, key=lambda member: case.number(member.variance))
             rms = math.sqrt(case.number(largest.variance))
             over = phrases.noise_spreads_too_much(
                 level(math.sqrt(variance)), level(limit), largest.row_id, level(rms)
@@ -413,20 +429,20 @@ def _displacement(error: RandomError, model: str) -> GroundVector | None:
     return effect.east * error.declared, effect.north * error.declared
 
 
-def _said(mission: Mission, error: RandomError) -> tuple[str, str | None, tuple[Note, ...]]:
+def _wording(mission: Mission, error: RandomError) -> tuple[str, str | None, tuple[Note, ...]]:
     """Equation, evidence and notes of an error's row."""
     kind, figure, sync = error.subject.kind, error.subject.axis, mission.synchronization
     if sync is not None and kind == "synchronization":
         return "synchronisation", sync.source, () if sync.interval else (phrases.another_for_each_pulse(),)
     if kind == "oscillator":
-        return _said_of_acceleration(mission, error) if figure else _said_of_oscillator(mission, error)
+        return _acceleration_wording(mission, error) if figure else _oscillator_wording(mission, error)
     if kind == "propagation":
-        return _said_of_air(mission, error)
+        return _air_wording(mission, error)
     if kind == "other":
         return "as declared", mission.other_errors[error.subject.entry or 0].source, ()
     if kind == "vibration":
         motion_error: MotionError = getattr(mission.platforms, error.owner).motion_error
-        return "spectrum of vibration", motion_error.source, _said_of_spectrum(mission, error.owner)
+        return "spectrum of vibration", motion_error.source, _spectrum_notes(mission, error.owner)
     if kind == "trajectory":
         path: FlownPath | None = getattr(mission.platforms, error.owner).path
         return "Gauss-Markov", path and path.source, (phrases.log_is_flown_as_it_is(figure),)
@@ -441,8 +457,8 @@ def _said(mission: Mission, error: RandomError) -> tuple[str, str | None, tuple[
         lever = motion.lever_arm
         return "lever arm", (lever and lever.source) or motion.source, ()
     if kind != "random":
-        is_own = motion.imu is not None and motion.key_of(figure) == figure
-        source = motion.imu.source if motion.imu and is_own else None
+        is_of_imu = motion.imu is not None and motion.key_of(figure) == figure
+        source = motion.imu.source if motion.imu and is_of_imu else None
         equation = "lever arm" if kind == "lever_arm" else "inertial sensor"
     notes = override_notes(error.owner, motion.overridden, figure)
     if error.counted_in and error.declared is None:  # else it is the reason of the row
@@ -450,7 +466,7 @@ def _said(mission: Mission, error: RandomError) -> tuple[str, str | None, tuple[
     return equation, source or motion.evidence(figure), notes
 
 
-def _said_of_spectrum(mission: Mission, name: str) -> tuple[Note, ...]:
+def _spectrum_notes(mission: Mission, name: str) -> tuple[Note, ...]:
     vibration: Vibration = getattr(mission.platforms, name).motion_error.vibration
     spectrum, along = vibration.spectrum, float(counted(mission, name, 1.0, "islr"))
     if spectrum is None:
@@ -461,28 +477,30 @@ def _said_of_spectrum(mission: Mission, name: str) -> tuple[Note, ...]:
     return (phrases.spectrum_shakes(rms, vibration.spectrum_level or 0.0), *order, *seen)
 
 
-def _said_of_acceleration(mission: Mission, error: RandomError) -> tuple[str, str | None, tuple[Note, ...]]:
+def _acceleration_wording(mission: Mission, error: RandomError) -> tuple[str, str | None, tuple[Note, ...]]:
     oscillator: Oscillator = getattr(mission.platforms, error.owner).oscillator
     return "acceleration sensitivity", evidence(oscillator), notes_of_acceleration(mission, error.owner)
 
 
-def _said_of_oscillator(mission: Mission, error: RandomError) -> tuple[str, str | None, tuple[Note, ...]]:
+def _oscillator_wording(mission: Mission, error: RandomError) -> tuple[str, str | None, tuple[Note, ...]]:
     oscillator: Oscillator = getattr(mission.platforms, error.owner).oscillator
-    own, sync = error.noise, mission.synchronization
+    noise, sync = error.noise, mission.synchronization
     notes = [*override_notes(error.owner, oscillator.overridden, *FORMS, "frequency")]
     if oscillator.level:
         notes.append(phrases.noise_is_shifted(oscillator.level))
     is_heard = not mission.has_direct_path or error.owner == "receiver"
-    if own is not None and is_heard:
-        notes += [note for note in (own.extrapolated, *own.notes) if note]
+    if noise is not None and is_heard:
+        notes += [note for note in (noise.extrapolated, *noise.notes) if note]
         notes += _kept_by(mission, sync)
         slow = [
-            one.slow_parts(mission.collection.aperture_time) for one in spurs_of(mission) if one.name == error.owner
+            spur.slow_parts(mission.collection.aperture_time)
+            for spur in spurs_of(mission)
+            if spur.name == error.owner
         ]
-        if any(one is not None and one.quadratic > 0 for one in slow):
+        if any(spur is not None and spur.quadratic > 0 for spur in slow):
             notes.append(phrases.folded_spurs_count())
-    if own is not None and _GOOD_FIT < own.misfit <= POOR_FIT:
-        notes.append(phrases.power_law_fits(own.misfit))
+    if noise is not None and _GOOD_FIT < noise.misfit <= POOR_FIT:
+        notes.append(phrases.power_law_fits(noise.misfit))
     return "phase noise", oscillator.source, tuple(notes)
 
 
@@ -498,7 +516,7 @@ def _kept_by(mission: Mission, sync: Synchronization | None) -> Iterator[Note]:
         yield phrases.heard_twice(mission.geometry.echo_delay)
 
 
-def _said_of_air(mission: Mission, error: RandomError) -> tuple[str, str | None, tuple[Note, ...]]:
+def _air_wording(mission: Mission, error: RandomError) -> tuple[str, str | None, tuple[Note, ...]]:
     """The same of a delay on a leg."""
     source = None if mission.propagation is None else mission.propagation.source_of(legs_of(error.owner)[0])
     if error.counted_in and error.declared is None:  # else it is the reason of the row
@@ -509,8 +527,8 @@ def _said_of_air(mission: Mission, error: RandomError) -> tuple[str, str | None,
 
 def _unlimited(mission: Mission, error: RandomError, effect: RandomEffect) -> Note:
     """Say why nothing limits an error: it does nothing, or what it does is not required."""
-    parts = (("cubic phase", effect.cubic), ("ISLR", effect.spread), ("displacement", effect.displacement))
-    does = [name for name, size in parts if size > 0]
+    effects = (("cubic phase", effect.cubic), ("ISLR", effect.spread), ("displacement", effect.displacement))
+    does = [name for name, size in effects if size > 0]
     return phrases.no_requirement_limits(does) if does else no_effect(mission, error)
 
 
@@ -540,8 +558,8 @@ def _over(mission: Mission, error: RandomError, model: str, binding: str | None,
     if binding == ISLR:
         level = _levels(mission, model)
         return phrases.spreads_too_much(level(effect.spread * size), level(limits.spread))
-    own = error.effect(model)
-    qpe, hidden = own.quadratic * size, own.hidden * size
+    unit_effect = error.effect(model)
+    qpe, hidden = unit_effect.quadratic * size, unit_effect.hidden * size
     over = phrases.quadratic_phase_over(effect.quadratic * size, limits.quadratic, quadratic=qpe)
     return over.then(allocation.passes_with(qpe, hidden, error.owner, mission))
 
@@ -551,25 +569,25 @@ def _continuation(case: Case, error: RandomError, model: str) -> Note:
     effect, size, worst = error.effect(model), error.declared, NOTHING
     limits = limits_for(case.mission, case.allocation, error.owner, model, case.allocation.autofocus_gain)
     most = 0.0
-    for part, limit in zip(("quadratic", "cubic", "spread", "displacement"), limits, strict=True):
-        does = float(part_of(effect, part)) * size
-        if limit is None or not rests_on_masks([error], part, does, limit):
+    for effect_kind, limit in zip(("quadratic", "cubic", "spread", "displacement"), limits, strict=True):
+        does = float(part_of(effect, effect_kind)) * size
+        if limit is None or not rests_on_masks([error], effect_kind, does, limit):
             continue
-        share = float(continued_power([error], part)) / does**2
+        share = float(continued_power([error], effect_kind)) / does**2
         if share > most:
-            most, worst = share, continuation_note(case, [error], part, does)
+            most, worst = share, continuation_note(case, [error], effect_kind, does)
     return worst
 
 
 def _doubt(mission: Mission, error: RandomError, gating: str, binding: str, limit: float) -> Note:
     """Say by which requirement the model that does not gate fails a declared error."""
-    other, size = OTHER_MODEL[gating], error.declared
-    effect = held_effect(mission, error.effect(other), error.coverage(mission), autofocus_gain_of(mission))
+    other_model, size = OTHER_MODEL[gating], error.declared
+    effect = held_effect(mission, error.effect(other_model), error.coverage(mission), autofocus_gain_of(mission))
     if binding == ISLR:
-        return phrases.other_model_spreads(other, _levels(mission, other)(effect.spread * size))
+        return phrases.other_model_spreads(other_model, _levels(mission, other_model)(effect.spread * size))
     per_unit = {QUADRATIC: effect.quadratic, CUBIC: effect.cubic, LOCATION: effect.displacement}[binding]
     allowed = limit if binding == QUADRATIC else getattr(mission.requirements, binding)
-    return phrases.other_model_fails(other, per_unit * size, allowed, *EFFECTS[binding])
+    return phrases.other_model_fails(other_model, per_unit * size, allowed, *EFFECTS[binding])
 
 
 def _levels(mission: Mission, model: str) -> Callable[[float], float]:

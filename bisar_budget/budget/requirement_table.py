@@ -39,28 +39,28 @@ from bisar_budget.phrases import NOTHING, Note
 def rows_in_words(judged: JudgedMission, case: Case) -> Iterator[Row]:
     """Rows of one case, before waivers, in the order of the contract."""
     families: dict[tuple[str, str], FamilyRow] = {
-        (model, one.judged.subject.id): one
-        for model, found in judged.families.items()
-        for one in found
-        if one.is_there is True or one.is_there[case.place]
+        (model, judged_row.judged.subject.id): judged_row
+        for model, family in judged.families.items()
+        for judged_row in family
+        if judged_row.is_there is True or judged_row.is_there[case.place]
     }
-    for one in judged.before:
-        if one.metric == DECLARE:
-            yield _declarations(case, one)
+    for judged_row in judged.before:
+        if judged_row.metric == DECLARE:
+            yield _declarations(case, judged_row)
             continue
-        model = MODELS[one.model[case.place]]
-        found = families.get((model, one.subject.id))
-        if found is None:  # only other cases have it
+        model = MODELS[judged_row.model[case.place]]
+        family = families.get((model, judged_row.subject.id))
+        if family is None:  # only other cases have it
             continue
-        row, status = found.in_words(case, model), statuses(one.status[case.place])
+        row, status = family.in_words(case, model), statuses(judged_row.status[case.place])
         changes: dict[str, Any] = {"model": model, "status": status, "is_unjudged": status == "not_evaluated"}
         if status != row.status and status == "info":
             changes |= {"utilization": None, "margin": None}
         row = row._replace(**changes)
-        yield row._replace(reason=_why(judged, case, one, row)) if one.why[case.place] else row
+        yield row._replace(reason=_why(judged, case, judged_row, row)) if judged_row.why[case.place] else row
 
 
-def _declarations(case: Case, one: Judged) -> Row:
+def _declarations(case: Case, judged_row: Judged) -> Row:
     """The row that says whether all is declared: of kinds, too, that have no row where nothing is declared."""
     mission = case.mission
     missing, shifted = missing_declarations(mission), shifted_figures(mission)
@@ -68,53 +68,60 @@ def _declarations(case: Case, one: Judged) -> Row:
         DECLARATIONS,
         DECLARE,
         unit="",
-        status=statuses(one.status[case.place]),
+        status=statuses(judged_row.status[case.place]),
         line=mission.line(("requirements", "declare")),
         reason=_declarations_missing(missing) if missing else None,
         equation="requirements.declare",
         requirement_id=mission.requirement_ids.get(DECLARATIONS.id),
         model=mission.gating_model,
         is_unjudged=bool(missing),
-        remarks=tuple(phrases.declared_off_its_source(one.key, one.level, one.off) for one in shifted),
+        remarks=tuple(
+            phrases.declared_off_its_source(judged_row.key, judged_row.level, judged_row.off)
+            for judged_row in shifted
+        ),
     )
 
 
 def _declarations_missing(missing: Sequence[Missing]) -> Note:
     """Say what the file should declare and does not: whole errors first, then those of which it states half."""
-    halves = [phrases.not_declared_as_required(one.key, one.lacks) for one in missing if one.lacks]
-    keys = [one.key for one in missing if not one.lacks]
+    halves = [
+        phrases.not_declared_as_required(declaration.key, declaration.lacks)
+        for declaration in missing
+        if declaration.lacks
+    ]
+    keys = [declaration.key for declaration in missing if not declaration.lacks]
     if not keys:
         return halves[0].then(*halves[1:])
     return phrases.declarations_are_missing(keys).then(*halves)
 
 
-def _why(judged: JudgedMission, case: Case, one: Judged, row: Row) -> Note:
+def _why(judged: JudgedMission, case: Case, judged_row: Judged, row: Row) -> Note:
     """Why a row is not judged by its own numbers."""
-    mission, why = case.mission, Why(one.why[case.place])
+    mission, why = case.mission, Why(judged_row.why[case.place])
     if why is Why.NOT_DECLARED_AS_REQUIRED:
-        missing = (each for each in missing_declarations(mission) if is_asked_for(one.subject, each))
+        missing = (each for each in missing_declarations(mission) if is_asked_for(judged_row.subject, each))
         first = next(missing)
         return phrases.not_declared_as_required(first.key, first.lacks)
     if why is Why.INPUT_IN_DOUBT:
         doubts = input_doubts(mission)
-        said = [each.note for each in doubts if is_in_doubt(one.subject, each.owner, mission, each.kind)]
-        return said[0].then(*said[1:])
+        reasons = [each.note for each in doubts if is_in_doubt(judged_row.subject, each.owner, mission, each.kind)]
+        return reasons[0].then(*reasons[1:])
     if why is Why.NO_PLACE:
         return unknown_place(judged, case)
     if why is Why.AIR_STAYS:
         return judged.air.reason(case, row.id)
     if why is Why.HALF_A_CAUSE:
-        halves = [half.note for half in half_causes(mission) if half.holds(one.subject)]
+        halves = [half.note for half in half_causes(mission) if half.holds(judged_row.subject)]
         return halves[0].then(*halves[1:])
     if why is Why.NOTHING_SPREADS:
         return phrases.nothing_judges("islr")
-    said = [row.reason] if row.status == "fail" and row.reason else []  # it is broken, and more of it not judged
+    reasons = [row.reason] if row.status == "fail" and row.reason else []  # it is broken, and more of it not judged
     for each in judged.untaken:
         if row.id in each.makers and each.makers[row.id][case.place]:
             lines = [f"{key}: {EXAMPLES[key]}" for key in TAKEN_BY[each.kind]]
-            parts = case.number(each.parts[row.id]), case.number(each.total)
-            said.append(phrases.effect_is_not_judged(each.kind, *parts, lines))
-    return said[0].then(*said[1:])
+            sizes = case.number(each.parts[row.id]), case.number(each.total)
+            reasons.append(phrases.effect_is_not_judged(each.kind, *sizes, lines))
+    return reasons[0].then(*reasons[1:])
 
 
 def unknown_place(judged: JudgedMission, case: Case) -> Note:
@@ -122,15 +129,15 @@ def unknown_place(judged: JudgedMission, case: Case) -> Note:
     clocks = [row_id for row_id, is_there in judged.unplaced.items() if is_there[case.place]]
     if clocks:
         return phrases.clocks_are_not_set(clocks)
-    doubts = [one for one in input_doubts(case.mission) if one.kind != RESIDUAL]
+    doubts = [doubt for doubt in input_doubts(case.mission) if doubt.kind != RESIDUAL]
     return doubts[0].note if doubts else NOTHING
 
 
 def negligible_effects(judged: JudgedMission, case: Case) -> Iterator[Note]:
     """Say which effects no requirement takes, and are too small for one."""
-    for one in judged.untaken:
-        if one.is_negligible[case.place]:
-            yield phrases.effect_is_negligible(one.kind, case.number(one.total), list(TAKEN_BY[one.kind]))
+    for effect in judged.untaken:
+        if effect.is_negligible[case.place]:
+            yield phrases.effect_is_negligible(effect.kind, case.number(effect.total), list(TAKEN_BY[effect.kind]))
     yield from judged.air.note(case)
 
 
@@ -138,7 +145,7 @@ def negligible_effects(judged: JudgedMission, case: Case) -> Iterator[Note]:
 def requirements_in_words(judged: JudgedMission, case: Case, waived: Waived) -> tuple[JudgedRequirement, ...]:
     """How every requirement of one case stands; `waived` are its rows in words, after waivers."""
     rows = {row.id: row for row in waived.rows}
-    of_all = [rows.get(one.subject.id) for one in judged.before]  # None: only other cases have it
+    of_all = [rows.get(judged_row.subject.id) for judged_row in judged.before]  # None: only other cases have it
     return tuple(_entry(state, judged, case, of_all, waived) for state in judged.requirements)
 
 
@@ -147,8 +154,8 @@ def _entry(
 ) -> JudgedRequirement:
     mission, key = case.mission, state.key
     value = None if key == DECLARE else getattr(mission.requirements, key)
-    status, place = statuses(state.status[case.place]), state.decider[case.place]
-    decider, user = (rows[one] if one >= 0 else None for one in (place, state.user[case.place]))
+    status, decider_index = statuses(state.status[case.place]), state.decider[case.place]
+    decider, user = (rows[index] if index >= 0 else None for index in (decider_index, state.user[case.place]))
     is_open = bool(state.is_unjudged[case.place])
     utilization = case.number(state.utilization)  # an error without an image has no phase to compare
     has_use = user is not None and user.utilization is not None and math.isfinite(utilization)
@@ -160,7 +167,7 @@ def _entry(
         )
     elif decider is not None and status not in ("pass", "info"):
         reason = decider.reason
-    judges = [row for row, is_one in zip(rows, state.judges[:, case.place], strict=True) if row and is_one]
+    judges = [row for row, does_judge in zip(rows, state.judges[:, case.place], strict=True) if row and does_judge]
     path = ("requirements", key)
     return JudgedRequirement(
         key=key,
@@ -192,9 +199,9 @@ def _waivers(
 
 def _total(key: str, judged: JudgedMission, case: Case, rows: Sequence[Row | None]) -> float | None:
     """Total of the mission: that of its own row, or the largest quadratic phase of a single error."""
-    own = next((row for row in rows if row is not None and row.id == f"mission.{key}"), None)
-    if own is not None and key != DECLARE:
-        return own.declared
+    row_of_mission = next((row for row in rows if row is not None and row.id == f"mission.{key}"), None)
+    if row_of_mission is not None and key != DECLARE:
+        return row_of_mission.declared
     if key != QUADRATIC:
         return None
     totals = [

@@ -152,21 +152,21 @@ def staying_air(analysis: Analysis, rows: Sequence[Judged]) -> StayingAir:
     uses: dict[str, AirUse] = {}
     for model in analysis.gates:
         for use in _uses(analysis, errors, model):
-            beside = np.nan_to_num(utilization.get(use.row_id, np.zeros(cases)), nan=0.0, posinf=0.0)
-            use = use._replace(is_doubted=is_long & _rests_on(mission, use, beside))
-            other = uses.get(use.row_id)
-            if other is None or np.max(use.use) > np.max(other.use):
-                is_either = use.is_doubted if other is None else use.is_doubted | other.is_doubted
+            declared_use = np.nan_to_num(utilization.get(use.row_id, np.zeros(cases)), nan=0.0, posinf=0.0)
+            use = use._replace(is_doubted=is_long & _rests_on(mission, use, declared_use))
+            larger_use = uses.get(use.row_id)
+            if larger_use is None or np.max(use.use) > np.max(larger_use.use):
+                is_either = use.is_doubted if larger_use is None else use.is_doubted | larger_use.is_doubted
                 uses[use.row_id] = use._replace(is_doubted=is_either)
             else:
-                uses[use.row_id] = other._replace(is_doubted=use.is_doubted | other.is_doubted)
+                uses[use.row_id] = larger_use._replace(is_doubted=use.is_doubted | larger_use.is_doubted)
     return StayingAir(errors, is_long, uses, untaken_effects(analysis, errors))
 
 
-def _rests_on(mission: Mission, use: AirUse, beside: Floats) -> Truths:
+def _rests_on(mission: Mission, use: AirUse, declared_use: Floats) -> Truths:
     """Whether delays would use more than a tenth, or break a requirement together with what is declared."""
     rule = "rss" if use.key == ISLR else mission.allocation.combine
-    together = combined((use.use, beside), rule)
+    together = combined((use.use, declared_use), rule)
     return np.asarray((use.use > TENTH) | ((use.use > 0) & (together > BOUND)))
 
 
@@ -207,12 +207,18 @@ def _size(analysis: Analysis, error: RandomError, model: str, key: str) -> Any:
     Of a displacement it is what the delay adds by changing: the image moves by as much as before, and farther.
     """
     effect = error.effect(model)
-    held = held_effect(analysis.mission, effect, error.coverage(analysis.mission), analysis.allocation.autofocus_gain)
+    judged_effect = held_effect(
+        analysis.mission, effect, error.coverage(analysis.mission), analysis.allocation.autofocus_gain
+    )
     if key == LOCATION:
-        stays = next(other for other in analysis.random if other.id == error.id).effect(model)
+        stays = next(declared_error for declared_error in analysis.random if declared_error.id == error.id).effect(
+            model
+        )
         added = np.square(effect.displacement) - np.square(stays.displacement)
         return np.sqrt(np.maximum(added, 0.0)) * error.declared
-    return {QUADRATIC: held.quadratic, CUBIC: held.cubic, ISLR: held.spread}[key] * np.asarray(error.declared)
+    return {QUADRATIC: judged_effect.quadratic, CUBIC: judged_effect.cubic, ISLR: judged_effect.spread}[
+        key
+    ] * np.asarray(error.declared)
 
 
 def _keys(mission: Mission) -> list[str]:

@@ -35,20 +35,20 @@ SENSITIVITY = "acceleration_sensitivity"
 
 
 # ---------------------------------------------------------------------- all tones together
-def pslr_row(judging: Judging, found: Sequence[Tone], required: Any) -> "PslrRow":
+def pslr_row(judging: Judging, tones: Sequence[Tone], required: Any) -> "PslrRow":
     """Judge the highest echo that all tones make together, in the worst of their phases.
 
     From first principles by both models: the shares of the paper's rule stay 3 dB inside it. Tones at most 2.5 cycles
     per aperture apart raise each other's echo, whoever makes them.
     """
-    highest, allowed = highest_echo(found, (judging.cases,)), judging.array(10 ** (np.asarray(required) / 20))
-    what = subject("mission", "pslr")
-    judged = judging.row(what, None, allowed)
+    highest, allowed = highest_echo(tones, (judging.cases,)), judging.array(10 ** (np.asarray(required) / 20))
+    row_subject = subject("mission", "pslr")
+    judged = judging.row(row_subject, None, allowed)
     if highest is not None:
-        is_declared = np.any([np.broadcast_to(one.is_there, (judging.cases,)) for one in found], axis=0)
-        judged = judged.where(is_declared, judging.row(what, highest.level, allowed))
+        is_declared = np.any([np.broadcast_to(tone.is_there, (judging.cases,)) for tone in tones], axis=0)
+        judged = judged.where(is_declared, judging.row(row_subject, highest.level, allowed))
     judged = judged._replace(allowable_published=allowed, allowable_full=allowed)
-    return PslrRow(judged.in_decibel().held_to("pslr"), found, highest)
+    return PslrRow(judged.in_decibel().held_to("pslr"), tones, highest)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,8 +62,10 @@ class PslrRow(FamilyRow):
         """The row of one case."""
         over = NOTHING
         if self.highest is not None:
-            makers = [one for one, is_in in zip(self.tones, self.highest.is_of[:, case.place], strict=True) if is_in]
-            largest = max(makers, key=lambda one: case.number(one.phase))
+            makers = [
+                tone for tone, is_in in zip(self.tones, self.highest.is_of[:, case.place], strict=True) if is_in
+            ]
+            largest = max(makers, key=lambda tone: case.number(tone.phase))
             level, required = case.number(self.judged.declared), case.mission.requirements.pslr or 0.0
             over = phrases.echoes_together_over(level, required, largest.subject.id, len(makers))
         return worded(
@@ -82,13 +84,13 @@ def spur_rows(judging: Judging, analysis: Analysis, model: str) -> Iterator["Spu
     """Judge the oscillators' tones by a model; they make paired echoes as vibrations do. [dB of echo to response]"""
     mission = analysis.mission
     metric, by_platform = tone_limits(mission, analysis.allocation)
-    for place, spur in enumerate(spurs_of(mission, analysis.geometry) if has_instruments(mission) else ()):
-        what, phase, T = spur.subject, judging.array(spur.phase), mission.collection.aperture_time
+    for spur_index, spur in enumerate(spurs_of(mission, analysis.geometry) if has_instruments(mission) else ()):
+        row_subject, phase, T = spur.subject, judging.array(spur.phase), mission.collection.aperture_time
         limits, is_over_other = by_platform.get(spur.name), np.zeros(judging.cases, dtype=bool)
         phases = _near_phases(judging, analysis, spur.name, _phases_beside(spur.left, spur.free, T))
         level = phase / 2  # the amplitude of an echo over that of the response
         if limits is None:
-            judged = phases.row(judging, what, metric, level, None)
+            judged = phases.row(judging, row_subject, metric, level, None)
         else:
             limits = VibrationLimits(*(2 * math.pi / mission.radar.wavelength * limit for limit in limits))
             is_over_other = phase > limits.by(OTHER_MODEL[model]) * BOUND
@@ -96,14 +98,16 @@ def spur_rows(judging: Judging, analysis: Analysis, model: str) -> Iterator["Spu
             is_in_doubt = has_doubted_frequency(mission, spur.name) & _is_used(phase, limits.by(model))
             is_unknown = (is_near & (metric == "pslr")) | is_in_doubt
             allowed = judging.array(limits.by(model) / 2)
-            judged = phases.row(judging, what, metric, level, allowed, doubt=is_over_other, is_unknown=is_unknown)
+            judged = phases.row(
+                judging, row_subject, metric, level, allowed, doubt=is_over_other, is_unknown=is_unknown
+            )
             published, full = (np.fmin(limit / 2, phases.limit(level)) for limit in limits)
             judged = judged._replace(allowable_published=published, allowable_full=full)
         judged = judged.in_decibel()
         if metric == "islr":
             judged = judged._replace(islr_db=islr_of(mission, phase**2 / 2))
         is_there = (phase > 0) | (not spur.left.is_folded)
-        yield SpurRow(judged, place, is_over_other, is_there=is_there)
+        yield SpurRow(judged, spur_index, is_over_other, is_there=is_there)
 
 
 def _is_used(size: Any, limit: Any) -> Truths:
@@ -115,13 +119,13 @@ def _is_used(size: Any, limit: Any) -> Truths:
 class SpurRow(FamilyRow):
     """A tone of an oscillator in many cases, by its place, as echo over response in decibel; see `VibrationRow`."""
 
-    place: int
+    spur_index: int
     is_over_other: Any
 
     def in_words(self, case: Case, model: str) -> Row:
         """The row of one case, by the model that judges it."""
         mission, row, doubt, over = case.mission, self.judged, NOTHING, phase_over(case, self.judged)
-        spur = spurs_of(mission)[self.place]
+        spur = spurs_of(mission)[self.spur_index]
         oscillator: Oscillator = getattr(mission.platforms, spur.name).oscillator
         T, missing = mission.collection.aperture_time, phrases.no_requirement_of("pslr")
         near = float(spur.left.slowest_echo(T))
@@ -130,8 +134,8 @@ class SpurRow(FamilyRow):
         if not math.isnan(row.allowable[case.place]):
             over = over or phrases.echoes_over(case.number(row.declared), case.number(row.allowable))
             if self.is_over_other[case.place]:
-                other = OTHER_MODEL[model]
-                doubt = phrases.other_model_allows(other, case.number(row.allowable_by(other)), "dB")
+                other_model = OTHER_MODEL[model]
+                doubt = phrases.other_model_allows(other_model, case.number(row.allowable_by(other_model)), "dB")
         return worded(
             case,
             row,
@@ -155,17 +159,17 @@ class SpurRow(FamilyRow):
         )
 
 
-def _folds(left: LeftTone, free: float, aperture_time: float, row_id: str) -> tuple[Note, ...]:
+def _folds(folded: LeftTone, free: float, aperture_time: float, row_id: str) -> tuple[Note, ...]:
     """Say what of a tone is folded below one cycle per aperture, and of which row its phases are."""
     slow = [
         (float(share), float(frequency))
-        for frequency, share in zip(left.frequencies, left.shares, strict=True)
-        if left.is_folded and frequency * aperture_time < SLOWEST and share > 0
+        for frequency, share in zip(folded.frequencies, folded.shares, strict=True)
+        if folded.is_folded and frequency * aperture_time < SLOWEST and share > 0
     ]
     if not slow:
         return ()
-    parts = left.slow_parts(aperture_time)
-    qpe, cubic = (free * math.sqrt(float(part)) for part in (parts.quadratic, parts.cubic))
+    variances = folded.slow_parts(aperture_time)
+    qpe, cubic = (free * math.sqrt(float(variance)) for variance in (variances.quadratic, variances.cubic))
     frequency = max(slow)[1]
     return (phrases.tone_is_folded(frequency, frequency * aperture_time, qpe, cubic, row_id),)
 
@@ -178,57 +182,61 @@ def accelerated_rows(judging: Judging, analysis: Analysis, model: str) -> Iterat
     """
     mission = analysis.mission
     metric, by_platform = tone_limits(mission, analysis.allocation)
-    for place, one in enumerate(accelerated_tones(mission, analysis.geometry) if has_instruments(mission) else ()):
-        T, per_unit = mission.collection.aperture_time, judging.array(one.per_unit)
-        is_there = per_unit > 0 if one.left.is_folded else judging.array(one.frequency * T) >= SLOWEST
+    for tone_index, tone in enumerate(
+        accelerated_tones(mission, analysis.geometry) if has_instruments(mission) else ()
+    ):
+        T, per_unit = mission.collection.aperture_time, judging.array(tone.per_unit)
+        is_there = per_unit > 0 if tone.left.is_folded else judging.array(tone.frequency * T) >= SLOWEST
         if not is_there.any():
             continue
-        declared, limits = judging.array(one.sensitivity), by_platform.get(one.name)
+        declared, limits = judging.array(tone.sensitivity), by_platform.get(tone.name)
         phase = declared * per_unit
-        beside = _phases_beside(one.left, one.free * one.sensitivity, T)
-        phases = _near_phases(judging, analysis, one.name, beside)
+        phases_beside = _phases_beside(tone.left, tone.free * tone.sensitivity, T)
+        phases = _near_phases(judging, analysis, tone.name, phases_beside)
         if limits is None:
-            judged = phases.row(judging, one.subject, metric, declared, None)
+            judged = phases.row(judging, tone.subject, metric, declared, None)
             is_over_other = np.zeros(judging.cases, dtype=bool)
         else:
             by_published, by_full = (
                 judging.array(2 * math.pi / mission.radar.wavelength * limit) / per_unit for limit in limits
             )
-            published, full = (np.where(per_unit > 0, one, math.nan) for one in (by_published, by_full))
+            published, full = (np.where(per_unit > 0, tone, math.nan) for tone in (by_published, by_full))
             allowable = full if model == "full" else published
             is_over_other = declared > (published if model == "full" else full) * BOUND
-            judged = phases.row(judging, one.subject, metric, declared, allowable, doubt=is_over_other)
+            judged = phases.row(judging, tone.subject, metric, declared, allowable, doubt=is_over_other)
             published, full = (np.fmin(limit, phases.limit(declared)) for limit in (published, full))
             judged = judged._replace(allowable_published=published, allowable_full=full)
         if metric == "islr":
             judged = judged._replace(islr_db=islr_of(mission, phase**2 / 2))
-        yield AcceleratedRow(judged, place, is_over_other, is_there=is_there)
+        yield AcceleratedRow(judged, tone_index, is_over_other, is_there=is_there)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AcceleratedRow(FamilyRow):
     """A vibration of an oscillator in many cases, by its place among them; `is_there` where it is fast enough."""
 
-    place: int
+    tone_index: int
     is_over_other: Any
 
     def in_words(self, case: Case, model: str) -> Row:
         """The row of one case, by the model that judges it."""
         mission, row, doubt, over = case.mission, self.judged, NOTHING, phase_over(case, self.judged)
-        one = accelerated_tones(mission)[self.place]
+        tone = accelerated_tones(mission)[self.tone_index]
         T, missing = mission.collection.aperture_time, phrases.no_requirement_of("pslr")
         if not math.isnan(row.allowable[case.place]):
-            echoes = (20 * math.log10(one.per_unit * case.number(size) / 2) for size in (row.declared, row.allowable))
+            echoes = (
+                20 * math.log10(tone.per_unit * case.number(size) / 2) for size in (row.declared, row.allowable)
+            )
             over = over or (phrases.echoes_over(*echoes) if row.declared[case.place] else NOTHING)
             if self.is_over_other[case.place]:
-                other = OTHER_MODEL[model]
-                doubt = phrases.other_model_allows(other, case.number(row.allowable_by(other)), "s^2/m")
-        oscillator: Oscillator = getattr(mission.platforms, one.name).oscillator
+                other_model = OTHER_MODEL[model]
+                doubt = phrases.other_model_allows(other_model, case.number(row.allowable_by(other_model)), "s^2/m")
+        oscillator: Oscillator = getattr(mission.platforms, tone.name).oscillator
         return worded(
             case,
             row,
             unit="s^2/m",
-            path=("platforms", one.name, "oscillator", SENSITIVITY),
+            path=("platforms", tone.name, "oscillator", SENSITIVITY),
             equation="acceleration sensitivity" if model == "full" else "Section V, sinusoidal",
             over=over,
             doubt=doubt,
@@ -236,22 +244,22 @@ class AcceleratedRow(FamilyRow):
             info=missing,
             evidence=evidence(oscillator),
             remarks=(
-                phrases.tone_lies(one.frequency, one.frequency * T),
-                phrases.shakes_an_oscillator(float(one.acceleration), one.phase),
-                *_folds(one.left, one.free * one.sensitivity, T, f"{one.name}.oscillator.acceleration"),
-                *_whose(mission, one.name),
-                *override_notes(one.name, oscillator.overridden, SENSITIVITY),
+                phrases.tone_lies(tone.frequency, tone.frequency * T),
+                phrases.shakes_an_oscillator(float(tone.acceleration), tone.phase),
+                *_folds(tone.left, tone.free * tone.sensitivity, T, f"{tone.name}.oscillator.acceleration"),
+                *_whose(mission, tone.name),
+                *override_notes(tone.name, oscillator.overridden, SENSITIVITY),
             ),
             binding_requirement=phase_requirement(case, row),
             displacement_m=case.moved_by_tone(row.subject, model),
         )
 
 
-def _phases_beside(left: LeftTone, free: Any, aperture_time: Any) -> tuple[Any, Any]:
+def _phases_beside(folded: LeftTone, free: Any, aperture_time: Any) -> tuple[Any, Any]:
     """Quadratic and cubic phase of the echoes that lie beside the mainlobe, in their worst phases. [rad]"""
     qpe: Any = 0.0
     cubic: Any = 0.0
-    for frequency, share in zip(left.frequencies, left.echoes(aperture_time), strict=True):
+    for frequency, share in zip(folded.frequencies, folded.echoes(aperture_time), strict=True):
         cycles = frequency * aperture_time
         phase = np.where(cycles < ECHO_CYCLES, free * share, 0.0)
         qpe, cubic = qpe + phase * quadratic_part(cycles), cubic + phase * cubic_part(cycles)
@@ -271,18 +279,18 @@ def evidence(oscillator: Oscillator) -> str | None:
 
 def _whose(mission: Mission, name: str) -> tuple[Note, ...]:
     """Say that the vibration which an oscillator feels is that of its platform."""
-    one = felt(mission, name)
-    return () if one is not None and one.is_own else (phrases.vibration_of_the_platform(),)
+    felt_vibration = felt(mission, name)
+    return () if felt_vibration is not None and felt_vibration.is_own else (phrases.vibration_of_the_platform(),)
 
 
 def notes_of_acceleration(mission: Mission, name: str) -> tuple[Note, ...]:
     """Say of the row of an oscillator's acceleration what counts in it, and what cannot."""
-    one = felt(mission, name)
+    felt_vibration = felt(mission, name)
     oscillator: Oscillator = getattr(mission.platforms, name).oscillator
     notes = list[Note]()
-    if one is None or (mission.has_direct_path and name == "transmitter"):
+    if felt_vibration is None or (mission.has_direct_path and name == "transmitter"):
         return ()
-    vibration = one.vibration
+    vibration = felt_vibration.vibration
     if vibration.spectrum is not None or vibration.sinusoidal:
         notes += _whose(mission, name)
     elif not lacks_a_spectrum(mission, name):

@@ -36,37 +36,39 @@ def with_verdicts(findings: MissionFindings, verified: VerifiedMission, today: d
     verdicts = verified.rows
     by_id = {verdict.id: verdict for verdict in verdicts}
     rows = [_with_verdict(row, by_id[row.id]) if row.id in by_id else row for row in findings.rows]
-    places = [
-        place
-        for place, (before, row) in enumerate(zip(findings.rows, rows, strict=True))
+    changed_indices = [
+        index
+        for index, (before, row) in enumerate(zip(findings.rows, rows, strict=True))
         if row.status != before.status
     ]
     used: set[str] = set()
     requirement_waivers: Mapping[str, tuple[AppliedWaiver, ...]] = {}
     if today is not None and findings.mission is not None:
-        waived = apply_waivers([rows[place] for place in places], findings.mission, today)
+        waived = apply_waivers([rows[index] for index in changed_indices], findings.mission, today)
         requirement_waivers = waived.requirements
-        for place, row in zip(places, waived.rows, strict=True):
-            rows[place] = row
+        for index, row in zip(changed_indices, waived.rows, strict=True):
+            rows[index] = row
         used = {
             waiver.id
             for waiver, (_, covered) in zip(findings.mission.waivers, waived.covered, strict=True)
             if covered
         }
     requirements = tuple(
-        _with_refuted(one, [rows[place] for place in places], requirement_waivers.get(one.id, ()))
-        for one in findings.requirements
+        _with_refuted(entry, [rows[index] for index in changed_indices], requirement_waivers.get(entry.id, ()))
+        for entry in findings.requirements
     )
-    known = {row.id for row in findings.rows}
+    row_ids = {row.id for row in findings.rows}
     warnings = [
-        one for one in findings.warnings if one.message.code != "waiver-not-used" or one.message.values[0] not in used
+        entry
+        for entry in findings.warnings
+        if entry.message.code != "waiver-not-used" or entry.message.values[0] not in used
     ]
     if verified.doubt:
         warnings.append(FileWarning(line=None, message=verified.doubt))
     warnings += [
         FileWarning(line=None, message=file_warnings.limit_is_optimistic(verdict.id, _shown(verdict)))
         for verdict in verdicts
-        if verdict.id not in known and verdict.verdict == "optimistic"
+        if verdict.id not in row_ids and verdict.verdict == "optimistic"
     ]
     images = (phrases.images_formed(verified.conditions),) if verified.conditions else ()
     return findings._replace(
@@ -80,19 +82,19 @@ def with_verdicts(findings: MissionFindings, verified: VerifiedMission, today: d
 
 
 def _with_verdict(row: Row, verdict: Verdict) -> Row:
-    said = []
+    remarks = []
     reason = NOTHING
     if verdict.verdict_autofocus == "optimistic":
         if row.status == "pass_with_autofocus":
             reason = phrases.autofocus_refuted(str(verdict.reason_autofocus))
         else:
-            said.append(phrases.optimistic_limit_with_autofocus(str(verdict.reason_autofocus)))
+            remarks.append(phrases.optimistic_limit_with_autofocus(str(verdict.reason_autofocus)))
     if verdict.verdict == "optimistic":
         if not reason and _is_gate(row):
             reason = phrases.limit_refuted(format_limit(verdict.boundary_error, verdict.unit), _shown(verdict))
         else:
-            said.insert(0, phrases.optimistic_limit(_shown(verdict)))
-    refuted = (*row.refuted, *said)
+            remarks.insert(0, phrases.optimistic_limit(_shown(verdict)))
+    refuted = (*row.refuted, *remarks)
     if not reason:
         return row._replace(refuted=refuted)
     return row._replace(status="fail", reason=reason, refuted=refuted)._replace(is_unjudged=False)
@@ -123,18 +125,18 @@ def _with_refuted(
     ]
     if not judges or RANK[requirement.status] <= RANK["fail"]:
         return requirement
-    row = min(judges, key=lambda one: RANK[one.status])
+    row = min(judges, key=lambda judge: RANK[judge.status])
     status = "waived" if waivers and row.status == "fail" else row.status
     if RANK[status] > RANK[requirement.status]:
         return requirement
     covering = in_order([*requirement.waivers, *waivers, *row.waived_by])
-    found = requirement._replace(
+    refuted_requirement = requirement._replace(
         status=status, row=row.id, reason=row.reason, waivers=holding(status, covering), is_unjudged=False
     )
     if row.id == requirement.row:
-        return found
+        return refuted_requirement
     # The row's own numbers are in its unit, and no part of the requirement: an image says that its limit is wrong.
-    return found._replace(utilization=row.utilization, use_row=row.id, share=None)
+    return refuted_requirement._replace(utilization=row.utilization, use_row=row.id, share=None)
 
 
 def _shown(verdict: Verdict) -> str:
@@ -155,10 +157,10 @@ def rows_worth_showing(findings: MissionFindings) -> tuple[Verdict, ...]:
     A row that nobody declared is shown only if its limit is refuted, or if there is nothing else.
     """
     rows = {row.id: row for row in findings.rows}
-    known = [v for v in findings.verdicts or () if v.measured_qpe_rad is not None and v.id in rows]
-    ordered = sorted(known, key=lambda verdict: _urgency(rows[verdict.id], verdict))
-    wanted = [v for v in ordered if rows[v.id].status != "not_declared" or _is_refuted(v)]
-    return tuple((wanted or ordered[:1])[:_SHOWN])
+    measured = [v for v in findings.verdicts or () if v.measured_qpe_rad is not None and v.id in rows]
+    ordered = sorted(measured, key=lambda verdict: _urgency(rows[verdict.id], verdict))
+    decisive = [v for v in ordered if rows[v.id].status != "not_declared" or _is_refuted(v)]
+    return tuple((decisive or ordered[:1])[:_SHOWN])
 
 
 def _urgency(row: Row, verdict: Verdict) -> tuple[int, bool, bool, float]:

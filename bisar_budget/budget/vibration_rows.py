@@ -54,11 +54,20 @@ class Vibrations:
         self.noise = vibration_limits(mission, allocation, "islr")
         self.to_phase = 2 * math.pi / mission.radar.wavelength
         lines = {name: lines_of(mission, name, geometry) for name in PLATFORMS}
-        self.count = {name: len(of_one) for name, of_one in lines.items()}
-        self.amplitudes = {name: self._columns([one.amplitude for one in of_one]) for name, of_one in lines.items()}
+        self.count = {name: len(lines_of_platform) for name, lines_of_platform in lines.items()}
+        self.amplitudes = {
+            name: self._columns([line.amplitude for line in lines_of_platform])
+            for name, lines_of_platform in lines.items()
+        }
         T = mission.collection.aperture_time
-        self.cycles = {name: self._columns([one.frequency * T for one in of_one]) for name, of_one in lines.items()}
-        self.per_metre = {name: self._columns([one.per_metre for one in of_one]) for name, of_one in lines.items()}
+        self.cycles = {
+            name: self._columns([line.frequency * T for line in lines_of_platform])
+            for name, lines_of_platform in lines.items()
+        }
+        self.per_metre = {
+            name: self._columns([line.per_metre for line in lines_of_platform])
+            for name, lines_of_platform in lines.items()
+        }
 
     def _columns(self, numbers: Sequence[Any]) -> Floats:
         return np.array([self.array(number) for number in numbers]).reshape(-1, self.judging.cases)
@@ -77,21 +86,21 @@ class Vibrations:
                 if not is_slow.all():
                     yield self._line(model, name, index, ~is_slow).in_unit(self.per_metre[name][index])
             if not self.count[name]:
-                what = subject(name, "vibration", "sinusoidal", entry=0)
-                yield self._row(model, what, self.metric, None, self.tones.get(name), everywhere)
+                row_subject = subject(name, "vibration", "sinusoidal", entry=0)
+                yield self._row(model, row_subject, self.metric, None, self.tones.get(name), everywhere)
             elif self.metric == "pslr":
                 yield from self._near_each_other(model, name)
             wideband = getattr(self.mission.platforms, name).motion_error.vibration.wideband
             rms = None
             if wideband is not None:
                 rms = self.array(counted(self.mission, name, wideband.rms, "islr", self.geometry))
-            what = subject(name, "vibration", "wideband")
-            yield self._row(model, what, "islr", rms, self.noise.get(name), everywhere)
+            row_subject = subject(name, "vibration", "wideband")
+            yield self._row(model, row_subject, "islr", rms, self.noise.get(name), everywhere)
 
     def _row(
         self,
         model: str,
-        what: Subject,
+        row_subject: Subject,
         metric: str,
         declared: Floats | None,
         limits: VibrationLimits | None,
@@ -107,10 +116,12 @@ class Vibrations:
             if declared is not None and not self.mission.has_direct_path:  # which the published model does not know
                 is_over_other = declared > limits.by(OTHER_MODEL[model]) * BOUND
         if phases is None or declared is None:
-            judged = self.judging.row(what, declared, allowable, doubt=doubt | is_over_other, is_info=limits is None)
+            judged = self.judging.row(
+                row_subject, declared, allowable, doubt=doubt | is_over_other, is_info=limits is None
+            )
             judged = judged.held_to(metric)
         else:
-            judged = phases.row(self.judging, what, metric, declared, allowable, doubt=doubt | is_over_other)
+            judged = phases.row(self.judging, row_subject, metric, declared, allowable, doubt=doubt | is_over_other)
         if self.judging.is_whole:
             if limits is not None:
                 judged = self._with_limits(judged, limits)
@@ -121,7 +132,7 @@ class Vibrations:
                 judged = judged._replace(allowable_published=published, allowable_full=full)
             if declared is not None and metric == "islr":
                 variance = (self.to_phase * declared) ** 2
-                of_row = variance if what.axis == "wideband" else variance / 2
+                of_row = variance if row_subject.axis == "wideband" else variance / 2
                 judged = judged._replace(islr_db=islr_of(self.mission, of_row))
         return VibrationRow(judged, limits, is_there=is_there, is_over_other=is_over_other, **others)
 
@@ -136,17 +147,17 @@ class Vibrations:
         """
         cycles, both = self.cycles[name][index], self._both[name][index]
         is_near, phases = cycles < ECHO_CYCLES, None
-        what = subject(name, "vibration", "sinusoidal", entry=index)
+        row_subject = subject(name, "vibration", "sinusoidal", entry=index)
         if is_near.any():
-            does, gain = self.slow_tones[what.id].declared, self.allocation.autofocus_gain
-            found = (does.quadratic, does.cubic, does.judged(1.0), does.judged(gain))
-            phases = NearPhases.of(self.mission, self.allocation, name, is_near, found)
+            does, gain = self.slow_tones[row_subject.id].declared, self.allocation.autofocus_gain
+            phases_of_line = (does.quadratic, does.cubic, does.judged(1.0), does.judged(gain))
+            phases = NearPhases.of(self.mission, self.allocation, name, is_near, phases_of_line)
         level = 20 * np.log10(echo_level(np.minimum(both, LARGEST_ECHO)))
         required = self.mission.requirements.pslr
         is_over_both = np.zeros(is_there.shape, dtype=bool) if required is None else level > required + _ROUNDING_DB
         return self._row(
             model,
-            what,
+            row_subject,
             self.metric,
             self.amplitudes[name][index],
             self.tones.get(name),
@@ -167,14 +178,14 @@ class Vibrations:
 
         One along three axes is declared as the amplitude along the line of sight that uses as much.
         """
-        what, cycles = subject(name, "vibration", "sinusoidal", entry=index), self.cycles[name][index]
-        tone = self.slow_tones[what.id]
+        row_subject, cycles = subject(name, "vibration", "sinusoidal", entry=index), self.cycles[name][index]
+        tone = self.slow_tones[row_subject.id]
         limits = slow_limits(self.mission, self.allocation, tone)
         declared = limits.use * limits.smallest if tone.hears_part else self.amplitudes[name][index]
         does = tone.declared
         without_autofocus = does.judged(1.0) / self.allocation.qpe_limit(name)
         judged = self.judging.row(
-            what,
+            row_subject,
             declared,
             self.array(limits.smallest),
             without_autofocus=without_autofocus,
@@ -189,12 +200,12 @@ class Vibrations:
             rest_rad=does.rest,
             quadratic_use=limits.quadratic_use,
         )
-        same = VibrationLimits(limits.quadratic, limits.quadratic)
+        both_limits = VibrationLimits(limits.quadratic, limits.quadratic)
         if self.judging.is_whole:
-            judged = self._with_limits(judged, same)._replace(qpe_full_rad=qpe)
+            judged = self._with_limits(judged, both_limits)._replace(qpe_full_rad=qpe)
         return VibrationRow(
             judged,
-            same,
+            both_limits,
             is_there=is_there,
             is_slow=True,
             cycles=cycles,
@@ -206,9 +217,9 @@ class Vibrations:
     def _near_each_other(self, model: str, name: str) -> Iterator["VibrationRow"]:
         """Lines so near each other that their echoes add: each time the one line that has an echo as high."""
         for index, (members, amplitude) in enumerate(self._near[name]):
-            what = subject(name, "vibration", "sinusoidal.sum", entry=index)
+            row_subject = subject(name, "vibration", "sinusoidal.sum", entry=index)
             is_there = np.asarray(members.any(axis=0))
-            yield self._row(model, what, "pslr", amplitude, self.tones.get(name), is_there, members=members)
+            yield self._row(model, row_subject, "pslr", amplitude, self.tones.get(name), is_there, members=members)
 
     @cached_property
     def _near(self) -> dict[str, list[tuple[Truths, Floats]]]:
@@ -225,12 +236,12 @@ class Vibrations:
         amplitudes, cycles = (
             np.concatenate([of[name] for name in PLATFORMS]) for of in (self.amplitudes, self.cycles)
         )
-        found = np.full(cycles.shape, math.nan)
+        phases = np.full(cycles.shape, math.nan)
         if self.mission.requirements.pslr is not None and all(self.count.values()):
             for members, amplitude in _together(amplitudes, cycles):
                 is_of_both = members[:ours].any(axis=0) & members[ours:].any(axis=0)
-                found = np.where(members & is_of_both & (amplitude > 0), self.to_phase * amplitude, found)
-        return {PLATFORMS[0]: found[:ours], PLATFORMS[1]: found[ours:]}
+                phases = np.where(members & is_of_both & (amplitude > 0), self.to_phase * amplitude, phases)
+        return {PLATFORMS[0]: phases[:ours], PLATFORMS[1]: phases[ours:]}
 
 
 def _together(amplitudes: Floats, cycles: Floats) -> Iterator[tuple[Truths, Floats]]:
@@ -238,9 +249,9 @@ def _together(amplitudes: Floats, cycles: Floats) -> Iterator[tuple[Truths, Floa
     groups = near_groups(cycles)
     for index in range(groups.max(initial=-1) + 1):
         members = groups == index
-        found, some = np.zeros(members.shape[1]), np.flatnonzero(members.any(axis=0))
-        found[some] = worst_phases(amplitudes[:, some], cycles[:, some], members[:, some]).amplitude
-        yield members, found
+        amplitude, cases = np.zeros(members.shape[1]), np.flatnonzero(members.any(axis=0))
+        amplitude[cases] = worst_phases(amplitudes[:, cases], cycles[:, cases], members[:, cases]).amplitude
+        yield members, amplitude
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -275,15 +286,15 @@ class VibrationRow(FamilyRow):
 
     def in_words(self, case: Case, model: str) -> Row:
         """The row of one case, by the model that judges it."""
-        what = self.judged.subject
-        error: MotionError = getattr(case.mission.platforms, what.owner).motion_error
+        row_subject = self.judged.subject
+        error: MotionError = getattr(case.mission.platforms, row_subject.owner).motion_error
         if self.is_slow:
             return _slow_row(case, self, error, model)
         if self.members is not None:
             members = np.flatnonzero(self.members[:, case.place]).tolist()
             note = _lines_together(error, members, case.number(self.judged.declared))
             return _row(case, self, error, model, ("sinusoidal", members[0], "frequency"), (note,))
-        if what.axis == "wideband":
+        if row_subject.axis == "wideband":
             wideband = error.vibration.wideband
             seen = () if wideband is None else _seen(case, self, error, wideband.rms)
             return _row(case, self, error, model, ("wideband", "rms"), seen)
@@ -291,29 +302,48 @@ class VibrationRow(FamilyRow):
 
 
 # ---------------------------------------------------------------------- in words
-def _line_row(case: Case, one: VibrationRow, error: MotionError, model: str) -> Row:
-    mission, allocation, place = case.mission, case.allocation, case.place
-    owner, index = one.judged.subject.owner, one.judged.subject.entry or 0
+def _line_row(case: Case, vibration_row: VibrationRow, error: MotionError, model: str) -> Row:
+    mission, allocation, case_index = case.mission, case.allocation, case.place
+    owner, index = vibration_row.judged.subject.owner, vibration_row.judged.subject.entry or 0
     key, lines = ("sinusoidal", index, "amplitude"), error.vibration.sinusoidal
     if not lines:
-        return _row(case, one, error, model, key)
+        return _row(case, vibration_row, error, model, key)
     doubt, more, required = NOTHING, list[Note](), mission.requirements.pslr
-    if required is not None and not math.isnan(one.both[place]):
-        (other,) = (platform for platform in PLATFORMS if platform != owner)
+    if required is not None and not math.isnan(vibration_row.both[case_index]):
+        (other_platform,) = (platform for platform in PLATFORMS if platform != owner)
         note = phrases.both_platforms_vibrate(
-            other, NEAR_CYCLES, float(one.level[place]), bool(one.both[place] > LARGEST_ECHO), required
+            other_platform,
+            NEAR_CYCLES,
+            float(vibration_row.level[case_index]),
+            bool(vibration_row.both[case_index] > LARGEST_ECHO),
+            required,
         )
-        more, doubt = [note], note if one.is_over_both[place] else NOTHING
-    if one.cycles[place] < ECHO_CYCLES:
+        more, doubt = [note], note if vibration_row.is_over_both[case_index] else NOTHING
+    if vibration_row.cycles[case_index] < ECHO_CYCLES:
         limit = allocation.qpe_allowed(owner)
-        qpe, cubic, allowed = float(one.qpe[place]), float(one.cubic[place]), mission.requirements.cubic_phase_error
-        more.insert(0, phrases.slower_than_three_cycles(float(one.cycles[place]), qpe, limit, cubic, allowed))
-    return _row(case, one, error, model, key, _seen(case, one, error, lines[index].displacement), more, doubt)
+        qpe, cubic, allowed = (
+            float(vibration_row.qpe[case_index]),
+            float(vibration_row.cubic[case_index]),
+            mission.requirements.cubic_phase_error,
+        )
+        more.insert(
+            0, phrases.slower_than_three_cycles(float(vibration_row.cycles[case_index]), qpe, limit, cubic, allowed)
+        )
+    return _row(
+        case,
+        vibration_row,
+        error,
+        model,
+        key,
+        _seen(case, vibration_row, error, lines[index].displacement),
+        more,
+        doubt,
+    )
 
 
 def _row(
     case: Case,
-    one: VibrationRow,
+    vibration_row: VibrationRow,
     error: MotionError,
     model: str,
     key: tuple[str | int, ...],
@@ -322,46 +352,50 @@ def _row(
     doubt: Note = NOTHING,
 ) -> Row:
     """A row of echoes or noise: `notes` stand before what is said of its limit, `more` after it."""
-    what, metric = one.judged.subject, one.judged.metric
+    row_subject, metric = vibration_row.judged.subject, vibration_row.judged.metric
     equation = f"Section V, {key[0]}" if model == "published" else "first principles"
     missing, margin = phrases.no_requirement_of(metric), None
-    if one.limits is not None:
-        limits = VibrationLimits(*map(case.number, one.limits))
+    if vibration_row.limits is not None:
+        limits = VibrationLimits(*map(case.number, vibration_row.limits))
         margin = float(limits.margin_db)
         notes = (*notes, phrases.published_rule_is_off(margin))
-        if one.is_over_other[case.place]:
-            other = OTHER_MODEL[model]
-            allowed = float(limits.by(other)) * case.number(one.per_metre)
-            doubt = phrases.other_model_allows(other, allowed, _unit(case, one))
+        if vibration_row.is_over_other[case.place]:
+            other_model = OTHER_MODEL[model]
+            allowed = float(limits.by(other_model)) * case.number(vibration_row.per_metre)
+            doubt = phrases.other_model_allows(other_model, allowed, _unit(case, vibration_row))
     return worded(
         case,
-        one.judged,
-        unit=_unit(case, one),
-        path=("platforms", what.owner, "motion_error", "vibration", *key),
+        vibration_row.judged,
+        unit=_unit(case, vibration_row),
+        path=("platforms", row_subject.owner, "motion_error", "vibration", *key),
         equation=equation,
-        over=phase_over(case, one.judged) or phrases.share_of_power_over(metric, equation),
+        over=phase_over(case, vibration_row.judged) or phrases.share_of_power_over(metric, equation),
         doubt=doubt,
         no_limit=missing,
         info=missing,
-        without_autofocus=case.number(one.without_autofocus),
+        without_autofocus=case.number(vibration_row.without_autofocus),
         evidence=error.source,
         remarks=(*notes, *more),
         published_margin_db=margin,
-        binding_requirement=phase_requirement(case, one.judged),
-        displacement_m=case.moved_by_tone(what, model),
+        binding_requirement=phase_requirement(case, vibration_row.judged),
+        displacement_m=case.moved_by_tone(row_subject, model),
     )
 
 
-def _seen(case: Case, one: VibrationRow, error: MotionError, value: Any) -> tuple[Note, ...]:
-    metres = case.number(one.judged.declared) / case.number(one.per_metre)
-    seen = projected(case.mission, value, error, metres, is_slow=one.is_slow)
-    stated = () if seen or _unit(case, one) == "m" else (phrases.amplitude_of_acceleration(metres),)
+def _seen(case: Case, vibration_row: VibrationRow, error: MotionError, value: Any) -> tuple[Note, ...]:
+    metres = case.number(vibration_row.judged.declared) / case.number(vibration_row.per_metre)
+    seen = projected(case.mission, value, error, metres, is_slow=vibration_row.is_slow)
+    stated = () if seen or _unit(case, vibration_row) == "m" else (phrases.amplitude_of_acceleration(metres),)
     return (*stated, *seen)
 
 
-def _unit(case: Case, one: VibrationRow) -> str:
-    what = one.judged.subject
-    return unit_of_line(case.mission, what.owner, what.entry or 0) if what.axis == "sinusoidal" else "m"
+def _unit(case: Case, vibration_row: VibrationRow) -> str:
+    row_subject = vibration_row.judged.subject
+    return (
+        unit_of_line(case.mission, row_subject.owner, row_subject.entry or 0)
+        if row_subject.axis == "sinusoidal"
+        else "m"
+    )
 
 
 def _lines_together(error: MotionError, members: Sequence[int], declared: float) -> Note:
@@ -371,25 +405,25 @@ def _lines_together(error: MotionError, members: Sequence[int], declared: float)
     return phrases.lines_together(shown, " to ".join(dict.fromkeys(ends)), NEAR_CYCLES, declared)
 
 
-def _slow_row(case: Case, one: VibrationRow, error: MotionError, model: str) -> Row:
+def _slow_row(case: Case, vibration_row: VibrationRow, error: MotionError, model: str) -> Row:
     mission = case.mission
-    what, combine = one.judged.subject, mission.allocation.combine
-    cycles, qpe, cubic = map(case.number, (one.cycles, one.qpe, one.cubic))
-    entry = what.entry or 0
+    row_subject, combine = vibration_row.judged.subject, mission.allocation.combine
+    cycles, qpe, cubic = map(case.number, (vibration_row.cycles, vibration_row.qpe, vibration_row.cubic))
+    entry = row_subject.entry or 0
     return worded(
         case,
-        one.judged,
-        unit=_unit(case, one),
-        path=("platforms", what.owner, "motion_error", "vibration", "sinusoidal", entry, "amplitude"),
+        vibration_row.judged,
+        unit=_unit(case, vibration_row),
+        path=("platforms", row_subject.owner, "motion_error", "vibration", "sinusoidal", entry, "amplitude"),
         equation="first principles",
-        over=phase_over(case, one.judged),
+        over=phase_over(case, vibration_row.judged),
         info=NOTHING if combine == "each" else phrases.aggregate_decides(combine),
-        without_autofocus=case.number(one.without_autofocus),
+        without_autofocus=case.number(vibration_row.without_autofocus),
         evidence=error.source,
         remarks=(
-            *_seen(case, one, error, error.vibration.sinusoidal[entry].displacement),
+            *_seen(case, vibration_row, error, error.vibration.sinusoidal[entry].displacement),
             phrases.slower_than_a_cycle(cycles, qpe, cubic),
         ),
-        binding_requirement=one.judged.requirement(case),
-        displacement_m=case.moved_by_tone(what, model),
+        binding_requirement=vibration_row.judged.requirement(case),
+        displacement_m=case.moved_by_tone(row_subject, model),
     )

@@ -39,11 +39,11 @@ class Waived(NamedTuple):
 
     def unused(self, judged: Sequence[JudgedRequirement]) -> Iterator[tuple[KeyPath, Note]]:
         """Say which waivers name nothing, everything, or nothing that is broken."""
-        broken = {one.id for one in judged if one.status in (*BROKEN, "waived")}
-        ids = [one.id for one in judged]
+        broken = {requirement.id for requirement in judged if requirement.status in (*BROKEN, "waived")}
+        ids = [requirement.id for requirement in judged]
         for index, (waiver, (named, failing)) in enumerate(zip(self.mission.waivers, self.covered, strict=True)):
             key = ("waivers", index, "id")
-            requirements = [ids[place] for place in named_by(waiver.id, ids)]
+            requirements = [ids[requirement_index] for requirement_index in named_by(waiver.id, ids)]
             if not named and not requirements:
                 yield key, file_warnings.waiver_matches_nothing(waiver.id)
             elif named == len(self.rows):
@@ -85,33 +85,37 @@ def apply_waivers(rows: Sequence[Row], mission: Mission, today: date) -> Waived:
             over.append((applied, failing))
             continue
         holding = dict.fromkeys(failing, applied) | holding
-        for place in named_by(waiver.id, requirements):
-            of_requirements.setdefault(requirements[place], (applied,))
+        for requirement_index in named_by(waiver.id, requirements):
+            of_requirements.setdefault(requirements[requirement_index], (applied,))
     last: dict[int, AppliedWaiver] = {}
-    for applied, failing in sorted(over, key=lambda one: one[0].until):
+    for applied, failing in sorted(over, key=lambda expired: expired[0].until):
         last |= dict.fromkeys(failing, applied)
     waived = [_waived(row, holding.get(position), last.get(position)) for position, row in enumerate(rows)]
     return Waived(mission, waived, of_requirements, covered)
 
 
 def _waived(row: Row, holding: AppliedWaiver | None, last: AppliedWaiver | None) -> Row:
-    applied = [one for one in (holding, last) if one is not None]
+    applied = [waiver for waiver in (holding, last) if waiver is not None]
     status = row.status if holding is None else "waived"
     return row._replace(status=status, waivers=(*row.waivers, *applied)) if applied else row
 
 
 def holding_place(mission: Mission, today: date, ids: Sequence[str]) -> int:
     """Place in the file of the first waiver that holds and names one of some ids; -1: none does."""
-    held = (place for place, one in enumerate(mission.waivers) if today <= one.until and named_by(one.id, ids))
-    return next(held, -1)
+    valid = (
+        waiver_index
+        for waiver_index, waiver in enumerate(mission.waivers)
+        if today <= waiver.until and named_by(waiver.id, ids)
+    )
+    return next(valid, -1)
 
 
 def named_by(pattern: str, ids: Sequence[str]) -> list[int]:
     """Places of the ids that a waiver names; an id may hold a bracket of its own."""
     if not any(char in pattern for char in "*?["):
-        return [place for place, row_id in enumerate(ids) if row_id == pattern]
+        return [id_index for id_index, row_id in enumerate(ids) if row_id == pattern]
     matches = map(re.compile(translate(pattern)).match, ids)
-    return [place for place, match in enumerate(matches) if match or ids[place] == pattern]
+    return [id_index for id_index, match in enumerate(matches) if match or ids[id_index] == pattern]
 
 
 # ---------------------------------------------------------------------- from outside the file
@@ -127,12 +131,14 @@ def overrides(mission: Mission, outside: Outside, today: date) -> tuple[Override
     today : date
         Day on which waivers are judged, UTC. It bears on the verdict where the file has a waiver.
     """
-    found = list(outside.options)
+    from_outside = list(outside.options)
     if mission.waivers or outside.is_day_given:
-        found.append(Override("--date", today.isoformat(), outside.day_origin))
-    found += [Override("--set", f"{change.key}={change.text}", outside.set_origin) for change in mission.changes]
-    levels = (Override(one.key, one.level, one.off) for one in shifted_figures(mission))
-    return (*found, *_own_parts(mission), *levels, *_planned_orbits(mission))
+        from_outside.append(Override("--date", today.isoformat(), outside.day_origin))
+    from_outside += [
+        Override("--set", f"{change.key}={change.text}", outside.set_origin) for change in mission.changes
+    ]
+    levels = (Override(figure.key, figure.level, figure.off) for figure in shifted_figures(mission))
+    return (*from_outside, *_own_parts(mission), *levels, *_planned_orbits(mission))
 
 
 def _planned_orbits(mission: Mission) -> Iterator[Override]:
