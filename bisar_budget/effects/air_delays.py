@@ -120,12 +120,12 @@ def dispersed_legs(mission: Mission, geometry: BistaticGeometry) -> dict[str, An
     The coverage factor is in it. Legs of which no content is declared are left out.
     """
     propagation, factor = mission.propagation, mission.allocation.coverage_factor
-    found: dict[str, Any] = {}
+    phases: dict[str, Any] = {}
     for name, path in zip(PLATFORMS, geometry.both, strict=True):
         content = None if propagation is None else propagation.content(name)
         if content is not None:
-            found[name] = content * factor * dispersion_per_unit(mission, path)
-    return found
+            phases[name] = content * factor * dispersion_per_unit(mission, path)
+    return phases
 
 
 def dispersed(mission: Mission, geometry: BistaticGeometry) -> Any:
@@ -179,13 +179,13 @@ def _delay_error(
     name = legs_of(owner)[0]
     leg = None if propagation is None else propagation.leg(name)
     value = None if leg is None else getattr(leg, delay)
-    moving, held = (np.asarray(sum(of_legs)) for of_legs in zip(*groups, strict=True))
+    moving, at_mid_aperture = (np.asarray(sum(of_legs)) for of_legs in zip(*groups, strict=True))
     correlation_time = correlation_time_of(seen.mission, owner)
     if correlation_time is None:
         course = seen_course(moving, seen.exact.fit[0] @ moving, delay)
-        published, full = seen.of_courses(course[None], held[None])
+        published, full = seen.of_courses(course[None], at_mid_aperture[None])
     else:
-        published, full = _changing(seen, delay, moving, held[0], correlation_time)
+        published, full = _changing(seen, delay, moving, at_mid_aperture[0], correlation_time)
     return RandomError(
         subject=subject(owner, "propagation", delay),
         unit=UNITS[delay],
@@ -205,14 +205,14 @@ def correlation_time_of(mission: Mission, owner: str) -> Any:
 
 
 def _changing(
-    seen: SensorCases, delay: str, group: Floats, held: Floats, correlation_time: Any
+    seen: SensorCases, delay: str, group: Floats, at_mid_aperture: Floats, correlation_time: Any
 ) -> tuple[RandomEffect, RandomEffect]:
     """Effects by both models of a unit that changes, along group delays of a leg as it turns, and held. [m/unit]"""
     k, half = seen.exact.k, seen.exact.half
-    along = gauss_markov(2 * half, np.broadcast_to(correlation_time, half.shape)).times(np.square(held))
-    quadratic, cubic, left = (k * np.sqrt(power) for power in along[:3])
+    along = gauss_markov(2 * half, np.broadcast_to(correlation_time, half.shape)).times(np.square(at_mid_aperture))
+    quadratic, cubic, spread = (k * np.sqrt(power) for power in along[:3])
     # What spreads is a mean power, which has no coverage factor.
-    published = RandomEffect(quadratic, cubic, left / seen.factor, *seen.moved(along.constant, along.linear))
+    published = RandomEffect(quadratic, cubic, spread / seen.factor, *seen.moved(along.constant, along.linear))
     full = seen.of_gauss_markov(group[None], correlation_time, is_phase_advanced=delay == CONTENT)
     return published, full
 
@@ -242,7 +242,7 @@ def zenith_courses(mission: Mission, owner: str, aperture_time: Floats, count: i
     correlation_time = correlation_time_of(mission, owner)
     if correlation_time is None:
         return np.ones((1, count, 1))
-    ratios, place = np.unique(aperture_time / (2 * correlation_time), return_inverse=True)
+    ratios, ratio_index = np.unique(aperture_time / (2 * correlation_time), return_inverse=True)
     between = 1 + departure_at_nodes(count, ratios)
     courses = np.swapaxes(factor(np.moveaxis(between, 2, 0)), 1, 2)  # (ratios, courses, nodes)
-    return np.moveaxis(courses, 0, 2)[..., place.ravel()]
+    return np.moveaxis(courses, 0, 2)[..., ratio_index.ravel()]

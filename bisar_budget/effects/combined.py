@@ -38,16 +38,16 @@ class Correlated(NamedTuple):
         """Name of the six together."""
         return f"{self.platform}.covariance"
 
-    def of(self, some: NDArray[Any]) -> "Correlated":
+    def of(self, cases: NDArray[Any]) -> "Correlated":
         """The same in some of the cases."""
-        rows = [[rho[some] if np.ndim(rho) else rho for rho in row] for row in self.correlation]
+        rows = [[rho[cases] if np.ndim(rho) else rho for rho in row] for row in self.correlation]
         return self._replace(correlation=rows)
 
     def phase(self, phases: Sequence[Any] | Floats) -> Any:
         """√(gᵀCg) of the six phases gᵢσᵢ; infinite where one of them is. [rad]"""
         with np.errstate(invalid="ignore"):
-            found = np.sqrt(squared(self.correlation, phases))
-        return np.where(np.isnan(found), math.inf, found)[()]
+            size = np.sqrt(squared(self.correlation, phases))
+        return np.where(np.isnan(size), math.inf, size)[()]
 
     def displacement(self, moves: Sequence[tuple[Any, Any]]) -> tuple[Any, Any]:
         """The rms length of the displacement, the root of its covariance's trace, and 0: it has no direction. [m]"""
@@ -57,7 +57,7 @@ class Correlated(NamedTuple):
 
 def correlated_errors(mission: Mission) -> tuple[Correlated, ...]:
     """List the covariances of a mission; nothing for nearly every one."""
-    found = []
+    groups = []
     for name in PLATFORMS:
         error: MotionError = getattr(mission.platforms, name).motion_error
         if error.covariance is not None:
@@ -66,8 +66,8 @@ def correlated_errors(mission: Mission) -> tuple[Correlated, ...]:
                 for kind in ("position", "velocity")
                 for axis in FRAME_AXES[error.frame]
             )
-            found.append(Correlated(name, ids, error.covariance.correlation))
-    return tuple(found)
+            groups.append(Correlated(name, ids, error.covariance.correlation))
+    return tuple(groups)
 
 
 def squared(correlation: Sequence[Sequence[Any]], parts: Sequence[Any] | Floats) -> Any:
@@ -91,15 +91,15 @@ def displacement_parts(moves: Moves, rule: str, groups: Sequence[Correlated]) ->
 
 
 def _parts(
-    found: Sequence[tuple[str, Any]], rule: str, groups: Sequence[Correlated], as_one: Callable[..., Any]
+    named_sizes: Sequence[tuple[str, Any]], rule: str, groups: Sequence[Correlated], combine: Callable[..., Any]
 ) -> list[tuple[str, Any]]:
     if rule != "rss" or not groups:  # few missions have any
-        return list(found)
-    left, parts = dict(found), []
+        return list(named_sizes)
+    singles, combined_parts = dict(named_sizes), []
     for group in groups:
-        if left.keys() >= set(group.ids):
-            parts.append((group.id, as_one(group, [left.pop(row_id) for row_id in group.ids])))
-    return [*parts, *left.items()]
+        if singles.keys() >= set(group.ids):
+            combined_parts.append((group.id, combine(group, [singles.pop(row_id) for row_id in group.ids])))
+    return [*combined_parts, *singles.items()]
 
 
 # ---------------------------------------------------------------------- what they combine to
@@ -138,7 +138,7 @@ def largest_signed_sum(vectors: Floats) -> Any:
     x, y = np.where(is_upper, x, -x), np.where(is_upper, y, -y)
     order = np.argsort(np.arctan2(y, x), axis=0)
     x, y = np.take_along_axis(x, order, axis=0), np.take_along_axis(y, order, axis=0)
-    corners_x, corners_y = (part.sum(axis=0) - 2 * np.cumsum(part, axis=0) for part in (x, y))
+    corners_x, corners_y = (component.sum(axis=0) - 2 * np.cumsum(component, axis=0) for component in (x, y))
     return np.hypot(corners_x, corners_y).max(axis=0, initial=0.0)
 
 

@@ -68,22 +68,22 @@ NOWHERE: Vector = (0.0, 0.0, 0.0)  # direction of what is no motion
 def override_notes(platform: str, overridden: Sequence["Overridden"], *figures: str) -> tuple[Note, ...]:
     """Say which figures of parts the file replaces, of these or of all."""
     return tuple(
-        phrases.overrides_a_part(f"platforms.{platform}.{one.key}", one.text, one.part)
-        for one in overridden
-        if not figures or one.figure in figures
+        phrases.overrides_a_part(f"platforms.{platform}.{figure.key}", figure.text, figure.part)
+        for figure in overridden
+        if not figures or figure.figure in figures
     )
 
 
-def plain(column: Any, place: int = 0) -> float:
+def plain(column: Any, case: int = 0) -> float:
     """The number of a case, by its place; one that all cases have is that of each."""
     if not isinstance(column, np.ndarray):
         return float(column)
-    return float(column.item(place if column.size > 1 else 0))
+    return float(column.item(case if column.size > 1 else 0))
 
 
-def _plain_way(part: Any) -> Any:
+def _plain_way(component: Any) -> Any:
     """A component of a direction in one case; of one that turns all nodes."""
-    return part if np.ndim(part) > 1 else plain(part)
+    return component if np.ndim(component) > 1 else plain(component)
 
 
 class ErrorSource(NamedTuple):
@@ -124,14 +124,14 @@ class ErrorSource(NamedTuple):
         effect, full = Effect._make(map(plain, self.effect)), FullEffect._make(map(plain, self.full))
         declared = None if self.declared is None else plain(self.declared)
         clock = self.clock and tuple(map(plain, self.clock))
-        direction, of_receiver = (one and tuple(map(_plain_way, one)) for one in (self.direction, self.of_receiver))
+        direction, of_receiver = (way and tuple(map(_plain_way, way)) for way in (self.direction, self.of_receiver))
         return self._replace(
             declared=declared, effect=effect, full=full, direction=direction, of_receiver=of_receiver, clock=clock
         )
 
-    def direction_of(self, place: int) -> Any:
+    def direction_of(self, platform_index: int) -> Any:
         """Direction in which it moves a platform."""
-        return self.of_receiver if place == 1 and self.of_receiver is not None else self.direction
+        return self.of_receiver if platform_index == 1 and self.of_receiver is not None else self.direction
 
     @property
     def owner(self) -> str:
@@ -225,17 +225,17 @@ def indicated_point(
         Range and Doppler gradients are parallel at τ_i.
     """
     east, north = seen_from
-    held, look, rate = [], [0.0, 0.0], [0.0, 0.0]
+    state_numbers, look, rate = [], [0.0, 0.0], [0.0, 0.0]
     for state in (geometry.transmitter, geometry.receiver):
         (x, y, z), velocity = state.at(piece.time)
         then = PlatformState(position=(x - east, y - north, z), velocity=velocity)
         slant_range = math.dist(state.position, (east, north, 0.0))
-        held += [x - east, y - north, *velocity[:2], slant_range]
+        state_numbers += [x - east, y - north, *velocity[:2], slant_range]
         for axis in range(2):
             look[axis] += then.look[axis]
             rate[axis] += then.look_rate[axis]
     if model == "published":
-        (a, b), (c, d), (determinant,) = evaluators.published_ground_inverse(*held)
+        (a, b), (c, d), (determinant,) = evaluators.published_ground_inverse(*state_numbers)
     else:
         (a, b), (c, d), (determinant,) = evaluators.full_ground_inverse(*look, *rate)
     return (

@@ -70,7 +70,7 @@ def process_of(mission: Mission, error: RandomError) -> GaussMarkov:
     if error.owner in PLATFORMS:
         motion = getattr(mission.platforms, error.owner).motion_error
     assert motion is not None
-    return next(one for one in motion.random if one.name == error.subject.axis)
+    return next(process for process in motion.random if process.name == error.subject.axis)
 
 
 def process_axes(mission: Mission, error: RandomError) -> dict[str, Floats]:
@@ -125,7 +125,7 @@ def inertial_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
     error = seen.error(name)
     if error.imu is None:
         return
-    axes, place, state = seen.axes(name), PLATFORMS.index(name), getattr(seen.geometry, name)
+    axes, platform_index, state = seen.axes(name), PLATFORMS.index(name), getattr(seen.geometry, name)
     stated = None if error.lever_arm is None else error.lever_arm.arm
     arm = None if stated is None else arm_at(state, stated, seen.exact.times)
     force = seen.vector(specific_force(seen.mission, state))
@@ -139,10 +139,10 @@ def inertial_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
         along = seen.along(name, directions)
         row = _at_mid_aperture(seen.mission, index, along)
         if arm is not None and kind in TILTS:
-            published, full = _with_arm(seen, place, kind, directions, about, arm)
+            published, full = _with_arm(seen, platform_index, kind, directions, about, arm)
         else:
             published = RandomEffect(row[0], row[1], row[2] / seen.factor, *_moved_by_imu(seen, kind, along))
-            full = _over_aperture(seen, place, kind, directions)
+            full = _over_aperture(seen, platform_index, kind, directions)
         yield RandomError(
             subject=subject(name, "imu", kind),
             unit=unit_of_figure,
@@ -151,25 +151,27 @@ def inertial_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
             published=published,
             full=full,
             spreads=kind in NOISE,
-            moves=_moves_by_imu(seen, place, kind, directions, about, arm) if seen.has_edge else (),
+            moves=_moves_by_imu(seen, platform_index, kind, directions, about, arm) if seen.has_edge else (),
         )
 
 
 def _moves_by_imu(
-    seen: SensorCases, place: int, kind: str, directions: Floats, about: Floats, arm: Floats | None
+    seen: SensorCases, platform_index: int, kind: str, directions: Floats, about: Floats, arm: Floats | None
 ) -> tuple[Moves, ...]:
     """How a unit moves a platform: by the acceleration it makes, (axes, 3, cases) [m/s²/unit], and with an arm."""
     ways, half = directions[:, :, None], seen.exact.half
     if arm is None or kind not in TILTS:
         courses = _courses(kind, len(seen.exact.times))
-        return (Moves(place, ways, courses[..., None] * half ** (_GROWS[kind] / 2)),)
+        return (Moves(platform_index, ways, courses[..., None] * half ** (_GROWS[kind] / 2)),)
     swings = swung(about, arm)
     if kind != "angle_random_walk":
         order, times = (2 if kind == "attitude" else 3), seen.exact.times
         grows, swing = times**order / math.factorial(order), times ** (order - 2)
-        return Moves(place, ways, grows[None]), Moves(place, swings, swing[None])
+        return Moves(platform_index, ways, grows[None]), Moves(platform_index, swings, swing[None])
     twice, once = _courses_of_both_walks(len(seen.exact.times))
-    return Moves(place, ways, twice[..., None] * half**2.5), Moves(place, swings, once[..., None] * half**0.5)
+    return Moves(platform_index, ways, twice[..., None] * half**2.5), Moves(
+        platform_index, swings, once[..., None] * half**0.5
+    )
 
 
 def _at_mid_aperture(mission: Mission, index: int, along: Any) -> tuple[Any, ...]:
@@ -190,12 +192,12 @@ def _moved_by_imu(seen: SensorCases, kind: str, along: Floats) -> list[Any]:
     return seen.moved(constant * scale, linear * scale)
 
 
-def _over_aperture(seen: SensorCases, place: int, kind: str, directions: Floats) -> RandomEffect:
+def _over_aperture(seen: SensorCases, platform_index: int, kind: str, directions: Floats) -> RandomEffect:
     """Effect of a unit by the full model over the exact paths; `directions` (axes, 3, cases) are its acceleration.
 
     What a unit moves over an aperture grows as a power of half the aperture time from that over an aperture of 2 s.
     """
-    count, along = len(seen.exact.times), seen.range_errors(place, directions[:, :, None])
+    count, along = len(seen.exact.times), seen.range_errors(platform_index, directions[:, :, None])
     scale = seen.exact.half ** _GROWS[kind]
     if kind not in NOISE:
         courses = along * (_courses(kind, count)[0, :, None] * np.sqrt(scale))
@@ -227,13 +229,13 @@ def _courses(kind: str, count: int) -> Floats:
 # ---------------------------------------------------------------------- lever arms
 def body_axes(state: PlatformState, times: Floats) -> Floats:
     """Axes of a platform's body, along, cross and up of its velocity at slow times [s], (axes, 3, *times.shape)."""
-    u, v, w = (np.broadcast_to(part, times.shape) for part in state.at(times)[1])
+    u, v, w = (np.broadcast_to(component, times.shape) for component in state.at(times)[1])
     if np.any(state.is_still):
         u, v, w = (np.where(state.is_still, *both) for both in ((1.0, u), (0.0, v), (0.0, w)))
     with np.errstate(all="ignore"):
         along = without_rounding(unit((u, v, w)))
-        left = without_rounding(unit((-v, u, 0.0 * w)))
-    return np.array((along, left, cross(along, left)))
+        to_left = without_rounding(unit((-v, u, 0.0 * w)))
+    return np.array((along, to_left, cross(along, to_left)))
 
 
 def arm_at(state: PlatformState, arm: Any, times: Floats) -> Floats:
@@ -256,7 +258,7 @@ def lever_arm_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
     lever: LeverArm | None = error.lever_arm
     if lever is None:
         return
-    place, state, times = PLATFORMS.index(name), getattr(seen.geometry, name), seen.exact.times
+    platform_index, state, times = PLATFORMS.index(name), getattr(seen.geometry, name), seen.exact.times
     key = ("platforms", name, "motion_error")
     if lever.arm is not None:
         declared, axes = None, seen.axes(name)
@@ -264,55 +266,57 @@ def lever_arm_errors(seen: SensorCases, name: str) -> Iterator[RandomError]:
         if attitude is not None:
             declared, sizes = parts_of_largest(seen.vector(attitude))
             declared, axes = declared * seen.factor, axes * sizes[:, None]
-        published, full = seen.of_motion(place, swung(axes, arm_at(state, lever.arm, times)))
-        is_of_part = error.key_of("attitude") != "attitude"
-        path: KeyPath = (*key, "sensor") if is_of_part else (*key, "imu", "attitude")
-        what = subject(name, "lever_arm", "attitude")
+        published, full = seen.of_motion(platform_index, swung(axes, arm_at(state, lever.arm, times)))
+        is_of_sensor = error.key_of("attitude") != "attitude"
+        path: KeyPath = (*key, "sensor") if is_of_sensor else (*key, "imu", "attitude")
+        row_subject = subject(name, "lever_arm", "attitude")
         counted = subject(name, "imu", "attitude").id
-        yield RandomError(what, "rad", declared, path, published, full, spreads=False, counted_in=counted)
+        yield RandomError(row_subject, "rad", declared, path, published, full, spreads=False, counted_in=counted)
     if lever.uncertainty is not None:
         declared, sizes = parts_of_largest(seen.vector(lever.uncertainty))
         ways = body_axes(state, times) * sizes[:, None, None]
-        published, full = seen.of_motion(place, ways)
-        what = subject(name, "lever_arm", "uncertainty")
+        published, full = seen.of_motion(platform_index, ways)
+        row_subject = subject(name, "lever_arm", "uncertainty")
         path = (*key, "lever_arm", "uncertainty")
-        moves = (Moves(place, ways, np.ones((1, len(times), 1))),)
-        yield RandomError(what, "m", declared * seen.factor, path, published, full, spreads=False, moves=moves)
+        moves = (Moves(platform_index, ways, np.ones((1, len(times), 1))),)
+        yield RandomError(row_subject, "m", declared * seen.factor, path, published, full, spreads=False, moves=moves)
 
 
 def _with_arm(
-    seen: SensorCases, place: int, kind: str, directions: Floats, about: Floats, arm: Floats
+    seen: SensorCases, platform_index: int, kind: str, directions: Floats, about: Floats, arm: Floats
 ) -> tuple[RandomEffect, RandomEffect]:
     """Effects by both models of a unit of tilt about axes (axes, 3, cases), or of its rate or noise, with an arm.
 
     `directions` (axes, 3, cases) is what it makes of the specific force [m/s²/unit], `arm` the arm at the nodes. [m]
     """
-    state, times = seen.geometry.both[place], seen.exact.times
+    state, times = seen.geometry.both[platform_index], seen.exact.times
     swings = swung(about, arm)
     if kind != "angle_random_walk":
         order = 2 if kind == "attitude" else 3
         grows = times**order / math.factorial(order)
-        return seen.of_motion(place, directions[:, :, None] * grows + swings * times ** (order - 2))
+        return seen.of_motion(platform_index, directions[:, :, None] * grows + swings * times ** (order - 2))
     # The tilt walks, and twice integrated it is a position: two walks, of which each axis has its own.
-    along = [seen.range_errors(place, one) for one in (directions[:, :, None], swings)]
-    stated = seen.error(PLATFORMS[place]).lever_arm
+    along = [seen.range_errors(platform_index, way) for way in (directions[:, :, None], swings)]
+    stated = seen.error(PLATFORMS[platform_index]).lever_arm
     assert stated is not None
     at_middle = swung(about, arm_at(state, stated.arm, np.zeros((1, seen.cases))))[:, :, 0]
-    held = [np.einsum("ac,eac->ec", seen.vector(state.look), one) for one in (directions, at_middle)]
+    at_mid_aperture = [np.einsum("ac,eac->ec", seen.vector(state.look), way) for way in (directions, at_middle)]
     fit, half, k, count = seen.exact.fit, seen.exact.half, seen.exact.k, len(times)
-    covariance, beyond, orders, left = (np.zeros(()) for _ in range(4))
+    covariance, beyond, orders, beyond_cubic = (np.zeros(()) for _ in range(4))
     for (i, a), (j, b) in product(enumerate((2, 0)), repeat=2):  # how often each is integrated
         walk, scale = _walks(a, b, count), half ** (a + b + 1)
         moved = np.einsum("anc,amc->nmc", along[i], along[j])
         covariance = covariance + scale * walk.at_nodes[..., None] * moved
         beyond = beyond + scale * walk.beyond * (fit[0] @ np.einsum("nnc->nc", moved))
-        power = scale * (held[i] * held[j]).sum(axis=0)
+        power = scale * (at_mid_aperture[i] * at_mid_aperture[j]).sum(axis=0)
         orders = orders + np.diagonal(fit @ walk.at_nodes @ fit.T)[:, None] * power
-        left = left + walk.left * power
-    constant, linear, own, own_cubic = np.maximum(orders, 0.0)
+        beyond_cubic = beyond_cubic + walk.left * power
+    constant, linear, quadratic_power, cubic_power = np.maximum(orders, 0.0)
     # What spreads is a mean power, which has no coverage factor.
-    spread = k * np.sqrt(np.maximum(left, 0.0)) / seen.factor
-    published = RandomEffect(k * np.sqrt(own), k * np.sqrt(own_cubic), spread, *seen.moved(constant, linear))
+    spread = k * np.sqrt(np.maximum(beyond_cubic, 0.0)) / seen.factor
+    published = RandomEffect(
+        k * np.sqrt(quadratic_power), k * np.sqrt(cubic_power), spread, *seen.moved(constant, linear)
+    )
     return published, seen.of_process(np.asarray(covariance), beyond)
 
 

@@ -50,25 +50,34 @@ def felt(mission: Mission, name: str) -> Felt | None:
     oscillator: Oscillator | None = platform.oscillator
     if oscillator is None or oscillator.acceleration_sensitivity is None:
         return None
-    own = oscillator.vibration
-    vibration = platform.motion_error.vibration if own is None else own
-    return Felt(vibration, oscillator.acceleration_sensitivity, own is not None)
+    felt_vibration = oscillator.vibration
+    vibration = platform.motion_error.vibration if felt_vibration is None else felt_vibration
+    return Felt(vibration, oscillator.acceleration_sensitivity, felt_vibration is not None)
 
 
 def lacks_a_spectrum(mission: Mission, name: str) -> Any:
     """Whether an oscillator feels a wideband vibration, in which cases: its phase f₀Γ·4π²·f·σ/g needs a frequency."""
-    one = felt(mission, name)
-    if one is None or not isinstance(one.vibration, Vibration) or one.vibration.wideband is None:
+    felt_vibration = felt(mission, name)
+    if (
+        felt_vibration is None
+        or not isinstance(felt_vibration.vibration, Vibration)
+        or felt_vibration.vibration.wideband is None
+    ):
         return False
-    rms, is_heard = one.vibration.wideband.rms, name == "receiver" or not mission.has_direct_path
-    return is_heard & (np.asarray(rms if not isinstance(rms, tuple) else sum(rms)) * one.sensitivity > 0)
+    rms, is_heard = felt_vibration.vibration.wideband.rms, name == "receiver" or not mission.has_direct_path
+    return is_heard & (np.asarray(rms if not isinstance(rms, tuple) else sum(rms)) * felt_vibration.sensitivity > 0)
 
 
 def is_unshaken(mission: Mission, name: str) -> bool:
     """Whether an oscillator is sensitive to acceleration, and the file has neither vibration nor turn for it."""
-    one = felt(mission, name)
+    felt_vibration = felt(mission, name)
     is_heard = name == "receiver" or not mission.has_direct_path
-    if one is None or not is_heard or not np.any(one.sensitivity) or one.vibration.is_stated:
+    if (
+        felt_vibration is None
+        or not is_heard
+        or not np.any(felt_vibration.sensitivity)
+        or felt_vibration.vibration.is_stated
+    ):
         return False
     return not flies_a_turn(mission, name)
 
@@ -113,21 +122,25 @@ def accelerated_tones(mission: Mission, geometry: BistaticGeometry | None = None
 
     `geometry` is that of many cases, where numbers of the mission are arrays.
     """
-    found = []
+    tones = []
     for name in PLATFORMS[mission.has_direct_path :]:
-        one = felt(mission, name)
-        if one is None:
+        felt_vibration = felt(mission, name)
+        if felt_vibration is None:
             continue
-        for index, line in enumerate(one.vibration.sinusoidal):
-            left = left_of_tone(line.frequency, mission, geometry or mission.geometry)
+        for index, line in enumerate(felt_vibration.vibration.sinusoidal):
+            remaining = left_of_tone(line.frequency, mission, geometry or mission.geometry)
             a = norm(line.acceleration) if isinstance(line.acceleration, tuple) else line.acceleration
             free = mission.radar.center_frequency * a / line.frequency
             # Axes may vibrate in any phase: then a quarter of a turn is not certain.
-            is_apart = one.is_own or isinstance(line.amplitude, tuple)
+            is_apart = felt_vibration.is_own or isinstance(line.amplitude, tuple)
             shared = None if is_apart else subject(name, "vibration", "sinusoidal", entry=index).id
-            echo = left.echo(mission)
-            found.append(AcceleratedTone(name, index, line.frequency, a, free, one.sensitivity, left, echo, shared))
-    return found
+            echo = remaining.echo(mission)
+            tones.append(
+                AcceleratedTone(
+                    name, index, line.frequency, a, free, felt_vibration.sensitivity, remaining, echo, shared
+                )
+            )
+    return tones
 
 
 def oscillator_acceleration(seen: SensorCases, name: str) -> Iterator[RandomError]:
@@ -135,26 +148,28 @@ def oscillator_acceleration(seen: SensorCases, name: str) -> Iterator[RandomErro
 
     Its unit is that of the sensitivity. Faster tones have rows of their own.
     """
-    one = felt(seen.mission, name)
-    if one is None:
+    felt_vibration = felt(seen.mission, name)
+    if felt_vibration is None:
         return
-    published, full = seen.of_parts(_vibrating(seen, name, one))
+    published, full = seen.of_parts(_vibrating(seen, name, felt_vibration))
     # From direct path to echo a turn changes next to nothing.
     turn = None if seen.mission.has_direct_path else _turning(seen, name)
     if turn is not None:
         published, full = _together(published, turn[0]), _together(full, turn[1])
     published, full = (effect._replace(spread=effect.spread / seen.factor) for effect in (published, full))
     path = ("platforms", name, "oscillator", "acceleration_sensitivity")
-    what = subject(name, "oscillator", "acceleration")
-    yield RandomError(what, "s^2/m", one.sensitivity * seen.factor + np.zeros(seen.cases), path, published, full)
+    row_subject = subject(name, "oscillator", "acceleration")
+    yield RandomError(
+        row_subject, "s^2/m", felt_vibration.sensitivity * seen.factor + np.zeros(seen.cases), path, published, full
+    )
 
 
-def _vibrating(seen: SensorCases, name: str, one: Felt) -> Parts:
+def _vibrating(seen: SensorCases, name: str, felt_vibration: Felt) -> Parts:
     """Parts of the range error by a unit of Γ: of a spectrum, and of slow tones in their worst phases. [m²/unit²]"""
     mission, total = seen.mission, np.zeros((len(Parts._fields), seen.cases))
     if mission.has_direct_path and name == "transmitter":  # it drops out
         return Parts(*total)
-    sync, vibration = mission.synchronization, one.vibration
+    sync, vibration = mission.synchronization, felt_vibration.vibration
     if vibration.spectrum is not None:
         interval = None if sync is None else sync.interval
         delay = seen.geometry.echo_delay if mission.has_direct_path else None
@@ -192,15 +207,17 @@ def turn_courses(state: PlatformState, moments: Floats, interval: Any = None) ->
 
     if interval is None:
         return gained(moments)
-    found = []
+    courses = []
     for start in range(_STARTS):
         offset = interval * start / _STARTS
         before = np.floor((moments - offset) / interval) * interval + offset
-        part = (moments - before) / interval
-        whole, joined = gained(moments), gained(before) * (1 - part) + gained(before + interval) * part
-        left = whole - joined  # of a constant acceleration rounding alone
-        found.append(np.where(np.abs(left) > ROUNDING * np.abs(whole).max(), left, 0.0) / math.sqrt(_STARTS))
-    return np.concatenate(found)
+        fraction = (moments - before) / interval
+        exact_gain, joined = gained(moments), gained(before) * (1 - fraction) + gained(before + interval) * fraction
+        remaining = exact_gain - joined  # of a constant acceleration rounding alone
+        courses.append(
+            np.where(np.abs(remaining) > ROUNDING * np.abs(exact_gain).max(), remaining, 0.0) / math.sqrt(_STARTS)
+        )
+    return np.concatenate(courses)
 
 
 def _falls(mission: Mission, state: PlatformState) -> Any:
@@ -215,20 +232,20 @@ def flies_a_turn(mission: Mission, name: str) -> bool:
     return bool(np.any(bends & ~np.asarray(_falls(mission, state))))
 
 
-def _together(one: RandomEffect, other: RandomEffect) -> RandomEffect:
+def _together(first: RandomEffect, second: RandomEffect) -> RandomEffect:
     """Effect of two independent errors that grow alike."""
-    quadratic, cubic, spread, east, north = (np.hypot(*both) for both in zip(one[:5], other[:5], strict=True))
-    is_known = one.covariance is not None and other.covariance is not None
-    covariance = one.covariance + other.covariance if is_known else None
-    hidden, rest = np.hypot(one.hidden, other.hidden), np.hypot(one.rest, other.rest)
-    return RandomEffect(quadratic, cubic, spread, east, north, covariance, hidden, rest)
+    quadratic, cubic, spread, east, north = (np.hypot(*both) for both in zip(first[:5], second[:5], strict=True))
+    has_covariance = first.covariance is not None and second.covariance is not None
+    covariance = first.covariance + second.covariance if has_covariance else None
+    hidden, higher_orders = np.hypot(first.hidden, second.hidden), np.hypot(first.rest, second.rest)
+    return RandomEffect(quadratic, cubic, spread, east, north, covariance, hidden, higher_orders)
 
 
 def pieces_by_acceleration(mission: Mission, name: str) -> tuple[PowerLawPiece, ...]:
     """Spectrum of an oscillator's phase by random vibration, of a unit of Γ; empty without one. [rad²/Hz/unit²]"""
-    one = felt(mission, name)
+    felt_vibration = felt(mission, name)
     is_heard = not mission.has_direct_path or name == "receiver"
-    if one is None or one.vibration.spectrum is None or not is_heard:
+    if felt_vibration is None or felt_vibration.vibration.spectrum is None or not is_heard:
         return ()
-    factor = mission.radar.center_frequency**2 * float(power_of(one.vibration))
-    return spectrum_pieces(one.vibration.spectrum, (factor, PHASE[1]))
+    factor = mission.radar.center_frequency**2 * float(power_of(felt_vibration.vibration))
+    return spectrum_pieces(felt_vibration.vibration.spectrum, (factor, PHASE[1]))

@@ -47,7 +47,7 @@ class LeftTone(NamedTuple):
         """Amplitude of the largest echo; of all together by their powers where PSLR does not hold tones."""
         echoes = self.echoes(mission.collection.aperture_time)
         if mission.requirements.pslr is None:
-            return np.sqrt(sum(np.square(one) for one in echoes))
+            return np.sqrt(sum(np.square(amplitude) for amplitude in echoes))
         return np.max(np.broadcast_arrays(*echoes), axis=0)[()]
 
     def slowest_echo(self, aperture_time: Any) -> Any:
@@ -73,12 +73,12 @@ class LeftTone(NamedTuple):
             cycles = frequency * aperture_time
             if not np.any(cycles < SLOWEST):
                 continue
-            quadratic, cubic, left, constant, linear = tone(math.pi * np.minimum(cycles, SLOWEST))
-            parts = np.array((quadratic, cubic, np.sqrt(left), constant, linear))
-            total = total + np.where(cycles < SLOWEST, share, 0.0) * parts
-        quadratic, cubic, left, constant, linear = total
+            quadratic, cubic, spread, constant, linear = tone(math.pi * np.minimum(cycles, SLOWEST))
+            tone_orders = np.array((quadratic, cubic, np.sqrt(spread), constant, linear))
+            total = total + np.where(cycles < SLOWEST, share, 0.0) * tone_orders
+        quadratic, cubic, spread, constant, linear = total
         products = (-constant * quadratic, -linear * cubic)
-        return Parts(quadratic**2, cubic**2, left**2, constant**2, linear**2, *products)
+        return Parts(quadratic**2, cubic**2, spread**2, constant**2, linear**2, *products)
 
 
 def left_of_tone(frequency: Any, mission: Mission, geometry: BistaticGeometry) -> LeftTone:
@@ -90,9 +90,12 @@ def left_of_tone(frequency: Any, mission: Mission, geometry: BistaticGeometry) -
         return LeftTone((frequency,), (1.0,))
     turns = frequency * np.asarray(sync.interval)
     folds = [np.rint(turns) + n for n in range(-_NEIGHBOURS, _NEIGHBOURS + 1)]
-    places = [np.abs(turns - fold) for fold in folds]
-    folded = [np.where(fold == 0, 0.0, np.sinc(place) ** 2)[()] for fold, place in zip(folds, places, strict=True)]
-    frequencies = (frequency, *(place / sync.interval for place in places))
+    folded_turns = [np.abs(turns - fold) for fold in folds]
+    folded = [
+        np.where(fold == 0, 0.0, np.sinc(folded_turn) ** 2)[()]
+        for fold, folded_turn in zip(folds, folded_turns, strict=True)
+    ]
+    frequencies = (frequency, *(folded_turn / sync.interval for folded_turn in folded_turns))
     return LeftTone(frequencies, (1 - np.sinc(turns) ** 2, *folded))
 
 
@@ -132,13 +135,13 @@ def spurs_of(mission: Mission, geometry: BistaticGeometry | None = None) -> list
 
     `geometry` is that of many cases, where numbers of the mission are arrays.
     """
-    found = []
+    spurs = []
     for name in PLATFORMS[mission.has_direct_path :]:
         oscillator = getattr(mission.platforms, name).oscillator
         for index, (frequency, level) in enumerate(oscillator.spurs if oscillator is not None else ()):
             scale = mission.radar.center_frequency / oscillator.frequency
-            left = left_of_tone(frequency, mission, geometry or mission.geometry)
+            remaining = left_of_tone(frequency, mission, geometry or mission.geometry)
             # A sideband of a phase φ has the amplitude φ/2 of the carrier.
             free = 2 * 10 ** (level / 20) * scale
-            found.append(Spur(name, index, frequency, free, left, left.echo(mission)))
-    return found
+            spurs.append(Spur(name, index, frequency, free, remaining, remaining.echo(mission)))
+    return spurs

@@ -123,12 +123,12 @@ def fitted(points: Points, bandwidth: float, aperture_time: float) -> Fit:
     per_term = evaluators.power_law_parts(aperture_time)[0]
 
     def phase(fit: Fit) -> float:
-        return math.fsum(value * part for value, part in zip(fit.law, reversed(per_term), strict=True))
+        return math.fsum(value * per_unit for value, per_unit in zip(fit.law, reversed(per_term), strict=True))
 
     best = Fit(math.inf, PowerLaw())
-    for found in _fits(points, bandwidth):
-        least = min(fit.misfit for fit in found)
-        fits = max((fit for fit in found if fit.misfit <= 1.1 * least), key=phase)
+    for candidates in _fits(points, bandwidth):
+        least = min(fit.misfit for fit in candidates)
+        fits = max((fit for fit in candidates if fit.misfit <= 1.1 * least), key=phase)
         if fits.misfit < 0.9 * best.misfit and best.misfit > _DESCRIBES:
             best = fits
     return best
@@ -139,10 +139,13 @@ def _fits(points: Points, bandwidth: float) -> tuple[tuple[Fit, ...], ...]:
     """Fit every choice of one term, of two and so on, none of them negative."""
     terms = 4  # white and flicker phase noise have nearly the same Allan variance
     basis = [allan_variances(tau, bandwidth) for tau, _ in points]
-    scaled = [[one / deviation**2 for one in row[:terms]] for row, (_, deviation) in zip(basis, points, strict=True)]
+    scaled = [
+        [variance / deviation**2 for variance in row[:terms]]
+        for row, (_, deviation) in zip(basis, points, strict=True)
+    ]
     fits = []
     for count in range(1, min(terms, len(points)) + 1):
-        found = []
+        fits_of_count = []
         for chosen in combinations(range(terms), count):
             if any(row[index] <= 0 for row in scaled for index in chosen):  # of a narrow band
                 continue
@@ -155,9 +158,9 @@ def _fits(points: Points, bandwidth: float) -> tuple[tuple[Fit, ...], ...]:
             worst = max(
                 abs(math.sqrt(math.fsum(a * b for a, b in zip(row, h[:terms], strict=True))) - 1) for row in scaled
             )
-            found.append(Fit(max(worst, _EXACT), PowerLaw(*h)))
-        if found:
-            fits.append(tuple(found))
+            fits_of_count.append(Fit(max(worst, _EXACT), PowerLaw(*h)))
+        if fits_of_count:
+            fits.append(tuple(fits_of_count))
     return tuple(fits)
 
 
@@ -202,14 +205,14 @@ def oscillator_noise(seen: SensorCases, name: str) -> Iterator[RandomError]:
     oscillator: Oscillator | None = getattr(mission.platforms, name).oscillator
     if oscillator is None:
         return
-    found = _left_at_1_hz(seen, name, oscillator.noise_alone)
+    noise_parts = _left_at_1_hz(seen, name, oscillator.noise_alone)
     scale = mission.radar.center_frequency**2 * 10 ** (np.asarray(oscillator.level) / 10)
-    tones = np.zeros_like(found)
+    tones = np.zeros_like(noise_parts)
     for spur in spurs_of(mission, seen.geometry):
         slow = spur.slow_parts(seen.aperture_time)
         if spur.name == name and slow is not None:
             tones += slow.rows.reshape(len(tones), -1)
-    published, full = _of_clock(seen, Parts(*found * scale), Parts(*tones))
+    published, full = _of_clock(seen, Parts(*noise_parts * scale), Parts(*tones))
     key = ("platforms", name, "oscillator")
     path = key if oscillator.sensor is None else (*key, "sensor")
     error = RandomError(
@@ -232,13 +235,13 @@ def _continued(seen: SensorCases, name: str, oscillator: Oscillator, scale: Any)
 
 def _is_in_doubt(seen: SensorCases, oscillator: Oscillator) -> Truths:
     """Cases in which the spectrum is another one than the file states: another frequency's, or a poor fit's."""
-    found = np.full(seen.cases, bool(oscillator.mask_at_frequency_of_part))
+    in_doubt = np.full(seen.cases, bool(oscillator.mask_at_frequency_of_part))
     if oscillator.allan_deviation is None:
-        return found
-    for alike, places in seen.alike(oscillator.noise_alone):
-        for place in places.tolist():
-            found[place] |= noise_of(alike, 1.0, float(seen.aperture_time[place])).misfit > POOR_FIT
-    return found
+        return in_doubt
+    for alike, cases in seen.alike(oscillator.noise_alone):
+        for case in cases.tolist():
+            in_doubt[case] |= noise_of(alike, 1.0, float(seen.aperture_time[case])).misfit > POOR_FIT
+    return in_doubt
 
 
 def states_both_terms(mission: Mission) -> bool:
@@ -247,27 +250,28 @@ def states_both_terms(mission: Mission) -> bool:
     return not mission.has_direct_path and timing.constant is not None and timing.linear is not None
 
 
-def _of_clock(seen: SensorCases, found: Parts, tones: Parts) -> tuple[RandomEffect, RandomEffect]:
+def _of_clock(seen: SensorCases, noise: Parts, tones: Parts) -> tuple[RandomEffect, RandomEffect]:
     """Effects by both models of a phase with these parts [rad²]; those of orders 0 and 1 where they are known.
 
     Where the file states both terms of the clock, these stand for orders 0 and 1 of a free oscillator, but not for
     those of its slow `tones`. Orders 2 and 3 displace the image as the line of sight turns, and defocus less by that.
     """
     k, is_stated = 2 * math.pi / np.asarray(seen.mission.radar.wavelength), states_both_terms(seen.mission)
-    quadratic, cubic, spread = np.sqrt(found.rows[:3] + tones.rows[:3])
-    is_known = np.isfinite(found.constant + found.linear)
+    quadratic, cubic, spread = np.sqrt(noise.rows[:3] + tones.rows[:3])
+    has_both_terms = np.isfinite(noise.constant + noise.linear)
     nothing = np.where(is_stated | (quadratic + cubic == 0), 0.0, math.nan)
-    counts = is_known & (not is_stated)
-    known = Parts(*np.where(counts, found.rows, found.of_high_orders.rows) + tones.rows).times(1 / k**2)
+    counts = has_both_terms & (not is_stated)
+    counted = Parts(*np.where(counts, noise.rows, noise.of_high_orders.rows) + tones.rows).times(1 / k**2)
     is_placed = counts | is_stated
     east, north = (
-        np.where(is_placed, one, nothing) for one in seen.moved(known.constant, known.linear, known.constant_linear)
+        np.where(is_placed, sigma, nothing)
+        for sigma in seen.moved(counted.constant, counted.linear, counted.constant_linear)
     )
     published = RandomEffect(quadratic, cubic, spread, east, north)
-    (quadratic, cubic, east, north, hidden), whole = seen.of_orders(known.covariance)
-    whole[2:, :, ~is_placed] = whole[:, 2:, ~is_placed] = 0.0
-    east, north = (np.where(is_placed, one, nothing) for one in (east, north))
-    return published, RandomEffect(quadratic, cubic, spread, east, north, whole, hidden)
+    (quadratic, cubic, east, north, hidden), covariance = seen.of_orders(counted.covariance)
+    covariance[2:, :, ~is_placed] = covariance[:, 2:, ~is_placed] = 0.0
+    east, north = (np.where(is_placed, sigma, nothing) for sigma in (east, north))
+    return published, RandomEffect(quadratic, cubic, spread, east, north, covariance, hidden)
 
 
 def _left_at_1_hz(seen: SensorCases, name: str, oscillator: Oscillator, *, is_below_mask: bool = False) -> Floats:
@@ -279,35 +283,35 @@ def _left_at_1_hz(seen: SensorCases, name: str, oscillator: Oscillator, *, is_be
     the clocks were set, or what a receiver that hears the transmitter has between direct path and echo.
     """
     sync, times = seen.mission.synchronization, seen.aperture_time
-    found = np.zeros((len(Parts._fields), seen.cases))
+    remaining = np.zeros((len(Parts._fields), seen.cases))
     if sync is not None and sync.is_direct_path and name == "transmitter":
-        return found
+        return remaining
     interval = None if sync is None else sync.interval
-    for (alike, exchanged), places in seen.alike((oscillator, interval)):
+    for (alike, exchanged), cases in seen.alike((oscillator, interval)):
         spectra: dict[Any, list[int]] = {}
-        for place in places.tolist():  # an Allan deviation may be fitted otherwise over another aperture
-            pieces = noise_of(alike, 1.0, float(times[place])).pieces
-            spectra.setdefault(pieces[:1] if is_below_mask else pieces, []).append(place)
-        for pieces, some in spectra.items():
-            found[:, some] = _left_of(pieces, exchanged, seen, some).rows
-    return found
+        for case in cases.tolist():  # an Allan deviation may be fitted otherwise over another aperture
+            pieces = noise_of(alike, 1.0, float(times[case])).pieces
+            spectra.setdefault(pieces[:1] if is_below_mask else pieces, []).append(case)
+        for pieces, cases_of_spectrum in spectra.items():
+            remaining[:, cases_of_spectrum] = _left_of(pieces, exchanged, seen, cases_of_spectrum).rows
+    return remaining
 
 
 def _left_of(
-    pieces: Sequence[PowerLawPiece], interval: float | None, seen: SensorCases, some: Sequence[int]
+    pieces: Sequence[PowerLawPiece], interval: float | None, seen: SensorCases, cases_of_spectrum: Sequence[int]
 ) -> Parts:
     """Parts of what is left of a spectrum in some cases, (some,)."""
-    sync, aperture_time = seen.mission.synchronization, seen.aperture_time[some]
+    sync, aperture_time = seen.mission.synchronization, seen.aperture_time[cases_of_spectrum]
     if sync is None or interval is not None:
         return left_parts(pieces, aperture_time, interval)
 
-    def of_some(value: Any) -> Floats:
-        return np.broadcast_to(np.asarray(value), (seen.cases,))[some]
+    def of_cases(value: Any) -> Floats:
+        return np.broadcast_to(np.asarray(value), (seen.cases,))[cases_of_spectrum]
 
     if sync.is_holdover:
-        return set_parts(pieces, aperture_time, of_some(sync.age), of_some(sync.averaging))
+        return set_parts(pieces, aperture_time, of_cases(sync.age), of_cases(sync.averaging))
     # The constant phase between direct path and echo moves nothing.
-    return heard_parts(pieces, aperture_time, of_some(seen.geometry.echo_delay)).without_constant()
+    return heard_parts(pieces, aperture_time, of_cases(seen.geometry.echo_delay)).without_constant()
 
 
 def link_noise(seen: SensorCases) -> Iterator[RandomError]:
@@ -315,15 +319,15 @@ def link_noise(seen: SensorCases) -> Iterator[RandomError]:
     sync = seen.mission.synchronization
     if sync is None or sync.error is None:
         return
-    found = np.zeros((len(Parts._fields), seen.cases))
+    parts = np.zeros((len(Parts._fields), seen.cases))
     if sync.interval is None:  # from pulse to pulse: all of it spreads
-        found[Parts._fields.index("left")] = 1.0
+        parts[Parts._fields.index("left")] = 1.0
     else:
-        for interval, places in seen.alike(sync.interval):
-            times, place = np.unique(seen.aperture_time[places], return_inverse=True)
-            found[:, places] = link_parts(times, interval).rows[:, place]
-    left = Parts(*found).without_constant()  # a constant phase moves nothing
-    published, full = _of_clock(seen, left, Parts(*np.zeros_like(found)))
-    published, full = (one._replace(spread=one.spread / seen.factor) for one in (published, full))
-    what = subject("clock", "synchronization")
-    yield RandomError(what, "rad", sync.error * seen.factor, ("synchronization", "error"), published, full)
+        for interval, cases in seen.alike(sync.interval):
+            times, time_index = np.unique(seen.aperture_time[cases], return_inverse=True)
+            parts[:, cases] = link_parts(times, interval).rows[:, time_index]
+    left = Parts(*parts).without_constant()  # a constant phase moves nothing
+    published, full = _of_clock(seen, left, Parts(*np.zeros_like(parts)))
+    published, full = (effect._replace(spread=effect.spread / seen.factor) for effect in (published, full))
+    row_subject = subject("clock", "synchronization")
+    yield RandomError(row_subject, "rad", sync.error * seen.factor, ("synchronization", "error"), published, full)

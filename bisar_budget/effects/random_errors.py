@@ -29,8 +29,8 @@ from bisar_budget.mission.model import Mission
 
 # Effect of a unit, whichever model: of 1 rad, and of 1 m.
 _CUBIC = RandomEffect(0.0, 1.0, 0.0, 0.0, 0.0, np.diag([0.0, 1.0, 0.0, 0.0])[..., None])
-_PLACE = RandomEffect(0.0, 0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5), np.diag([0.0, 0.0, 0.5, 0.5])[..., None])
-_EFFECTS = {"cubic_phase_error": ("rad", _CUBIC), "location_error": ("m", _PLACE)}
+_DISPLACEMENT = RandomEffect(0.0, 0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5), np.diag([0.0, 0.0, 0.5, 0.5])[..., None])
+_EFFECTS = {"cubic_phase_error": ("rad", _CUBIC), "location_error": ("m", _DISPLACEMENT)}
 
 
 def random_errors(mission: Mission, geometry: BistaticGeometry | None = None, cases: int = 1) -> list[RandomError]:
@@ -41,29 +41,29 @@ def random_errors(mission: Mission, geometry: BistaticGeometry | None = None, ca
     without it all numbers are floats.
     """
     seen = SensorCases(mission, geometry or mission.geometry, cases)
-    found = [error for name in PLATFORMS for error in vibration_spectrum(seen, name)]
-    found += [error for name in PLATFORMS for error in inertial_errors(seen, name)]
-    found += [error for name in PLATFORMS for error in lever_arm_errors(seen, name)]
-    found += [error for name in PLATFORMS for error in position_noise(seen, name)]
-    found += [error for name in PLATFORMS for error in log_noise(seen, name)]
-    found += common_noise(seen)
-    found += [error for name in PLATFORMS for error in oscillator_noise(seen, name)]
-    found += [error for name in PLATFORMS for error in oscillator_acceleration(seen, name)]
-    found += link_noise(seen)
-    found += delay_errors(seen)
-    found += _stated_effects(mission)
-    return [in_one_case(mission, error) for error in found] if geometry is None else found
+    errors = [error for name in PLATFORMS for error in vibration_spectrum(seen, name)]
+    errors += [error for name in PLATFORMS for error in inertial_errors(seen, name)]
+    errors += [error for name in PLATFORMS for error in lever_arm_errors(seen, name)]
+    errors += [error for name in PLATFORMS for error in position_noise(seen, name)]
+    errors += [error for name in PLATFORMS for error in log_noise(seen, name)]
+    errors += common_noise(seen)
+    errors += [error for name in PLATFORMS for error in oscillator_noise(seen, name)]
+    errors += [error for name in PLATFORMS for error in oscillator_acceleration(seen, name)]
+    errors += link_noise(seen)
+    errors += delay_errors(seen)
+    errors += _stated_effects(mission)
+    return [in_one_case(mission, error) for error in errors] if geometry is None else errors
 
 
 def _stated_effects(mission: Mission) -> Iterator[RandomError]:
     """Cubic phases and displacements from elsewhere, those that the file states."""
-    for index, other in enumerate(mission.other_errors):
+    for index, stated in enumerate(mission.other_errors):
         for key, (unit, effect) in _EFFECTS.items():
-            size = getattr(other, key)
+            size = getattr(stated, key)
             if size is not None:
-                what = subject("mission", "other", f"{other.name}.{key}", entry=index)
+                row_subject = subject("mission", "other", f"{stated.name}.{key}", entry=index)
                 yield RandomError(
-                    what, unit, np.abs(size), ("other_errors", index, key), effect, effect, spreads=False
+                    row_subject, unit, np.abs(size), ("other_errors", index, key), effect, effect, spreads=False
                 )
 
 

@@ -52,8 +52,8 @@ def effects_of_courses(exact: ExactRanges, weights: Floats, courses: Floats) -> 
     weighted = weights[:, None] * courses
     effects = weighted.sum(axis=2)
     sizes = np.square(np.abs(weighted).sum(axis=2)).sum(axis=1)
-    left = exact.left_of_small(courses, (effects[2], effects[3]))
-    _, beyond = exact.mean_squares(left, exact.fit @ left)
+    remaining = exact.left_of_small(courses, (effects[2], effects[3]))
+    _, beyond = exact.mean_squares(remaining, exact.fit @ remaining)
     return RangeEffects(np.einsum("fec,gec->fgc", effects, effects), sizes, beyond.sum(axis=0))
 
 
@@ -76,13 +76,13 @@ def effects_of_process(exact: ExactRanges, weights: Floats, covariance: Floats, 
     bends = np.einsum("nm,amc->anc", higher, exact.slopes)
     weighted_bends = exact.mean * bends
     integrals = np.concatenate((weights, weighted_bends))
-    found = np.einsum("fmc,gmc->fgc", np.einsum("fnc,nmc->fmc", integrals, covariance), integrals)
+    products = np.einsum("fmc,gmc->fgc", np.einsum("fnc,nmc->fmc", integrals, covariance), integrals)
     of_bends = np.einsum("anc,bnc->abc", bends, weighted_bends)
-    own = np.einsum("nm,nmc->c", exact.mean * higher, covariance)
-    moved = 2 * (found[8, 2] + found[9, 3]) + np.einsum("abc,abc->c", of_bends, found[2:4, 2:4])
+    power = np.einsum("nm,nmc->c", exact.mean * higher, covariance)
+    moved = 2 * (products[8, 2] + products[9, 3]) + np.einsum("abc,abc->c", of_bends, products[2:4, 2:4])
     spread = np.sqrt(np.maximum(np.einsum("nnc->nc", covariance), 0.0))
     sizes = np.square((np.abs(weights) * spread).sum(axis=1))
-    return RangeEffects(found[:8, :8], sizes, own + moved + beyond)
+    return RangeEffects(products[:8, :8], sizes, power + moved + beyond)
 
 
 def effects_of_gauss_markov(
@@ -102,8 +102,8 @@ def effects_of_gauss_markov(
         Whether the phase has the other sign than the group, as free electrons make it: then the mean of the group
         counts, and everything else with the other sign.
     """
-    ratios, place = np.unique(np.broadcast_to(ratio, exact.half.shape), return_inverse=True)
-    departure = departure_at_nodes(len(exact.times), ratios)[..., place.ravel()]
+    ratios, ratio_index = np.unique(np.broadcast_to(ratio, exact.half.shape), return_inverse=True)
+    departure = departure_at_nodes(len(exact.times), ratios)[..., ratio_index.ravel()]
     courses = courses + np.zeros_like(exact.times)
     covariance = np.einsum("enc,emc->nmc", courses, courses) * departure
     # The correlation departs by nothing at no lag: what the orders have of it lacks in those beyond.
@@ -115,8 +115,8 @@ def effects_of_gauss_markov(
         courses = 2 * (mean @ courses)[:, None] - courses
     staying = effects_of_courses(exact, weights, courses)
     departing = effects_of_process(exact, weights, covariance, beyond)
-    whole = staying.covariance + departing.covariance
-    return RangeEffects(whole, staying.sizes, np.maximum(staying.left + departing.left, 0.0))
+    total = staying.covariance + departing.covariance
+    return RangeEffects(total, staying.sizes, np.maximum(staying.left + departing.left, 0.0))
 
 
 def departure_at_nodes(count: int, ratios: Floats) -> Floats:
@@ -154,11 +154,11 @@ def _lagged(count: int) -> tuple[Floats, Floats]:
     width = np.diff(edges)
     lags = (edges[:-1, None] + width[:, None] * (x + 1) / 2).ravel()
     weights = (width[:, None] / 2 * w).ravel()
-    places, of_places = np.polynomial.legendre.leggauss(count)  # exact for products of two orders
+    abscissas, weights_of_abscissas = np.polynomial.legendre.leggauss(count)  # exact for products of two orders
     half = 1 - lags[:, None] / 2
-    early = -1 + half * (places + 1)
+    early = -1 + half * (abscissas + 1)
     values = np.polynomial.legendre.legvander(early, count - 1)
     late = np.polynomial.legendre.legvander(early + lags[:, None], count - 1)
-    products = np.einsum("ls,lsm,lsn->lmn", half * of_places, values, late, optimize=True)
+    products = np.einsum("ls,lsm,lsn->lmn", half * weights_of_abscissas, values, late, optimize=True)
     products = products + np.swapaxes(products, 1, 2)
     return lags, products * weights[:, None, None]

@@ -50,8 +50,8 @@ class TonePhases:
 
     def axes(self) -> list["TonePhases"]:
         """Those of each axis alone."""
-        parts = (self.quadratics, self.cubics, self.hiddens, self.rests)
-        return [TonePhases(*(part[[axis]] for part in parts)) for axis in range(len(self.quadratics))]
+        phases = (self.quadratics, self.cubics, self.hiddens, self.rests)
+        return [TonePhases(*(phase[[axis]] for phase in phases)) for axis in range(len(self.quadratics))]
 
     @cached_property
     def quadratic(self) -> Floats:
@@ -93,9 +93,9 @@ class SlowTone(NamedTuple):
 
 def slow_tones(mission: Mission, geometry: BistaticGeometry, cases: int) -> dict[str, SlowTone]:
     """Every declared vibration that has fewer than three cycles per aperture in any case, by the id of its row."""
-    T, is_heard, found = mission.collection.aperture_time, mission.has_direct_path, dict[str, SlowTone]()
+    T, is_heard, slow = mission.collection.aperture_time, mission.has_direct_path, dict[str, SlowTone]()
     exact: ExactRanges | None = None
-    for place, name in enumerate(PLATFORMS):
+    for platform_index, name in enumerate(PLATFORMS):
         error: MotionError = getattr(mission.platforms, name).motion_error
         for index, line in enumerate(error.vibration.sinusoidal):
             is_there = np.broadcast_to(np.asarray(line.frequency * T < ECHO_CYCLES), (cases,))
@@ -104,34 +104,36 @@ def slow_tones(mission: Mission, geometry: BistaticGeometry, cases: int) -> dict
             if exact is None:
                 count = nodes_for(geometry, T, has_direct_path=is_heard)
                 exact = exact_ranges(mission, geometry, max(FINE, int(np.max(count))), cases)
-            tone = _Tone(exact, place, line.frequency)
+            tone = _Tone(exact, platform_index, line.frequency)
             value, hears_all = line.displacement, not (is_heard or isinstance(line.displacement, tuple))
             if hears_all:  # and what its displacement adds in second order is a rounding of it
                 of_axes = tone.of_range(value)[None]
             else:
-                x, y, z = (track / exact.ranges[place] for track in exact.tracks[place])
+                x, y, z = (track / exact.ranges[platform_index] for track in exact.tracks[platform_index])
                 axes, sizes = [(x, y, z)], (value,)
                 if isinstance(value, tuple):
                     axes, sizes = getattr(geometry, name).frame(error.frame), value
                 of_axes = np.array([tone.of(axis, size) for axis, size in zip(axes, sizes, strict=True)])
             declared, of_metre = TonePhases(*np.moveaxis(of_axes, 1, 0)), TonePhases(*tone.of_range(1.0)[:, None])
-            what = subject(name, "vibration", "sinusoidal", entry=index)
-            found[what.id] = SlowTone(what, is_there, of_metre, declared, not hears_all)
-    return found
+            row_subject = subject(name, "vibration", "sinusoidal", entry=index)
+            slow[row_subject.id] = SlowTone(row_subject, is_there, of_metre, declared, not hears_all)
+    return slow
 
 
-def slow_phases(mission: Mission, found: Mapping[str, SlowTone], gain: Any) -> list[DeclaredPhase]:
+def slow_phases(mission: Mission, slow: Mapping[str, SlowTone], gain: Any) -> list[DeclaredPhase]:
     """Phases of the vibrations below one cycle per aperture, which count with those of other errors."""
     T, phases = mission.collection.aperture_time, []
-    for row_id, one in found.items():
-        line = getattr(mission.platforms, one.subject.owner).motion_error.vibration.sinusoidal[one.subject.entry or 0]
+    for row_id, tone in slow.items():
+        line = getattr(mission.platforms, tone.subject.owner).motion_error.vibration.sinusoidal[
+            tone.subject.entry or 0
+        ]
         is_slow = np.asarray(line.frequency * T < SLOWEST)[()]
         if np.any(is_slow):
-            does = one.declared
+            does = tone.declared
             quadratic, cubic, hidden = (
-                np.where(is_slow, part, 0.0) for part in (does.quadratic, does.cubic, does.hidden(gain))
+                np.where(is_slow, phase_part, 0.0) for phase_part in (does.quadratic, does.cubic, does.hidden(gain))
             )
-            phase = DeclaredPhase(row_id, one.subject.owner, quadratic, cubic, is_there=is_slow)
+            phase = DeclaredPhase(row_id, tone.subject.owner, quadratic, cubic, is_there=is_slow)
             phases.append(phase._replace(hidden_rad=hidden))
     return phases
 
@@ -139,8 +141,8 @@ def slow_phases(mission: Mission, found: Mapping[str, SlowTone], gain: Any) -> l
 class _Tone:
     """A frequency of a platform's motion in many cases."""
 
-    def __init__(self, exact: ExactRanges, place: int, frequency: Any) -> None:
-        self.exact, self.place = exact, place
+    def __init__(self, exact: ExactRanges, platform_index: int, frequency: Any) -> None:
+        self.exact, self.platform_index = exact, platform_index
         self.angle = 2 * math.pi * frequency * exact.times
 
     def of_range(self, size: Any) -> Floats:
@@ -151,46 +153,49 @@ class _Tone:
         exact = self.exact
         range_error = np.array((np.cos(self.angle), -np.sin(self.angle))) * size
         effect = exact.effect(range_error)
-        left = exact.left_of_small(range_error, (effect.east, effect.north))
+        remaining = exact.left_of_small(range_error, (effect.east, effect.north))
         quadratic, cubic = (TURNED @ both for both in (effect.qpe, effect.cubic))
-        hidden, rest = exact.unresolved(np.tensordot(TURNED, left, 1))
-        return np.array((quadratic, cubic, hidden, rest))
+        hidden, beyond_cubic = exact.unresolved(np.tensordot(TURNED, remaining, 1))
+        return np.array((quadratic, cubic, hidden, beyond_cubic))
 
     def of(self, way: Vectors, size: Any) -> Floats:
         """Effects of a motion along a way, floats, (cases,) or (nodes, cases), of any size [m], as `of_range`."""
         exact, cases = self.exact, self.exact.half.size
-        small, size = self.of_range(exact.along(self.place, way) * size), np.broadcast_to(np.abs(size), (cases,))
+        small, size = (
+            self.of_range(exact.along(self.platform_index, way) * size),
+            np.broadcast_to(np.abs(size), (cases,)),
+        )
         quadratic, cubic, hidden, moved = exact.most_per_metre
         reach = size * (1 + moved)
         grows = reach * reach / exact.nearest_node
-        of_quadratic, of_cubic, of_hidden = (np.abs(part).max(axis=0) for part in small[:3])
+        of_quadratic, of_cubic, of_hidden = (np.abs(phases).max(axis=0) for phases in small[:3])
         share = SHARE * np.hypot(of_quadratic, of_hidden)
         is_large = np.asarray((quadratic + hidden) * grows > np.maximum(FLOOR_RAD, share))
         is_large |= cubic * grows > np.maximum(FLOOR_RAD, SHARE * of_cubic)
-        some = np.flatnonzero(is_large & (size > 0))
-        for first in range(0, some.size, TOGETHER // PHASES):
-            here = some[first : first + TOGETHER // PHASES]
+        large_cases = np.flatnonzero(is_large & (size > 0))
+        for first in range(0, large_cases.size, TOGETHER // PHASES):
+            here = large_cases[first : first + TOGETHER // PHASES]
             small[..., here] = self._of_large(way, size, here)
         return small
 
-    def _of_large(self, way: Vectors, size: Floats, some: Places) -> Floats:
+    def _of_large(self, way: Vectors, size: Floats, cases: Places) -> Floats:
         """The same in some cases by exact ranges.
 
         Where no ground point has the range history of a phase, that of the whole motion stands for each.
         """
-        case, turned = np.repeat(some, PHASES), np.tile(ANGLES, some.size)
+        case, turned = np.repeat(cases, PHASES), np.tile(ANGLES, cases.size)
         angle = self.angle[:, case] if self.angle.shape[1] > 1 else self.angle
         course = size[case] * np.cos(angle + turned)
-        moved = [_of_case(part, case) * course for part in way]
-        shifts = [moved, STILL] if self.place == 0 else [STILL, moved]
+        moved = [_of_case(component, case) * course for component in way]
+        shifts = [moved, STILL] if self.platform_index == 0 else [STILL, moved]
         point = followed(self.exact, np.zeros_like(course), shifts, case)
-        found = np.array((point.quadratic, point.cubic, point.hidden, point.rest))
-        found = np.moveaxis(found.reshape(4, some.size, PHASES), 2, 1)
-        return np.where(np.isnan(found), 2 * self.exact.k[some] * size[some], found)
+        phases = np.array((point.quadratic, point.cubic, point.hidden, point.rest))
+        phases = np.moveaxis(phases.reshape(4, cases.size, PHASES), 2, 1)
+        return np.where(np.isnan(phases), 2 * self.exact.k[cases] * size[cases], phases)
 
 
-def _of_case(part: Any, case: Places) -> Any:
-    return part[..., case] if np.ndim(part) and np.shape(part)[-1] > 1 else part
+def _of_case(component: Any, case: Places) -> Any:
+    return component[..., case] if np.ndim(component) and np.shape(component)[-1] > 1 else component
 
 
 def _worst(squares: Floats) -> Floats:

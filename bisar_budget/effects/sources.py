@@ -73,17 +73,17 @@ class ErrorListing:
 
     def listed(self) -> Iterator[ErrorSource]:
         """Every position, velocity, acceleration, clock and other error, in the order of the contract."""
-        for place, name in enumerate(PLATFORMS):
+        for platform_index, name in enumerate(PLATFORMS):
             for kind, unit in MOTION_UNITS.items():
-                yield from self._of_motion(place, name, kind, unit)
+                yield from self._of_motion(platform_index, name, kind, unit)
         yield from self._of_clock()
         yield from self._of_both_platforms()
         yield from self._of_time_tags()
         yield from self._of_terrain()
-        yield from self._others()
+        yield from self._stated_elsewhere()
 
-    def _is_listed(self, what: Subject, declared: Any) -> bool:
-        return declared is not None or self.shown is None or what.id in self.shown
+    def _is_listed(self, row_subject: Subject, declared: Any) -> bool:
+        return declared is not None or self.shown is None or row_subject.id in self.shown
 
     @cached_property
     def _published(self) -> list[Any]:
@@ -93,33 +93,33 @@ class ErrorListing:
             for path in self.geometry.both
         ]
 
-    def legs(self, place: int, kind: str) -> tuple[list[Effect], list[FullEffect]]:
+    def legs(self, platform_index: int, kind: str) -> tuple[list[Effect], list[FullEffect]]:
         """Effects of a unit of a kind of error of one platform along x, y, z, by Tables I and II and in full."""
-        if (place, kind) not in self._legs:
+        if (platform_index, kind) not in self._legs:
             first = 3 * list(MOTION_UNITS).index(kind)
-            published = [Effect._make(row) for row in self._published[place][first : first + 3]]
-            along = np.stack([self.exact.along(place, axis) for axis in _AXES])
-            found = self.exact.effect(along * self.exact.powers[MOTION_UNITS[kind]])
-            full = [FullEffect._make(row) for row in zip(*found, strict=True)]
-            self._legs[place, kind] = published, full
-        return self._legs[place, kind]
+            published = [Effect._make(row) for row in self._published[platform_index][first : first + 3]]
+            along = np.stack([self.exact.along(platform_index, axis) for axis in _AXES])
+            effects = self.exact.effect(along * self.exact.powers[MOTION_UNITS[kind]])
+            full = [FullEffect._make(row) for row in zip(*effects, strict=True)]
+            self._legs[platform_index, kind] = published, full
+        return self._legs[platform_index, kind]
 
-    def _of_motion(self, place: int, name: str, kind: str, unit: str) -> Iterator[ErrorSource]:
+    def _of_motion(self, platform_index: int, name: str, kind: str, unit: str) -> Iterator[ErrorSource]:
         error: MotionError = getattr(self.mission.platforms, name).motion_error
         values = error.stated(kind)
-        own = _scene_axes(name, kind)
-        if not any(self._is_listed(what, values) for what, *_ in own):
+        scene_rows = _scene_axes(name, kind)
+        if not any(self._is_listed(row_subject, values) for row_subject, *_ in scene_rows):
             return
         in_scene = error.frame == "scene"
-        published, full = self.legs(place, kind)
-        axes = self.geometry.both[place].frame(error.frame)
+        published, full = self.legs(platform_index, kind)
+        axes = self.geometry.both[platform_index].frame(error.frame)
         covariance = error.covariance if kind != "acceleration" else None
         key = "covariance" if covariance is not None else error.key_of(kind)
         path: KeyPath = ("platforms", name, "motion_error", key)
         notes, evidence = override_notes(name, error.overridden, kind), error.evidence(kind)
-        for axis, (what, own_path, equation, no_limit) in enumerate(own):
+        for axis, (row_subject, row_path, equation, no_limit) in enumerate(scene_rows):
             # Of errors that the file states along other axes those of the scene are listed where all are.
-            if self.shown is not None and what.id not in self.shown and not (in_scene and values is not None):
+            if self.shown is not None and row_subject.id not in self.shown and not (in_scene and values is not None):
                 continue
             on_axis = None
             if values is not None:
@@ -128,14 +128,16 @@ class ErrorListing:
                 elif covariance is None:
                     on_axis = self.factor * _along_scene_axis(values, axes, axis, error.distribution)
                 else:
-                    on_axis = self.factor * _along_covariance(covariance, kind, [one[axis] for one in axes])
+                    on_axis = self.factor * _along_covariance(
+                        covariance, kind, [frame_axis[axis] for frame_axis in axes]
+                    )
             if covariance is not None:
-                own_path = (*path, *covariance.path(kind, axis))
+                row_path = (*path, *covariance.path(kind, axis))
             yield ErrorSource(
-                subject=what,
+                subject=row_subject,
                 unit=unit,
                 declared=on_axis,
-                path=own_path if in_scene and values is not None and key != "sensor" else path,
+                path=row_path if in_scene and values is not None and key != "sensor" else path,
                 effect=published[axis],
                 full=full[axis],
                 direction=_AXES[axis],
@@ -167,20 +169,20 @@ class ErrorListing:
         sync, is_heard = self.mission.synchronization, not self.mission.has_direct_path
         is_set = sync is not None and sync.is_holdover
         for power, (term, unit) in enumerate(CLOCK_UNITS.items()):
-            value, what = getattr(self.mission.timing_error, term), subject("clock", "timing", term)
-            if self._is_listed(what, value) and not (is_set and power < 2):  # which setting states
-                terms = tuple(float(power == place) for place in range(4))
+            value, row_subject = getattr(self.mission.timing_error, term), subject("clock", "timing", term)
+            if self._is_listed(row_subject, value) and not (is_set and power < 2):  # which setting states
+                terms = tuple(float(power == order) for order in range(4))
                 no_limit = phrases.no_quadratic_term_of_clock(term) if is_heard else phrases.clock_is_heard()
                 equation = "Table I row 1, step of Table II" if term == "quadratic" else "Table I row 1"
                 path = ("timing_error", term)
-                yield self._of_terms(what, unit, value, path, terms, no_limit, equation, is_heard=is_heard)
+                yield self._of_terms(row_subject, unit, value, path, terms, no_limit, equation, is_heard=is_heard)
         yield from self._of_setting()
         for name in PLATFORMS:
             yield from self._of_aging(name)
 
     def _of_terms(
         self,
-        what: Subject,
+        row_subject: Subject,
         unit: str,
         value: Any,
         path: KeyPath,
@@ -194,9 +196,11 @@ class ErrorListing:
         clock = terms if is_heard else (0.0,) * 4
         wavelength, T = self.mission.radar.wavelength, self.mission.collection.aperture_time
         rows = evaluators.published_clock(SPEED_OF_LIGHT, wavelength, T)
-        of_terms = ([term * part for part in row] for term, row in zip(terms, rows, strict=True) if np.any(term))
+        of_terms = (
+            [term * per_term for per_term in row] for term, row in zip(terms, rows, strict=True) if np.any(term)
+        )
         return ErrorSource(
-            subject=what,
+            subject=row_subject,
             unit=unit,
             declared=None if value is None else value * self.factor,
             path=path,
@@ -221,10 +225,10 @@ class ErrorListing:
             ("time", "s", sync.time_error, (1.0, 0.0, 0.0, 0.0)),
             ("frequency", "s/s", sync.frequency_error, frequency),
         ):
-            what = subject("clock", kind)
-            if value is not None or (sync.is_holdover and self._is_listed(what, value)):
+            row_subject = subject("clock", kind)
+            if value is not None or (sync.is_holdover and self._is_listed(row_subject, value)):
                 path, no_limit = ("synchronization", f"{kind}_error"), phrases.no_quadratic_term_of_setting(kind)
-                yield self._of_terms(what, unit, value, path, terms, no_limit, evidence=sync.source)
+                yield self._of_terms(row_subject, unit, value, path, terms, no_limit, evidence=sync.source)
 
     @property
     def _delay_of_the_echo(self) -> tuple[Any, ...]:
@@ -233,7 +237,8 @@ class ErrorListing:
         seconds = (sum(exact.ranges) - exact.baselines) / SPEED_OF_LIGHT
         powers = np.vander(exact.sampling.places, 4, increasing=True)
         return tuple(
-            part / exact.half**power for power, part in enumerate(np.linalg.lstsq(powers, seconds, rcond=None)[0])
+            coefficient / exact.half**power
+            for power, coefficient in enumerate(np.linalg.lstsq(powers, seconds, rcond=None)[0])
         )
 
     def _of_aging(self, name: str) -> Iterator[ErrorSource]:
@@ -244,9 +249,9 @@ class ErrorListing:
         oscillator, sync = getattr(self.mission.platforms, name).oscillator, self.mission.synchronization
         if oscillator is None:
             return
-        what, value = subject(name, "oscillator", "aging"), oscillator.aging
+        row_subject, value = subject(name, "oscillator", "aging"), oscillator.aging
         is_set, age = sync is not None and sync.is_holdover, 0.0 if sync is None or sync.age is None else sync.age
-        if value is None and not (is_set and self._is_listed(what, value)):
+        if value is None and not (is_set and self._is_listed(row_subject, value)):
             return
         path = ("platforms", name, "oscillator", "aging")
         terms: tuple[Any, ...] = (0.0, 0.0, 0.5 * (sync is None), 0.0)
@@ -256,7 +261,7 @@ class ErrorListing:
             phrases.aging_is_followed() if sync is not None else phrases.no_quadratic_term_of_clock("quadratic")
         )
         yield self._of_terms(
-            what,
+            row_subject,
             "1/s",
             value,
             path,
@@ -280,11 +285,11 @@ class ErrorListing:
         for kind, unit in MOTION_UNITS.items():
             values = getattr(error, kind)
             for axis, name in enumerate(names):
-                what = subject("mission", kind, name, error.frame)
-                if not self._is_listed(what, values):
+                row_subject = subject("mission", kind, name, error.frame)
+                if not self._is_listed(row_subject, values):
                     continue
                 ways = [frame[axis] for frame in frames]
-                both = [self.legs(place, kind) for place in (0, 1)]
+                both = [self.legs(platform_index, kind) for platform_index in (0, 1)]
                 published = self._of_both([legs for legs, _ in both], axis, None if in_scene else ways)
                 full = self._of_both([legs for _, legs in both], axis, None if in_scene else ways)
                 if kind == "position" and name in ("x", "y"):
@@ -296,7 +301,7 @@ class ErrorListing:
                     cause = "velocities" if kind == "velocity" else "lines of sight"
                     no_limit = phrases.no_common_component(cause, name if in_scene else _axis_of(error.frame, name))
                 yield ErrorSource(
-                    subject=what,
+                    subject=row_subject,
                     unit=unit,
                     declared=None if values is None else values[axis] * self.factor,
                     path=("common_motion_error", kind, axis),
@@ -323,11 +328,11 @@ class ErrorListing:
         A path is measured where the platform is a little later, p(τ + δt) − p(τ). Of a small tag that is v(τ)·δt, and
         of any other exact ranges take the path itself.
         """
-        for place, name in enumerate(PLATFORMS):
+        for platform_index, name in enumerate(PLATFORMS):
             error: MotionError = getattr(self.mission.platforms, name).motion_error
             if error.time_tag is not None:
                 key: KeyPath = ("platforms", name, "motion_error", "time_tag")
-                yield self._of_time_tag(name, (place,), error.time_tag, key, error.source)
+                yield self._of_time_tag(name, (platform_index,), error.time_tag, key, error.source)
         common = self.mission.common_motion_error
         if common is not None and common.time_tag is not None:
             note = phrases.held_to_the_total("both platforms")
@@ -335,34 +340,36 @@ class ErrorListing:
             yield self._of_time_tag("mission", (0, 1), common.time_tag, key, common.source, note)
 
     def _of_time_tag(
-        self, owner: str, places: Sequence[int], value: Any, key: KeyPath, source: str | None, *notes: Note
+        self, owner: str, platform_indices: Sequence[int], value: Any, key: KeyPath, source: str | None, *notes: Note
     ) -> ErrorSource:
         ways = [self._velocities(path) for path in self.geometry.both]
-        moved = np.sum([self.exact.along(place, ways[place]) for place in places], axis=0)
-        parts = [
-            _along(self.legs(place, kind)[0], vector)
-            for place in places
-            for kind, vector in zip(MOTION_UNITS, self.geometry.both[place].rates, strict=False)
+        moved = np.sum(
+            [self.exact.along(platform_index, ways[platform_index]) for platform_index in platform_indices], axis=0
+        )
+        effects = [
+            _along(self.legs(platform_index, kind)[0], vector)
+            for platform_index in platform_indices
+            for kind, vector in zip(MOTION_UNITS, self.geometry.both[platform_index].rates, strict=False)
         ]
         return ErrorSource(
             subject=subject(owner, "time_tag"),
             unit="s",
             declared=value * self.factor,
             path=key,
-            effect=_sum(parts),
+            effect=_sum(effects),
             full=self.exact.effect(moved),
-            direction=ways[places[0]],
+            direction=ways[platform_indices[0]],
             equation="Tables I and II along the velocity and its rates",
             no_limit=phrases.no_quadratic_term_of_time_tag(),
             evidence=source,
             notes=notes,
-            of_receiver=ways[1] if len(places) > 1 else None,
+            of_receiver=ways[1] if len(platform_indices) > 1 else None,
         )
 
     def _velocities(self, path: PlatformState) -> Vectors:
         """Velocity of a path at the nodes, (nodes, cases) each. [m/s]"""
         times = self.exact.times
-        u, v, w = (np.broadcast_to(part, times.shape) for part in path.at(times)[1])
+        u, v, w = (np.broadcast_to(component, times.shape) for component in path.at(times)[1])
         return (u, v, w)
 
     def _of_terrain(self) -> Iterator[ErrorSource]:
@@ -370,7 +377,7 @@ class ErrorListing:
         height = self.mission.scene.height_error
         if height is None:
             return
-        both = [self.legs(place, "position") for place in (0, 1)]
+        both = [self.legs(platform_index, "position") for platform_index in (0, 1)]
         published, full = _sum([legs[2] for legs, _ in both]), _sum([legs[2] for _, legs in both])
         yield ErrorSource(
             subject=subject("mission", "terrain"),
@@ -385,21 +392,21 @@ class ErrorListing:
             notes=(phrases.held_to_the_total("no platform"),),
         )
 
-    def _others(self) -> Iterator[ErrorSource]:
-        for index, other in enumerate(self.mission.other_errors):
-            if other.quadratic_phase_error is None:
+    def _stated_elsewhere(self) -> Iterator[ErrorSource]:
+        for index, stated in enumerate(self.mission.other_errors):
+            if stated.quadratic_phase_error is None:
                 continue
             yield ErrorSource(
-                subject=subject("mission", "other", other.name),
+                subject=subject("mission", "other", stated.name),
                 unit="rad",
-                declared=other.quadratic_phase_error,
+                declared=stated.quadratic_phase_error,
                 path=("other_errors", index, "quadratic_phase_error"),
                 effect=_PUBLISHED_UNIT,
                 full=_FULL_UNIT,
                 direction=NOWHERE,
                 equation="as declared",
                 no_limit=NOTHING,
-                evidence=other.source,
+                evidence=stated.source,
                 notes=(phrases.held_to_the_total("no platform"),),
             )
 

@@ -47,7 +47,7 @@ class Parts(NamedTuple):
         """Covariance of the constant, linear, quadratic and cubic part at the aperture edge, (4, 4, ...)."""
         zero = np.zeros(np.shape(self.quadratic))
         both, to_cubic, to_quadratic = (
-            part + zero for part in (self.constant_linear, self.constant_cubic, self.linear_quadratic)
+            product + zero for product in (self.constant_linear, self.constant_cubic, self.linear_quadratic)
         )
         return np.array([
             [self.constant, both, self.constant_quadratic, to_cubic],
@@ -63,7 +63,7 @@ class Parts(NamedTuple):
 
     def times(self, power: Any) -> "Parts":
         """Those of a phase of so many times the power."""
-        return Parts(*(part * power for part in self))
+        return Parts(*(mean_square * power for mean_square in self))
 
     @property
     def of_high_orders(self) -> "Parts":
@@ -158,11 +158,11 @@ class PowerLawPiece(NamedTuple):
 
 def density(pieces: Sequence[PowerLawPiece], frequency: Floats) -> Floats:
     """Density of a spectrum at frequencies [Hz]; 0 where no piece is. [rad²/Hz]"""
-    found = np.zeros_like(frequency)
+    total = np.zeros_like(frequency)
     for piece in pieces:
         is_in = (piece.low <= frequency) & (frequency < piece.high)
-        found += np.where(is_in, piece.at(np.where(is_in, frequency, 1.0)), 0.0)
-    return found
+        total += np.where(is_in, piece.at(np.where(is_in, frequency, 1.0)), 0.0)
+    return total
 
 
 def parts(pieces: Sequence[PowerLawPiece], aperture_time: Any, above: Any = 0.0) -> Parts:
@@ -188,9 +188,9 @@ def parts(pieces: Sequence[PowerLawPiece], aperture_time: Any, above: Any = 0.0)
 
 def left_parts(pieces: Sequence[PowerLawPiece], aperture_time: Floats, interval: float | None) -> Parts:
     """Parts over apertures (cases,): of a spectrum, or of what pulses leave of it that are exchanged so often."""
-    times, place = np.unique(aperture_time, return_inverse=True)
-    found = parts(pieces, times) if interval is None else synchronized_parts(pieces, times, interval)
-    return Parts(*found.rows[:, place])
+    times, time_index = np.unique(aperture_time, return_inverse=True)
+    parts_of_times = parts(pieces, times) if interval is None else synchronized_parts(pieces, times, interval)
+    return Parts(*parts_of_times.rows[:, time_index])
 
 
 def _like(total: Floats, aperture_time: Any) -> Parts:
@@ -206,8 +206,8 @@ def _of_power_law(slope: float, low: Floats, high: Floats) -> Floats:
     until = np.where(has_edge, _EDGES[np.minimum(first, _EDGES.size - 1)], high)
     start = np.where(has_edge, _EDGES[last - 1], high)
     between = _between_edges(slope)
-    whole = np.where(has_edge, between[:, last - 1] - between[:, np.minimum(first, _EDGES.size - 1)], 0.0)
-    return whole + _at_an_end(slope, low, until) + _at_an_end(slope, start, high)
+    between_edges = np.where(has_edge, between[:, last - 1] - between[:, np.minimum(first, _EDGES.size - 1)], 0.0)
+    return between_edges + _at_an_end(slope, low, until) + _at_an_end(slope, start, high)
 
 
 @lru_cache(maxsize=256)
@@ -219,18 +219,18 @@ def _between_edges(slope: float) -> Floats:
 
 def _at_an_end(slope: float, low: Floats, high: Floats) -> Floats:
     """Parts of a panel at the end of a piece, which may be slow or fast; nothing of one without length."""
-    found = np.zeros((_INTEGRALS, low.size))
+    total = np.zeros((_INTEGRALS, low.size))
     is_slow = high <= _FIRST * _SAME
     is_fast = (low >= _FAST / _SAME) & (high > low + _RESOLVED_TURNS * math.pi)
-    for some, of_panel in (
+    for is_chosen, of_panel in (
         (is_slow, _slow),
         (~is_slow & is_fast, _fast),
         (~is_slow & ~is_fast, _power_panels),
     ):
-        chosen = some & (low < high)
+        chosen = is_chosen & (low < high)
         if chosen.any():
-            found[:, chosen] = of_panel(slope, low[chosen], high[chosen])
-    return found
+            total[:, chosen] = of_panel(slope, low[chosen], high[chosen])
+    return total
 
 
 def _integral(exponent: float, low: Floats, high: Floats) -> Floats:
@@ -248,8 +248,8 @@ def _slow(slope: float, low: Floats, high: Floats) -> Floats:
 
 def _fast(slope: float, low: Floats, high: Floats) -> Floats:
     """Tones so fast that what turns with them is averaged."""
-    (found,) = evaluators.tone_parts_fast(*(_integral(-power - slope, low, high) for power in (0, 2, 4, 6, 8)))  # type: ignore[arg-type]
-    return np.array(found)
+    (means,) = evaluators.tone_parts_fast(*(_integral(-power - slope, low, high) for power in (0, 2, 4, 6, 8)))  # type: ignore[arg-type]
+    return np.array(means)
 
 
 def _power_panels(slope: float, low: Floats, high: Floats) -> Floats:
@@ -266,9 +266,9 @@ def squares(angle: Floats) -> Floats:
     They are means of a tone of power 1; of one of amplitude 1, each part in the phase where it is largest. Order n of
     a tone turns by n quarters: those that are two apart have opposite signs.
     """
-    quadratic, cubic, left, constant, linear = tone(angle)
+    quadratic, cubic, spread, constant, linear = tone(angle)
     both = -constant * quadratic, -linear * cubic
-    return np.array((quadratic**2, cubic**2, left, constant**2, linear**2, *both))
+    return np.array((quadratic**2, cubic**2, spread, constant**2, linear**2, *both))
 
 
 # ---------------------------------------------------------------------- clocks that were set
@@ -294,25 +294,25 @@ def set_parts(pieces: Sequence[PowerLawPiece], aperture_time: Floats, age: Float
     beyond = _RESOLVED / age
     times, above = (aperture_time, aperture_time, averaging), (0.0 * beyond, beyond, beyond)
     of_each = np.array(parts(pieces, np.concatenate(times), np.concatenate(above))[:_INTEGRALS])
-    free, own, of_line = (Parts(*one) for one in np.split(of_each, 3, axis=1))
+    free, of_clock, of_line = (Parts(*columns) for columns in np.split(of_each, 3, axis=1))
     fast = of_line.linear * (2 / averaging) ** 2  # of the slope of the line
     half = aperture_time / 2
     together = [
-        own.constant + of_line.constant + age**2 * fast,
-        own.linear + half**2 * fast,
+        of_clock.constant + of_line.constant + age**2 * fast,
+        of_clock.linear + half**2 * fast,
         age * half * fast,
-        own.constant_quadratic,
+        of_clock.constant_quadratic,
         0.0,
         0.0,
-        own.linear_cubic,
+        of_clock.linear_cubic,
     ]
     ends = np.array([edge for piece in pieces for edge in (piece.low, piece.high)])[:, None] * age
     edges = np.sort(np.concatenate((_AGES[:, None] + 0.0 * age, np.clip(ends, _AGES[0], _RESOLVED))), axis=0) / age
     span = np.log(edges[1:] / edges[:-1])
     f = edges[:-1] * np.exp(span * _NODES[:, None])  # (nodes, panels, cases)
     weight = density(pieces, f) * f * span * _WEIGHTS[:, None]
-    for place, square in enumerate(_squares_of_set(f, aperture_time, age, averaging)):
-        together[place] = together[place] + (weight * square).sum(axis=(0, 1))
+    for order_index, square in enumerate(_squares_of_set(f, aperture_time, age, averaging)):
+        together[order_index] = together[order_index] + (weight * square).sum(axis=(0, 1))
     constant, linear, both, even, to_cubic, to_quadratic, odd = together
     return Parts(free.quadratic, free.cubic, free.left, constant, linear, even, odd, both, to_cubic, to_quadratic)
 
@@ -328,8 +328,8 @@ def _squares_of_set(f: Floats, aperture_time: Floats, age: Floats, averaging: Fl
         -quadratic,
         -1j * cubic,
     )
-    for one, other in ((0, 0), (1, 1), (0, 1), (0, 2), (0, 3), (1, 2), (1, 3)):
-        yield (orders[one] * orders[other].conjugate()).real
+    for first, second in ((0, 0), (1, 1), (0, 1), (0, 2), (0, 3), (1, 2), (1, 3)):
+        yield (orders[first] * orders[second].conjugate()).real
 
 
 # ---------------------------------------------------------------------- a clock that is heard twice
@@ -379,7 +379,7 @@ def synchronized_parts(pieces: Sequence[PowerLawPiece], aperture_time: Any, inte
     last = np.maximum(near * rate, _FAST / scale)
     images = _image_edges(ends, rate)
     edges = [[*_exchange_edges(T, rate), *images] for T in times.tolist()]
-    total = _over_panels(lambda f, cases: _left(pieces, f, rate), edges, last, scale)
+    total = _over_panels(lambda f, cases: _unjoined(pieces, f, rate), edges, last, scale)
     _add_fast(total, pieces, last, scale, 1.0)  # straight lines pass nothing any more
     total += parts(_far_images(pieces, images, rate), times)[:_INTEGRALS]
     return _like(total, aperture_time)
@@ -404,18 +404,18 @@ def _over_panels(
 ) -> Floats:
     """Integrate a density, of frequencies in cases, with the parts of a tone from 0 Hz on, between edges."""
     panels = [
-        (low, top, place)
-        for place, (of_case, end) in enumerate(zip(edges, high.tolist(), strict=True))
+        (low, top, case)
+        for case, (of_case, end) in enumerate(zip(edges, high.tolist(), strict=True))
         for low, top in _panels(end, of_case)
     ]
     low, top, cases = (np.array(column) for column in zip(*panels, strict=True))
     total = np.zeros((_INTEGRALS, high.size))
     for start in range(0, low.size, _MOST):
-        some = slice(start, start + _MOST)
-        here = cases[some]
-        found = _panels_of(partial(density, cases=here), low[some], top[some], scale[here])
-        for kept, part in zip(total, found, strict=True):
-            kept += np.bincount(cases[some], part, high.size)
+        block = slice(start, start + _MOST)
+        here = cases[block]
+        panel_parts = _panels_of(partial(density, cases=here), low[block], top[block], scale[here])
+        for kept, parts_of_panels in zip(total, panel_parts, strict=True):
+            kept += np.bincount(cases[block], parts_of_panels, high.size)
     return total
 
 
@@ -424,8 +424,8 @@ def _add_fast(total: Floats, pieces: Sequence[PowerLawPiece], last: Floats, scal
     for piece in pieces:
         to_angle = times * piece.density * scale ** (piece.slope - 1)
         low, high = np.maximum(piece.low, last) * scale, piece.high * scale
-        some = piece.high > last
-        total[:, some] += to_angle[some] * _at_an_end(piece.slope, low[some], high[some])
+        is_beyond = piece.high > last
+        total[:, is_beyond] += to_angle[is_beyond] * _at_an_end(piece.slope, low[is_beyond], high[is_beyond])
 
 
 def _panels_of(density: Callable[[Floats], Floats], low: Floats, high: Floats, scale: Floats) -> Floats:
@@ -442,18 +442,18 @@ def _panels_of(density: Callable[[Floats], Floats], low: Floats, high: Floats, s
     return np.asarray((density(f) * width * of_tone).sum(axis=1))
 
 
-def _left(pieces: Sequence[PowerLawPiece], f: Floats, rate: float) -> Floats:
+def _unjoined(pieces: Sequence[PowerLawPiece], f: Floats, rate: float) -> Floats:
     """Spectrum that straight lines between samples leave, at nodes of panels (nodes, n). [rad²/Hz]"""
     _, once, again = np.unique(f[0] + 1j * f[-1], return_index=True, return_inverse=True)  # cases share panels
     f = f[:, once]
-    own, passed = density(pieces, f), np.sinc(f / rate) ** 2
-    total = own * (1 - passed) ** 2
-    some = f < _FOLDED * rate
-    nearest = np.rint(f[some] / rate)
-    start = np.abs(f[some] - nearest * rate)
+    density_here, passed = density(pieces, f), np.sinc(f / rate) ** 2
+    total = density_here * (1 - passed) ** 2
+    is_folded = f < _FOLDED * rate
+    nearest = np.rint(f[is_folded] / rate)
+    start = np.abs(f[is_folded] - nearest * rate)
     aliases = sum((_aliases(piece, start, rate) for piece in pieces), np.zeros_like(start))
-    aliases += np.where(nearest == 0, 0.0, density(pieces, start) - own[some])
-    total[some] += passed[some] ** 2 * aliases
+    aliases += np.where(nearest == 0, 0.0, density(pieces, start) - density_here[is_folded])
+    total[is_folded] += passed[is_folded] ** 2 * aliases
     return np.asarray(total[:, again])
 
 
@@ -488,10 +488,10 @@ def _far_images(pieces: Sequence[PowerLawPiece], edges: Sequence[float], rate: f
     x = f / rate
     powers = aliases * np.sin(math.pi * x) ** 4 * (high - low) * _WEIGHTS
     at_half = 2 * float((powers * (x**2 - x + 1 / 6)).sum())
-    whole, last = float(powers.sum()), float(_FOLDED)
+    integral, last = float(powers.sum()), float(_FOLDED)
     return [
         PowerLawPiece(begin * rate, math.inf, 2 * rate**3 / math.pi**4 * power, 4.0)
-        for begin, power in ((last - 0.5, at_half), (last, whole - 2 * at_half), (last + 0.5, at_half))
+        for begin, power in ((last - 0.5, at_half), (last, integral - 2 * at_half), (last + 0.5, at_half))
     ]
 
 

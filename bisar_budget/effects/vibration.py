@@ -78,9 +78,9 @@ def near_groups(cycles: Floats) -> NDArray[np.intp]:
     has_next = np.zeros(cycles.shape, dtype=bool)
     has_next[:-1] = ~begins[1:]
     number = np.where(~begins | has_next, np.cumsum(begins & has_next, axis=0) - 1, -1)
-    found = np.empty_like(number)
-    np.put_along_axis(found, order, number, axis=0)
-    return found
+    group = np.empty_like(number)
+    np.put_along_axis(group, order, number, axis=0)
+    return group
 
 
 def near_lines(cycles: Sequence[float]) -> list[tuple[int, ...]]:
@@ -88,7 +88,7 @@ def near_lines(cycles: Sequence[float]) -> list[tuple[int, ...]]:
     if not cycles:
         return []
     number = near_groups(np.array(cycles)[:, None])[:, 0]
-    return [tuple(np.flatnonzero(number == one).tolist()) for one in range(number.max() + 1)]
+    return [tuple(np.flatnonzero(number == group).tolist()) for group in range(number.max() + 1)]
 
 
 def worst_phases(amplitudes: Any, cycles: Any, is_member: Truths | None = None) -> Worst:
@@ -109,73 +109,73 @@ def worst_phases(amplitudes: Any, cycles: Any, is_member: Truths | None = None) 
         Amplitude of one line whose echo is as high, in the unit of `amplitudes`; at least the largest of them, and
         their sum where all have one frequency.
     """
-    sizes, places = np.asarray(amplitudes, dtype=float), np.asarray(cycles, dtype=float)
+    sizes, frequencies = np.asarray(amplitudes, dtype=float), np.asarray(cycles, dtype=float)
     count, *shape = sizes.shape
-    sizes, places = sizes.reshape(count, -1), places.reshape(count, -1)
+    sizes, frequencies = sizes.reshape(count, -1), frequencies.reshape(count, -1)
     if is_member is not None:
         is_member = is_member.reshape(count, -1)
-        places = np.where(is_member, places, math.inf)
+        frequencies = np.where(is_member, frequencies, math.inf)
         count = is_member.sum(axis=0).max()
-    here = np.arange(places.shape[1])
-    order = np.argsort(places, axis=0, kind="stable")[:count]
-    sizes, places = sizes[order, here], places[order, here]
+    here = np.arange(frequencies.shape[1])
+    order = np.argsort(frequencies, axis=0, kind="stable")[:count]
+    sizes, frequencies = sizes[order, here], frequencies[order, here]
     if is_member is not None:  # where a case has fewer, lines without an amplitude beside the last
-        is_one = np.isfinite(places)
-        sizes = np.where(is_one, sizes, 0.0)
-        places = np.where(is_one, places, np.where(is_one, places, 0.0).max(axis=0))
-    begins = np.flatnonzero(np.append(True, (places[1:] != places[:-1]).any(axis=1)))
-    sizes, places = np.add.reduceat(sizes, begins, axis=0), places[begins]  # lines of one frequency are one
-    if len(places) == 1:
-        return Worst(sizes[0].reshape(shape)[()], places[0].reshape(shape)[()])
-    starts = np.sort(np.concatenate((places, (places[1:] + places[:-1]) / 2)), axis=0)
+        is_line = np.isfinite(frequencies)
+        sizes = np.where(is_line, sizes, 0.0)
+        frequencies = np.where(is_line, frequencies, np.where(is_line, frequencies, 0.0).max(axis=0))
+    begins = np.flatnonzero(np.append(True, (frequencies[1:] != frequencies[:-1]).any(axis=1)))
+    sizes, frequencies = np.add.reduceat(sizes, begins, axis=0), frequencies[begins]  # lines of one frequency are one
+    if len(frequencies) == 1:
+        return Worst(sizes[0].reshape(shape)[()], frequencies[0].reshape(shape)[()])
+    starts = np.sort(np.concatenate((frequencies, (frequencies[1:] + frequencies[:-1]) / 2)), axis=0)
     starts = starts[np.append(True, (starts[1:] != starts[:-1]).any(axis=1))]
     if len(starts) > _SEARCHED:
-        starts = _highest(sizes, places, starts)
-    found = np.empty((2, here.size))
-    together = max(1, _MOST // (len(starts) * _REACH.size * len(places)))
+        starts = _highest(sizes, frequencies, starts)
+    worst = np.empty((2, here.size))
+    together = max(1, _MOST // (len(starts) * _REACH.size * len(frequencies)))
     for first in range(0, here.size, together):
-        some = slice(first, first + together)
-        found[:, some] = _searched(sizes[:, some], places[:, some], starts[:, some])
-    return Worst(*(column.reshape(shape)[()] for column in found))
+        cases = slice(first, first + together)
+        worst[:, cases] = _searched(sizes[:, cases], frequencies[:, cases], starts[:, cases])
+    return Worst(*(column.reshape(shape)[()] for column in worst))
 
 
-def _highest(sizes: Floats, places: Floats, starts: Floats) -> Floats:
+def _highest(sizes: Floats, frequencies: Floats, starts: Floats) -> Floats:
     """Places within a cell of which lie the lines that make most of an echo: the highest of them, each once."""
     summed = np.concatenate((np.zeros((1, sizes.shape[1])), np.cumsum(sizes, axis=0)))
-    before, until = (_count(places, starts, reach) for reach in (-1, 1))
+    before, until = (_count(frequencies, starts, reach) for reach in (-1, 1))
     around = np.take_along_axis(summed, until, axis=0) - np.take_along_axis(summed, before, axis=0)
     around[1:][starts[1:] == starts[:-1]] = -1.0
     order = np.argsort(-around, axis=0, kind="stable")[:_SEARCHED]
     return np.take_along_axis(starts, order, axis=0)
 
 
-def _count(places: Floats, starts: Floats, reach: int) -> NDArray[np.intp]:
+def _count(frequencies: Floats, starts: Floats, reach: int) -> NDArray[np.intp]:
     """Number of places below each start less a cell, or up to each start and a cell; both are sorted."""
     ends = starts + reach
-    both = (places, ends) if reach > 0 else (ends, places)
+    both = (frequencies, ends) if reach > 0 else (ends, frequencies)
     order = np.argsort(np.concatenate(both), axis=0, kind="stable")
-    is_place = order < len(places) if reach > 0 else order >= len(ends)
+    is_frequency = order < len(frequencies) if reach > 0 else order >= len(ends)
     counted = np.empty_like(order)
-    np.put_along_axis(counted, order, np.cumsum(is_place, axis=0), axis=0)
-    return counted[len(places) :] if reach > 0 else counted[: len(ends)]
+    np.put_along_axis(counted, order, np.cumsum(is_frequency, axis=0), axis=0)
+    return counted[len(frequencies) :] if reach > 0 else counted[: len(ends)]
 
 
-def _searched(sizes: Floats, places: Floats, starts: Floats) -> tuple[Floats, Floats]:
+def _searched(sizes: Floats, frequencies: Floats, starts: Floats) -> tuple[Floats, Floats]:
     """Height and place of the highest echo at the starts and in steps around them."""
     best = starts
     for step in _STEPS:
         tried = best + step * _REACH
-        highest = _heights(sizes, places, tried).argmax(axis=0)
+        highest = _heights(sizes, frequencies, tried).argmax(axis=0)
         best = best + step * (highest + _REACH[0, 0, 0])
     ends = np.concatenate((starts, best))
-    heights = _heights(sizes, places, ends)
+    heights = _heights(sizes, frequencies, ends)
     height = heights.max(axis=0)
     return height, np.where(heights == height, ends, -math.inf).max(axis=0)
 
 
-def _heights(sizes: Floats, places: Floats, x: Floats) -> Floats:
+def _heights(sizes: Floats, frequencies: Floats, x: Floats) -> Floats:
     """Height of all echoes together, in phase, at places (…, cases)."""
-    return np.asarray((sizes * np.abs(np.sinc(x[..., None, :] - places))).sum(axis=-2))
+    return np.asarray((sizes * np.abs(np.sinc(x[..., None, :] - frequencies))).sum(axis=-2))
 
 
 # ---------------------------------------------------------------------- along the line of sight
@@ -193,8 +193,8 @@ class Line(NamedTuple):
 def sight_of(mission: Mission, name: str, geometry: Any = None) -> Vector:
     """Part of a metre of a platform's motion that the range loses, or the range less the direct path. [-]"""
     sights = (geometry or mission.geometry).sights(has_direct_path=mission.has_direct_path)
-    found: Vector = sights[PLATFORMS.index(name)]
-    return found
+    sight: Vector = sights[PLATFORMS.index(name)]
+    return sight
 
 
 def seen_of_axes(
@@ -208,17 +208,17 @@ def seen_of_axes(
     geometry, is_heard = geometry or mission.geometry, mission.has_direct_path
     if not is_vector and not is_heard:
         return [1.0]
-    T, place = mission.collection.aperture_time, PLATFORMS.index(name)
+    T, platform_index = mission.collection.aperture_time, PLATFORMS.index(name)
     sampling = nodes(int(np.max(nodes_for(geometry, T, has_direct_path=is_heard))))
     turned = geometry.at(np.multiply.outer(sampling.places, np.atleast_1d(T) / 2))
-    sight = turned.sights(has_direct_path=is_heard)[place]
+    sight = turned.sights(has_direct_path=is_heard)[platform_index]
     error: MotionError = getattr(mission.platforms, name).motion_error
-    ways = getattr(geometry, name).frame(error.frame) if is_vector else [turned.both[place].look]
+    ways = getattr(geometry, name).frame(error.frame) if is_vector else [turned.both[platform_index].look]
     mean = sampling.fit[0]
-    floor = ROUNDING * np.sqrt(mean @ sum(one * one for one in sight))
+    floor = ROUNDING * np.sqrt(mean @ sum(component * component for component in sight))
     along = [np.sqrt(mean @ np.square(dot(way, sight))) for way in ways]
-    found = [np.where(one > floor, one, 0.0) for one in along]
-    return found if np.ndim(T) or found[0].size > 1 else [one.item() for one in found]
+    seen = [np.where(component > floor, component, 0.0) for component in along]
+    return seen if np.ndim(T) or seen[0].size > 1 else [component.item() for component in seen]
 
 
 def counted(mission: Mission, name: str, value: Any, metric: str, geometry: BistaticGeometry | None = None) -> Any:
@@ -229,8 +229,12 @@ def counted(mission: Mission, name: str, value: Any, metric: str, geometry: Bist
     """
     is_vector = isinstance(value, tuple)
     seen = seen_of_axes(mission, name, is_vector=is_vector, geometry=geometry)
-    parts = [along * size for along, size in zip(seen, value if is_vector else (value,), strict=True)]
-    return sum(map(np.abs, parts)) if metric == "pslr" else np.sqrt(sum(part * part for part in parts))
+    projections = [along * size for along, size in zip(seen, value if is_vector else (value,), strict=True)]
+    return (
+        sum(map(np.abs, projections))
+        if metric == "pslr"
+        else np.sqrt(sum(projection * projection for projection in projections))
+    )
 
 
 def lines_of(mission: Mission, name: str, geometry: Any = None) -> list[Line]:
@@ -262,7 +266,8 @@ def projected(
         stated = f"{format_quantity(value, 'm')} along the line of sight"
         return (says(stated, along, True),) if mission.has_direct_path else ()
     axes = ", ".join(
-        f"{axis} {format_quantity(part, 'm')}" for axis, part in zip(FRAME_AXES[error.frame], value, strict=True)
+        f"{axis} {format_quantity(amplitude, 'm')}"
+        for axis, amplitude in zip(FRAME_AXES[error.frame], value, strict=True)
     )
     return (says(axes, along, mission.has_direct_path),)
 
@@ -337,19 +342,19 @@ def spectrum_pieces(spectrum: Spectrum, law: tuple[float, float] = (1.0, 0.0)) -
     factor, slope = law
     if not spectrum.is_accelerated:
         factor, slope = factor / DISPLACED[0], slope - DISPLACED[1]
-    found = []
+    pieces = []
     for (f, density), (g, last) in pairwise(spectrum.points):
         if not (density and last):  # made so small that nothing is left, of which there is no logarithm
             continue
-        own = math.log(density / last) / math.log(g / f)
-        if abs(own) <= _STEEP:
-            found.append(PowerLawPiece(f, g, factor * density * f**own, own + slope))
+        own_slope = math.log(density / last) / math.log(g / f)
+        if abs(own_slope) <= _STEEP:
+            pieces.append(PowerLawPiece(f, g, factor * density * f**own_slope, own_slope + slope))
             continue
         ends = np.geomspace(f, g, _PARTS + 1).tolist()
         for low, high in pairwise(ends):
-            at_ends = (density * (low / f) ** -own, density * (high / f) ** -own)
-            found.append(PowerLawPiece(low, high, factor * _mean(own, low, high, *at_ends), slope))
-    return tuple(found)
+            at_ends = (density * (low / f) ** -own_slope, density * (high / f) ** -own_slope)
+            pieces.append(PowerLawPiece(low, high, factor * _mean(own_slope, low, high, *at_ends), slope))
+    return tuple(pieces)
 
 
 def _mean(slope: float, low: float, high: float, at_low: float, at_high: float) -> float:
@@ -365,15 +370,15 @@ def spectrum_parts(
     `interval` is that of exchanged pulses, of which then counts what they leave, `delay` that between two times of
     which only the difference counts. Densities, intervals and delays may differ from case to case.
     """
-    found = np.zeros((len(Parts._fields), seen.cases))
-    for (of_group, exchanged), some in seen.alike((spectrum, interval)):
-        pieces, times = spectrum_pieces(of_group, law), seen.aperture_time[some]
+    total = np.zeros((len(Parts._fields), seen.cases))
+    for (of_group, exchanged), cases in seen.alike((spectrum, interval)):
+        pieces, times = spectrum_pieces(of_group, law), seen.aperture_time[cases]
         if delay is None:
             of_pieces = left_parts(pieces, times, exchanged)
         else:
-            of_pieces = heard_parts(pieces, times, np.broadcast_to(delay, (seen.cases,))[some])
-        found[:, some] = of_pieces.rows
-    return Parts(*found)
+            of_pieces = heard_parts(pieces, times, np.broadcast_to(delay, (seen.cases,))[cases])
+        total[:, cases] = of_pieces.rows
+    return Parts(*total)
 
 
 def vibration_spectrum(seen: SensorCases, name: str) -> Iterator[RandomError]:
@@ -381,18 +386,22 @@ def vibration_spectrum(seen: SensorCases, name: str) -> Iterator[RandomError]:
     vibration = seen.error(name).vibration
     if vibration.spectrum is None:
         return
-    found = spectrum_parts(seen, vibration.spectrum, DISPLACED)
-    place = PLATFORMS.index(name)
-    x, y, z = (track / seen.exact.ranges[place] for track in seen.exact.tracks[place])  # it shakes along these
-    published, full = seen.of_parts(found.times(power_of(vibration)), seen.exact.along(place, (x, y, z)))
+    noise = spectrum_parts(seen, vibration.spectrum, DISPLACED)
+    platform_index = PLATFORMS.index(name)
+    x, y, z = (
+        track / seen.exact.ranges[platform_index] for track in seen.exact.tracks[platform_index]
+    )  # it shakes along these
+    published, full = seen.of_parts(noise.times(power_of(vibration)), seen.exact.along(platform_index, (x, y, z)))
     path = ("platforms", name, "motion_error", "vibration", "spectrum")
-    what = subject(name, "vibration", "spectrum")
+    row_subject = subject(name, "vibration", "spectrum")
     moves: tuple[Moves, ...] = ()
     if seen.has_edge:  # along the line of sight of the centre, and nothing is said of other motion
         way = seen.factor * seen.vector(getattr(seen.geometry, name).look)[None, :, None]
-        courses = seen.courses(found.times(power_of(vibration)).covariance)
-        moves = (Moves(place, way, courses),)
-    yield RandomError(what, "dB", 1.0, path, published.times(seen.factor), full.times(seen.factor), moves=moves)
+        courses = seen.courses(noise.times(power_of(vibration)).covariance)
+        moves = (Moves(platform_index, way, courses),)
+    yield RandomError(
+        row_subject, "dB", 1.0, path, published.times(seen.factor), full.times(seen.factor), moves=moves
+    )
 
 
 def displacement_rms(spectrum: Spectrum, power: float = 1.0) -> float:
