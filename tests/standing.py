@@ -2,7 +2,7 @@
 
 from collections.abc import Container
 
-from bisar_budget.budget.judged_requirements import ALIKE
+from bisar_budget.budget.judged_requirements import EQUAL_USE_FRACTION
 from bisar_budget.design.table import Standing
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.row import Row
@@ -22,7 +22,9 @@ def standing(found: MissionFindings, row_id: str | None, breaks: Container[str])
         broken = [one.key for one in found.requirements if one.status == status and row_id is None and not complies]
         return Standing(complies, status, requirement=broken[0] if broken else None, waived_by=waived_by)
     highest = max(map(_use, deciding))
-    worst = next(row for row in deciding if _use(row) >= highest - ALIKE * abs(highest) or _use(row) == highest)
+    worst = next(
+        row for row in deciding if _use(row) >= highest - EQUAL_USE_FRACTION * abs(highest) or _use(row) == highest
+    )
     is_unknown = (status == "not_evaluated" and not complies) or _use(worst) < 0
     use = None if is_unknown else worst.utilization  # it need not be that of what decides
     return Standing(complies, status, worst.id, worst.binding_requirement or worst.metric, use, waived_by)

@@ -21,7 +21,7 @@ from bisar_budget.effects.declared import CUBIC
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.oscillator_acceleration import accelerated_tones
 from bisar_budget.effects.oscillator_tones import LeftTone, spurs_of
-from bisar_budget.effects.vibration import SLOWEST, counted, lines_of
+from bisar_budget.effects.vibration import SLOWEST_ECHO_CYCLES, counted, lines_of
 from bisar_budget.mission.model import Mission, Simulation, has_instruments
 
 if TYPE_CHECKING:
@@ -118,7 +118,7 @@ def tones(mission: Mission, geometry: Any = None) -> list[Tone]:
     for name in PLATFORMS:
         for index, line in enumerate(lines_of(mission, name, geometry)):
             cycles = line.frequency * T
-            is_there = np.asarray(cycles >= SLOWEST)[()]
+            is_there = np.asarray(cycles >= SLOWEST_ECHO_CYCLES)[()]
             if np.any(is_there):
                 phase = 2 * math.pi * line.amplitude / mission.radar.wavelength
                 what = subject(name, "vibration", "sinusoidal", entry=index)
@@ -128,7 +128,9 @@ def tones(mission: Mission, geometry: Any = None) -> list[Tone]:
             found += _echoes(Tone(spur.subject, spur.phase, spur.frequency * T), spur.free, spur.left, mission)
         for one in accelerated_tones(mission, geometry):
             cycles = one.frequency * T
-            alone = Tone(one.subject, one.phase, cycles, np.asarray(cycles >= SLOWEST)[()], one.in_quadrature)
+            alone = Tone(
+                one.subject, one.phase, cycles, np.asarray(cycles >= SLOWEST_ECHO_CYCLES)[()], one.in_quadrature
+            )
             found += _echoes(alone, one.free * one.sensitivity, one.left, mission)
     return [one for one in found if np.any(one.is_there)]
 

@@ -23,7 +23,7 @@ from bisar_budget.effects.oscillator_acceleration import accelerated_tones
 from bisar_budget.effects.oscillator_tones import LeftTone, spurs_of
 from bisar_budget.effects.random_effect import orders_at
 from bisar_budget.effects.spectra import tone
-from bisar_budget.effects.vibration import SLOWEST, counted
+from bisar_budget.effects.vibration import SLOWEST_ECHO_CYCLES, counted
 from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.model import Mission, has_instruments
 from bisar_budget.mission.platforms import MotionError
@@ -100,7 +100,7 @@ def _tones_of_oscillators(mission: Mission, geometry: BistaticGeometry) -> Itera
     for spur in spurs_of(mission, geometry):
         yield spur.subject, spur.free, spur.left
     for one in accelerated_tones(mission, geometry):
-        is_fast = one.left.is_folded | (one.frequency * mission.collection.aperture_time >= SLOWEST)
+        is_fast = one.left.is_folded | (one.frequency * mission.collection.aperture_time >= SLOWEST_ECHO_CYCLES)
         yield one.subject, is_fast * one.free * one.sensitivity, one.left
 
 

@@ -16,13 +16,13 @@ from bisar_budget.analysis.together import Together, cubics, quadratics
 from bisar_budget.budget.continued_masks import continuation_note, part_of, rests_on_masks
 from bisar_budget.budget.doubted_noise import doubted_noise_note, rests_on_doubted_noise
 from bisar_budget.budget.judged_requirements import (
-    MAKES_UP,
+    MAKER_FRACTION,
     TAKEN_BY,
     UntakenEffect,
     first_highest,
     negligible_rad,
 )
-from bisar_budget.budget.judged_rows import BOUND, CODE, FamilyRow, Judging, worded
+from bisar_budget.budget.judged_rows import CODE, LIMIT_RATIO, FamilyRow, Judging, worded
 from bisar_budget.effects.combined import Phases, correlation_notes
 from bisar_budget.effects.declared import CUBIC, LOCATION, OTHER_MODEL, QUADRATIC
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
@@ -186,11 +186,11 @@ class Aggregates:
             limit = self.array(limit)
             models = ("published", "full") if row_subject.kind == QUADRATIC else ("published",)
             by_model = {f"allowable_{model}": limit for model in models}
-            is_over_by_other = self.errors.doubts(theirs.model, size_by_theirs > limit * BOUND)
-            is_over_of_all = of_all > limit * BOUND
+            is_over_by_other = self.errors.doubts(theirs.model, size_by_theirs > limit * LIMIT_RATIO)
+            is_over_of_all = of_all > limit * LIMIT_RATIO
             rests_on = rests_on_masks(continued[1], continued[0], size, limit)
             is_in_doubt = rests_on_doubted_noise(continued[1], continued[0], OTHER_MODEL[theirs.model], limit)
-            is_in_doubt = is_in_doubt & ~(size > limit * BOUND) & (not never_fails)
+            is_in_doubt = is_in_doubt & ~(size > limit * LIMIT_RATIO) & (not never_fails)
         judged = self.judging.row(
             row_subject,
             size,
@@ -259,7 +259,7 @@ class Aggregate(FamilyRow):
             notes = correlation_notes(combine, [group for group in groups if owner in (group.platform, "mission")])
         if size is None:
             over = phrases.no_ground_point()
-        elif limit is not None and size > limit * BOUND:
+        elif limit is not None and size > limit * LIMIT_RATIO:
             over = phrases.aggregate_over(wording.what, size, limit, wording.unit, *_largest(case, model, self))
         if row_subject.kind == QUADRATIC:
             if over and size is not None and combine != "each":
@@ -339,7 +339,7 @@ def untaken_effects(analysis: Analysis, instead: Sequence[RandomError] = ()) -> 
         largest = np.max(list(sizes.values()), axis=0)
         is_above = (total >= level) & (largest > 0)
         count = np.sum([size > 0 for size in sizes.values()], axis=0)
-        least = np.minimum(MAKES_UP * largest, level / np.maximum(count, 1))
+        least = np.minimum(MAKER_FRACTION * largest, level / np.maximum(count, 1))
         makers = {row_id: is_above & (size >= least) & (size > 0) for row_id, size in sizes.items()}
         effects.append(UntakenEffect(kind, total, (total > 0) & ~is_above, makers, least, sizes))
     return effects
@@ -455,7 +455,7 @@ class JudgedScene:
             return SceneRow(nothing, self)
         doubt = edges.has_doubt
         if model == "published":
-            doubt = doubt | (edges.difference > total * BOUND)
+            doubt = doubt | (edges.difference > total * LIMIT_RATIO)
         judged = judging.row(row_subject, edges.difference, allowable, doubt=doubt)._replace(
             qpe_published_rad=np.zeros(judging.cases), qpe_full_rad=edges.difference, allowable_full=total
         )
@@ -479,7 +479,7 @@ class SceneRow(FamilyRow):
             if not degeneracy:
                 open_drift = (phrases.drift_is_open_at_the_edge(drifting),) if drifting else ()
                 notes = (*edge.notes(total), *open_drift)
-            if model == "published" and edge.difference > total * BOUND:
+            if model == "published" and edge.difference > total * LIMIT_RATIO:
                 doubt = phrases.other_model_fails("full", edge.difference, total, "rad")
         return worded(
             case,

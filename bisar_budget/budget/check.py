@@ -39,7 +39,7 @@ from bisar_budget.units import format_quantity
 if TYPE_CHECKING:
     from bisar_budget.sampling.draws import Share
 
-_TOGETHER = 256  # cases: arrays of more do not stay in a cache
+_CASES_AT_ONCE = 256  # cases: arrays of more do not stay in a cache
 
 
 def check_mission(mission: Mission, today: date, *, outside: Outside = NOTHING_OUTSIDE) -> MissionFindings:
@@ -75,8 +75,8 @@ def check_missions(
         yield 0, check_mission(missions[0], today, outside=outside)
         return
     for alike, indices in stacked(missions):
-        for start in range(0, indices.size, _TOGETHER):
-            block = indices[start : start + _TOGETHER]
+        for start in range(0, indices.size, _CASES_AT_ONCE):
+            block = indices[start : start + _CASES_AT_ONCE]
             if block.size == 1:
                 yield int(block[0]), check_mission(missions[block[0]], today, outside=outside)
                 continue
@@ -169,8 +169,8 @@ def _unused_keys(mission: Mission) -> Iterator[Note]:
 Found = MissionFindings | UnusableMission
 Kept = TypeVar("Kept")
 
-MANY = 200  # files, of which half pay for a second process
-AT_ONCE = 500  # files that are checked together at most
+FILES_FOR_TWO_PROCESSES = 200  # files, of which half pay for a second process
+FILES_AT_ONCE = 500  # files that are checked together at most
 
 
 class Draws(NamedTuple):
@@ -248,7 +248,7 @@ def _chunks(files: Sequence[str]) -> list[Sequence[str]]:
 
     What is found of a mission differs, in its last digits, by what is checked together with it.
     """
-    count = 1 if len(files) < MANY else 2 * math.ceil(len(files) / (2 * AT_ONCE))
+    count = 1 if len(files) < FILES_FOR_TWO_PROCESSES else 2 * math.ceil(len(files) / (2 * FILES_AT_ONCE))
     ends = [chunk * len(files) // count for chunk in range(count + 1)]
     return [files[start:stop] for start, stop in pairwise(ends)]
 

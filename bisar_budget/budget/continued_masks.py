@@ -16,7 +16,7 @@ from bisar_budget.effects.random_effect import RandomEffect, RandomError
 from bisar_budget.phrases import NOTHING, Note
 
 MOST_OF_POWER = 0.5  # share of a row's power, above which it rests on the continuation
-LEAST_USE = 0.1  # of a limit, up to which it does not matter what a row rests on
+MIN_USE_FRACTION = 0.1  # of a limit, up to which it does not matter what a row rests on
 
 Part = str  # quadratic, cubic, spread or displacement
 
@@ -39,7 +39,7 @@ def rests_on_masks(errors: Iterable[RandomError], effect_kind: Part, size: Any, 
     """Whether a size, with its limit, rests on what lies below the first points of masks, in which cases."""
     power = continued_power(errors, effect_kind)
     with np.errstate(all="ignore"):
-        return (power > MOST_OF_POWER * np.square(size)) & (size > LEAST_USE * np.asarray(limit))
+        return (power > MOST_OF_POWER * np.square(size)) & (size > MIN_USE_FRACTION * np.asarray(limit))
 
 
 def continuation_note(case: Case, errors: Sequence[RandomError], effect_kind: Part, size: float) -> Note:

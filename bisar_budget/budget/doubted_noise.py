@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from bisar_budget import phrases
-from bisar_budget.budget.continued_masks import LEAST_USE, Part, part_of
+from bisar_budget.budget.continued_masks import MIN_USE_FRACTION, Part, part_of
 from bisar_budget.effects.effect import PLATFORMS
-from bisar_budget.effects.oscillators import POOR_FIT, noise_of
+from bisar_budget.effects.oscillators import POOR_FIT_FRACTION, noise_of
 from bisar_budget.effects.random_effect import RandomError
 from bisar_budget.mission.model import Mission
 from bisar_budget.phrases import NOTHING, Note
@@ -27,7 +27,7 @@ def rests_on_doubted_noise(errors: Iterable[RandomError], effect_kind: Part, mod
             size = part_of(error.effect(model), effect_kind) * np.asarray(error.declared)
             power = power + np.where(error.is_in_doubt, np.nan_to_num(np.square(size)), 0.0)
     with np.errstate(all="ignore"):
-        return np.sqrt(power) > LEAST_USE * np.asarray(limit)
+        return np.sqrt(power) > MIN_USE_FRACTION * np.asarray(limit)
 
 
 def has_doubted_frequency(mission: Mission, platform: str) -> bool:
@@ -53,7 +53,7 @@ def noise_doubts(mission: Mission, platform: str) -> Iterator[tuple[str, Note]]:
         yield replaced.figure, sentence
     if oscillator.allan_deviation is not None:
         misfit = noise_of(oscillator, mission.radar.center_frequency, mission.collection.aperture_time).misfit
-        if misfit > POOR_FIT:
+        if misfit > POOR_FIT_FRACTION:
             key = f"platforms.{platform}.oscillator"
             yield (
                 ("allan_deviation" if oscillator.sensor is None else "sensor"),

@@ -30,13 +30,13 @@ from bisar_budget.phrases import NOTHING, Note
 from bisar_budget.ranges.exact_ranges import Floats, Truths
 
 LEAST_M = 1e-3  # of a doubt; what is less is no story beside any declared error, zero included
-NEGLIGIBLE_USE = 0.1  # of a requirement, by the doubt of a path or by a velocity that its source states
+NEGLIGIBLE_USE_FRACTION = 0.1  # of a requirement, by the doubt of a path or by a velocity that its source states
 NEGLIGIBLE_RAD = 0.08  # of quadratic phase, in any image
 _TYPICAL_SHARE = 1 / 3  # of a usual error; a fix may be as much better than those of its quality usually are
 MOST_RESIDUAL_RAD = 0.2  # rms phase along the line of sight that a smooth path may leave of a log, unsaid
 MOST_GRID_SHARE = 0.1  # of the declared position error, that a step of a log may have, unsaid
 RESIDUAL = "residual"  # kind of doubt of what a smooth path leaves
-_EQUAL = 1e-6  # relative, of variances: equal is enough, and turned axes round
+_EQUAL_VARIANCE_FRACTION = 1e-6  # relative, of variances: equal is enough, and turned axes round
 
 
 @dataclass(frozen=True)
@@ -157,13 +157,15 @@ def states_more(mission: Mission, name: str, kind: str, stated: StatedAccuracy) 
     stated_covariance = _stated_covariance(stated, kind)
     declared = _declared_covariance(platform, kind)
     if stated.covariance is None:
-        is_more = kind == "position" and stated.total**2 > np.trace(declared, axis1=-2, axis2=-1) * (1 + _EQUAL)
+        is_more = kind == "position" and stated.total**2 > np.trace(declared, axis1=-2, axis2=-1) * (
+            1 + _EQUAL_VARIANCE_FRACTION
+        )
         return np.asarray(is_more) & (stated.total > LEAST_M)
     if stated_covariance is None:
         return False
     share = _TYPICAL_SHARE**2 if stated.is_typical else 1.0
     seen = LEAST_M**2 if kind == "position" else 0.0
-    excess = declared * (1 + _EQUAL) + seen * np.eye(3) - share * stated_covariance
+    excess = declared * (1 + _EQUAL_VARIANCE_FRACTION) + seen * np.eye(3) - share * stated_covariance
     scale = np.trace(stated_covariance, axis1=-2, axis2=-1)
     is_more = np.linalg.eigvalsh(excess)[..., 0] < -1e-9 * scale
     is_open = stated.is_typical and platform.motion_error.stated(kind) is None and not platform.motion_error.random
@@ -220,7 +222,8 @@ def _stated_doubt(platform: Platform, name: str, kind: str, stated: StatedAccura
     sizes = [np.sqrt(np.diag(axes @ covariance @ axes.T)).tolist() for covariance in (stated_covariance, declared)]
     share = _TYPICAL_SHARE if stated.is_typical else 1.0
     if all(
-        share * size <= declared_size * (1 + _EQUAL) + LEAST_M for size, declared_size in zip(*sizes, strict=True)
+        share * size <= declared_size * (1 + _EQUAL_VARIANCE_FRACTION) + LEAST_M
+        for size, declared_size in zip(*sizes, strict=True)
     ):
         # Along each axis enough is declared, but not between them.
         values, directions = np.linalg.eigh(declared - share**2 * stated_covariance)
@@ -268,7 +271,7 @@ def is_coarse(mission: Mission, name: str) -> Any:
     grid = _stack(log.grid)
     squares = np.swapaxes(grid, -1, -2) @ grid
     declared = _declared_covariance(platform, "position")
-    excess = MOST_GRID_SHARE**2 * declared * (1 + _EQUAL) + LEAST_M**2 * np.eye(3) - squares
+    excess = MOST_GRID_SHARE**2 * declared * (1 + _EQUAL_VARIANCE_FRACTION) + LEAST_M**2 * np.eye(3) - squares
     coarse = np.linalg.eigvalsh(excess)[..., 0] < 0
     if coarse.any() and platform.motion_error.stated("position") is None and not platform.motion_error.random:
         coarse = coarse & _matters(mission, name, "position", squares / 12)
@@ -313,11 +316,13 @@ def _matters(mission: Mission, name: str, kind: str, covariance: Floats) -> Any:
             constant, linear, edge = 0 * middle, (after + before) / 2, (after - before) * at_ends / 2
         at_edge = np.sqrt(np.einsum("...i,...ij,...j->...", edge, covariance, edge))
         phase = 2 * np.pi / np.asarray(mission.radar.wavelength) * at_edge
-        matters = np.logical_not(phase < np.minimum(NEGLIGIBLE_USE * needs.quadratic_phase_error, NEGLIGIBLE_RAD))
+        matters = np.logical_not(
+            phase < np.minimum(NEGLIGIBLE_USE_FRACTION * needs.quadratic_phase_error, NEGLIGIBLE_RAD)
+        )
         if needs.location_error is not None:
             moved = _moved(mission.geometry, constant, linear)
             spread = np.sqrt(np.einsum("...ai,...ij,...aj->...", moved, covariance, moved))
-            matters = matters | np.logical_not(spread < NEGLIGIBLE_USE * np.asarray(needs.location_error))
+            matters = matters | np.logical_not(spread < NEGLIGIBLE_USE_FRACTION * np.asarray(needs.location_error))
     return matters
 
 
@@ -342,7 +347,9 @@ def _moved(geometry: BistaticGeometry, constant: Floats, linear: Floats) -> Floa
 
 
 # ---------------------------------------------------------------------- the published model
-APART = 0.05  # of the full model's allowable; farther from it, the published one does not hold
+MAX_MODEL_DIFFERENCE_FRACTION = (
+    0.05  # of the full model's allowable; farther from it, the published one does not hold
+)
 
 
 def model_doubt(case: Case, rows: Sequence[Row]) -> Note:
@@ -371,7 +378,7 @@ def _is_apart(row: Row) -> bool:
     published, full = row.allowable_published, row.allowable_full
     if published is None or full is None:
         return published is not full
-    return abs(published - full) > APART * full
+    return abs(published - full) > MAX_MODEL_DIFFERENCE_FRACTION * full
 
 
 def _difference(row: Row) -> float:

@@ -9,7 +9,16 @@ import numpy as np
 
 from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Analysis, Case, Model
-from bisar_budget.budget.judged_rows import BOUND, CODE, EFFECTS, REQUIREMENTS, FamilyRow, Judged, Judging, worded
+from bisar_budget.budget.judged_rows import (
+    CODE,
+    EFFECTS,
+    LIMIT_RATIO,
+    REQUIREMENTS,
+    FamilyRow,
+    Judged,
+    Judging,
+    worded,
+)
 from bisar_budget.effects.declared import CUBIC, END_OF_IMAGE, HELD, LOCATION, OTHER_MODEL, QUADRATIC, Declared
 from bisar_budget.effects.effect import PLATFORMS, ErrorSource, subject
 from bisar_budget.findings.row import SPECIFICATION, Row
@@ -92,11 +101,11 @@ class ErrorRows:
 def _is_over(does: Declared, gain: Any, limits: tuple[Floats, float | None, float | None], is_motion: Any) -> Any:
     """Whether any effect of errors is over what it is held to."""
     limit, cubic, location = limits
-    is_over = does.judged(gain) / limit > BOUND
+    is_over = does.judged(gain) / limit > LIMIT_RATIO
     if cubic is not None:
-        is_over |= is_motion & (np.abs(does.cubic) / cubic > BOUND)
+        is_over |= is_motion & (np.abs(does.cubic) / cubic > LIMIT_RATIO)
     if location is not None:
-        is_over |= np.hypot(*does.farthest) / location > BOUND
+        is_over |= np.hypot(*does.farthest) / location > LIMIT_RATIO
     return is_over
 
 
@@ -178,7 +187,7 @@ def _doubt(case: Case, other: Model, source: ErrorSource, limit: float) -> Note:
         moved = 0.0 if theirs.farthest is None else math.hypot(*theirs.farthest)
         uses.append((moved, needs.location_error, LOCATION))
     size, allowed, binding = max(uses, key=lambda use: use[0] / use[1])
-    if size <= allowed * BOUND or other.is_blind:
+    if size <= allowed * LIMIT_RATIO or other.is_blind:
         return NOTHING
     if binding == QUADRATIC and other.is_published:
         return phrases.other_model_fails(other.name, size, allowed, *EFFECTS[binding], source.equation)

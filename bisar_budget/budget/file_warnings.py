@@ -13,7 +13,7 @@ from bisar_budget.analysis.analysis import Case
 from bisar_budget.budget.declarations import swings_nothing
 from bisar_budget.budget.doubted_noise import noise_doubts
 from bisar_budget.budget.doubts import input_doubts, missing_settings
-from bisar_budget.budget.fit_noise import MOST_CHANGE, allowable_noise
+from bisar_budget.budget.fit_noise import MAX_UNSAID_CHANGE_FRACTION, allowable_noise
 from bisar_budget.constants import FASTEST_FLIGHT
 from bisar_budget.effects.effect import PLATFORMS
 from bisar_budget.effects.oscillator_acceleration import is_unshaken
@@ -140,7 +140,7 @@ def _noisy_fits(mission: Mission) -> Iterator[_Warned]:
     """Logs whose noise changes the allowables, through the path that is fitted to them."""
     for name in PLATFORMS:
         noise = allowable_noise(mission, name)
-        if noise is not None and noise.change > MOST_CHANGE:
+        if noise is not None and noise.change > MAX_UNSAID_CHANGE_FRACTION:
             note = fit_changes_allowables(name, noise.acceleration, noise.change, noise.row_id)
             yield _Warned(("platforms", name, "trajectory"), note)
 

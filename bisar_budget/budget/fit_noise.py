@@ -17,8 +17,10 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import Platform
 from bisar_budget.ranges.exact_ranges import Floats
 
-MOST_CHANGE = 0.05  # of an allowable, that goes unsaid
-_MATTERS = 0.1  # of the largest effect per unit of a kind: what does less has an allowable that decides nothing
+MAX_UNSAID_CHANGE_FRACTION = 0.05  # of an allowable, that goes unsaid
+_DECISIVE_EFFECT_FRACTION = (
+    0.1  # of the largest effect per unit of a kind: what does less has an allowable that decides nothing
+)
 _KINDS = ("position", "velocity")
 
 
@@ -85,4 +87,6 @@ def _changes(units: Floats) -> Floats:
     with np.errstate(all="ignore"):
         first, second = np.split(np.abs(here[..., None] / units[..., 1:] - 1), 2, axis=-1)
         changes = np.sqrt(np.square(np.maximum(first, second)).sum(axis=-1))
-    return np.where(here > _MATTERS * here.max(), np.nan_to_num(changes, nan=0.0, posinf=np.inf), 0.0)
+    return np.where(
+        here > _DECISIVE_EFFECT_FRACTION * here.max(), np.nan_to_num(changes, nan=0.0, posinf=np.inf), 0.0
+    )

@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bisar_budget.budget.continued_masks import LEAST_USE
-from bisar_budget.budget.judged_rows import BOUND, Codes
+from bisar_budget.budget.continued_masks import MIN_USE_FRACTION
+from bisar_budget.budget.judged_rows import LIMIT_RATIO, Codes
 from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.findings.status import BROKEN, RANK, STATUS
 from bisar_budget.mission.model import Mission
@@ -23,10 +23,10 @@ from bisar_budget.ranges.exact_ranges import Floats, Truths
 
 KEYS = (QUADRATIC, CUBIC, LOCATION, "pslr", "islr", "declare")
 UNITS = {QUADRATIC: "rad", CUBIC: "rad", LOCATION: "m", "pslr": "dB", "islr": "dB", "declare": ""}
-ALIKE = 1e-9  # of a utilization: what is nearer is the same, but for rounding
-TENTH, SMALL_RAD = 0.1, 0.08  # of the quadratic requirement; and of any image
+EQUAL_USE_FRACTION = 1e-9  # of a utilization: what is nearer is the same, but for rounding
+NEGLIGIBLE_FRACTION, SMALL_RAD = 0.1, 0.08  # of the quadratic requirement; and of any image
 # Of the largest part: a row with less does not make an effect up, if all that have less are negligible.
-MAKES_UP = 0.1
+MAKER_FRACTION = 0.1
 
 # Requirements that take an effect, in the order in which one is suggested.
 TAKEN_BY = {"cubic": (CUBIC, "islr"), "spread": ("islr",), "tone": ("pslr", "islr")}
@@ -78,12 +78,12 @@ def first_highest(uses: Floats) -> NDArray[np.intp]:
 def is_as_high(uses: Any, other_uses: Any) -> Truths:
     """Whether utilizations are as high as others, but for rounding."""
     with np.errstate(invalid="ignore"):  # one that is endless is as high as itself
-        return np.asarray((uses >= other_uses - ALIKE * np.abs(other_uses)) | (uses == other_uses))
+        return np.asarray((uses >= other_uses - EQUAL_USE_FRACTION * np.abs(other_uses)) | (uses == other_uses))
 
 
 def negligible_rad(mission: Mission) -> Any:
     """Total of an effect that no requirement takes, below which it is negligible. [rad]"""
-    return np.minimum(TENTH * np.asarray(mission.requirements.quadratic_phase_error), SMALL_RAD)
+    return np.minimum(NEGLIGIBLE_FRACTION * np.asarray(mission.requirements.quadratic_phase_error), SMALL_RAD)
 
 
 def required_keys(mission: Mission) -> tuple[str, ...]:
@@ -145,8 +145,8 @@ def requirement_states(
             broken = np.where(
                 codes == RANK["waived"], codes, RANK["fail"]
             )  # a waiver of the row covers all it breaks
-            breaks = np.nan_to_num(quadratic_use) > BOUND
-            rests_on = in_doubt & is_open & (np.nan_to_num(quadratic_use) > LEAST_USE)
+            breaks = np.nan_to_num(quadratic_use) > LIMIT_RATIO
+            rests_on = in_doubt & is_open & (np.nan_to_num(quadratic_use) > MIN_USE_FRACTION)
             kept = np.where(rests_on, codes, by_autofocus)
             levels = np.where(is_of_other, np.where(breaks, broken, kept), levels)
             used = np.where(is_of_other, quadratic_use, uses)

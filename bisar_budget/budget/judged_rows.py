@@ -24,7 +24,7 @@ from bisar_budget.ranges.exact_ranges import Floats
 
 Codes = NDArray[np.int8]  # places of statuses in STATUS: the worst has the lowest
 
-BOUND = 1 + UTILIZATION_TOLERANCE
+LIMIT_RATIO = 1 + UTILIZATION_TOLERANCE
 CODE = {name: np.int8(rank) for name, rank in RANK.items()}
 _NAMES = np.array(list(STATUS), dtype=object)
 REQUIREMENTS = (QUADRATIC, CUBIC, LOCATION, "pslr", "islr", END_OF_IMAGE)
@@ -210,9 +210,9 @@ class Judging(NamedTuple):
                 is_silent,
                 np.broadcast_to(is_info, shape),
                 np.broadcast_to(is_unknown, shape),
-                use > BOUND,
+                use > LIMIT_RATIO,
                 np.broadcast_to(doubt, shape),
-                np.broadcast_to(without_autofocus > BOUND, shape),
+                np.broadcast_to(without_autofocus > LIMIT_RATIO, shape),
                 use > self.warn_above,
             ],
             [

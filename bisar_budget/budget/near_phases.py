@@ -13,7 +13,7 @@ import numpy as np
 from bisar_budget import phrases
 from bisar_budget.analysis.allocation import Allocation
 from bisar_budget.analysis.analysis import Case
-from bisar_budget.budget.judged_rows import BOUND, REQUIREMENTS, Judged, Judging
+from bisar_budget.budget.judged_rows import LIMIT_RATIO, REQUIREMENTS, Judged, Judging
 from bisar_budget.effects.declared import CUBIC, QUADRATIC
 from bisar_budget.effects.effect import Subject
 from bisar_budget.mission.model import Mission
@@ -56,7 +56,7 @@ class NearPhases(NamedTuple):
     @property
     def is_over(self) -> Truths:
         """Whether they break a requirement."""
-        return np.asarray(self.use > BOUND)
+        return np.asarray(self.use > LIMIT_RATIO)
 
     def limit(self, declared: Floats) -> Floats:
         """Size of the tone that uses all of the stricter limit; infinite where nothing limits it."""

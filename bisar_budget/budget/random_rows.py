@@ -25,9 +25,15 @@ from bisar_budget.analysis.spread import (
     spread_limit,
     stated_powers,
 )
-from bisar_budget.budget.continued_masks import LEAST_USE, continuation_note, continued_power, part_of, rests_on_masks
+from bisar_budget.budget.continued_masks import (
+    MIN_USE_FRACTION,
+    continuation_note,
+    continued_power,
+    part_of,
+    rests_on_masks,
+)
 from bisar_budget.budget.doubted_noise import doubted_noise_note, rests_on_doubted_noise
-from bisar_budget.budget.judged_rows import BOUND, CODE, EFFECTS, REQUIREMENTS, FamilyRow, Judging, worded
+from bisar_budget.budget.judged_rows import CODE, EFFECTS, LIMIT_RATIO, REQUIREMENTS, FamilyRow, Judging, worded
 from bisar_budget.budget.tone_rows import evidence, notes_of_acceleration
 from bisar_budget.effects.air_delays import CONTENT, legs_of
 from bisar_budget.effects.declared import CUBIC, LOCATION, OTHER_MODEL, QUADRATIC
@@ -35,7 +41,7 @@ from bisar_budget.effects.effect import PLATFORMS, override_notes, subject
 from bisar_budget.effects.navigation_errors import CORRELATED, process_of
 from bisar_budget.effects.oscillator_acceleration import lacks_a_spectrum
 from bisar_budget.effects.oscillator_tones import spurs_of
-from bisar_budget.effects.oscillators import POOR_FIT
+from bisar_budget.effects.oscillators import POOR_FIT_FRACTION
 from bisar_budget.effects.random_effect import RandomEffect, RandomError
 from bisar_budget.effects.vibration import counted, displacement_rms, power_of, projected
 from bisar_budget.findings.row import Row
@@ -50,7 +56,7 @@ from bisar_budget.ranges.exact_ranges import Floats, Truths
 
 ISLR = "islr"
 HELD = (QUADRATIC, CUBIC, ISLR, LOCATION)  # requirements, in the order of what an error does
-_GOOD_FIT = 0.005  # of an Allan deviation, up to which a power law needs no word
+_GOOD_FIT_FRACTION = 0.005  # of an Allan deviation, up to which a power law needs no word
 
 
 class Limits(NamedTuple):
@@ -151,13 +157,13 @@ class RandomRows:
         )
         within = qpe / limit
         without_autofocus = np.where((gain > 1) & (qpe > 0) & is_limited, within, 0.0)
-        is_over_other = declared > sizes_of_other.min(axis=0) * BOUND
+        is_over_other = declared > sizes_of_other.min(axis=0) * LIMIT_RATIO
         published, full = (mine, theirs) if model == "published" else (theirs, mine)
         is_continued = self._rests_on_masks(mine, sizes)
         in_doubt = self._table([error.is_in_doubt for error in self.errors]) > 0
         with np.errstate(all="ignore"):
             use = declared / allowable
-        is_in_doubt = in_doubt & (use > LEAST_USE) & ~(use > BOUND)
+        is_in_doubt = in_doubt & (use > MIN_USE_FRACTION) & ~(use > LIMIT_RATIO)
         judged = self.judging.row(
             self.errors[0].subject,
             declared,
@@ -247,8 +253,8 @@ class RandomRows:
             subject("mission", ISLR),
             np.where(is_declared, rms, math.nan),
             np.where(is_there, limit, math.nan),
-            doubt=(rms > limit_of_other * BOUND) | rests_on,
-            is_unknown=is_in_doubt & is_there & ~(rms > limit * BOUND),
+            doubt=(rms > limit_of_other * LIMIT_RATIO) | rests_on,
+            is_unknown=is_in_doubt & is_there & ~(rms > limit * LIMIT_RATIO),
         )
         published, full = (limit, limit_of_other) if model == "published" else (limit_of_other, limit)
         columns = (judged.declared, judged.allowable, published, full)  # by one rule: the whole reads as required
@@ -362,7 +368,7 @@ class IslrRow(FamilyRow):
         level = _levels(case.mission, gating)
         other_model, over, doubt = OTHER_MODEL[gating], NOTHING, NOTHING
         variance, limit, limit_by_other = map(case.number, (self.variance, self.limit, self.limit_of_other))
-        if math.sqrt(variance) > limit_by_other * BOUND:
+        if math.sqrt(variance) > limit_by_other * LIMIT_RATIO:
             doubt = phrases.other_model_allows(other_model, level(limit_by_other), "dB")
         elif self.judged.status[case.place] == CODE["warn"]:
             makers = [member for member in case.random if member.id in {each.row_id for each in self.members}]
@@ -499,7 +505,7 @@ def _oscillator_wording(mission: Mission, error: RandomError) -> tuple[str, str 
         ]
         if any(spur is not None and spur.quadratic > 0 for spur in slow):
             notes.append(phrases.folded_spurs_count())
-    if noise is not None and _GOOD_FIT < noise.misfit <= POOR_FIT:
+    if noise is not None and _GOOD_FIT_FRACTION < noise.misfit <= POOR_FIT_FRACTION:
         notes.append(phrases.power_law_fits(noise.misfit))
     return "phase noise", oscillator.source, tuple(notes)
 

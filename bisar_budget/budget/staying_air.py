@@ -16,8 +16,8 @@ from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Analysis, Case
 from bisar_budget.analysis.spread import islr_db, mainlobe_energy, spread_limit
 from bisar_budget.budget.aggregates import untaken_effects
-from bisar_budget.budget.judged_requirements import EXAMPLES, TAKEN_BY, TENTH, UntakenEffect
-from bisar_budget.budget.judged_rows import BOUND, Judged
+from bisar_budget.budget.judged_requirements import EXAMPLES, NEGLIGIBLE_FRACTION, TAKEN_BY, UntakenEffect
+from bisar_budget.budget.judged_rows import LIMIT_RATIO, Judged
 from bisar_budget.budget.random_rows import HELD, ISLR, held_effect
 from bisar_budget.effects.air_delays import changing_air
 from bisar_budget.effects.combined import combined
@@ -167,7 +167,7 @@ def _rests_on(mission: Mission, use: AirUse, declared_use: Floats) -> Truths:
     """Whether delays would use more than a tenth, or break a requirement together with what is declared."""
     rule = "rss" if use.key == ISLR else mission.allocation.combine
     together = combined((use.use, declared_use), rule)
-    return np.asarray((use.use > TENTH) | ((use.use > 0) & (together > BOUND)))
+    return np.asarray((use.use > NEGLIGIBLE_FRACTION) | ((use.use > 0) & (together > LIMIT_RATIO)))
 
 
 def _uses(analysis: Analysis, errors: Sequence[RandomError], model: str) -> Iterator[AirUse]:

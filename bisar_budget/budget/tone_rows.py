@@ -11,9 +11,9 @@ from bisar_budget import phrases
 from bisar_budget.analysis.analysis import Analysis, Case
 from bisar_budget.analysis.spread import Tone, islr_of
 from bisar_budget.analysis.vibration_limits import Echo, VibrationLimits, highest_echo, tone_limits
-from bisar_budget.budget.continued_masks import LEAST_USE
+from bisar_budget.budget.continued_masks import MIN_USE_FRACTION
 from bisar_budget.budget.doubted_noise import doubted_noise_note, has_doubted_frequency
-from bisar_budget.budget.judged_rows import BOUND, FamilyRow, Judging, worded
+from bisar_budget.budget.judged_rows import LIMIT_RATIO, FamilyRow, Judging, worded
 from bisar_budget.budget.near_phases import NearPhases, phase_over, phase_requirement
 from bisar_budget.effects.declared import OTHER_MODEL
 from bisar_budget.effects.effect import override_notes, subject
@@ -24,7 +24,7 @@ from bisar_budget.effects.oscillator_acceleration import (
     lacks_a_spectrum,
 )
 from bisar_budget.effects.oscillator_tones import LeftTone, spurs_of
-from bisar_budget.effects.vibration import ECHO_CYCLES, SLOWEST, cubic_part, quadratic_part
+from bisar_budget.effects.vibration import ECHO_CYCLES, SLOWEST_ECHO_CYCLES, cubic_part, quadratic_part
 from bisar_budget.findings.row import Row
 from bisar_budget.mission.instruments import Oscillator
 from bisar_budget.mission.model import Mission, has_instruments
@@ -93,7 +93,7 @@ def spur_rows(judging: Judging, analysis: Analysis, model: str) -> Iterator["Spu
             judged = phases.row(judging, row_subject, metric, level, None)
         else:
             limits = VibrationLimits(*(2 * math.pi / mission.radar.wavelength * limit for limit in limits))
-            is_over_other = phase > limits.by(OTHER_MODEL[model]) * BOUND
+            is_over_other = phase > limits.by(OTHER_MODEL[model]) * LIMIT_RATIO
             is_near = spur.left.slowest_echo(T) * T < ECHO_CYCLES
             is_in_doubt = has_doubted_frequency(mission, spur.name) & _is_used(phase, limits.by(model))
             is_unknown = (is_near & (metric == "pslr")) | is_in_doubt
@@ -112,7 +112,7 @@ def spur_rows(judging: Judging, analysis: Analysis, model: str) -> Iterator["Spu
 
 def _is_used(size: Any, limit: Any) -> Truths:
     """Where a size uses enough of its limit that a doubt about it counts, and does not break it."""
-    return np.asarray((size > LEAST_USE * limit) & ~(size > limit * BOUND))
+    return np.asarray((size > MIN_USE_FRACTION * limit) & ~(size > limit * LIMIT_RATIO))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -164,7 +164,7 @@ def _folds(folded: LeftTone, free: float, aperture_time: float, row_id: str) -> 
     slow = [
         (float(share), float(frequency))
         for frequency, share in zip(folded.frequencies, folded.shares, strict=True)
-        if folded.is_folded and frequency * aperture_time < SLOWEST and share > 0
+        if folded.is_folded and frequency * aperture_time < SLOWEST_ECHO_CYCLES and share > 0
     ]
     if not slow:
         return ()
@@ -186,7 +186,7 @@ def accelerated_rows(judging: Judging, analysis: Analysis, model: str) -> Iterat
         accelerated_tones(mission, analysis.geometry) if has_instruments(mission) else ()
     ):
         T, per_unit = mission.collection.aperture_time, judging.array(tone.per_unit)
-        is_there = per_unit > 0 if tone.left.is_folded else judging.array(tone.frequency * T) >= SLOWEST
+        is_there = per_unit > 0 if tone.left.is_folded else judging.array(tone.frequency * T) >= SLOWEST_ECHO_CYCLES
         if not is_there.any():
             continue
         declared, limits = judging.array(tone.sensitivity), by_platform.get(tone.name)
@@ -202,7 +202,7 @@ def accelerated_rows(judging: Judging, analysis: Analysis, model: str) -> Iterat
             )
             published, full = (np.where(per_unit > 0, tone, math.nan) for tone in (by_published, by_full))
             allowable = full if model == "full" else published
-            is_over_other = declared > (published if model == "full" else full) * BOUND
+            is_over_other = declared > (published if model == "full" else full) * LIMIT_RATIO
             judged = phases.row(judging, tone.subject, metric, declared, allowable, doubt=is_over_other)
             published, full = (np.fmin(limit, phases.limit(declared)) for limit in (published, full))
             judged = judged._replace(allowable_published=published, allowable_full=full)
@@ -295,7 +295,7 @@ def notes_of_acceleration(mission: Mission, name: str) -> tuple[Note, ...]:
         notes += _whose(mission, name)
     elif not lacks_a_spectrum(mission, name):
         notes.append(phrases.oscillator_does_not_vibrate(flies_a_turn(mission, name)))
-    if any(line.frequency * mission.collection.aperture_time >= SLOWEST for line in vibration.sinusoidal):
+    if any(line.frequency * mission.collection.aperture_time >= SLOWEST_ECHO_CYCLES for line in vibration.sinusoidal):
         notes.append(phrases.tones_have_rows(f"{name}.oscillator.acceleration"))
     if mission.synchronization is not None and mission.synchronization.interval is not None:
         notes.append(phrases.left_by_exchanges(mission.synchronization.interval))

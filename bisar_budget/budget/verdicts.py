@@ -14,7 +14,7 @@ from bisar_budget.findings.status import RANK
 from bisar_budget.phrases import NOTHING
 from bisar_budget.units import format_limit
 
-_SHOWN = 4  # rows of a mission
+_SHOWN_ROWS = 4  # rows of a mission
 
 
 def with_verdicts(findings: MissionFindings, verified: VerifiedMission, today: date | None = None) -> MissionFindings:
@@ -160,7 +160,7 @@ def rows_worth_showing(findings: MissionFindings) -> tuple[Verdict, ...]:
     measured = [v for v in findings.verdicts or () if v.measured_qpe_rad is not None and v.id in rows]
     ordered = sorted(measured, key=lambda verdict: _urgency(rows[verdict.id], verdict))
     decisive = [v for v in ordered if rows[v.id].status != "not_declared" or _is_refuted(v)]
-    return tuple((decisive or ordered[:1])[:_SHOWN])
+    return tuple((decisive or ordered[:1])[:_SHOWN_ROWS])
 
 
 def _urgency(row: Row, verdict: Verdict) -> tuple[int, bool, bool, float]:

@@ -19,14 +19,14 @@ from bisar_budget.analysis.vibration_limits import (
     tone_limits,
     vibration_limits,
 )
-from bisar_budget.budget.judged_rows import BOUND, REQUIREMENTS, FamilyRow, Judged, Judging, worded
+from bisar_budget.budget.judged_rows import LIMIT_RATIO, REQUIREMENTS, FamilyRow, Judged, Judging, worded
 from bisar_budget.budget.near_phases import NearPhases, phase_over, phase_requirement
 from bisar_budget.effects.declared import CUBIC, OTHER_MODEL, QUADRATIC
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.vibration import (
     ECHO_CYCLES,
     NEAR_CYCLES,
-    SLOWEST,
+    SLOWEST_ECHO_CYCLES,
     counted,
     lines_of,
     near_groups,
@@ -80,7 +80,7 @@ class Vibrations:
         everywhere = np.ones(self.judging.cases, dtype=bool)
         for name in PLATFORMS:
             for index in range(self.count[name]):
-                is_slow = self.cycles[name][index] < SLOWEST
+                is_slow = self.cycles[name][index] < SLOWEST_ECHO_CYCLES
                 if is_slow.any():
                     yield self._slow(name, index, is_slow).in_unit(self.per_metre[name][index])
                 if not is_slow.all():
@@ -114,7 +114,7 @@ class Vibrations:
         if limits is not None:
             allowable = self.array(limits.by(model))
             if declared is not None and not self.mission.has_direct_path:  # which the published model does not know
-                is_over_other = declared > limits.by(OTHER_MODEL[model]) * BOUND
+                is_over_other = declared > limits.by(OTHER_MODEL[model]) * LIMIT_RATIO
         if phases is None or declared is None:
             judged = self.judging.row(
                 row_subject, declared, allowable, doubt=doubt | is_over_other, is_info=limits is None

@@ -14,7 +14,7 @@ import numpy as np
 
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.budget.judged_mission import JudgedMission, judged_mission
-from bisar_budget.budget.judged_requirements import SMALL_RAD, TENTH
+from bisar_budget.budget.judged_requirements import NEGLIGIBLE_FRACTION, SMALL_RAD
 from bisar_budget.budget.judged_rows import CODE, REQUIREMENTS, Why
 from bisar_budget.budget.random_rows import ISLR
 from bisar_budget.design.geometric_program import Rows
@@ -163,10 +163,12 @@ class SpecifiedMission:
             binding = int(row.binding.max())
             requirement = row.metric if binding < 0 or binding >= len(REQUIREMENTS) - 1 else REQUIREMENTS[binding]
             found.append((row.subject.id, requirement, self._power(row.subject.kind), use))
-        level = min(TENTH * float(np.max(self.stated.requirements.quadratic_phase_error)), SMALL_RAD)
+        level = min(NEGLIGIBLE_FRACTION * float(np.max(self.stated.requirements.quadratic_phase_error)), SMALL_RAD)
         for air in judged.air.uses.values():
             power = self._power(air.key if air.key != ISLR else "")
-            found.append((f"{NEGLIGIBLE}.{air.row_id}", air.key, power, judged.air.is_long * air.use / TENTH))
+            found.append(
+                (f"{NEGLIGIBLE}.{air.row_id}", air.key, power, judged.air.is_long * air.use / NEGLIGIBLE_FRACTION)
+            )
         untaken = [(one.kind, one) for one in judged.untaken]
         untaken += [(f"air.{one.kind}", one) for one in judged.air.untaken]
         for name, one in untaken:

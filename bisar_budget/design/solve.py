@@ -17,7 +17,7 @@ import numpy as np
 
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.budget.judged_mission import JudgedMission, judged_mission
-from bisar_budget.budget.judged_requirements import ALIKE
+from bisar_budget.budget.judged_requirements import EQUAL_USE_FRACTION
 from bisar_budget.design.table import (
     GEOMETRY,
     REASON,
@@ -240,7 +240,9 @@ def _nearest(states: Sequence[State]) -> State:
 
 def _is_alike(one: float | None, other: float | None) -> bool:
     """Whether two utilizations are one, but for rounding."""
-    return one == other or (one is not None and other is not None and math.isclose(one, other, rel_tol=ALIKE))
+    return one == other or (
+        one is not None and other is not None and math.isclose(one, other, rel_tol=EQUAL_USE_FRACTION)
+    )
 
 
 class _Search:

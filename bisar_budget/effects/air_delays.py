@@ -35,9 +35,9 @@ from bisar_budget.mission.propagation import (
 )
 from bisar_budget.ranges.exact_ranges import Floats
 
-ELECTRONS = 40.308  # m³/s²: e²/(8π²ε₀mₑ), the group delay of 1/m² is so much over f² (CODATA 2018)
-TROPOSPHERE = 7e3  # m, height at which a spherical troposphere is crossed as a whole
-IONOSPHERE = 350e3  # m, the same of free electrons, where the platform is not lower
+ELECTRON_DELAY_M3_PER_S2 = 40.308  # m³/s²: e²/(8π²ε₀mₑ), the group delay of 1/m² is so much over f² (CODATA 2018)
+TROPOSPHERE_HEIGHT_M = 7e3  # m, height at which a spherical troposphere is crossed as a whole
+IONOSPHERE_HEIGHT_M = 350e3  # m, the same of free electrons, where the platform is not lower
 DELAY, CONTENT = DELAYS
 UNITS = dict(zip(DELAYS, ("m", "1/m^2"), strict=True))
 
@@ -68,13 +68,13 @@ def leg_factor(delay: str, position: Vectors, middle: Vectors) -> Any:
     if delay == DELAY:
         is_low = elevation_deg(middle) < LEAST_ELEVATION_DEG
         with np.errstate(divide="ignore"):
-            return np.where(is_low, 0.0, obliquity(position, np.where(is_above, TROPOSPHERE, 0.0)))
-    return np.where(is_above, obliquity(position, np.minimum(IONOSPHERE, np.maximum(height, 0.0))), 0.0)
+            return np.where(is_low, 0.0, obliquity(position, np.where(is_above, TROPOSPHERE_HEIGHT_M, 0.0)))
+    return np.where(is_above, obliquity(position, np.minimum(IONOSPHERE_HEIGHT_M, np.maximum(height, 0.0))), 0.0)
 
 
 def metres_per_unit(mission: Mission, delay: str) -> Any:
     """Group delay of the zenith by a unit of a figure, at the centre frequency. [m/unit]"""
-    return 1.0 if delay == DELAY else ELECTRONS / np.square(mission.radar.center_frequency)
+    return 1.0 if delay == DELAY else ELECTRON_DELAY_M3_PER_S2 / np.square(mission.radar.center_frequency)
 
 
 def group_delay(mission: Mission, path: PlatformState, delay: str, times: Any) -> Any:

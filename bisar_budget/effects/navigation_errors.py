@@ -59,7 +59,7 @@ _GROWS = {
 # ---------------------------------------------------------------------- inertial sensors
 CORRELATED = ("random", "trajectory")  # kinds of error that are correlated noise of a position
 _CONSTANT_S = 1e9  # correlation time of what is constant over any aperture
-_UNIFORM = 12**-0.5  # sigma of an error that is uniform over a step
+_UNIFORM_SIGMA_RATIO = 12**-0.5  # sigma of an error that is uniform over a step
 
 
 def process_of(mission: Mission, error: RandomError) -> GaussMarkov:
@@ -424,7 +424,7 @@ def _log_parts(log: LogNoise, cases: int) -> dict[str, tuple[Floats, Floats, Any
             np.moveaxis(ways, (2, 1, 0), (0, 1, 2)),
             log.correlation_time,
         ),
-        "grid": (_UNIFORM * steps.T, np.moveaxis(along, 0, -1), _CONSTANT_S),
+        "grid": (_UNIFORM_SIGMA_RATIO * steps.T, np.moveaxis(along, 0, -1), _CONSTANT_S),
     }
 
 

@@ -32,8 +32,8 @@ from bisar_budget.mission.vibrations import FeltVibration, Vibration
 from bisar_budget.ranges.exact_ranges import Floats
 
 PHASE = (1.0, 2.0)  # S_φ = (Γ·f₀)²·S_a/f²
-_FELT = 1e-6  # m/s², below which an acceleration of a path is none
-_STARTS = 8  # of exchanges within an interval, over which what they leave of a turn is a mean
+_FELT_ACCELERATION_MPS2 = 1e-6  # m/s², below which an acceleration of a path is none
+_EXCHANGE_START_COUNT = 8  # of exchanges within an interval, over which what they leave of a turn is a mean
 
 
 class Felt(NamedTuple):
@@ -184,7 +184,7 @@ def _vibrating(seen: SensorCases, name: str, felt_vibration: Felt) -> Parts:
 def _turning(seen: SensorCases, name: str) -> tuple[RandomEffect, RandomEffect] | None:
     """Effects of a unit of Γ by the acceleration of a path; None where it has none."""
     state: PlatformState = getattr(seen.geometry, name)
-    if state.is_quadratic and not np.any(norm(state.acceleration) > _FELT):
+    if state.is_quadratic and not np.any(norm(state.acceleration) > _FELT_ACCELERATION_MPS2):
         return None
     felt_part = np.where(_falls(seen.mission, state), 0.0, 1.0)
     if not np.any(felt_part):
@@ -208,14 +208,15 @@ def turn_courses(state: PlatformState, moments: Floats, interval: Any = None) ->
     if interval is None:
         return gained(moments)
     courses = []
-    for start in range(_STARTS):
-        offset = interval * start / _STARTS
+    for start in range(_EXCHANGE_START_COUNT):
+        offset = interval * start / _EXCHANGE_START_COUNT
         before = np.floor((moments - offset) / interval) * interval + offset
         fraction = (moments - before) / interval
         exact_gain, joined = gained(moments), gained(before) * (1 - fraction) + gained(before + interval) * fraction
         remaining = exact_gain - joined  # of a constant acceleration rounding alone
         courses.append(
-            np.where(np.abs(remaining) > ROUNDING * np.abs(exact_gain).max(), remaining, 0.0) / math.sqrt(_STARTS)
+            np.where(np.abs(remaining) > ROUNDING * np.abs(exact_gain).max(), remaining, 0.0)
+            / math.sqrt(_EXCHANGE_START_COUNT)
         )
     return np.concatenate(courses)
 
@@ -228,7 +229,7 @@ def _falls(mission: Mission, state: PlatformState) -> Any:
 def flies_a_turn(mission: Mission, name: str) -> bool:
     """Whether an oscillator feels the path of its platform, in any case."""
     state: PlatformState = getattr(mission.geometry, name)
-    bends = not state.is_quadratic or norm(state.acceleration) > _FELT
+    bends = not state.is_quadratic or norm(state.acceleration) > _FELT_ACCELERATION_MPS2
     return bool(np.any(bends & ~np.asarray(_falls(mission, state))))
 
 

@@ -12,12 +12,14 @@ import numpy as np
 
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.spectra import Parts, tone
-from bisar_budget.effects.vibration import SLOWEST
+from bisar_budget.effects.vibration import SLOWEST_ECHO_CYCLES
 from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.mission.model import Mission
 
-_SEEN = 0.01  # of the amplitude of a tone, below which an echo beside the mainlobe is nothing
-_NEIGHBOURS = 3  # rates around 0 Hz beyond which a tone is folded with less than a hundredth of its amplitude
+_SEEN_AMPLITUDE_FRACTION = 0.01  # of the amplitude of a tone, below which an echo beside the mainlobe is nothing
+_NEIGHBOUR_RATE_COUNT = (
+    3  # rates around 0 Hz beyond which a tone is folded with less than a hundredth of its amplitude
+)
 
 
 class LeftTone(NamedTuple):
@@ -39,7 +41,7 @@ class LeftTone(NamedTuple):
         if not self.is_folded:
             return [self.shares[0]]
         return [
-            np.where(frequency * aperture_time >= SLOWEST, share, 0.0)[()]
+            np.where(frequency * aperture_time >= SLOWEST_ECHO_CYCLES, share, 0.0)[()]
             for frequency, share in zip(self.frequencies, self.shares, strict=True)
         ]
 
@@ -55,7 +57,9 @@ class LeftTone(NamedTuple):
         if not self.is_folded:
             return self.frequencies[0]
         seen = zip(self.frequencies, self.echoes(aperture_time), strict=True)
-        return np.min([np.where(share > _SEEN, frequency, math.inf) for frequency, share in seen], axis=0)[()]
+        return np.min(
+            [np.where(share > _SEEN_AMPLITUDE_FRACTION, frequency, math.inf) for frequency, share in seen], axis=0
+        )[()]
 
     def place(self, aperture_time: Any) -> Any:
         """Frequency of the largest echo. [Hz]"""
@@ -71,11 +75,11 @@ class LeftTone(NamedTuple):
         total: Any = np.zeros((5, *np.broadcast_shapes(*map(np.shape, (aperture_time, *self.frequencies)))))
         for frequency, share in zip(self.frequencies, self.shares, strict=True):
             cycles = frequency * aperture_time
-            if not np.any(cycles < SLOWEST):
+            if not np.any(cycles < SLOWEST_ECHO_CYCLES):
                 continue
-            quadratic, cubic, spread, constant, linear = tone(math.pi * np.minimum(cycles, SLOWEST))
+            quadratic, cubic, spread, constant, linear = tone(math.pi * np.minimum(cycles, SLOWEST_ECHO_CYCLES))
             tone_orders = np.array((quadratic, cubic, np.sqrt(spread), constant, linear))
-            total = total + np.where(cycles < SLOWEST, share, 0.0) * tone_orders
+            total = total + np.where(cycles < SLOWEST_ECHO_CYCLES, share, 0.0) * tone_orders
         quadratic, cubic, spread, constant, linear = total
         products = (-constant * quadratic, -linear * cubic)
         return Parts(quadratic**2, cubic**2, spread**2, constant**2, linear**2, *products)
@@ -89,7 +93,7 @@ def left_of_tone(frequency: Any, mission: Mission, geometry: BistaticGeometry) -
     if sync is None or sync.interval is None:
         return LeftTone((frequency,), (1.0,))
     turns = frequency * np.asarray(sync.interval)
-    folds = [np.rint(turns) + n for n in range(-_NEIGHBOURS, _NEIGHBOURS + 1)]
+    folds = [np.rint(turns) + n for n in range(-_NEIGHBOUR_RATE_COUNT, _NEIGHBOUR_RATE_COUNT + 1)]
     folded_turns = [np.abs(turns - fold) for fold in folds]
     folded = [
         np.where(fold == 0, 0.0, np.sinc(folded_turn) ** 2)[()]

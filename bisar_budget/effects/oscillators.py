@@ -22,10 +22,13 @@ from bisar_budget.mission.readers import Points, SortedPoints
 from bisar_budget.phrases import NOTHING, Note
 from bisar_budget.ranges.exact_ranges import Floats, Truths
 
-BANDWIDTH = 1e3  # Hz, to which noise counts that is stated without an end
-POOR_FIT = 0.2  # of an Allan deviation, from where a power law does not describe it
-_EXACT, _DESCRIBES = 1e-6, 0.01  # misfits of an Allan deviation: nothing, and so little that no term is added
-_SLOPE_BELOW_MASK = 3.0  # flicker of frequency; by the first points' own, a higher point could lower a phase
+DEFAULT_BANDWIDTH_HZ = 1e3  # Hz, to which noise counts that is stated without an end
+POOR_FIT_FRACTION = 0.2  # of an Allan deviation, from where a power law does not describe it
+_EXACT_FIT_FRACTION, _GOOD_FIT_OF_TERMS_FRACTION = (
+    1e-6,
+    0.01,
+)  # misfits of an Allan deviation: nothing, and so little that no term is added
+_BELOW_MASK_EXPONENT = 3.0  # flicker of frequency; by the first points' own, a higher point could lower a phase
 COVERED_CYCLES = 0.1  # per aperture, down to which a mask should reach: what is slower is hardly in any order
 
 
@@ -43,7 +46,7 @@ def noise_of(oscillator: Oscillator, center_frequency: float, aperture_time: flo
     center_frequency *= 10 ** (oscillator.level / 20)  # noise goes up as its square
     if oscillator.phase_noise is not None:
         return _of_mask(oscillator, center_frequency, aperture_time)
-    bandwidth = BANDWIDTH if oscillator.bandwidth is None else oscillator.bandwidth
+    bandwidth = DEFAULT_BANDWIDTH_HZ if oscillator.bandwidth is None else oscillator.bandwidth
     if oscillator.power_law is not None:
         return Noise(_of_power_law(oscillator.power_law, center_frequency, bandwidth))
     points = oscillator.allan_deviation or ()
@@ -70,7 +73,7 @@ def _of_mask(oscillator: Oscillator, center_frequency: float, aperture_time: flo
         slope = math.log(density / next_density) / math.log(g / f)
         pieces.append(PowerLawPiece(f, g, density * f**slope, slope))
     first, density = densities[0]
-    slope = _SLOPE_BELOW_MASK
+    slope = _BELOW_MASK_EXPONENT
     pieces.insert(0, PowerLawPiece(0.0, first, density * first**slope, slope))
     # The quadratic phase is made of tones of about a cycle per aperture.
     below = NOTHING
@@ -129,7 +132,7 @@ def fitted(points: Points, bandwidth: float, aperture_time: float) -> Fit:
     for candidates in _fits(points, bandwidth):
         least = min(fit.misfit for fit in candidates)
         fits = max((fit for fit in candidates if fit.misfit <= 1.1 * least), key=phase)
-        if fits.misfit < 0.9 * best.misfit and best.misfit > _DESCRIBES:
+        if fits.misfit < 0.9 * best.misfit and best.misfit > _GOOD_FIT_OF_TERMS_FRACTION:
             best = fits
     return best
 
@@ -158,7 +161,7 @@ def _fits(points: Points, bandwidth: float) -> tuple[tuple[Fit, ...], ...]:
             worst = max(
                 abs(math.sqrt(math.fsum(a * b for a, b in zip(row, h[:terms], strict=True))) - 1) for row in scaled
             )
-            fits_of_count.append(Fit(max(worst, _EXACT), PowerLaw(*h)))
+            fits_of_count.append(Fit(max(worst, _EXACT_FIT_FRACTION), PowerLaw(*h)))
         if fits_of_count:
             fits.append(tuple(fits_of_count))
     return tuple(fits)
@@ -240,7 +243,7 @@ def _is_in_doubt(seen: SensorCases, oscillator: Oscillator) -> Truths:
         return in_doubt
     for alike, cases in seen.alike(oscillator.noise_alone):
         for case in cases.tolist():
-            in_doubt[case] |= noise_of(alike, 1.0, float(seen.aperture_time[case])).misfit > POOR_FIT
+            in_doubt[case] |= noise_of(alike, 1.0, float(seen.aperture_time[case])).misfit > POOR_FIT_FRACTION
     return in_doubt
 
 

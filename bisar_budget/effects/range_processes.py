@@ -23,8 +23,10 @@ import numpy as np
 from bisar_budget.image_plane import LEADING
 from bisar_budget.ranges.exact_ranges import ExactRanges, Floats
 
-_ORDERS = 4  # Legendre orders 0 to 3, which displace and defocus
-_OCTAVES = 44  # of lags below an aperture: half of it over the shortest correlation time that a file can state
+_ORDER_COUNT = 4  # Legendre orders 0 to 3, which displace and defocus
+_LAG_OCTAVE_COUNT = (
+    44  # of lags below an aperture: half of it over the shortest correlation time that a file can state
+)
 _NODES_PER_OCTAVE = 20  # follow the correlation within an octave of lags to 1e-10
 
 
@@ -71,7 +73,7 @@ def effects_of_process(exact: ExactRanges, weights: Floats, covariance: Floats, 
     beyond : (cases,)
         Mean square of the range error in higher orders, which spread. [m²]
     """
-    orders = np.polynomial.legendre.legvander(exact.sampling.places, _ORDERS - 1) / LEADING
+    orders = np.polynomial.legendre.legvander(exact.sampling.places, _ORDER_COUNT - 1) / LEADING
     higher = np.eye(len(orders)) - orders @ exact.fit  # leaves what lies beyond the cubic
     bends = np.einsum("nm,amc->anc", higher, exact.slopes)
     weighted_bends = exact.mean * bends
@@ -150,7 +152,7 @@ def _lagged(count: int) -> tuple[Floats, Floats]:
     Lags are denser towards 0, octave by octave: correlation times of any length are followed.
     """
     x, w = np.polynomial.legendre.leggauss(_NODES_PER_OCTAVE)
-    edges = np.concatenate(([0.0], 2.0 ** np.arange(1 - _OCTAVES, 2)))
+    edges = np.concatenate(([0.0], 2.0 ** np.arange(1 - _LAG_OCTAVE_COUNT, 2)))
     width = np.diff(edges)
     lags = (edges[:-1, None] + width[:, None] * (x + 1) / 2).ravel()
     weights = (width[:, None] / 2 * w).ravel()

@@ -22,23 +22,23 @@ import numpy as np
 from bisar_budget.effects.declared import FLOOR_RAD, SHARE
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.sources import exact_ranges
-from bisar_budget.effects.vibration import ECHO_CYCLES, SLOWEST, DeclaredPhase
+from bisar_budget.effects.vibration import ECHO_CYCLES, SLOWEST_ECHO_CYCLES, DeclaredPhase
 from bisar_budget.geometry import BistaticGeometry, Vectors
 from bisar_budget.image_plane import nodes_for
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
 from bisar_budget.ranges.exact_ranges import FINE, STILL, ExactRanges, Floats, Places, Truths, followed
 
-PHASES = 16  # in which a large vibration is followed
-ANGLES = 2 * math.pi * np.arange(PHASES) / PHASES
+TONE_PHASE_COUNT = 16  # in which a large vibration is followed
+ANGLES = 2 * math.pi * np.arange(TONE_PHASE_COUNT) / TONE_PHASE_COUNT
 TURNED = np.stack((np.cos(ANGLES), np.sin(ANGLES)), axis=1)  # what a cosine and a sine have in each
-BETWEEN = 16  # values between two of them, of the harmonics that they give
-TOGETHER = 1 << 12  # lanes that are followed at once
+VALUES_PER_PHASE = 16  # values between two of them, of the harmonics that they give
+MAX_LANE_COUNT = 1 << 12  # lanes that are followed at once
 
 
 @dataclass(frozen=True, eq=False)
 class TonePhases:
-    """Effects of a vibration in `PHASES` phases all around, of each of its axes, (axes, PHASES, cases) each.
+    """Effects of a vibration in `TONE_PHASE_COUNT` phases all around, of each of its axes, (axes, TONE_PHASE_COUNT, cases) each.
 
     Quadratic and cubic phase at the aperture edge; the hidden phase, and the rms beyond the cubic. [rad]
     """
@@ -127,7 +127,7 @@ def slow_phases(mission: Mission, slow: Mapping[str, SlowTone], gain: Any) -> li
         line = getattr(mission.platforms, tone.subject.owner).motion_error.vibration.sinusoidal[
             tone.subject.entry or 0
         ]
-        is_slow = np.asarray(line.frequency * T < SLOWEST)[()]
+        is_slow = np.asarray(line.frequency * T < SLOWEST_ECHO_CYCLES)[()]
         if np.any(is_slow):
             does = tone.declared
             quadratic, cubic, hidden = (
@@ -148,7 +148,7 @@ class _Tone:
     def of_range(self, size: Any) -> Floats:
         """Effects of a range error of an amplitude, a number or (nodes, cases), of the first order in it. [m]
 
-        Those of `TonePhases` in all phases, (4, PHASES, cases). [rad]
+        Those of `TonePhases` in all phases, (4, TONE_PHASE_COUNT, cases). [rad]
         """
         exact = self.exact
         range_error = np.array((np.cos(self.angle), -np.sin(self.angle))) * size
@@ -173,8 +173,8 @@ class _Tone:
         is_large = np.asarray((quadratic + hidden) * grows > np.maximum(FLOOR_RAD, share))
         is_large |= cubic * grows > np.maximum(FLOOR_RAD, SHARE * of_cubic)
         large_cases = np.flatnonzero(is_large & (size > 0))
-        for first in range(0, large_cases.size, TOGETHER // PHASES):
-            here = large_cases[first : first + TOGETHER // PHASES]
+        for first in range(0, large_cases.size, MAX_LANE_COUNT // TONE_PHASE_COUNT):
+            here = large_cases[first : first + MAX_LANE_COUNT // TONE_PHASE_COUNT]
             small[..., here] = self._of_large(way, size, here)
         return small
 
@@ -183,14 +183,14 @@ class _Tone:
 
         Where no ground point has the range history of a phase, that of the whole motion stands for each.
         """
-        case, turned = np.repeat(cases, PHASES), np.tile(ANGLES, cases.size)
+        case, turned = np.repeat(cases, TONE_PHASE_COUNT), np.tile(ANGLES, cases.size)
         angle = self.angle[:, case] if self.angle.shape[1] > 1 else self.angle
         course = size[case] * np.cos(angle + turned)
         moved = [_of_case(component, case) * course for component in way]
         shifts = [moved, STILL] if self.platform_index == 0 else [STILL, moved]
         point = followed(self.exact, np.zeros_like(course), shifts, case)
         phases = np.array((point.quadratic, point.cubic, point.hidden, point.rest))
-        phases = np.moveaxis(phases.reshape(4, cases.size, PHASES), 2, 1)
+        phases = np.moveaxis(phases.reshape(4, cases.size, TONE_PHASE_COUNT), 2, 1)
         return np.where(np.isnan(phases), 2 * self.exact.k[cases] * size[cases], phases)
 
 
@@ -199,7 +199,7 @@ def _of_case(component: Any, case: Places) -> Any:
 
 
 def _worst(squares: Floats) -> Floats:
-    """Roots of the largest squares of axes, by values around a circle, (axes, PHASES, cases), added."""
-    steps = PHASES * BETWEEN
-    around = np.fft.irfft(np.fft.rfft(squares, axis=1), steps, axis=1) * BETWEEN
+    """Roots of the largest squares of axes, by values around a circle, (axes, TONE_PHASE_COUNT, cases), added."""
+    steps = TONE_PHASE_COUNT * VALUES_PER_PHASE
+    around = np.fft.irfft(np.fft.rfft(squares, axis=1), steps, axis=1) * VALUES_PER_PHASE
     return np.asarray(np.sqrt(np.maximum(around.max(axis=1), 0.0)).sum(axis=0))

@@ -19,7 +19,7 @@ from bisar_budget import evaluators
 from bisar_budget.image_plane import nodes
 from bisar_budget.ranges.exact_ranges import Floats
 
-SLOW = 0.5  # angle, or ratio, below which terms cancel and a series is exact to 1e-8
+SERIES_ANGLE_RAD = 0.5  # angle, or ratio, below which terms cancel and a series is exact to 1e-8
 
 
 class Parts(NamedTuple):
@@ -80,10 +80,10 @@ class Parts(NamedTuple):
 def gauss_markov(aperture_time: Any, correlation_time: Any) -> Parts:
     """Parts of a stationary process of variance 1 and correlation exp(−|t|/τ_c)."""
     ratio = np.asarray(aperture_time / (2 * correlation_time))
-    (slow,) = evaluators.gauss_markov_parts_slow(np.minimum(ratio, SLOW))
-    fast = np.maximum(ratio, SLOW)
+    (slow,) = evaluators.gauss_markov_parts_slow(np.minimum(ratio, SERIES_ANGLE_RAD))
+    fast = np.maximum(ratio, SERIES_ANGLE_RAD)
     (exact,) = evaluators.gauss_markov_parts(fast, np.exp(-2 * fast))
-    return Parts(*(np.where(ratio < SLOW, *both)[()] for both in zip(slow, exact, strict=True)))
+    return Parts(*(np.where(ratio < SERIES_ANGLE_RAD, *both)[()] for both in zip(slow, exact, strict=True)))
 
 
 def tone(angle: Any) -> Floats:
@@ -93,10 +93,10 @@ def tone(angle: Any) -> Floats:
     linear part.
     """
     angle = np.asarray(angle)
-    slow = np.array(*evaluators.tone_parts_slow(np.minimum(angle, SLOW)))  # type: ignore[arg-type]
-    fast = np.maximum(angle, SLOW)
+    slow = np.array(*evaluators.tone_parts_slow(np.minimum(angle, SERIES_ANGLE_RAD)))  # type: ignore[arg-type]
+    fast = np.maximum(angle, SERIES_ANGLE_RAD)
     exact = np.array(*evaluators.tone_parts(fast, np.sin(fast), np.cos(fast)))  # type: ignore[arg-type]
-    return np.where(angle < SLOW, slow, exact)
+    return np.where(angle < SERIES_ANGLE_RAD, slow, exact)
 
 
 def held(step: Any) -> Any:
@@ -104,33 +104,35 @@ def held(step: Any) -> Any:
     return np.sinc(step / (2 * math.pi)) ** 4
 
 
-_INTEGRALS = 7  # parts of any spectrum, in their order
-_TURNS = 24  # half turns of a tone within the aperture that are followed one by one
-_FAST = _TURNS * math.pi  # angle from which what turns with a tone is averaged
-_RESOLVED_TURNS = 1.5  # half turns within a panel, up to which its nodes follow a tone however fast
-_FIRST = 0.1  # angle below which a tone's parts are their first powers, to 4e-4 of the 3 % that lie there
-_OCTAVE = 2.0
-_SAME = 1.000001  # of two edges, computed in two ways
-_APART = 1 + 1e-10  # ratio of two edges of panels, at least
-_FOLDED = 10  # intervals of sampling up to which images are followed one by one
-_PASSED = 50  # intervals beyond which they pass less than 1e-4 of its amplitude
-_NEAR_ALIASES = 3  # rates, and one for each two powers of a slope, within which aliases are counted one by one
-_STEEP = 4.0  # slope beyond which straight lines do not flatten an image of a piece
-_FALLS = 6.0  # powers of e by which a steep piece falls from edge to edge
+_INTEGRAL_COUNT = 7  # parts of any spectrum, in their order
+_FOLLOWED_TURN_COUNT = 24  # half turns of a tone within the aperture that are followed one by one
+_FAST = _FOLLOWED_TURN_COUNT * math.pi  # angle from which what turns with a tone is averaged
+_RESOLVED_TURN_COUNT = 1.5  # half turns within a panel, up to which its nodes follow a tone however fast
+_FIRST_POWER_ANGLE_RAD = (
+    0.1  # angle below which a tone's parts are their first powers, to 4e-4 of the 3 % that lie there
+)
+_OCTAVE_RATIO = 2.0
+_SAME_EDGE_RATIO = 1.000001  # of two edges, computed in two ways
+_MIN_EDGE_RATIO = 1 + 1e-10  # ratio of two edges of panels, at least
+_FOLLOWED_IMAGE_COUNT = 10  # intervals of sampling up to which images are followed one by one
+_PASSED_IMAGE_COUNT = 50  # intervals beyond which they pass less than 1e-4 of its amplitude
+_NEAR_ALIAS_COUNT = 3  # rates, and one for each two powers of a slope, within which aliases are counted one by one
+_STEEP_EXPONENT = 4.0  # slope beyond which straight lines do not flatten an image of a piece
+_FALL_EXPONENT = 6.0  # powers of e by which a steep piece falls from edge to edge
 
 # Nodes and weights of Gauss and Legendre on 0 … 1.
 _NODES, _WEIGHTS = (
     (0.5 + 0.5 * nodes(6).places)[:, None],
     nodes(6).fit[0][:, None],
 )
-_MOST = 4096  # panels that are integrated at once
+_MAX_PANEL_COUNT = 4096  # panels that are integrated at once
 
 
 def _tone_edges(aperture_time: float) -> list[float]:
     """Frequencies between which a tone's parts are smooth. [Hz]"""
     scale = math.pi * aperture_time
-    edges = [_FIRST / scale * _OCTAVE**n for n in range(4)]
-    return edges + [math.pi * n / scale for n in range(1, _TURNS + 1)]
+    edges = [_FIRST_POWER_ANGLE_RAD / scale * _OCTAVE_RATIO**n for n in range(4)]
+    return edges + [math.pi * n / scale for n in range(1, _FOLLOWED_TURN_COUNT + 1)]
 
 
 _EDGES = np.array(_tone_edges(1 / math.pi))  # angles
@@ -178,7 +180,7 @@ def parts(pieces: Sequence[PowerLawPiece], aperture_time: Any, above: Any = 0.0)
         Frequency from which on the spectrum counts. [Hz]
     """
     scale = math.pi * np.atleast_1d(aperture_time)
-    total = np.zeros((_INTEGRALS, *scale.shape))
+    total = np.zeros((_INTEGRAL_COUNT, *scale.shape))
     for piece in pieces:
         to_angle = piece.density * scale ** (piece.slope - 1)
         low = np.minimum(np.maximum(piece.low, above), piece.high)
@@ -200,8 +202,8 @@ def _like(total: Floats, aperture_time: Any) -> Parts:
 
 def _of_power_law(slope: float, low: Floats, high: Floats) -> Floats:
     """Parts of x^(−slope) between two angles."""
-    first = np.searchsorted(_EDGES, low * _SAME, side="right")
-    last = np.searchsorted(_EDGES, high / _SAME, side="left")
+    first = np.searchsorted(_EDGES, low * _SAME_EDGE_RATIO, side="right")
+    last = np.searchsorted(_EDGES, high / _SAME_EDGE_RATIO, side="left")
     has_edge = last > first
     until = np.where(has_edge, _EDGES[np.minimum(first, _EDGES.size - 1)], high)
     start = np.where(has_edge, _EDGES[last - 1], high)
@@ -219,9 +221,9 @@ def _between_edges(slope: float) -> Floats:
 
 def _at_an_end(slope: float, low: Floats, high: Floats) -> Floats:
     """Parts of a panel at the end of a piece, which may be slow or fast; nothing of one without length."""
-    total = np.zeros((_INTEGRALS, low.size))
-    is_slow = high <= _FIRST * _SAME
-    is_fast = (low >= _FAST / _SAME) & (high > low + _RESOLVED_TURNS * math.pi)
+    total = np.zeros((_INTEGRAL_COUNT, low.size))
+    is_slow = high <= _FIRST_POWER_ANGLE_RAD * _SAME_EDGE_RATIO
+    is_fast = (low >= _FAST / _SAME_EDGE_RATIO) & (high > low + _RESOLVED_TURN_COUNT * math.pi)
     for is_chosen, of_panel in (
         (is_slow, _slow),
         (~is_slow & is_fast, _fast),
@@ -272,8 +274,12 @@ def squares(angle: Floats) -> Floats:
 
 
 # ---------------------------------------------------------------------- clocks that were set
-_RESOLVED = 24.0  # cycles within the age of the setting up to which aperture and setting are followed together
-_AGES = np.concatenate((np.geomspace(1e-6, 0.125, 18), np.arange(0.25, _RESOLVED + 0.1, 0.25)))  # edges, in cycles
+_RESOLVED_AGE_CYCLES = (
+    24.0  # cycles within the age of the setting up to which aperture and setting are followed together
+)
+_AGES = np.concatenate(
+    (np.geomspace(1e-6, 0.125, 18), np.arange(0.25, _RESOLVED_AGE_CYCLES + 0.1, 0.25))
+)  # edges, in cycles
 
 
 def set_parts(pieces: Sequence[PowerLawPiece], aperture_time: Floats, age: Floats, averaging: Floats) -> Parts:
@@ -291,9 +297,9 @@ def set_parts(pieces: Sequence[PowerLawPiece], aperture_time: Floats, age: Float
     aperture_time, age, averaging : (cases,)
         T, H from the middle of the averaging to mid-aperture, at least (t_c + T)/2, and t_c. [s]
     """
-    beyond = _RESOLVED / age
+    beyond = _RESOLVED_AGE_CYCLES / age
     times, above = (aperture_time, aperture_time, averaging), (0.0 * beyond, beyond, beyond)
-    of_each = np.array(parts(pieces, np.concatenate(times), np.concatenate(above))[:_INTEGRALS])
+    of_each = np.array(parts(pieces, np.concatenate(times), np.concatenate(above))[:_INTEGRAL_COUNT])
     free, of_clock, of_line = (Parts(*columns) for columns in np.split(of_each, 3, axis=1))
     fast = of_line.linear * (2 / averaging) ** 2  # of the slope of the line
     half = aperture_time / 2
@@ -307,7 +313,10 @@ def set_parts(pieces: Sequence[PowerLawPiece], aperture_time: Floats, age: Float
         of_clock.linear_cubic,
     ]
     ends = np.array([edge for piece in pieces for edge in (piece.low, piece.high)])[:, None] * age
-    edges = np.sort(np.concatenate((_AGES[:, None] + 0.0 * age, np.clip(ends, _AGES[0], _RESOLVED))), axis=0) / age
+    edges = (
+        np.sort(np.concatenate((_AGES[:, None] + 0.0 * age, np.clip(ends, _AGES[0], _RESOLVED_AGE_CYCLES))), axis=0)
+        / age
+    )
     span = np.log(edges[1:] / edges[:-1])
     f = edges[:-1] * np.exp(span * _NODES[:, None])  # (nodes, panels, cases)
     weight = density(pieces, f) * f * span * _WEIGHTS[:, None]
@@ -333,7 +342,7 @@ def _squares_of_set(f: Floats, aperture_time: Floats, age: Floats, averaging: Fl
 
 
 # ---------------------------------------------------------------------- a clock that is heard twice
-_HEARD = 12  # turns of a tone within the delay that are followed
+_FOLLOWED_DELAY_CYCLES = 12  # turns of a tone within the delay that are followed
 
 
 def heard_parts(pieces: Sequence[PowerLawPiece], aperture_time: Any, delay: Any) -> Parts:
@@ -348,7 +357,7 @@ def heard_parts(pieces: Sequence[PowerLawPiece], aperture_time: Any, delay: Any)
     """
     times, delays = np.broadcast_arrays(np.atleast_1d(aperture_time), np.atleast_1d(delay))
     end = max((piece.high for piece in pieces), default=0.0)
-    last = np.minimum(_HEARD / delays, end)
+    last = np.minimum(_FOLLOWED_DELAY_CYCLES / delays, end)
     edges = [
         [*_exchange_edges(T, 1 / gap), *(edge for piece in pieces for edge in (piece.low, piece.high))]
         for T, gap in zip(times.tolist(), delays.tolist(), strict=True)
@@ -375,13 +384,13 @@ def synchronized_parts(pieces: Sequence[PowerLawPiece], aperture_time: Any, inte
     rate, times = 1 / interval, np.atleast_1d(aperture_time)
     scale = math.pi * times
     ends = [edge for piece in pieces for edge in _ends(piece)]
-    near = _PASSED if max(ends, default=0.0) > _FOLDED * rate else _FOLDED
+    near = _PASSED_IMAGE_COUNT if max(ends, default=0.0) > _FOLLOWED_IMAGE_COUNT * rate else _FOLLOWED_IMAGE_COUNT
     last = np.maximum(near * rate, _FAST / scale)
     images = _image_edges(ends, rate)
     edges = [[*_exchange_edges(T, rate), *images] for T in times.tolist()]
     total = _over_panels(lambda f, cases: _unjoined(pieces, f, rate), edges, last, scale)
     _add_fast(total, pieces, last, scale, 1.0)  # straight lines pass nothing any more
-    total += parts(_far_images(pieces, images, rate), times)[:_INTEGRALS]
+    total += parts(_far_images(pieces, images, rate), times)[:_INTEGRAL_COUNT]
     return _like(total, aperture_time)
 
 
@@ -389,7 +398,7 @@ def link_parts(aperture_time: Any, interval: float) -> Parts:
     """Parts of samples of variance 1 with straight lines between: one-sided 2·T_s·sinc⁴(f·T_s), ⅔ in all."""
     rate, times = 1 / interval, np.atleast_1d(aperture_time)
     edges = [_exchange_edges(T, rate) for T in times.tolist()]
-    last = np.full(times.shape, _FOLDED * rate)
+    last = np.full(times.shape, _FOLLOWED_IMAGE_COUNT * rate)
     total = _over_panels(
         lambda f, cases: 2 * interval * held(2 * math.pi * f * interval), edges, last, math.pi * times
     )
@@ -409,9 +418,9 @@ def _over_panels(
         for low, top in _panels(end, of_case)
     ]
     low, top, cases = (np.array(column) for column in zip(*panels, strict=True))
-    total = np.zeros((_INTEGRALS, high.size))
-    for start in range(0, low.size, _MOST):
-        block = slice(start, start + _MOST)
+    total = np.zeros((_INTEGRAL_COUNT, high.size))
+    for start in range(0, low.size, _MAX_PANEL_COUNT):
+        block = slice(start, start + _MAX_PANEL_COUNT)
         here = cases[block]
         panel_parts = _panels_of(partial(density, cases=here), low[block], top[block], scale[here])
         for kept, parts_of_panels in zip(total, panel_parts, strict=True):
@@ -434,8 +443,8 @@ def _panels_of(density: Callable[[Floats], Floats], low: Floats, high: Floats, s
     span = np.log(high / np.where(is_first, high, low))
     f = np.where(is_first, high * _NODES, low * np.exp(span * _NODES))
     width = np.where(is_first, high, f * span) * _WEIGHTS
-    angle, of_tone = f * scale, np.empty((_INTEGRALS, *f.shape))
-    is_mean = (low * scale >= _FAST / _SAME) & ((high - low) * scale > _RESOLVED_TURNS * math.pi)
+    angle, of_tone = f * scale, np.empty((_INTEGRAL_COUNT, *f.shape))
+    is_mean = (low * scale >= _FAST / _SAME_EDGE_RATIO) & ((high - low) * scale > _RESOLVED_TURN_COUNT * math.pi)
     of_tone[..., ~is_mean] = squares(angle[:, ~is_mean])
     (mean,) = evaluators.tone_parts_fast(1.0, *(angle[:, is_mean] ** -power for power in (2, 4, 6, 8)))  # type: ignore[arg-type]
     of_tone[..., is_mean] = np.array(mean)
@@ -448,7 +457,7 @@ def _unjoined(pieces: Sequence[PowerLawPiece], f: Floats, rate: float) -> Floats
     f = f[:, once]
     density_here, passed = density(pieces, f), np.sinc(f / rate) ** 2
     total = density_here * (1 - passed) ** 2
-    is_folded = f < _FOLDED * rate
+    is_folded = f < _FOLLOWED_IMAGE_COUNT * rate
     nearest = np.rint(f[is_folded] / rate)
     start = np.abs(f[is_folded] - nearest * rate)
     aliases = sum((_aliases(piece, start, rate) for piece in pieces), np.zeros_like(start))
@@ -463,7 +472,7 @@ def _aliases(piece: PowerLawPiece, start: Floats, rate: float) -> Floats:
     Those where the power law bends within a rate are counted one by one, those beyond by the formula of Euler and
     Maclaurin.
     """
-    far = math.ceil(_NEAR_ALIASES + abs(piece.slope) / 2)
+    far = math.ceil(_NEAR_ALIAS_COUNT + abs(piece.slope) / 2)
     first, end = max(1, math.floor(piece.low / rate)), min(far, math.ceil(piece.high / rate) + 1)
     sides = np.array((start, -start))
     total = np.zeros_like(sides)
@@ -488,7 +497,7 @@ def _far_images(pieces: Sequence[PowerLawPiece], edges: Sequence[float], rate: f
     x = f / rate
     powers = aliases * np.sin(math.pi * x) ** 4 * (high - low) * _WEIGHTS
     at_half = 2 * float((powers * (x**2 - x + 1 / 6)).sum())
-    integral, last = float(powers.sum()), float(_FOLDED)
+    integral, last = float(powers.sum()), float(_FOLLOWED_IMAGE_COUNT)
     return [
         PowerLawPiece(begin * rate, math.inf, 2 * rate**3 / math.pi**4 * power, 4.0)
         for begin, power in ((last - 0.5, at_half), (last, integral - 2 * at_half), (last + 0.5, at_half))
@@ -515,29 +524,31 @@ def _sum_at_steps(piece: PowerLawPiece, low: Floats, high: Floats, step: float) 
 
 def _exchange_edges(aperture_time: float, rate: float) -> list[float]:
     """Frequencies between which a tone's parts, and what straight lines pass, are smooth. [Hz]"""
-    edges = [*_tone_edges(aperture_time), rate / 4, *(rate * n / 2 for n in range(1, 2 * _FOLDED + 1))]
-    octave = _TURNS / aperture_time
+    edges = [*_tone_edges(aperture_time), rate / 4, *(rate * n / 2 for n in range(1, 2 * _FOLLOWED_IMAGE_COUNT + 1))]
+    octave = _FOLLOWED_TURN_COUNT / aperture_time
     while octave < rate / 4:
         edges.append(octave)
-        octave *= _OCTAVE
+        octave *= _OCTAVE_RATIO
     return edges
 
 
 def _image_edges(ends: Sequence[float], rate: float) -> list[float]:
     """Frequencies between which a spectrum with such ends, and its images, are smooth. [Hz]"""
     starts = {abs(end - round(end / rate) * rate) for end in ends}
-    images = [abs(n * rate + sign * start) for start in starts for n in range(_FOLDED + 1) for sign in (1, -1)]
+    images = [
+        abs(n * rate + sign * start) for start in starts for n in range(_FOLLOWED_IMAGE_COUNT + 1) for sign in (1, -1)
+    ]
     least = min((start for start in starts if start), default=rate)
-    grown = (least * _OCTAVE ** (3 * n) for n in range(1, math.ceil(math.log2(max(rate / least, 1.0)) / 3)))
-    return [*ends, *images, *grown, *(n * rate for n in range(_FOLDED + 1, _PASSED))]
+    grown = (least * _OCTAVE_RATIO ** (3 * n) for n in range(1, math.ceil(math.log2(max(rate / least, 1.0)) / 3)))
+    return [*ends, *images, *grown, *(n * rate for n in range(_FOLLOWED_IMAGE_COUNT + 1, _PASSED_IMAGE_COUNT))]
 
 
 def _ends(piece: PowerLawPiece) -> Iterator[float]:
     """Where a piece begins and ends, and where a steep one has fallen from there by a few powers of e. [Hz]"""
     yield from (piece.low, piece.high)
-    if abs(piece.slope) > _STEEP:
+    if abs(piece.slope) > _STEEP_EXPONENT:
         dense = piece.low if piece.slope > 0 else piece.high
-        fallen = (dense * math.exp(_FALLS * n / piece.slope) for n in range(1, 4))
+        fallen = (dense * math.exp(_FALL_EXPONENT * n / piece.slope) for n in range(1, 4))
         yield from (f for f in fallen if piece.low < f < piece.high)
 
 
@@ -548,6 +559,6 @@ def _panels(high: float, edges: Sequence[float]) -> Iterator[tuple[float, float]
     """
     kept = [0.0]
     for edge in sorted(edges):
-        if kept[-1] * _APART < edge < high / _APART:
+        if kept[-1] * _MIN_EDGE_RATIO < edge < high / _MIN_EDGE_RATIO:
             kept.append(edge)
     return pairwise([*kept, high])

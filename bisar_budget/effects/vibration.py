@@ -44,17 +44,17 @@ from bisar_budget.ranges.exact_ranges import Floats, Truths
 from bisar_budget.units import format_quantity
 
 NEAR_CYCLES = 2.5  # per aperture; farther apart, two equal lines raise each other's echo by less than 1.1 dB
-SLOWEST = 1.0  # cycles per aperture; what is slower makes no echoes
+SLOWEST_ECHO_CYCLES = 1.0  # cycles per aperture; what is slower makes no echoes
 ECHO_CYCLES = 3.0  # likewise; below, echoes lie beside the mainlobe and the motion is a quadratic phase as well
 
 _STEPS = (0.1, 0.02)  # of the search, in cells
 _REACH = np.arange(-6, 7)[:, None, None]
-_SEARCHED = 16  # places around which it looks
-_MOST = 200_000  # echoes that are looked at together
+_SEARCH_START_COUNT = 16  # places around which it looks
+_MAX_ECHO_COUNT = 200_000  # echoes that are looked at together
 
 DISPLACED = ((2 * math.pi) ** -4, 4.0)  # S_x = S_a/(2πf)⁴
-_STEEP = 20.0  # slope of a density beyond which its powers would overflow
-_PARTS = 16  # by which such a piece is taken instead: it is narrow, or nearly nothing at one of its ends
+_STEEP_DENSITY_EXPONENT = 20.0  # slope of a density beyond which its powers would overflow
+_STEEP_PIECE_COUNT = 16  # by which such a piece is taken instead: it is narrow, or nearly nothing at one of its ends
 
 
 # ---------------------------------------------------------------------- echoes that add
@@ -74,7 +74,7 @@ def near_groups(cycles: Floats) -> NDArray[np.intp]:
     order = np.argsort(cycles, axis=0, kind="stable")
     placed = np.take_along_axis(cycles, order, axis=0)
     begins = np.ones(cycles.shape, dtype=bool)
-    begins[1:] = (placed[:-1] < SLOWEST) | (np.diff(placed, axis=0) > NEAR_CYCLES * (1 + 1e-9))
+    begins[1:] = (placed[:-1] < SLOWEST_ECHO_CYCLES) | (np.diff(placed, axis=0) > NEAR_CYCLES * (1 + 1e-9))
     has_next = np.zeros(cycles.shape, dtype=bool)
     has_next[:-1] = ~begins[1:]
     number = np.where(~begins | has_next, np.cumsum(begins & has_next, axis=0) - 1, -1)
@@ -129,10 +129,10 @@ def worst_phases(amplitudes: Any, cycles: Any, is_member: Truths | None = None) 
         return Worst(sizes[0].reshape(shape)[()], frequencies[0].reshape(shape)[()])
     starts = np.sort(np.concatenate((frequencies, (frequencies[1:] + frequencies[:-1]) / 2)), axis=0)
     starts = starts[np.append(True, (starts[1:] != starts[:-1]).any(axis=1))]
-    if len(starts) > _SEARCHED:
+    if len(starts) > _SEARCH_START_COUNT:
         starts = _highest(sizes, frequencies, starts)
     worst = np.empty((2, here.size))
-    together = max(1, _MOST // (len(starts) * _REACH.size * len(frequencies)))
+    together = max(1, _MAX_ECHO_COUNT // (len(starts) * _REACH.size * len(frequencies)))
     for first in range(0, here.size, together):
         cases = slice(first, first + together)
         worst[:, cases] = _searched(sizes[:, cases], frequencies[:, cases], starts[:, cases])
@@ -145,7 +145,7 @@ def _highest(sizes: Floats, frequencies: Floats, starts: Floats) -> Floats:
     before, until = (_count(frequencies, starts, reach) for reach in (-1, 1))
     around = np.take_along_axis(summed, until, axis=0) - np.take_along_axis(summed, before, axis=0)
     around[1:][starts[1:] == starts[:-1]] = -1.0
-    order = np.argsort(-around, axis=0, kind="stable")[:_SEARCHED]
+    order = np.argsort(-around, axis=0, kind="stable")[:_SEARCH_START_COUNT]
     return np.take_along_axis(starts, order, axis=0)
 
 
@@ -314,7 +314,7 @@ def slow_moves(seen: SensorCases) -> Iterator[tuple[Subject, Moves]]:
     """
     for name in PLATFORMS:
         for index, line in enumerate(seen.error(name).vibration.sinusoidal):
-            is_slow = line.frequency * seen.aperture_time < SLOWEST
+            is_slow = line.frequency * seen.aperture_time < SLOWEST_ECHO_CYCLES
             if not np.any(is_slow):
                 continue
             value = line.displacement
@@ -347,10 +347,10 @@ def spectrum_pieces(spectrum: Spectrum, law: tuple[float, float] = (1.0, 0.0)) -
         if not (density and last):  # made so small that nothing is left, of which there is no logarithm
             continue
         own_slope = math.log(density / last) / math.log(g / f)
-        if abs(own_slope) <= _STEEP:
+        if abs(own_slope) <= _STEEP_DENSITY_EXPONENT:
             pieces.append(PowerLawPiece(f, g, factor * density * f**own_slope, own_slope + slope))
             continue
-        ends = np.geomspace(f, g, _PARTS + 1).tolist()
+        ends = np.geomspace(f, g, _STEEP_PIECE_COUNT + 1).tolist()
         for low, high in pairwise(ends):
             at_ends = (density * (low / f) ** -own_slope, density * (high / f) ** -own_slope)
             pieces.append(PowerLawPiece(low, high, factor * _mean(own_slope, low, high, *at_ends), slope))

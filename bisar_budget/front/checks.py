@@ -10,7 +10,15 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any, cast
 
 from bisar_budget import __version__
-from bisar_budget.budget.check import MANY, Draws, Found, check_files, check_mission, whole, without_analysis
+from bisar_budget.budget.check import (
+    FILES_FOR_TWO_PROCESSES,
+    Draws,
+    Found,
+    check_files,
+    check_mission,
+    whole,
+    without_analysis,
+)
 from bisar_budget.faults import SetValue, printable
 from bisar_budget.findings.mission import FileWarning, MissionFindings
 from bisar_budget.findings.requirement import NOTHING_OUTSIDE, Outside, Override
@@ -217,7 +225,7 @@ def drawn_by(
         if workers is not None:
             yield Draws(draws, seed, partial(_watched, partial(shared_out, mapped=workers.mapped), workers))
         else:  # files that processes share out draw for themselves
-            yield Draws(draws, seed) if files >= MANY else drawn_here(draws, seed)
+            yield Draws(draws, seed) if files >= FILES_FOR_TWO_PROCESSES else drawn_here(draws, seed)
 
 
 def _watched(make: "Share", workers: "Workers | None", drawing: "Drawing") -> "Iterator[tuple[DrawsPiece, Tally]]":

@@ -19,15 +19,15 @@ from bisar_budget.geometry import BistaticGeometry
 from bisar_budget.image_plane import Band, nodes
 from bisar_budget.ranges.exact_ranges import ExactRanges, Floats
 
-SHORT = 0.05  # of half the support, by which its edges may bend: the closed widths are then right to 1 %
+BENT_EDGE_FRACTION = 0.05  # of half the support, by which its edges may bend: the closed widths are then right to 1 %
 _HALF_POWER = 0.5
-_HALF_POWER_OF_NULL = 0.88589  # full width at half power of a sinc, over the distance of its first null
-_BAND_NODES, _NODES = 16, 64  # for phases of ±20 rad, those of the last step
+_HALF_POWER_OF_NULL_RATIO = 0.88589  # full width at half power of a sinc, over the distance of its first null
+_BAND_NODE_COUNT, _APERTURE_NODE_COUNT = 16, 64  # for phases of ±20 rad, those of the last step
 # Steps, in half widths at half power of a parabola with the same bend. Of 3000 arcs of a circle none has its first
 # minimum beyond 6.
-_STEP, _STEPS = 0.25, 64
-_NEWTON = 5  # rounds: the last changes a width by less than 1e-6
-_CASES = 128  # sampled at once
+_STEP_RATIO, _MAX_STEP_COUNT = 0.25, 64
+_NEWTON_ROUNDS = 5  # rounds: the last changes a width by less than 1e-6
+_MAX_CASE_COUNT = 128  # sampled at once
 
 
 class Resolution(NamedTuple):
@@ -55,12 +55,12 @@ def resolution(exact: ExactRanges, geometry: BistaticGeometry, radar: Band, aper
             geometry.range_resolution(radar.bandwidth, SPEED_OF_LIGHT) * np.ones(cases),
             geometry.cross_range_resolution(wavelength, aperture_time_s) * np.ones(cases),
         )
-    widths = np.array((*nulls, *(_HALF_POWER_OF_NULL * null for null in nulls)))
+    widths = np.array((*nulls, *(_HALF_POWER_OF_NULL_RATIO * null for null in nulls)))
     relative_band = np.broadcast_to(np.asarray(radar.bandwidth / radar.center_frequency, dtype=float), (cases,))
     long = np.flatnonzero(~_is_short(exact, relative_band, conjugate, across))
-    for first in range(0, long.size, _CASES):
-        some = long[first : first + _CASES]
-        slopes = _slopes(geometry, exact.half, some, max(_NODES, exact.sampling.places.size))
+    for first in range(0, long.size, _MAX_CASE_COUNT):
+        some = long[first : first + _MAX_CASE_COUNT]
+        slopes = _slopes(geometry, exact.half, some, max(_APERTURE_NODE_COUNT, exact.sampling.places.size))
         for axis, direction in enumerate((conjugate, across)):
             widths[axis::2, some] = _widths(
                 exact.k[some], relative_band[some], np.einsum("anc,ac->nc", slopes, direction[:, some])
@@ -83,7 +83,7 @@ def _is_short(exact: ExactRanges, relative_band: Floats, conjugate: Floats, acro
     band = np.hypot(*exact.gradient[:, 0]) * relative_band / 2
     _, _, *bends = np.abs(np.einsum("aon,an->on", exact.gradient, conjugate))
     _, turn, *bends_across = np.abs(np.einsum("aon,an->on", exact.gradient, across))
-    return (sum(bends) <= SHORT * band) & (sum(bends_across) <= SHORT * turn)
+    return (sum(bends) <= BENT_EDGE_FRACTION * band) & (sum(bends_across) <= BENT_EDGE_FRACTION * turn)
 
 
 def _slopes(geometry: BistaticGeometry, half: Floats, some: Any, count: int) -> Floats:
@@ -97,7 +97,7 @@ def _slopes(geometry: BistaticGeometry, half: Floats, some: Any, count: int) -> 
 
 def _widths(k: Floats, relative_band: Floats, slopes: Floats) -> tuple[Floats, Floats]:
     """Peak to first null, and full width at half power, by slopes (nodes, cases) of the range per metre. [m]"""
-    frequencies, of_band = np.polynomial.legendre.leggauss(_BAND_NODES)
+    frequencies, of_band = np.polynomial.legendre.leggauss(_BAND_NODE_COUNT)
     wavenumbers = k * (1 + np.multiply.outer(frequencies, relative_band / 2))
     mean = np.multiply.outer(of_band / 2, nodes(len(slopes)).fit[0])[..., None]
     rates = wavenumbers[:, None] * slopes  # of phase [rad/m]
@@ -117,10 +117,10 @@ def _widths(k: Floats, relative_band: Floats, slopes: Floats) -> tuple[Floats, F
         level, slope, _ = power(step)
         return level - _HALF_POWER, slope
 
-    turn, turned = np.exp(1j * rates * _STEP), mean.astype(complex)
-    last = float(_STEPS)
+    turn, turned = np.exp(1j * rates * _STEP_RATIO), mean.astype(complex)
+    last = float(_MAX_STEP_COUNT)
     level, half, null = np.ones(unit.size), np.full(unit.size, last), np.full(unit.size, last)
-    for step in range(1, _STEPS):
+    for step in range(1, _MAX_STEP_COUNT):
         turned = turned * turn
         before, level = level, np.abs(turned.sum(axis=(0, 1))) ** 2
         half = np.where((half == last) & (level < _HALF_POWER), step - 0.5, half)
@@ -128,8 +128,8 @@ def _widths(k: Floats, relative_band: Floats, slopes: Floats) -> tuple[Floats, F
         if (null < last).all():
             break
     null, half = (
-        _settled(null * _STEP, _STEP, lambda step: power(step)[1:]),
-        _settled(half * _STEP, _STEP, above_half),
+        _settled(null * _STEP_RATIO, _STEP_RATIO, lambda step: power(step)[1:]),
+        _settled(half * _STEP_RATIO, _STEP_RATIO, above_half),
     )
     return unit * null, 2 * unit * half
 
@@ -137,7 +137,7 @@ def _widths(k: Floats, relative_band: Floats, slopes: Floats) -> tuple[Floats, F
 def _settled(step: Floats, reach: float, value: Callable[[Floats], tuple[Floats, Floats]]) -> Floats:
     """Newton's method for where a value, given with its slope, is nothing within reach of a step."""
     low, high = step - reach, step + reach
-    for _ in range(_NEWTON):
+    for _ in range(_NEWTON_ROUNDS):
         left, slope = value(step)
         step = np.clip(step - left / slope, low, high)
     return step

@@ -36,7 +36,7 @@ from bisar_budget.effects.oscillators import noise_of, states_both_terms
 from bisar_budget.effects.random_effect import RandomError, parts_of_largest
 from bisar_budget.effects.random_errors import random_errors
 from bisar_budget.effects.spectra import PowerLawPiece, density
-from bisar_budget.effects.vibration import SLOWEST, counted, pieces_of_vibration
+from bisar_budget.effects.vibration import SLOWEST_ECHO_CYCLES, counted, pieces_of_vibration
 from bisar_budget.geometry import PlatformState
 from bisar_budget.mission.model import Mission, Simulation
 from bisar_budget.mission.platforms import MotionError
@@ -428,7 +428,10 @@ def oscillator_sinusoids(mission: Mission, name: str) -> tuple[PathSinusoid, ...
         )
         for one in accelerated_tones(mission)
         for place, (frequency, share) in enumerate(zip(one.left.frequencies, one.left.shares, strict=True))
-        if one.name == name and one.frequency * T >= SLOWEST and frequency * T >= SLOWEST and (share or not place)
+        if one.name == name
+        and one.frequency * T >= SLOWEST_ECHO_CYCLES
+        and frequency * T >= SLOWEST_ECHO_CYCLES
+        and (share or not place)
     )
 
 
@@ -441,14 +444,14 @@ def _folded_tones(mission: Mission, error: RandomError) -> list[tuple[float, flo
     tones: list[tuple[float, LeftTone]] = []
     if error.subject.axis == "acceleration":
         of_platform = [one for one in accelerated_tones(mission) if one.name == name]
-        tones = [(one.free, one.left) for one in of_platform if one.frequency * T >= SLOWEST]
+        tones = [(one.free, one.left) for one in of_platform if one.frequency * T >= SLOWEST_ECHO_CYCLES]
     elif error.subject.kind == "oscillator":
         tones = [(spur.free, spur.left) for spur in spurs_of(mission) if spur.name == name]
     return [
         (frequency, free * share)
         for free, left in tones
         for frequency, share in zip(left.frequencies, left.shares, strict=True)
-        if frequency * T < SLOWEST and share
+        if frequency * T < SLOWEST_ECHO_CYCLES and share
     ]
 
 
@@ -467,7 +470,7 @@ class _Bend:
         self.slow = [
             (one.frequency, one.free if is_linked else one.free * one.left.shares[0])
             for one in accelerated_tones(mission)
-            if one.name == name and one.frequency * T < SLOWEST
+            if one.name == name and one.frequency * T < SLOWEST_ECHO_CYCLES
         ]
 
     def draw(self, rng: np.random.Generator) -> Callable[[Floats], Floats]:

@@ -18,7 +18,7 @@ from bisar_budget.budget.verdicts import rows_worth_showing
 from bisar_budget.effects.air_delays import dispersed_legs
 from bisar_budget.effects.declared import QUADRATIC
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
-from bisar_budget.effects.vibration import SLOWEST, lines_of
+from bisar_budget.effects.vibration import SLOWEST_ECHO_CYCLES, lines_of
 from bisar_budget.faults import printable
 from bisar_budget.findings.images import FLOOR_DB, ImageEvidence, PointImage, Verdict, VerifiedMission
 from bisar_budget.findings.mission import MissionFindings
@@ -153,7 +153,7 @@ def _cases(study: Study) -> Iterator[tuple[str, Case]]:
     slow: dict[Subject, Case] = {}
     for name in PLATFORMS:
         for index, line in enumerate(lines_of(mission, name)):
-            if line.frequency * study.collection.aperture_time < SLOWEST:
+            if line.frequency * study.collection.aperture_time < SLOWEST_ECHO_CYCLES:
                 one = subject(name, "vibration", "sinusoidal", entry=index)
                 slow[one] = partial(phase_cases.slow_vibration, study, one)
     swaying = slow | dict(vibration_cases(study))

@@ -6,7 +6,7 @@ from typing import Any
 from bisar_budget.analysis.allocation import ROOM, range_walk_cap
 from bisar_budget.effects.declared import CUBIC
 from bisar_budget.effects.effect import ErrorSource, Subject
-from bisar_budget.effects.slow_tones import PHASES
+from bisar_budget.effects.slow_tones import TONE_PHASE_COUNT
 from bisar_budget.effects.vibration import lines_of, unit_of_line
 from bisar_budget.findings.images import Verdict
 from bisar_budget.geometry import GroundVector
@@ -78,7 +78,7 @@ def slow_vibration(study: Study, of: Subject) -> Verdict:
 
 def _worst_phase(study: Study, name: str, line: PathSinusoid) -> Errors:
     """The vibration in the phase in which exact ranges lose most of the peak."""
-    turned = (line._replace(phase=2 * math.pi * step / PHASES) for step in range(PHASES))
+    turned = (line._replace(phase=2 * math.pi * step / TONE_PHASE_COUNT) for step in range(TONE_PHASE_COUNT))
     every = [Errors().of(name, PathError(sinusoids=(one,))) for one in turned]
     return max(every, key=lambda errors: study.collection.effect(errors).equal_loss)
 

@@ -25,7 +25,15 @@ from bisar_budget.effects.navigation_errors import CORRELATED, process_of
 from bisar_budget.effects.oscillator_acceleration import accelerated_tones
 from bisar_budget.effects.oscillator_tones import spurs_of
 from bisar_budget.effects.random_effect import RandomError
-from bisar_budget.effects.vibration import SLOWEST, Line, lines_of, near_lines, sight_of, unit_of_line, worst_phases
+from bisar_budget.effects.vibration import (
+    SLOWEST_ECHO_CYCLES,
+    Line,
+    lines_of,
+    near_lines,
+    sight_of,
+    unit_of_line,
+    worst_phases,
+)
 from bisar_budget.findings.images import Verdict
 from bisar_budget.image_plane import nodes
 from bisar_budget.mission.model import Simulation
@@ -118,7 +126,7 @@ def vibration_cases(study: Study) -> Iterator[tuple[Subject, Case]]:
     for name in PLATFORMS:
         for index, (_, frequency, per_metre) in enumerate(lines[name] or [Line(0.0, None)]):
             cycles = UNDECLARED_CYCLES if frequency is None else frequency * T
-            if cycles < SLOWEST or not tone:
+            if cycles < SLOWEST_ECHO_CYCLES or not tone:
                 continue  # a phase, which `phase_cases` looks at; or nothing holds it
             one, alone = subject(name, "vibration", "sinusoidal", entry=index), {name: tone[name]}
             unseen = blank(one, alone, pslr, per_metre)
@@ -285,7 +293,7 @@ def tone_cases(study: Study) -> Iterator[tuple[Subject, Case]]:
         if spur.name in sizes:
             yield case(spur.subject, 20 * math.log10(math.pi * sizes[spur.name] / wavelength), "dB", spur.frequency)
     for tone in accelerated_tones(mission):
-        is_fast = tone.frequency * study.collection.aperture_time >= SLOWEST
+        is_fast = tone.frequency * study.collection.aperture_time >= SLOWEST_ECHO_CYCLES
         if tone.name in sizes and is_fast and tone.per_unit:
             sensitivity = 2 * math.pi / wavelength * sizes[tone.name] / tone.per_unit
             yield case(tone.subject, sensitivity, "s^2/m", tone.frequency)

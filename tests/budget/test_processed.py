@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import bisar_budget as bb
 from bisar_budget.budget.check import check_mission
 from bisar_budget.budget.doubts import input_doubts, is_coarse, leaves_unsaid, residual_phase
-from bisar_budget.budget.fit_noise import MOST_CHANGE, allowable_noise
+from bisar_budget.budget.fit_noise import MAX_UNSAID_CHANGE_FRACTION, allowable_noise
 from bisar_budget.effects.random_errors import random_errors
 from bisar_budget.mission.load import load_mission
 from bisar_budget.mission.model import Mission
@@ -221,7 +221,7 @@ class TestTheNoiseOfTheFit:
         mission = logged(tmp_path, geodetic_csv(noisy(6.0)), "smoothed", position="60 m")
         noise = allowable_noise(mission, "receiver")
         assert noise is not None
-        assert noise.change > MOST_CHANGE
+        assert noise.change > MAX_UNSAID_CHANGE_FRACTION
         said = [str(one.message) for one in check_mission(mission, TODAY).warnings]
         assert any("noise of the log" in one and noise.row_id in one for one in said)
 
@@ -244,7 +244,7 @@ class TestTheNoiseOfTheFit:
     def test_a_clean_log_says_nothing(self, tmp_path: Path) -> None:
         mission = logged(tmp_path, geodetic_csv(flight()))
         noise = allowable_noise(mission, "receiver")
-        assert noise is None or noise.change < MOST_CHANGE
+        assert noise is None or noise.change < MAX_UNSAID_CHANGE_FRACTION
         assert not any("noise of the log" in str(one.message) for one in check_mission(mission, TODAY).warnings)
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.constants import EARTH_RADIUS, SPEED_OF_LIGHT
-from bisar_budget.effects.air_delays import TROPOSPHERE, group_delay, metres_per_unit, obliquity
+from bisar_budget.effects.air_delays import TROPOSPHERE_HEIGHT_M, group_delay, metres_per_unit, obliquity
 from bisar_budget.effects.random_effect import RandomError, SensorCases
 from bisar_budget.effects.random_errors import random_errors
 from bisar_budget.geometry import PlatformState
@@ -119,7 +119,7 @@ def test_the_air_of_a_sphere_is_a_shell_at_its_scale_height(degrees: float) -> N
     level = math.cos(math.radians(degrees)) * EARTH_RADIUS / (EARTH_RADIUS + heights)
     density = np.exp(-heights / 7e3)
     want = np.sum(density / np.sqrt(1 - level**2)) / np.sum(density)
-    assert obliquity(place, TROPOSPHERE) == pytest.approx(want, rel=0.01 if degrees < 20 else 0.002)
+    assert obliquity(place, TROPOSPHERE_HEIGHT_M) == pytest.approx(want, rel=0.01 if degrees < 20 else 0.002)
 
 
 def test_a_flat_shell_is_one_over_the_sine() -> None:
@@ -133,7 +133,7 @@ def test_a_leg_below_the_ionosphere_has_no_electrons(height: float) -> None:
     found = error.full.displacement
     assert found == 0 if height < 80e3 else found > 0
     flat = np.linalg.norm(mission.geometry.transmitter.position) / mission.geometry.transmitter.position[2]
-    of_a_sphere = obliquity(mission.geometry.transmitter.position, TROPOSPHERE)
+    of_a_sphere = obliquity(mission.geometry.transmitter.position, TROPOSPHERE_HEIGHT_M)
     want = flat if height < 80e3 else of_a_sphere
     assert group_delay(mission, mission.geometry.transmitter, "zenith_delay", 0.0) == pytest.approx(want, rel=1e-12)
 

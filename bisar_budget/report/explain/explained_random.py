@@ -14,9 +14,9 @@ from bisar_budget.constants import EARTH_RADIUS, SPEED_OF_LIGHT, STANDARD_GRAVIT
 from bisar_budget.effects.air_delays import (
     CONTENT,
     DELAY,
-    ELECTRONS,
-    IONOSPHERE,
-    TROPOSPHERE,
+    ELECTRON_DELAY_M3_PER_S2,
+    IONOSPHERE_HEIGHT_M,
+    TROPOSPHERE_HEIGHT_M,
     correlation_time_of,
     group_delay,
     leg_factor,
@@ -51,7 +51,13 @@ from bisar_budget.effects.spectra import (
     set_parts,
     synchronized_parts,
 )
-from bisar_budget.effects.vibration import SLOWEST, counted, displacement_rms, pieces_of_vibration, power_of
+from bisar_budget.effects.vibration import (
+    SLOWEST_ECHO_CYCLES,
+    counted,
+    displacement_rms,
+    pieces_of_vibration,
+    power_of,
+)
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import PlatformState
 from bisar_budget.mission.instruments import Synchronization
@@ -371,7 +377,7 @@ def _slow(what: str, frequency: float, left: LeftTone, free: float, mission: Mis
     slow = [
         f"{place:.6g} Hz, {place * T:.3g} cycles per aperture: {number(share)} of the amplitude"
         for place, share in zip(left.frequencies, left.shares, strict=True)
-        if place * T < SLOWEST and share > 0
+        if place * T < SLOWEST_ECHO_CYCLES and share > 0
     ]
     if slow:
         parts = left.slow_parts(T)
@@ -558,7 +564,7 @@ def _delay_on_a_leg(analysis: Analysis, error: RandomError, name: str) -> Iterat
     if height < ABOVE_THE_AIR:
         title, formula = "Within the air, over a flat Earth: 1 over the sine of the elevation", "R/z"
     else:
-        shell = TROPOSPHERE if delay == DELAY else min(IONOSPHERE, height)
+        shell = TROPOSPHERE_HEIGHT_M if delay == DELAY else min(IONOSPHERE_HEIGHT_M, height)
         values = {"p": (x * x + y * y) ** 0.5, "R": path.slant_range, "h": shell, "R_E": EARTH_RADIUS}
         title = "Above the air, through a spherical shell at height h; p is the distance along the ground's plane"
         formula = "1/sqrt(1 - (p/R)^2/(1 + h/R_E)^2)"
@@ -567,7 +573,7 @@ def _delay_on_a_leg(analysis: Analysis, error: RandomError, name: str) -> Iterat
     scale = float(metres_per_unit(mission, delay))
     if delay == CONTENT:
         values = {"m": factor, "f_0": mission.radar.center_frequency}
-        worked = WorkedEquation("g", f"{ELECTRONS:g}*m/f_0^2", values, factor * scale, "m per 1/m^2")
+        worked = WorkedEquation("g", f"{ELECTRON_DELAY_M3_PER_S2:g}*m/f_0^2", values, factor * scale, "m per 1/m^2")
         yield step("Group delay by a unit; the phase at the centre frequency is advanced by as much", worked)
     half = mission.collection.aperture_time / 2
     times = [half * moment for moment in _MOMENTS]

@@ -23,13 +23,13 @@ from bisar_budget.budget.doubts import (
     is_in_doubt,
 )
 from bisar_budget.budget.judged_requirements import (
-    MAKES_UP,
+    MAKER_FRACTION,
+    NEGLIGIBLE_FRACTION,
     SMALL_RAD,
-    TENTH,
     UntakenEffect,
 )
 from bisar_budget.constants import SPEED_OF_LIGHT
-from bisar_budget.effects.air_delays import CONTENT, ELECTRONS, dispersed_legs, leg_factor
+from bisar_budget.effects.air_delays import CONTENT, ELECTRON_DELAY_M3_PER_S2, dispersed_legs, leg_factor
 from bisar_budget.effects.combined import phase_parts
 from bisar_budget.effects.declared import CUBIC, LOCATION, QUADRATIC
 from bisar_budget.effects.effect import MOTION_UNITS, ErrorSource
@@ -510,7 +510,7 @@ def _dispersion(analysis: Analysis, found: MissionFindings, row: Row) -> Iterato
             continue
         content = propagation.content(name) * found.coverage_factor
         values = {
-            "K": ELECTRONS * content * float(leg_factor(CONTENT, path.position, path.position)),
+            "K": ELECTRON_DELAY_M3_PER_S2 * content * float(leg_factor(CONTENT, path.position, path.position)),
             "c": SPEED_OF_LIGHT,
             "f_0": mission.radar.center_frequency,
             "B": mission.radar.bandwidth,
@@ -635,7 +635,9 @@ def _air_that_changes(reason: Note) -> Step:
     _, correlation_time, key, size, use, _ = values
     unit = {"islr": "dB", LOCATION: "m"}.get(key, "rad")
     title = f"The declared delays of the air, as if they changed in {with_unit(correlation_time, 's')}"
-    return step(title, f"{key} = {with_unit(size, unit)}", f"use = {number(use)}, {TENTH:g} may go unsaid")
+    return step(
+        title, f"{key} = {with_unit(size, unit)}", f"use = {number(use)}, {NEGLIGIBLE_FRACTION:g} may go unsaid"
+    )
 
 
 def _reason(found: MissionFindings, row: Row) -> Note | None:
@@ -661,8 +663,10 @@ def _untaken(analysis: Analysis, row: Row, one: UntakenEffect) -> Iterator[Step]
     yield from combined(f"{_EFFECTS[kind]}: no requirement takes it", rule, parts, total, symbol="total")
     required = analysis.mission.requirements.quadratic_phase_error
     values = {"required": required}
-    level = min(TENTH * required, SMALL_RAD)
-    worked = WorkedEquation("negligible", f"min({TENTH:g}*required, {SMALL_RAD:g})", values, level, "rad")
+    level = min(NEGLIGIBLE_FRACTION * required, SMALL_RAD)
+    worked = WorkedEquation(
+        "negligible", f"min({NEGLIGIBLE_FRACTION:g}*required, {SMALL_RAD:g})", values, level, "rad"
+    )
     yield step(
         "Below a tenth of requirements.quadratic_phase_error and below 0.08 rad it would be negligible", worked
     )
@@ -670,7 +674,7 @@ def _untaken(analysis: Analysis, row: Row, one: UntakenEffect) -> Iterator[Step]
     count = sum(float(size[0]) > 0 for size in one.parts.values())
     values = {"largest": largest, "negligible": level}
     worked = WorkedEquation(
-        "least", f"min({MAKES_UP:g}*largest, negligible/{count})", values, float(one.least[0]), "rad"
+        "least", f"min({MAKER_FRACTION:g}*largest, negligible/{count})", values, float(one.least[0]), "rad"
     )
     title = (
         "Parts of at least a tenth of the largest make it up, and smaller ones that together would not be negligible"
