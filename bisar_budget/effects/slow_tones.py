@@ -38,9 +38,10 @@ MAX_LANE_COUNT = 1 << 12  # lanes that are followed at once
 
 @dataclass(frozen=True, eq=False)
 class TonePhases:
-    """Effects of a vibration in `TONE_PHASE_COUNT` phases all around, of each of its axes, (axes, TONE_PHASE_COUNT, cases) each.
+    """Effects of a vibration, one axis at a time, in phases all around the circle.
 
-    Quadratic and cubic phase at the aperture edge; the hidden phase, and the rms beyond the cubic. [rad]
+    Each is an array (axes, TONE_PHASE_COUNT, cases): quadratic and cubic phase at the aperture edge, the hidden phase,
+    and the rms beyond the cubic. [rad]
     """
 
     quadratics: Floats
