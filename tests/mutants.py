@@ -452,8 +452,8 @@ MUTANTS = (
     Mutant(
         "tones of an oscillator: cycles as a frequency over the aperture",
         "bisar_budget/simulator/realisations.py",
-        "if one.name == name and one.frequency * T >= SLOWEST_ECHO_CYCLES",
-        "if one.name == name and one.frequency / T >= SLOWEST_ECHO_CYCLES",
+        "        and one.frequency * T >= SLOWEST_ECHO_CYCLES",
+        "        and one.frequency / T >= SLOWEST_ECHO_CYCLES",
         (
             "tests/simulate/test_realisations.py::test_a_tone_of_an_oscillator_is_flown_from_one_cycle_per_aperture_on",
         ),
