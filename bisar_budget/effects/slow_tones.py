@@ -40,8 +40,8 @@ MAX_LANE_COUNT = 1 << 12  # lanes that are followed at once
 class TonePhases:
     """Effects of a vibration, one axis at a time, in phases all around the circle.
 
-    Each is an array (axes, TONE_PHASE_COUNT, cases): quadratic and cubic phase at the aperture edge, hidden phase, and
-    rms beyond the cubic. [rad]
+    Each is an array (axes, TONE_PHASE_COUNT, cases): quadratic and cubic phase at the aperture edge, hidden phase,
+    and rms beyond the cubic. [rad]
     """
 
     quadratics: Floats
