@@ -1,12 +1,12 @@
-"""Which points of the ground an aperture and a band tell apart: the matrix of the gradients of the range over both.
+"""The ground points that an aperture and a band tell apart: the matrix H of the range gradients over both.
 
-A ground point a step x away has another range, by g(τ)·x with g the sum of both lines of sight over the ground. Over
-aperture and band the phase then varies, a constant phase being free, by xᵀHx of its wavenumber squared, with
+A ground point at a step x from another has a range that differs by g(τ)·x. Here g is the sum of both lines of sight,
+projected on the ground. The variance of the phase over aperture and band, less a constant phase, is k²·xᵀHx with
 
     H = Cov_τ(g) + b²⟨g gᵀ⟩,    b² = B²/(12 f₀²),
 
-for a band of width B, evenly filled, about f₀; ⟨ ⟩ is the mean over the aperture. Where H is singular, points along a
-line look alike: there is no image plane. Derived here; `ranges.exact_ranges` finds the image point by it.
+for an evenly filled band of width B about f₀; ⟨ ⟩ is the mean over the aperture. A singular H means that points along
+a line look alike: the collection has no image plane. Derived here; `ranges.exact_ranges` finds the image point with H.
 """
 
 import math
@@ -50,10 +50,15 @@ class Band(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Sampling:
-    """When a history is sampled: slow times over −1 … 1, in half apertures, (samples,); and the weights that fit it.
+    """Slow times at which a history is sampled, and the weights that fit Legendre orders to it.
 
-    The weights (4, samples) give the mean, which is the P₀ part, the P₁ part at the edge, and the quadratic and the
-    cubic part at the edge: 3/2 of P₂ and 5/2 of P₃.
+    Attributes
+    ----------
+    places : (samples,)
+        Slow times from −1 to 1, in half apertures.
+    fit : (4, samples)
+        Weights of the mean (the P₀ part), of the P₁ part at the edge, and of the quadratic and the cubic part at the
+        edge: 3/2 of P₂ and 5/2 of P₃.
     """
 
     places: Floats
@@ -76,7 +81,7 @@ LEADING = np.array((1.0, 1.0, 1.5, 2.5))  # coefficient of xⁿ in the Legendre 
 
 @cache
 def nodes(count: int) -> Sampling:
-    """Sampling at the nodes of Gauss-Legendre quadrature: the projection (2n + 1)/2 ∫ρPₙ of each order n."""
+    """Sampling at the nodes of Gauss-Legendre quadrature, which projects each order n: (2n + 1)/2 ∫ρPₙ."""
     places, weights = np.polynomial.legendre.leggauss(count)
     orders = np.polynomial.legendre.legvander(places, 3)
     return Sampling(places, ((np.arange(4) + 0.5) * LEADING)[:, None] * orders.T * weights)
@@ -97,13 +102,13 @@ def nodes_for(geometry: BistaticGeometry, aperture_time_s: Any, *, has_direct_pa
 
 
 def band_variance(radar: Band) -> Any:
-    """b² of a band, evenly filled: the variance of its frequencies over the square of its centre."""
+    """b² of an evenly filled band: the variance of its frequencies over the square of its centre."""
     return (radar.bandwidth / radar.center_frequency) ** 2 / 12
 
 
 @dataclass(frozen=True, eq=False)
 class GroundMatrix:
-    """The matrix H of V over the ground, half its second derivative for what leaves nothing; and its product.
+    """The matrix H: half the second derivative of V over the ground, at a point that leaves no range error.
 
     Attributes
     ----------

@@ -1,8 +1,8 @@
-"""Hold declared errors to the allocated budget: one row for each, and what the rows add up to.
+"""Check missions: compare declared errors with the allocated budget, one row per error and per sum.
 
-A mission is checked by itself, those of one shape together, and many files in one call, which takes every core. What
-is found about a mission is some hundred objects. A caller who only wants what a format makes of it says so, and
-nothing else is kept, or sent from one process to another: that is a quarter of the time of a thousand missions.
+`check_mission` checks one mission. `check_missions` checks missions of one shape together. `check_files` checks many
+files on all cores. The findings of a mission are some hundred objects. A caller that needs only a report passes `keep`:
+it reduces the findings in the process that made them, which saves a quarter of the time of a thousand missions.
 """
 
 import gc
@@ -39,11 +39,11 @@ from bisar_budget.units import format_quantity
 if TYPE_CHECKING:
     from bisar_budget.sampling.draws import Share
 
-_CASES_AT_ONCE = 256  # cases: arrays of more do not stay in a cache
+_CASES_AT_ONCE = 256  # arrays of more cases leave the cache
 
 
 def check_mission(mission: Mission, today: date, *, outside: Outside = NOTHING_OUTSIDE) -> MissionFindings:
-    """Check one mission: judge it, as a single case, and put what is found into words.
+    """Check one mission: judge it as a single case, and write the findings in words.
 
     Parameters
     ----------
@@ -52,12 +52,12 @@ def check_mission(mission: Mission, today: date, *, outside: Outside = NOTHING_O
     today : date
         Day on which waivers are judged, UTC.
     outside : Outside
-        What from outside the file bears on the verdict, besides what the mission itself carries.
+        Options, settings and environment variables that bear on the verdict.
 
     Returns
     -------
     MissionFindings
-        Rows in the order of the contract, declared or not.
+        Rows of declared and undeclared errors, in the order of the contract.
     """
     analysis = Analysis(mission, is_whole=True)
     return _findings(judged_mission(analysis, today), Case(analysis), today, outside)
@@ -66,10 +66,10 @@ def check_mission(mission: Mission, today: date, *, outside: Outside = NOTHING_O
 def check_missions(
     missions: Sequence[Mission], today: date, *, outside: Outside = NOTHING_OUTSIDE
 ) -> Iterator[tuple[int, MissionFindings]]:
-    """Check missions, those of one shape together; each with its place, in any order.
+    """Check missions, and yield the index and the findings of each, in any order.
 
-    What is found of a mission is what `check_mission` finds. Others that are checked beside it change none of its
-    words; they may change digits beyond those that a search settles to, and what cancels to rounding.
+    Gives the same findings as `check_mission`. Missions of one shape are checked together. Checking missions together
+    never changes a status or a sentence; numbers may differ within the tolerance of the search.
     """
     if len(missions) == 1:
         yield 0, check_mission(missions[0], today, outside=outside)
@@ -91,7 +91,7 @@ def check_missions(
 
 
 def _findings(judged: JudgedMission, case: Case, today: date, outside: Outside) -> MissionFindings:
-    """Findings about one of the judged cases, in words."""
+    """Write the findings of one judged case in words."""
     mission, geometry = case.mission, case.geometry
     waived = apply_waivers(list(rows_in_words(judged, case)), mission, today)
     rows, requirements = waived.rows, requirements_in_words(judged, case, waived)
@@ -155,7 +155,7 @@ def _overridden(mission: Mission) -> Iterator[Note]:
 
 
 def _unused_keys(mission: Mission) -> Iterator[Note]:
-    """Say which keys that the file gives have no part in this check."""
+    """Name the keys of the file that this check does not use."""
     keys = {
         "collection.pulses": mission.collection.pulses is not None,
         "simulation": mission.simulation is not None,
@@ -169,12 +169,12 @@ def _unused_keys(mission: Mission) -> Iterator[Note]:
 Found = MissionFindings | UnusableMission
 Kept = TypeVar("Kept")
 
-FILES_FOR_TWO_PROCESSES = 200  # files, of which half pay for a second process
-FILES_AT_ONCE = 500  # files that are checked together at most
+FILES_FOR_TWO_PROCESSES = 200  # a second process takes as long to start as half of them take to check
+FILES_AT_ONCE = 500  # checked together at most
 
 
 class Draws(NamedTuple):
-    """Draws of a Monte Carlo that are asked for; as of `monte_carlo`, whose `share` is for one process."""
+    """Arguments of `monte_carlo`: number of draws, seed, and `share`, which works in one process only."""
 
     number: int
     seed: int | None
@@ -182,12 +182,12 @@ class Draws(NamedTuple):
 
 
 def without_analysis(findings: Found) -> Found:
-    """Keep all that is found, but not the analysis: a thousand would fill memory."""
+    """Keep the findings without the analysis: a thousand analyses fill the memory."""
     return findings if isinstance(findings, UnusableMission) else findings._replace(analysis=None)
 
 
 def whole(findings: Found) -> Found:
-    """Keep everything, in one process: an analysis is larger than what it takes to make it again."""
+    """Keep the findings with the analysis. An analysis is too large to send between processes."""
     return findings
 
 
@@ -201,7 +201,7 @@ def check_files(
     changes: Sequence[SetValue] = (),
     outside: Outside = NOTHING_OUTSIDE,
 ) -> list[Kept]:
-    """Check files, in their order; many are shared out between the cores.
+    """Check files, and return the results in the order of the files; many files are checked on all cores.
 
     Parameters
     ----------
@@ -212,18 +212,18 @@ def check_files(
     model : str or None
         Gating model in place of each file's own.
     keep : callable
-        Makes of the findings about a file what is wanted of them, in the process that found them.
+        Reduces the findings of a file to the result, in the process that made the findings.
     drawn : Draws, optional
-        Of a Monte Carlo; None: no draws.
+        Arguments of a Monte Carlo; None: no draws.
     changes : sequence of SetValue
-        Values in place of each file's.
+        Values that replace those of each file.
     outside : Outside
-        What else from outside the files bears on their verdicts.
+        Options, settings and environment variables that bear on the verdicts.
 
     Returns
     -------
     list
-        What `keep` made of each.
+        The result of `keep` for each file.
     """
     of = partial(_kept, today=today, model=model, keep=keep, drawn=drawn, changes=changes, outside=outside)
     chunks, count = _chunks(files), cores()
@@ -244,9 +244,9 @@ def check_files(
 
 
 def _chunks(files: Sequence[str]) -> list[Sequence[str]]:
-    """Files that are checked together: of many an even number of parts, whatever the number of cores.
+    """Divide files into chunks that are checked together, an even number of chunks for many files.
 
-    What is found of a mission differs, in its last digits, by what is checked together with it.
+    The chunks do not depend on the number of cores: the last digits of a result depend on its chunk.
     """
     count = 1 if len(files) < FILES_FOR_TWO_PROCESSES else 2 * math.ceil(len(files) / (2 * FILES_AT_ONCE))
     ends = [chunk * len(files) // count for chunk in range(count + 1)]
@@ -268,7 +268,7 @@ def _kept(
     changes: Sequence[SetValue],
     outside: Outside,
 ) -> list[Kept]:
-    # The findings of a thousand missions are 10⁵ tuples without a cycle: nothing to collect.
+    # The findings of a thousand missions are 10⁵ tuples without a reference cycle: the collector finds nothing.
     gc.disable()
     kept: dict[int, Kept] = {}
     missions: dict[int, Mission] = {}
