@@ -5,8 +5,9 @@ projected on the ground. The variance of the phase over aperture and band, less 
 
     H = Cov_τ(g) + b²⟨g gᵀ⟩,    b² = B²/(12 f₀²),
 
-for an evenly filled band of width B about f₀; ⟨ ⟩ is the mean over the aperture. A singular H means that points along
-a line look alike: the collection has no image plane. Derived here; `ranges.exact_ranges` finds the image point with H.
+for an evenly filled band of width B about f₀; ⟨ ⟩ is the mean over the aperture. A singular H means that points
+along a line look alike: the collection has no image plane. Derived here. `ranges.exact_ranges` finds the image point
+with H.
 """
 
 import math

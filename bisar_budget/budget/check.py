@@ -1,8 +1,8 @@
 """Check missions: compare declared errors with the allocated budget, one row per error and per sum.
 
 `check_mission` checks one mission. `check_missions` checks missions of one shape together. `check_files` checks many
-files on all cores. The findings of a mission are some hundred objects. A caller that needs only a report passes `keep`:
-it reduces the findings in the process that made them, which saves a quarter of the time of a thousand missions.
+files on all cores. The findings of a mission are some hundred objects. A caller that needs only a report passes
+`keep`: it reduces the findings in the process that made them, and saves a quarter of the time of a thousand missions.
 """
 
 import gc

@@ -1,0 +1,109 @@
+"""How the package reads, by counts that may only fall: names without a meaning, constants without a unit, `Any`.
+
+A count is a thermometer: no sentence and no name is written for it. Who makes a count fall lowers its bound here.
+"""
+
+import ast
+import re
+from collections import Counter
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.conftest import ROOT
+
+PACKAGE = ROOT / "bisar_budget"
+GENERATED = {PACKAGE / "catalogue.py", PACKAGE / "evaluators.py"}
+
+# Words that do not say what a thing is, and words that may stand between them.
+EMPTY = """
+one ones found part parts place places said what some known given wanted left made held other others beside own same
+whole thing things something anything rest such those these that which
+"""
+FILLERS = "the a an of to in at by for is as so no not"
+
+# The last word of a constant's name: a unit, or what is counted or compared.
+UNITS = "rad deg s ms us ns min hours days hz khz mhz ghz m km mm um m2 s2 mps mps2 db kg k pa v w ppm"
+MEASURES = """
+ratio factor fraction share degree order exponent power probability count cells lines nodes points rows columns files
+cases draws steps rounds samples pulses digits characters width indent version code seed level index id size length
+words pages states fixes terms iterations cycles bytes sigma per
+"""
+
+
+def trees() -> Iterator[tuple[Path, ast.Module]]:
+    for path in sorted(PACKAGE.rglob("*.py")):
+        if path not in GENERATED:
+            yield path, ast.parse(path.read_text(encoding="utf-8"))
+
+
+def words(name: str) -> list[str]:
+    return [word for word in re.split(r"_+|\d+", re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name).lower()) if word]
+
+
+def is_empty(name: str) -> bool:
+    """Whether a name has words of no meaning and fillers alone."""
+    found = set(words(name))
+    return bool(found & {*EMPTY.split()}) and found <= {*EMPTY.split(), *FILLERS.split()}
+
+
+def bound_names(node: ast.AST) -> list[str]:
+    if isinstance(node, ast.arg):
+        return [] if node.arg in ("self", "cls", "other") else [node.arg]
+    if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+        return [node.id]
+    if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store):
+        return [node.attr]
+    return [node.name] if isinstance(node, ast.FunctionDef | ast.ClassDef) else []
+
+
+def is_number(node: ast.AST) -> bool:
+    if isinstance(node, ast.UnaryOp):
+        return is_number(node.operand)
+    if isinstance(node, ast.BinOp):
+        return is_number(node.left) and is_number(node.right)
+    return isinstance(node, ast.Constant) and type(node.value) in (int, float)
+
+
+def has_measure(name: str) -> bool:
+    *_, last = words(name)
+    return last in (*UNITS.split(), *MEASURES.split()) or "per" in words(name) or words(name)[0] in MEASURES.split()
+
+
+def empty_names() -> int:
+    return sum(is_empty(name) for _, tree in trees() for node in ast.walk(tree) for name in bound_names(node))
+
+
+def bare_constants() -> int:
+    return sum(
+        is_number(node.value) and not has_measure(target.id)
+        for _, tree in trees()
+        for node in tree.body
+        if isinstance(node, ast.Assign)
+        for target in node.targets
+        if isinstance(target, ast.Name) and not target.id.startswith("__")
+    )
+
+
+def any_annotations() -> int:
+    return sum(isinstance(node, ast.Name) and node.id == "Any" for _, tree in trees() for node in ast.walk(tree))
+
+
+def classes_defined_twice() -> int:
+    counts = Counter(node.name for _, tree in trees() for node in ast.walk(tree) if isinstance(node, ast.ClassDef))
+    return sum(count > 1 for count in counts.values())
+
+
+BOUNDS = {empty_names: 3073, bare_constants: 423, any_annotations: 1155, classes_defined_twice: 2}
+
+
+@pytest.mark.parametrize("count", BOUNDS, ids=lambda count: count.__name__)
+def test_the_count_has_not_risen(count: Callable[[], int]) -> None:
+    assert count() <= BOUNDS[count]
+
+
+@pytest.mark.parametrize("count", BOUNDS, ids=lambda count: count.__name__)
+def test_a_bound_follows_its_count(count: Callable[[], int]) -> None:
+    """A bound far above its count would let it rise again."""
+    assert count() >= 0.9 * BOUNDS[count] - 5
