@@ -6,8 +6,8 @@ A count is a thermometer: no sentence and no name is written for it. Who makes a
 import ast
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator
-from pathlib import Path
+from collections.abc import Callable
+from functools import cache
 
 import pytest
 
@@ -17,25 +17,27 @@ PACKAGE = ROOT / "bisar_budget"
 GENERATED = {PACKAGE / "catalogue.py", PACKAGE / "evaluators.py"}
 
 # Words that do not say what a thing is, and words that may stand between them.
-EMPTY = """
+_EMPTY = """
 one ones found part parts place places said what some known given wanted left made held other others beside own same
 whole thing things something anything rest such those these that which
 """
-FILLERS = "the a an of to in at by for is as so no not"
+_FILLERS = "the a an of to in at by for is as so no not"
 
 # The last word of a constant's name: a unit, or what is counted or compared.
-UNITS = "rad deg s ms us ns min hours days hz khz mhz ghz m km mm um m2 s2 mps mps2 db kg k pa v w ppm"
-MEASURES = """
+_UNITS = "rad deg s ms us ns min hours days hz khz mhz ghz m km mm um m2 s2 mps mps2 db kg k pa v w ppm"
+_MEASURES = """
 ratio factor fraction share degree order exponent power probability count cells lines nodes points rows columns files
 cases draws steps rounds samples pulses digits characters width indent version code seed level index id size length
 words pages states fixes terms iterations cycles bytes sigma per
 """
+EMPTY, FILLERS, UNITS, MEASURES = (frozenset(text.split()) for text in (_EMPTY, _FILLERS, _UNITS, _MEASURES))
 
 
-def trees() -> Iterator[tuple[Path, ast.Module]]:
-    for path in sorted(PACKAGE.rglob("*.py")):
-        if path not in GENERATED:
-            yield path, ast.parse(path.read_text(encoding="utf-8"))
+@cache
+def nodes() -> tuple[ast.AST, ...]:
+    """Every node of the package that is written by hand."""
+    paths = (path for path in sorted(PACKAGE.rglob("*.py")) if path not in GENERATED)
+    return tuple(node for path in paths for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
 
 
 def words(name: str) -> list[str]:
@@ -45,7 +47,7 @@ def words(name: str) -> list[str]:
 def is_empty(name: str) -> bool:
     """Whether a name has words of no meaning and fillers alone."""
     found = set(words(name))
-    return bool(found & {*EMPTY.split()}) and found <= {*EMPTY.split(), *FILLERS.split()}
+    return bool(found & EMPTY) and found <= EMPTY | FILLERS
 
 
 def bound_names(node: ast.AST) -> list[str]:
@@ -68,30 +70,30 @@ def is_number(node: ast.AST) -> bool:
 
 def has_measure(name: str) -> bool:
     *_, last = words(name)
-    return last in (*UNITS.split(), *MEASURES.split()) or "per" in words(name) or words(name)[0] in MEASURES.split()
+    return last in UNITS | MEASURES or "per" in words(name) or words(name)[0] in MEASURES
 
 
 def empty_names() -> int:
-    return sum(is_empty(name) for _, tree in trees() for node in ast.walk(tree) for name in bound_names(node))
+    return sum(is_empty(name) for node in nodes() for name in bound_names(node))
 
 
 def bare_constants() -> int:
+    statements = (statement for node in nodes() if isinstance(node, ast.Module) for statement in node.body)
     return sum(
-        is_number(node.value) and not has_measure(target.id)
-        for _, tree in trees()
-        for node in tree.body
-        if isinstance(node, ast.Assign)
-        for target in node.targets
+        is_number(statement.value) and not has_measure(target.id)
+        for statement in statements
+        if isinstance(statement, ast.Assign)
+        for target in statement.targets
         if isinstance(target, ast.Name) and not target.id.startswith("__")
     )
 
 
 def any_annotations() -> int:
-    return sum(isinstance(node, ast.Name) and node.id == "Any" for _, tree in trees() for node in ast.walk(tree))
+    return sum(isinstance(node, ast.Name) and node.id == "Any" for node in nodes())
 
 
 def classes_defined_twice() -> int:
-    counts = Counter(node.name for _, tree in trees() for node in ast.walk(tree) if isinstance(node, ast.ClassDef))
+    counts = Counter(node.name for node in nodes() if isinstance(node, ast.ClassDef))
     return sum(count > 1 for count in counts.values())
 
 
