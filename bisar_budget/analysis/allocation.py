@@ -48,7 +48,7 @@ class Allocation(NamedTuple):
 
     def of(self, case: int) -> "Allocation":
         """Those of one of many cases, in plain numbers."""
-        return Allocation._make(_plain(part, case) for part in self)
+        return Allocation._make(_plain(figure, case) for figure in self)
 
     def passes_with(self, qpe: float, hidden: float, owner: str, mission: Mission) -> Note:
         """Say from which N_pull a QPE of an owner would pass, or that no autofocus corrects it.
@@ -73,10 +73,10 @@ def autofocus_gain_of(mission: Mission) -> Any:
     return _gain(effective_n_pull(mission), mission.requirements.quadratic_phase_error)
 
 
-def _plain(part: Any, case: int) -> Any:
-    if isinstance(part, Shares):
-        return Shares._make(_plain(share, case) for share in part)
-    return None if part is None else plain(part, case)
+def _plain(figure: Any, case: int) -> Any:
+    if isinstance(figure, Shares):
+        return Shares._make(_plain(share, case) for share in figure)
+    return None if figure is None else plain(figure, case)
 
 
 def is_balanced(mission: Mission) -> bool:
@@ -114,7 +114,7 @@ def _balanced(gates: Sequence[Together]) -> Shares:
     weights = []
     for owner in ("transmitter", "receiver"):
         by_model = zip(*(together.judged_parts(together.owed(EQUAL, owner)) for together in gates), strict=True)
-        phases = [(of_one[0][0], _largest([phase for _, phase in of_one])) for of_one in by_model]
+        phases = [(of_platform[0][0], _largest([phase for _, phase in of_platform])) for of_platform in by_model]
         # An error that leaves no image has no finite phase: it takes all that it may.
         weights.append(np.minimum(gates[0].combined(phases), 1e300))
     total = weights[0] + weights[1]

@@ -42,12 +42,12 @@ def by_nodes(
     T = np.broadcast_to(mission.collection.aperture_time, (cases,))
     counts = np.broadcast_to(nodes_for(geometry, T, has_direct_path=mission.has_direct_path), (cases,))
     for nodes in np.unique(counts).tolist():
-        same = np.flatnonzero(counts == nodes)
-        if same.size == cases:
-            yield nodes, same, mission, geometry
+        same_nodes = np.flatnonzero(counts == nodes)
+        if same_nodes.size == cases:
+            yield nodes, same_nodes, mission, geometry
         else:
-            part = picked(mission, same)
-            yield nodes, same, part, part.geometry
+            mission_of_nodes = picked(mission, same_nodes)
+            yield nodes, same_nodes, mission_of_nodes, mission_of_nodes.geometry
 
 
 class Analysis:
@@ -244,11 +244,11 @@ class Case:
         """Effect of a declared error by a model."""
         return self.analysis.errors.does(model.name, source).in_one_case(self.place)
 
-    def moved_by_tone(self, what: Subject, model: str) -> GroundVector | None:
+    def moved_by_tone(self, row_subject: Subject, model: str) -> GroundVector | None:
         """Displacement by the tone of a row in the worst phases, by a model; None of a row that is no tone's. [m]"""
-        for one in self.analysis.displacing_tones:
-            if one.subject.id == what.id:
-                east, north = map(self.number, one.by(model))
+        for tone in self.analysis.displacing_tones:
+            if tone.subject.id == row_subject.id:
+                east, north = map(self.number, tone.by(model))
                 return None if math.isnan(east) else (east, north)
         return None
 

@@ -63,12 +63,12 @@ def _losses_of_motion(analysis: "Analysis", motion: Sequence[ErrorSource]) -> li
     errors, together = analysis.errors, analysis.together("full")
     if not motion:
         return []
-    left = _range_errors_left(errors, motion)
-    places = {error.subject.id: place for place, error in enumerate(motion)}
-    losses = dict(zip(places, peak_losses(errors.exact, left).max(axis=1), strict=True))
+    remaining = _range_errors_left(errors, motion)
+    index_by_id = {error.subject.id: index for index, error in enumerate(motion)}
+    losses = dict(zip(index_by_id, peak_losses(errors.exact, remaining).max(axis=1), strict=True))
     for group in analysis.groups if together.rule == "rss" else ():
-        if places.keys() >= set(group.ids):
-            independent = together.independent(group, left[[places[row_id] for row_id in group.ids], 0])
+        if index_by_id.keys() >= set(group.ids):
+            independent = together.independent(group, remaining[[index_by_id[row_id] for row_id in group.ids], 0])
             losses |= dict(zip(group.ids, peak_losses(errors.exact, independent), strict=True))
     return list(losses.values())
 
@@ -79,16 +79,18 @@ def _range_errors_left(errors: DeclaredErrors, motion: Sequence[ErrorSource]) ->
     east, north = np.moveaxis(np.array([(effect.displacement, effect.opposite) for effect in does]), 2, 0)
     size = np.array([errors.array(error.declared) for error in motion])
     lanes = errors.lanes(*motion, signs=(1.0, -1.0))
-    left = errors.exact.left_over(lanes, np.repeat(size[:, None], 2, axis=1).ravel(), (east.ravel(), north.ravel()))
-    return np.moveaxis(left.reshape(len(left), len(motion), 2, errors.cases), 0, 2)
+    remaining = errors.exact.left_over(
+        lanes, np.repeat(size[:, None], 2, axis=1).ravel(), (east.ravel(), north.ravel())
+    )
+    return np.moveaxis(remaining.reshape(len(remaining), len(motion), 2, errors.cases), 0, 2)
 
 
-def peak_losses(exact: ExactRanges, left: Floats) -> Floats:
+def peak_losses(exact: ExactRanges, remaining: Floats) -> Floats:
     """Losses of the peak by range errors that are left at the nodes, (..., nodes, cases) [m]; (..., cases). [dB]"""
     sampling = exact.sampling
     if sampling.places.size <= OF_ENDS:  # few nodes carry a smooth range error, and not the turns of its phase
-        left, sampling = sampling.weights_at(nodes(_SUMMED_NODES).places) @ left, nodes(_SUMMED_NODES)
-    phase, relative_band = exact.k * left, np.sqrt(12 * exact.band)
+        remaining, sampling = sampling.weights_at(nodes(_SUMMED_NODES).places) @ remaining, nodes(_SUMMED_NODES)
+    phase, relative_band = exact.k * remaining, np.sqrt(12 * exact.band)
     of_band = np.sinc(phase * relative_band / (2 * math.pi))  # the mean over the band, in closed form
     amplitude = np.abs(np.einsum("n,...nc->...c", sampling.fit[0], np.exp(1j * phase) * of_band))
     return np.asarray(np.maximum(-20 * np.log10(amplitude), 0.0))  # less than rounding leaves is none

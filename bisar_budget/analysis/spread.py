@@ -105,8 +105,8 @@ def spread_limit(mission: Mission, allocation: Allocation, owner: str, model: st
     """Rms phase that an owner may spread, by the paper's rule or as an image shows it. [rad]"""
     if mission.requirements.islr is None:
         return None
-    whole = spread_phase(10 ** (np.asarray(mission.requirements.islr) / 10), model, mainlobe_energy(mission))
-    return whole * np.sqrt(allocation.islr.of(owner))
+    rms_of_mission = spread_phase(10 ** (np.asarray(mission.requirements.islr) / 10), model, mainlobe_energy(mission))
+    return rms_of_mission * np.sqrt(allocation.islr.of(owner))
 
 
 def tones(mission: Mission, geometry: Any = None) -> list[Tone]:
@@ -114,58 +114,62 @@ def tones(mission: Mission, geometry: Any = None) -> list[Tone]:
 
     `geometry` is that of many cases, where numbers of the mission are arrays.
     """
-    T, found = mission.collection.aperture_time, []
+    T, echoes = mission.collection.aperture_time, []
     for name in PLATFORMS:
         for index, line in enumerate(lines_of(mission, name, geometry)):
             cycles = line.frequency * T
             is_there = np.asarray(cycles >= SLOWEST_ECHO_CYCLES)[()]
             if np.any(is_there):
                 phase = 2 * math.pi * line.amplitude / mission.radar.wavelength
-                what = subject(name, "vibration", "sinusoidal", entry=index)
-                found.append(Tone(what, phase, cycles, is_there))
+                row_subject = subject(name, "vibration", "sinusoidal", entry=index)
+                echoes.append(Tone(row_subject, phase, cycles, is_there))
     if has_instruments(mission):
         for spur in spurs_of(mission, geometry):
-            found += _echoes(Tone(spur.subject, spur.phase, spur.frequency * T), spur.free, spur.left, mission)
-        for one in accelerated_tones(mission, geometry):
-            cycles = one.frequency * T
+            echoes += _echoes(Tone(spur.subject, spur.phase, spur.frequency * T), spur.free, spur.left, mission)
+        for accelerated in accelerated_tones(mission, geometry):
+            cycles = accelerated.frequency * T
             alone = Tone(
-                one.subject, one.phase, cycles, np.asarray(cycles >= SLOWEST_ECHO_CYCLES)[()], one.in_quadrature
+                accelerated.subject,
+                accelerated.phase,
+                cycles,
+                np.asarray(cycles >= SLOWEST_ECHO_CYCLES)[()],
+                accelerated.in_quadrature,
             )
-            found += _echoes(alone, one.free * one.sensitivity, one.left, mission)
-    return [one for one in found if np.any(one.is_there)]
+            echoes += _echoes(alone, accelerated.free * accelerated.sensitivity, accelerated.left, mission)
+    return [accelerated for accelerated in echoes if np.any(accelerated.is_there)]
 
 
-def _echoes(alone: Tone, free: Any, left: LeftTone, mission: Mission) -> list[Tone]:
+def _echoes(alone: Tone, free: Any, remaining: LeftTone, mission: Mission) -> list[Tone]:
     """Echoes of an oscillator's tone; of one that is folded where each lies, or all power where the largest does."""
-    if not left.is_folded:
+    if not remaining.is_folded:
         return [alone]
     T = mission.collection.aperture_time
     if mission.requirements.pslr is None:
-        cycles = left.place(T) * T
+        cycles = remaining.place(T) * T
         return [Tone(alone.subject, alone.phase, cycles, np.asarray(alone.phase > 0)[()])]
     each = [
         Tone(alone.subject, free * share, frequency * T, np.asarray(share > 0)[()])
-        for frequency, share in zip(left.frequencies, left.echoes(T), strict=True)
+        for frequency, share in zip(remaining.frequencies, remaining.echoes(T), strict=True)
     ]
     return [each[0]._replace(in_quadrature=alone.in_quadrature), *each[1:]]
 
 
 def noise(analysis: "Analysis", model: str) -> list[SpreadPhase]:
     """List what spreads beyond the cubic: wideband vibration, noise of sensors, phase noise, links, powers stated."""
-    mission, found = analysis.mission, []
+    mission, spreads = analysis.mission, []
     for name in PLATFORMS:
         wideband = getattr(mission.platforms, name).motion_error.vibration.wideband
         if wideband is not None:
             rms = counted(mission, name, wideband.rms, "islr", analysis.geometry)
             variance = (2 * math.pi * rms / mission.radar.wavelength) ** 2
-            found.append(SpreadPhase(subject(name, "vibration", "wideband").id, name, variance))
-    for one in analysis.random:
-        if one.declared is not None and one.spreads and not one.counted_in:
-            found.append(SpreadPhase(one.id, one.owner, (one.effect(model).spread * one.declared) ** 2))
+            spreads.append(SpreadPhase(subject(name, "vibration", "wideband").id, name, variance))
+    for error in analysis.random:
+        if error.declared is not None and error.spreads and not error.counted_in:
+            spreads.append(SpreadPhase(error.id, error.owner, (error.effect(model).spread * error.declared) ** 2))
     energy = mainlobe_energy(mission)
     for power in stated_powers(mission):
-        found.append(SpreadPhase(power.subject.id, power.subject.owner, power.rms(model, energy) ** 2))
-    return found
+        spreads.append(SpreadPhase(power.subject.id, power.subject.owner, power.rms(model, energy) ** 2))
+    return spreads
 
 
 def rests(analysis: "Analysis", model: str) -> list[SpreadPhase]:
@@ -176,35 +180,35 @@ def rests(analysis: "Analysis", model: str) -> list[SpreadPhase]:
     """
     if model == "published":
         return []
-    found, errors = [], analysis.errors
+    spreads, errors = [], analysis.errors
     factor = analysis.mission.allocation.coverage_factor
     for error in errors.stated:
         if error.is_motion:
             rms = np.asarray(errors.does(model, error).rest) / (factor if error.is_covered else 1.0)
             shows = (rms > SMALLEST_REST_RAD) & np.isfinite(rms) & ~errors.exact.is_turned
             if shows.any():
-                found.append(SpreadPhase(error.id, error.owner, np.where(shows, rms**2, math.nan)))
+                spreads.append(SpreadPhase(error.id, error.owner, np.where(shows, rms**2, math.nan)))
     for sensor in analysis.random:
         if sensor.declared is not None and not sensor.counted_in:
             rms = np.asarray(sensor.full.rest * sensor.declared)
             shows = rms > SMALLEST_REST_RAD
             if shows.any():
-                found.append(SpreadPhase(sensor.id, sensor.owner, np.where(shows, rms**2, math.nan)))
-    slow = {one.row_id: one.is_there for one in analysis.slow}
+                spreads.append(SpreadPhase(sensor.id, sensor.owner, np.where(shows, rms**2, math.nan)))
+    slow = {phase.row_id: phase.is_there for phase in analysis.slow}
     for tone in analysis.slow_tones.values():
         rms = tone.declared.rest
         shows = slow.get(tone.subject.id, False) & (rms > SMALLEST_REST_RAD) & ~errors.exact.is_turned
         if shows.any():
-            found.append(SpreadPhase(tone.subject.id, tone.subject.owner, np.where(shows, rms**2, math.nan)))
-    return found
+            spreads.append(SpreadPhase(tone.subject.id, tone.subject.owner, np.where(shows, rms**2, math.nan)))
+    return spreads
 
 
 def stated_powers(mission: Mission) -> list[StatedPower]:
     """List what errors from elsewhere spread that state their ISLR."""
     return [
-        StatedPower(subject("mission", "other", f"{other.name}.islr", entry=index), other.islr)
-        for index, other in enumerate(mission.other_errors)
-        if other.islr is not None
+        StatedPower(subject("mission", "other", f"{stated.name}.islr", entry=index), stated.islr)
+        for index, stated in enumerate(mission.other_errors)
+        if stated.islr is not None
     ]
 
 
@@ -218,23 +222,23 @@ def powers_held_by_islr(analysis: "Analysis", owners: Iterable[str], model: str)
     mission, split, together = analysis.mission, analysis.allocation.islr, analysis.together(model)
     spreads = noise(analysis, model) + rests(analysis, model)
     if mission.requirements.pslr is None:
-        for one in analysis.tones:
-            variance = np.where(one.is_there, one.phase**2 / 2, math.nan)[()]
-            spreads.append(SpreadPhase(one.subject.id, one.subject.owner, variance))
-    found = []
+        for spread in analysis.tones:
+            variance = np.where(spread.is_there, spread.phase**2 / 2, math.nan)[()]
+            spreads.append(SpreadPhase(spread.subject.id, spread.subject.owner, variance))
+    powers_by_owner = []
     for owner in owners:
-        powers = [one for one in spreads if split.includes(one.owner, owner)]
+        powers = [spread for spread in spreads if split.includes(spread.owner, owner)]
         if mission.requirements.cubic_phase_error is None:
             phase = together.cubic_without_coverage(split, owner)
             shows = (phase > SMALLEST_CUBIC_RAD) & np.isfinite(phase)
             if shows.any():
                 variance = np.where(shows, CUBIC_POWER * phase**2, math.nan)
                 powers.append(SpreadPhase(subject("mission", CUBIC).id, "mission", variance))
-        found.append(powers)
-    return found
+        powers_by_owner.append(powers)
+    return powers_by_owner
 
 
 def declared_powers(analysis: "Analysis", owner: str, model: str) -> list[SpreadPhase]:
     """List the phases of an owner that count against ISLR, of one case, in plain numbers."""
     (powers,) = powers_held_by_islr(analysis, [owner], model)
-    return [one._replace(variance=float(np.ravel(one.variance)[0])) for one in powers]
+    return [power._replace(variance=float(np.ravel(power.variance)[0])) for power in powers]

@@ -67,31 +67,35 @@ class Together:
     def own(self) -> list[DeclaredPhase]:
         """Phases of what has no displacement of its own: slow vibrations, declared errors of sensors and clocks."""
         array = self.errors.array
-        found = [one._replace(qpe_rad=array(one.qpe_rad), cubic_rad=array(one.cubic_rad)) for one in self.slow]
+        phases = [
+            vibration._replace(qpe_rad=array(vibration.qpe_rad), cubic_rad=array(vibration.cubic_rad))
+            for vibration in self.slow
+        ]
         for error in self.random:
             if error.declared is not None:
                 effect, coverage = error.effect(self.model), error.coverage(self.errors.mission)
                 quadratic, cubic, hidden = (
-                    array(part * error.declared) for part in (effect.quadratic, effect.cubic, effect.hidden)
+                    array(phase_part * error.declared)
+                    for phase_part in (effect.quadratic, effect.cubic, effect.hidden)
                 )
                 phase = DeclaredPhase(error.subject.id, error.subject.owner, quadratic, cubic, coverage)
-                found.append(phase._replace(hidden_rad=hidden))
-        return found
+                phases.append(phase._replace(hidden_rad=hidden))
+        return phases
 
     @cached_property
     def phases(self) -> list[DeclaredPhase]:
         """Phases of every declared error: of motion and the clock, of what is a phase alone, and `own`."""
-        found, factor = [], self.errors.mission.allocation.coverage_factor
+        phases_of_motion, factor = [], self.errors.mission.allocation.coverage_factor
         for error in self.errors.stated:
             does, coverage = self.errors.does(self.model, error), factor if error.is_covered else 1.0
             cubic = does.cubic if error.is_motion else None
             phase = DeclaredPhase(error.subject.id, error.subject.owner, does.qpe, cubic, coverage)
-            found.append(phase._replace(hidden_rad=does.hidden))
-        return [*found, *self.own]
+            phases_of_motion.append(phase._replace(hidden_rad=does.hidden))
+        return [*phases_of_motion, *self.own]
 
     def owed(self, split: Shares, owner: str) -> list[DeclaredPhase]:
         """Those that count against the share of an owner; against the mission's all."""
-        return [one for one in self.phases if split.includes(one.owner, owner)]
+        return [phase for phase in self.phases if split.includes(phase.owner, owner)]
 
     def judged_parts(self, members: Sequence[DeclaredPhase], rule: str = "", gain: Any = None) -> Phases:
         """List the judged phases that a rule combines, with the mission's gain or another. [rad]
@@ -99,16 +103,16 @@ class Together:
         Under root-sum-square the six of a covariance are one, as their correlations make it.
         """
         gain, groups = self.errors.gain if gain is None else gain, self.groups
-        found = {member.row_id: member.judged(gain) for member in members}
+        judged = {member.row_id: member.judged(gain) for member in members}
         if (rule or self.rule) == "rss":
             quadratic = dict(quadratics(members))
             for group in groups:
-                if found.keys() >= set(group.ids):
+                if judged.keys() >= set(group.ids):
                     size = group.phase([quadratic[row_id] for row_id in group.ids])
                     for row_id in group.ids:
-                        del found[row_id]
-                    found[group.id] = np.hypot(size, gain * self._hidden_of_groups[group.id])
-        return list(found.items())
+                        del judged[row_id]
+                    judged[group.id] = np.hypot(size, gain * self._hidden_of_groups[group.id])
+        return list(judged.items())
 
     def judged(self, members: Sequence[DeclaredPhase], rule: str = "", gain: Any = None) -> Floats:
         """Combine the judged phases of errors by the mission's rule, or another. [rad]"""
@@ -125,20 +129,20 @@ class Together:
     def _hidden_of(self, group: Correlated) -> Floats:
         """Hidden phase of the six errors of a covariance: the squares of independent errors add up. [rad]"""
         errors = {error.subject.id: error for error in self.motion}
-        left = []
+        remaining = []
         for row_id in group.ids:
-            block, place = self.errors.block_of(errors[row_id])
-            left.append(block.left_per_unit([place])[0] * np.nan_to_num(block.declared[place]))
-        hidden, _ = self.errors.exact.unresolved(self.independent(group, np.array(left)))
+            block, index = self.errors.block_of(errors[row_id])
+            remaining.append(block.left_per_unit([index])[0] * np.nan_to_num(block.declared[index]))
+        hidden, _ = self.errors.exact.unresolved(self.independent(group, np.array(remaining)))
         return np.asarray(np.sqrt(np.square(hidden).sum(axis=0)))
 
-    def independent(self, group: Correlated, left: Floats) -> Floats:
+    def independent(self, group: Correlated, remaining: Floats) -> Floats:
         """Range errors at the nodes of independent errors that together are those of a covariance. [m]
 
         Those of its six errors are (6, nodes, cases). A root of their correlations turns them.
         """
         correlation = np.array([[self.errors.array(rho) for rho in row] for row in group.correlation])
-        return np.asarray(np.einsum("cij,inc->jnc", factor(np.moveaxis(correlation, 2, 0)), left))
+        return np.asarray(np.einsum("cij,inc->jnc", factor(np.moveaxis(correlation, 2, 0)), remaining))
 
     def combined(self, phases: Phases, rule: str = "") -> Floats:
         """Combine phases by the mission's rule, or another. [rad]"""
@@ -147,7 +151,7 @@ class Together:
     def cubics_without_coverage(self, split: Shares, owner: str) -> Phases:
         """Cubic phase of each error that counts against an owner's share, at the declared sigma, signed. [rad]"""
         members = self.owed(split, owner)
-        return [(one.row_id, one.cubic_rad / one.coverage) for one in members if one.cubic_rad is not None]
+        return [(phase.row_id, phase.cubic_rad / phase.coverage) for phase in members if phase.cubic_rad is not None]
 
     def cubic_without_coverage(self, split: Shares, owner: str) -> Floats:
         """The same added up: with `combine: sum`, else by root-sum-square, since powers add. [rad]"""
@@ -161,9 +165,9 @@ class Together:
         """
         does = {error.subject.id: self.errors.does(self.model, error) for error in self.motion}
         if rule != "sum":
-            return [(row_id, one.farthest) for row_id, one in does.items()]
+            return [(row_id, effect.farthest) for row_id, effect in does.items()]
         ahead, back = (
-            np.array([getattr(one, side) for one in does.values()]).reshape(-1, 2, self.errors.cases)
+            np.array([getattr(effect, side) for effect in does.values()]).reshape(-1, 2, self.errors.cases)
             for side in ("displacement", "opposite")
         )
         rest = ((ahead + back) / 2).sum(axis=0)
@@ -176,18 +180,18 @@ class Together:
 
         None of a clock that the file leaves open.
         """
-        found = []
+        moves = []
         for error in self.random:
             if error.declared is not None:
                 effect = error.effect(self.model)
                 is_open = self.errors.array(error.displaces_unknown) > 0
-                moved = (self.errors.array(one * error.declared) for one in effect[3:5])
-                east, north = (np.where(is_open, 0.0, one) for one in moved)
-                found.append((error.subject.id, (east, north)))
+                moved = (self.errors.array(component * error.declared) for component in effect[3:5])
+                east, north = (np.where(is_open, 0.0, component) for component in moved)
+                moves.append((error.subject.id, (east, north)))
         for tone in self.tones:
             east, north = map(self.errors.array, tone.by(self.model))
-            found.append((tone.subject.id, (east, north)))
-        return found
+            moves.append((tone.subject.id, (east, north)))
+        return moves
 
     @property
     def is_placed(self) -> bool:
@@ -203,27 +207,27 @@ class Together:
         if rule != "sum":
             moves = [*self.moves(rule), *self.undirected_moves]
             return self.errors.array(combined_displacement(moves, rule, self.groups))
-        found = combined_displacement(self.moves(rule), rule, self.groups)
-        return self.errors.array(found + sum(np.hypot(*move) for _, move in self.undirected_moves))
+        largest = combined_displacement(self.moves(rule), rule, self.groups)
+        return self.errors.array(largest + sum(np.hypot(*move) for _, move in self.undirected_moves))
 
     # ---------------------------------------------------------------- of one case
     def phase_parts(self, phases: Phases, rule: str = "", case: int = 0) -> list[tuple[str, float]]:
         """List the parts of phases that the mission's rule, or another, combines, signed. [rad]"""
-        parts = phase_parts(phases, rule or self.rule, self.groups)
-        return [(row_id, float(phase[case])) for row_id, phase in parts]
+        combined_parts = phase_parts(phases, rule or self.rule, self.groups)
+        return [(row_id, float(phase[case])) for row_id, phase in combined_parts]
 
     def displacement_parts(self, case: int = 0) -> list[tuple[str, GroundVector]]:
         """List the parts of displacements that the mission's rule combines: none where one has no image. [m]"""
-        found = displacement_parts([*self.moves(self.rule), *self.undirected_moves], self.rule, self.groups)
-        parts = [(row_id, (float(east[case]), float(north[case]))) for row_id, (east, north) in found]
-        return [] if any(math.isnan(east) for _, (east, _) in parts) else parts
+        named_moves = displacement_parts([*self.moves(self.rule), *self.undirected_moves], self.rule, self.groups)
+        combined_parts = [(row_id, (float(east[case]), float(north[case]))) for row_id, (east, north) in named_moves]
+        return [] if any(math.isnan(east) for _, (east, _) in combined_parts) else combined_parts
 
 
 def quadratics(members: Iterable[DeclaredPhase]) -> Phases:
     """Quadratic phase of each, signed. [rad]"""
-    return [(one.row_id, one.qpe_rad) for one in members]
+    return [(phase.row_id, phase.qpe_rad) for phase in members]
 
 
 def cubics(members: Iterable[DeclaredPhase]) -> Phases:
     """Cubic phase of each that has one, signed. [rad]"""
-    return [(one.row_id, one.cubic_rad) for one in members if one.cubic_rad is not None]
+    return [(phase.row_id, phase.cubic_rad) for phase in members if phase.cubic_rad is not None]

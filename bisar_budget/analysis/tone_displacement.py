@@ -59,7 +59,7 @@ class ToneDisplacement(NamedTuple):
 
     def by(self, model: str) -> Floats:
         """Displacement east and north by a model, each in its worst phase, (2, n). [m]"""
-        return np.asarray(sum(part.displacement for part in self.parts(model)))
+        return np.asarray(sum(tone_part.displacement for tone_part in self.parts(model)))
 
 
 def tone_displacements(mission: Mission, geometry: BistaticGeometry, exact: ExactRanges) -> list[ToneDisplacement]:
@@ -68,40 +68,47 @@ def tone_displacements(mission: Mission, geometry: BistaticGeometry, exact: Exac
     One that exchanges fold has a part at each frequency. What is below one cycle per aperture, of a vibration that an
     oscillator feels or of a folded tone, counts in the row of the acceleration or of the oscillator.
     """
-    T, plane, found = mission.collection.aperture_time, _by_plane(geometry, exact), list[ToneDisplacement]()
-    for place, name in enumerate(PLATFORMS):
+    T, plane, displacements = mission.collection.aperture_time, _by_plane(geometry, exact), list[ToneDisplacement]()
+    for platform_index, name in enumerate(PLATFORMS):
         error: MotionError = getattr(mission.platforms, name).motion_error
         for index, line in enumerate(error.vibration.sinusoidal):
             value, cycles = line.displacement, line.frequency * T
             if isinstance(value, tuple):
                 ways, sizes = getattr(geometry, name).frame(error.frame), value
             else:  # along the line of sight, as it turns
-                ways, sizes = [[part / exact.ranges[place] for part in exact.tracks[place]]], (value,)
+                ways, sizes = (
+                    [[component / exact.ranges[platform_index] for component in exact.tracks[platform_index]]],
+                    (value,),
+                )
             published = TonePart(_orders(cycles, counted(mission, name, value, "pslr", geometry)), plane)
             full = [
-                TonePart(_orders(cycles, size), _by_ranges(exact, exact.along(place, way)))
+                TonePart(_orders(cycles, size), _by_ranges(exact, exact.along(platform_index, way)))
                 for way, size in zip(ways, sizes, strict=True)
             ]
-            found.append(ToneDisplacement(subject(name, "vibration", "sinusoidal", entry=index), [published], full))
+            displacements.append(
+                ToneDisplacement(subject(name, "vibration", "sinusoidal", entry=index), [published], full)
+            )
     by_models = [plane, _by_ranges(exact, np.ones_like(exact.times))]
     if mission.has_direct_path:  # the constant phase between direct path and echo moves nothing
         by_models = [per_metre * np.array([0.0, 1.0, 1.0, 1.0])[:, None, None] for per_metre in by_models]
-    for what, free, left in _tones_of_oscillators(mission, geometry) if has_instruments(mission) else ():
-        echoes = zip(left.frequencies, left.echoes(T), strict=True)
+    for row_subject, free, remaining in _tones_of_oscillators(mission, geometry) if has_instruments(mission) else ():
+        echoes = zip(remaining.frequencies, remaining.echoes(T), strict=True)
         orders = [_orders(frequency * T, free * share / exact.k) for frequency, share in echoes]
         if np.any(orders):
-            both = ([TonePart(one, per_metre) for one in orders] for per_metre in by_models)
-            found.append(ToneDisplacement(what, *both))
-    return found
+            both = ([TonePart(tone, per_metre) for tone in orders] for per_metre in by_models)
+            displacements.append(ToneDisplacement(row_subject, *both))
+    return displacements
 
 
 def _tones_of_oscillators(mission: Mission, geometry: BistaticGeometry) -> Iterator[tuple[Subject, Any, LeftTone]]:
     """Row, peak phase of a free oscillator [rad], and what the synchronization leaves of each tone."""
     for spur in spurs_of(mission, geometry):
         yield spur.subject, spur.free, spur.left
-    for one in accelerated_tones(mission, geometry):
-        is_fast = one.left.is_folded | (one.frequency * mission.collection.aperture_time >= SLOWEST_ECHO_CYCLES)
-        yield one.subject, is_fast * one.free * one.sensitivity, one.left
+    for accelerated in accelerated_tones(mission, geometry):
+        is_fast = accelerated.left.is_folded | (
+            accelerated.frequency * mission.collection.aperture_time >= SLOWEST_ECHO_CYCLES
+        )
+        yield accelerated.subject, is_fast * accelerated.free * accelerated.sensitivity, accelerated.left
 
 
 def _orders(cycles: Any, size: Any) -> Floats:
@@ -113,11 +120,11 @@ def _orders(cycles: Any, size: Any) -> Floats:
 def _by_plane(geometry: BistaticGeometry, exact: ExactRanges) -> Floats:
     """Displacement by a metre of each order by (25), (4, 2, n); not a number where Q has no inverse. [m/m]"""
     plane, _ = published_planes(geometry)
-    found = np.zeros((4, *np.shape(exact.place_weights)[::2]))
+    displacement = np.zeros((4, *np.shape(exact.place_weights)[::2]))
     scale = 1 / np.where(plane.is_singular, math.nan, plane.determinant)
     for way, (by_value, by_slope) in enumerate(plane.adjugate):
-        found[0, way], found[1, way] = by_value * scale, by_slope * scale / exact.half
-    return found
+        displacement[0, way], displacement[1, way] = by_value * scale, by_slope * scale / exact.half
+    return displacement
 
 
 def _by_ranges(exact: ExactRanges, along: Floats) -> Floats:

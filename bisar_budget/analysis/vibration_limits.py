@@ -85,8 +85,12 @@ def level_of(phase: Any) -> Any:
 
 def quadratures(tones: Sequence[Tone]) -> list[tuple[int, int]]:
     """Places of the tones that are in quadrature to another, each with the place of that."""
-    places = {one.subject.id: place for place, one in enumerate(tones)}
-    return [(here, places[one.in_quadrature]) for here, one in enumerate(tones) if one.in_quadrature in places]
+    index_by_id = {tone.subject.id: index for index, tone in enumerate(tones)}
+    return [
+        (here, index_by_id[tone.in_quadrature])
+        for here, tone in enumerate(tones)
+        if tone.in_quadrature in index_by_id
+    ]
 
 
 def highest_echo(tones: Sequence[Tone], shape: tuple[int, ...] = ()) -> Echo | None:
@@ -99,31 +103,33 @@ def highest_echo(tones: Sequence[Tone], shape: tuple[int, ...] = ()) -> Echo | N
     count = len(tones)
     phases, cycles, is_there = (
         np.array([np.broadcast_to(column, shape) for column in columns]).reshape(count, -1)
-        for columns in zip(*(one[1:4] for one in tones), strict=True)
+        for columns in zip(*(tone[1:4] for tone in tones), strict=True)
     )
     phases = np.where(is_there, phases, 0.0)
     pairs = quadratures(tones)
-    for one, other in pairs:  # at one frequency: the tone that it is with the other
-        phases[other], phases[one] = np.hypot(phases[one], phases[other]), 0.0
+    for first, second in pairs:  # at one frequency: the tone that it is with the other
+        phases[second], phases[first] = np.hypot(phases[first], phases[second]), 0.0
     number = near_groups(np.where(is_there, cycles, 0.0))
     here = np.arange(phases.shape[1])
     levels = level_of(phases)
     largest = levels.argmax(axis=0)
-    phase, place, level = (column[largest, here] for column in (phases, cycles, levels))
+    phase, frequency, level = (column[largest, here] for column in (phases, cycles, levels))
     is_of = np.arange(count)[:, None] == largest
     for group in range(number.max() + 1):
         members = number == group
-        some = np.flatnonzero(members.any(axis=0))
-        worst = worst_phases(phases[:, some], cycles[:, some], members[:, some])
+        cases_with_group = np.flatnonzero(members.any(axis=0))
+        worst = worst_phases(phases[:, cases_with_group], cycles[:, cases_with_group], members[:, cases_with_group])
         height = level_of(worst.amplitude)
-        is_higher = height > level[some]
-        some = some[is_higher]
-        phase[some], place[some], level[some] = (one[is_higher] for one in (*worst, height))
-        is_of[:, some] = members[:, some]
-    for one, other in pairs:
-        is_of[one] = is_of[other] & is_there[one].astype(bool)
-    phase, place, level = (one.reshape(shape)[()] for one in (phase, place, level))
-    return Echo(phase, place, level, is_of.reshape(count, *shape))
+        is_higher = height > level[cases_with_group]
+        cases_with_group = cases_with_group[is_higher]
+        phase[cases_with_group], frequency[cases_with_group], level[cases_with_group] = (
+            column[is_higher] for column in (*worst, height)
+        )
+        is_of[:, cases_with_group] = members[:, cases_with_group]
+    for first, second in pairs:
+        is_of[first] = is_of[second] & is_there[first].astype(bool)
+    phase, frequency, level = (column.reshape(shape)[()] for column in (phase, frequency, level))
+    return Echo(phase, frequency, level, is_of.reshape(count, *shape))
 
 
 def echo_phase(level: Any) -> Any:
@@ -146,13 +152,13 @@ def vibration_limits(mission: Mission, allocation: Allocation, metric: str) -> d
         largest = echo_phase(np.sqrt(power * (split.transmitter + split.receiver)))
     else:
         largest = spread_phase(power, "full", mainlobe_energy(mission))
-    wavelength, found = mission.radar.wavelength, {}
+    wavelength, limits = mission.radar.wavelength, {}
     for name in PLATFORMS:
         # The squares of rms phases are the shares of power.
-        part = amplitude_share(split, name) if metric == "pslr" else np.sqrt(split.of(name))
+        share = amplitude_share(split, name) if metric == "pslr" else np.sqrt(split.of(name))
         published = evaluators.vibration_limit(wavelength, power, split.of(name))
-        found[name] = VibrationLimits(published, evaluators.motion_of_phase(wavelength, largest * part))
-    return found
+        limits[name] = VibrationLimits(published, evaluators.motion_of_phase(wavelength, largest * share))
+    return limits
 
 
 def tone_limits(mission: Mission, allocation: Allocation) -> tuple[str, dict[str, VibrationLimits]]:
@@ -165,13 +171,15 @@ def tone_limits(mission: Mission, allocation: Allocation) -> tuple[str, dict[str
         return "pslr", vibration_limits(mission, allocation, "pslr")
     rms = vibration_limits(mission, allocation, "islr")
     root = math.sqrt(2)
-    return "islr", {name: VibrationLimits(root * one.published, root * one.full) for name, one in rms.items()}
+    return "islr", {
+        name: VibrationLimits(root * limits.published, root * limits.full) for name, limits in rms.items()
+    }
 
 
 def amplitude_share(split: Shares, name: str) -> Any:
     """Part of a platform in the amplitude of both: they sum to 1, in the ratio of the roots of power."""
-    own, other = split.of(name), split.of(next(one for one in PLATFORMS if one != name))
-    return evaluators.amplitude_share(own, other)
+    share, share_of_other = split.of(name), split.of(next(platform for platform in PLATFORMS if platform != name))
+    return evaluators.amplitude_share(share, share_of_other)
 
 
 class SlowLimits(NamedTuple):

@@ -73,10 +73,12 @@ def has_measure(name: str) -> bool:
     return last in UNITS | MEASURES or "per" in words(name) or words(name)[0] in MEASURES
 
 
+@cache
 def empty_names() -> int:
     return sum(is_empty(name) for node in nodes() for name in bound_names(node))
 
 
+@cache
 def bare_constants() -> int:
     statements = (statement for node in nodes() if isinstance(node, ast.Module) for statement in node.body)
     return sum(
@@ -88,10 +90,12 @@ def bare_constants() -> int:
     )
 
 
+@cache
 def any_annotations() -> int:
     return sum(isinstance(node, ast.Name) and node.id == "Any" for node in nodes())
 
 
+@cache
 def classes_defined_twice() -> int:
     counts = Counter(node.name for node in nodes() if isinstance(node, ast.ClassDef))
     return sum(count > 1 for count in counts.values())
