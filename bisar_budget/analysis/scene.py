@@ -31,7 +31,7 @@ from bisar_budget.geometry import BistaticGeometry, GroundVector
 from bisar_budget.image_plane import MIN_SINE, degeneracy
 from bisar_budget.mission.model import Mission, Shares
 from bisar_budget.phrases import NOTHING, Note
-from bisar_budget.ranges.exact_ranges import ExactRanges, Floats, Lanes, Places, SmallErrors, Truths
+from bisar_budget.ranges.exact_ranges import ExactRanges, Floats, Indices, Lanes, SmallErrors, Truths
 from bisar_budget.ranges.point_paths import ROWS, PointPaths
 from bisar_budget.units import format_quantity
 
@@ -55,8 +55,8 @@ AT_ONCE, TOGETHER = 512, 1024  # cases, and large errors at places: arrays of mo
 _BOUND = 1 + UTILIZATION_TOLERANCE
 _ARC = math.pi / RIM_POINTS
 _SIDES = np.array([[-1.0], [1.0]])
-HeightAt = Callable[[Floats, Places], Floats]  # heights at azimuths, of some climbers
-SizeAt = Callable[[Floats, Places], Floats]  # sizes at radii, of some cases
+HeightAt = Callable[[Floats, Indices], Floats]  # heights at azimuths, of some climbers
+SizeAt = Callable[[Floats, Indices], Floats]  # sizes at radii, of some cases
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,7 +94,7 @@ class Rims:
     difference: Floats
     phases: Floats
 
-    def of(self, some: Places) -> "Rims":
+    def of(self, some: Indices) -> "Rims":
         """Some of the circles."""
         return Rims(self.azimuth[some], self.difference[some], self.phases[..., some])
 
@@ -151,15 +151,15 @@ class ScenePhases:
             self.is_large[index] = errors.is_large(error)
         self.nearest = errors.array(np.minimum(*(path.slant_range for path in errors.geometries.both)))
 
-    def ranges_at(self, radius: Floats, azimuth: Floats, of: Places) -> ExactRanges:
+    def ranges_at(self, radius: Floats, azimuth: Floats, of: Indices) -> ExactRanges:
         """Exact ranges of places."""
         return self.exact.at(*at(radius, azimuth), of)
 
-    def places(self, radius: Floats, azimuth: Floats, of: Places) -> ScenePlaces:
+    def places(self, radius: Floats, azimuth: Floats, of: Indices) -> ScenePlaces:
         """Phases, size of their differences, and clearances at places."""
         return self.there(self.ranges_at(radius, azimuth, of), of)
 
-    def there(self, there: ExactRanges, of: Places) -> ScenePlaces:
+    def there(self, there: ExactRanges, of: Indices) -> ScenePlaces:
         """The same where exact ranges are taken."""
         centre = self.centre.take(of, axis=1)
         phases = self.random.there(there, of)
@@ -173,7 +173,7 @@ class ScenePhases:
             phases, clearance = np.where(is_nowhere, centre, phases), np.where(is_nowhere, 0.0, clearance)
         return ScenePlaces(phases, self.together(phases - centre, of), clearance)
 
-    def together(self, phases: Floats, of: Places, indices: Sequence[int] | None = None) -> Floats:
+    def together(self, phases: Floats, of: Indices, indices: Sequence[int] | None = None) -> Floats:
         """Phases of the errors, or of some of them, combined; those of a covariance with their correlations. [rad]"""
         found = self.of_errors(phases)
         if indices is None and not self.groups:
@@ -188,11 +188,11 @@ class ScenePhases:
         count = len(self.members)
         return np.concatenate((phases[:count], self.random.of_errors(phases[count:])))
 
-    def differences(self, radius: Floats, azimuth: Floats, of: Places) -> Floats:
+    def differences(self, radius: Floats, azimuth: Floats, of: Indices) -> Floats:
         """Phase of each error there less that at the centre; by the worse sign of the large ones. [rad]"""
         return self.around(radius, azimuth, of, self.is_large.take(of, axis=1))[1]
 
-    def around(self, radius: Floats, azimuth: Floats, of: Places, exact: Truths) -> tuple[Floats, Floats, Floats]:
+    def around(self, radius: Floats, azimuth: Floats, of: Indices, exact: Truths) -> tuple[Floats, Floats, Floats]:
         """The same were all errors small; with some taken exactly, (errors, places); and how gradients turn.
 
         That is the least of what range and Doppler gradients span where each of these leads, over what they span
@@ -208,7 +208,7 @@ class ScenePhases:
         return small, found, turns
 
     def _exactly(
-        self, there: ExactRanges, of: Places, error: Places, place: Places, kept: tuple[Floats, Floats]
+        self, there: ExactRanges, of: Indices, error: Indices, place: Indices, kept: tuple[Floats, Floats]
     ) -> None:
         """Put what exact ranges say into the differences and turns of some errors at places."""
         (found, turns), case, count = kept, of[place], error.size
@@ -226,7 +226,7 @@ class ScenePhases:
         found[error, place] = np.copysign(worst, found[error, place])
 
     @cached_property
-    def _rows(self) -> Places:
+    def _rows(self) -> Indices:
         """Places of the errors of each sign among `_lanes`, in lanes of all cases, (2, errors)."""
         place = np.cumsum(self.is_large.any(axis=1)) - 1
         return np.array((2 * place, 2 * place + 1))
@@ -254,11 +254,11 @@ class ScenePhases:
         return np.where(self.is_large, exactly - self.centre, 0.0)
 
     # ------------------------------------------------------------------ circles
-    def points(self, radius: Floats, of: Places) -> Places:
+    def points(self, radius: Floats, of: Indices) -> Indices:
         """Number of even points that circles need."""
         return np.where(radius <= WIDE * self.nearest[of], RIM_POINTS, 2 * RIM_POINTS)
 
-    def rims(self, radius: Floats, of: Places) -> Rims:
+    def rims(self, radius: Floats, of: Indices) -> Rims:
         """Evaluate circles that need the same number of points, evenly and around their worst point.
 
         That is where the difference is largest; and where a clearance is least, if it comes near to 1: a difference
@@ -266,7 +266,7 @@ class ScenePhases:
         """
         count, circles = int(self.points(radius, of)[0]), np.arange(of.size)
 
-        def look(azimuth: Floats, circle: Places) -> ScenePlaces:
+        def look(azimuth: Floats, circle: Indices) -> ScenePlaces:
             return self.places(radius[circle], azimuth, of[circle])
 
         even = look(np.repeat(2 * math.pi * np.arange(count) / count, of.size), np.tile(circles, count))
@@ -295,7 +295,7 @@ def at(radius: Any, azimuth: Any) -> tuple[Any, Any]:
 
 
 # ---------------------------------------------------------------------- climbs
-def _tops(heights: Floats, look: Callable[[Floats, Places], Floats]) -> tuple[Heights, Heights]:
+def _tops(heights: Floats, look: Callable[[Floats, Indices], Floats]) -> tuple[Heights, Heights]:
     """Climb from each of the even points of circles, (2, points, circles), that is above its neighbours.
 
     Heights are clearances, less than nothing, and sizes, as `look` has them at azimuths of circles. Arrived at are
@@ -367,7 +367,7 @@ class _Climb:
     They are climbed from the highest of some places of each circle, and of where it is largest of small errors.
     """
 
-    def __init__(self, phases: ScenePhases, radius: Floats, of: Places, rims: Rims) -> None:
+    def __init__(self, phases: ScenePhases, radius: Floats, of: Indices, rims: Rims) -> None:
         self.phases, self.radius, self.of, self.rims = phases, radius, of, rims
         self.large = phases.is_large.take(of, axis=1)
         self.bent = self._bent()
@@ -390,7 +390,7 @@ class _Climb:
         is_bent = large & ~(np.abs(exact - small) <= floor)
         return np.asarray(is_bent.reshape(len(large), PROBES, -1).any(axis=1))
 
-    def _look(self, some: Places, azimuths: Floats) -> Heights:
+    def _look(self, some: Indices, azimuths: Floats) -> Heights:
         """The largest of differences at azimuths (n, some); the least turns are kept in mind."""
         count = len(azimuths)
         of, bent = np.tile(self.of[some], count), np.tile(self.bent[:, some], count)
@@ -399,7 +399,7 @@ class _Climb:
         self.lowest.put(some, self.lowest.of(some).with_others(seen))
         return Heights(self.phases.together(found, of).reshape(count, -1), azimuths).highest
 
-    def _azimuths(self, some: Places) -> Floats:
+    def _azimuths(self, some: Indices) -> Floats:
         """Azimuths of the largest differences, or of places without an image, the bent errors taken exactly. [rad]
 
         Where gradients become parallel the image ends, on an arc that may lie between the places that are looked at:
@@ -510,7 +510,7 @@ def scene_edges(
 
 
 @np.errstate(all="ignore")  # a gradient vanishes, or both are parallel to the last digit
-def _evaluate(found: SceneEdges, members: Sequence[Sequence[int]], of: Places) -> None:
+def _evaluate(found: SceneEdges, members: Sequence[Sequence[int]], of: Indices) -> None:
     phases = found.phases
     rims = phases.rims(found.radius[of], of)
     found.rim.put(of, Heights(rims.difference, rims.azimuth))
@@ -520,7 +520,7 @@ def _evaluate(found: SceneEdges, members: Sequence[Sequence[int]], of: Places) -
         found.over[:, of[some]] = _over_at_the_edge(found, members, of[some], rims.of(some))
 
 
-def _largest(phases: ScenePhases, radius: Floats, of: Places, rims: Rims) -> Heights:
+def _largest(phases: ScenePhases, radius: Floats, of: Indices, rims: Rims) -> Heights:
     """Largest differences on circles, errors of any size counted. [rad]"""
     found = Heights(rims.difference.copy(), rims.azimuth.copy())
     some = np.flatnonzero(np.isfinite(rims.difference) & phases.is_large[:, of].any(axis=0))
@@ -529,7 +529,7 @@ def _largest(phases: ScenePhases, radius: Floats, of: Places, rims: Rims) -> Hei
     return found
 
 
-def _over_at_the_edge(found: SceneEdges, members: Sequence[Sequence[int]], of: Places, rims: Rims) -> Floats:
+def _over_at_the_edge(found: SceneEdges, members: Sequence[Sequence[int]], of: Indices, rims: Rims) -> Floats:
     """Phases at the edge of what is inside its limit at the centre and over it there, else 0, (names, of). [rad]"""
     phases, limit = found.phases, found.limit[:, of] * _BOUND
     more = phases.more[:, of]
@@ -578,7 +578,7 @@ class Corrections:
                 found[of] = self._served(of)
         return found
 
-    def _served(self, of: Places) -> Floats:
+    def _served(self, of: Indices) -> Floats:
         found, total = self._served_of_small(of), self.total[of]
         high = np.where(np.isinf(found), self.farthest[of], found)
         low, below, size = np.zeros(of.size), np.zeros(of.size), np.zeros(of.size)
@@ -586,7 +586,7 @@ class Corrections:
         if not some.size:
             return found
 
-        def largest(radius: Floats, places: Places) -> Floats:
+        def largest(radius: Floats, places: Indices) -> Floats:
             return self._crests(radius, of[places], of_small=False).height
 
         size[some] = largest(high[some], some)
@@ -597,7 +597,7 @@ class Corrections:
         found[over] = where(largest, total, over, (low, below), (high, size))
         return found
 
-    def _served_of_small(self, of: Places) -> Floats:
+    def _served_of_small(self, of: Indices) -> Floats:
         """The same, were effects of all errors proportional to them.
 
         Along the worst azimuth, and again where the rim at the radius found has a worse one.
@@ -606,7 +606,7 @@ class Corrections:
         size, azimuth = self.edges.rim.of(of)
         some = np.flatnonzero(size)
 
-        def along(radius: Floats, places: Places) -> Floats:
+        def along(radius: Floats, places: Indices) -> Floats:
             there = self.phases.places(radius, azimuth[places], of[places])
             return np.where(there.has_image, there.size, math.inf)
 
@@ -624,7 +624,7 @@ class Corrections:
             size[some], azimuth[some] = around
             some = some[~is_inside]
 
-        def rim(radius: Floats, places: Places) -> Floats:
+        def rim(radius: Floats, places: Indices) -> Floats:
             return self._crests(radius, of[places]).height
 
         none = np.zeros(of.size)
@@ -632,7 +632,7 @@ class Corrections:
         return found
 
     def _grow(
-        self, size_at: SizeAt, of: Places, some: Places, low: Floats, below: Floats, high: Floats, size: Floats
+        self, size_at: SizeAt, of: Indices, some: Indices, low: Floats, below: Floats, high: Floats, size: Floats
     ) -> None:
         """Look farther out until a size passes the total, or as far as it is searched for."""
         total, farthest = self.total[of], self.farthest[of]
@@ -645,7 +645,7 @@ class Corrections:
             high[some] = np.minimum(farthest[some], high[some] * by)
             size[some] = size_at(high[some], some)
 
-    def _crests(self, radius: Floats, of: Places, *, of_small: bool = True) -> Heights:
+    def _crests(self, radius: Floats, of: Indices, *, of_small: bool = True) -> Heights:
         """Largest differences on circles; of errors of any size, or were all of them small. [rad]"""
         found, counts = Heights(np.empty(of.size), np.empty(of.size)), self.phases.points(radius, of)
         for count in np.unique(counts):
@@ -659,7 +659,7 @@ class Corrections:
 def where(
     size_at: SizeAt,
     total: Floats,
-    some: Places,
+    some: Indices,
     inside: tuple[Floats, Floats],
     outside: tuple[Floats, Floats],
 ) -> Floats:
@@ -672,7 +672,7 @@ def where(
     total : (n,)
         What the sizes are held to.
     some : (some,)
-        Places, of n, that are looked at.
+        Indices, of n, that are looked at.
     inside, outside : (radius, size) of (n,)
         Between these.
     """

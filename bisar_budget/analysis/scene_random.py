@@ -39,7 +39,7 @@ from bisar_budget.effects.random_effect import FEWEST_NODES, MOST_NODES, Moves, 
 from bisar_budget.effects.vibration import slow_moves
 from bisar_budget.geometry import Vectors
 from bisar_budget.image_plane import nodes
-from bisar_budget.ranges.exact_ranges import ExactRanges, Floats, Places
+from bisar_budget.ranges.exact_ranges import ExactRanges, Floats, Indices
 
 _CLOCKS = ("oscillator", "synchronization")  # kinds of errors that move nothing
 
@@ -65,7 +65,7 @@ class RandomPhases:
         sizes = np.repeat([len(parts) // count for parts, count in zip(of_each, groups, strict=True)], groups)
         self._parts, self._groups = (np.cumsum([0, *counts])[:-1].astype(int) for counts in (sizes, groups))
 
-    def there(self, there: ExactRanges, of: Places) -> Floats:
+    def there(self, there: ExactRanges, of: Indices) -> Floats:
         """Quadratic phases of the parts where exact ranges are taken, (parts, places). [rad]"""
         return np.concatenate([np.zeros((0, of.size)), *(error.there(there, of) for error in self._errors)])
 
@@ -85,7 +85,7 @@ class _Moving(NamedTuple):
     size: Floats
     groups: int = 1
 
-    def there(self, there: ExactRanges, of: Places) -> Floats:
+    def there(self, there: ExactRanges, of: Indices) -> Floats:
         """Quadratic phase of each way and course, (parts, places). [rad]"""
         weights, (found, seen) = there.phase_weights[0], np.zeros((2, 1, 1, 1))
         for one in self.moves:
@@ -121,7 +121,7 @@ class _Clock(NamedTuple):
         constant, linear = (d * east - b * north) * scale, (a * north - c * east) * scale
         return cls(quadratic, constant, linear, _terms(exact.phase_weights, exact)[0])
 
-    def there(self, there: ExactRanges, of: Places) -> Floats:
+    def there(self, there: ExactRanges, of: Indices) -> Floats:
         """Quadratic phase of each part, (parts, places). [rad]"""
         by_constant, by_linear = _terms(there.phase_weights, there)[0] - self.at_centre[:, of]
         quadratic, constant, linear = (part[:, of] for part in self[:3])
@@ -147,7 +147,7 @@ class _Delay(NamedTuple):
     courses: Floats
     groups: int = 1
 
-    def there(self, there: ExactRanges, of: Places) -> Floats:
+    def there(self, there: ExactRanges, of: Indices) -> Floats:
         """Quadratic phase of each course, (courses, places). [rad]"""
         along: Any = 0.0
         for place, middle in zip(self.places, self.middles, strict=True):
@@ -205,6 +205,6 @@ def _between(sensed: int, count: int) -> Floats:
     return np.asarray(np.polynomial.legendre.legvander(nodes(count).places, order[-1]) @ fit)
 
 
-def _of(array: Any, some: Places) -> Any:
+def _of(array: Any, some: Indices) -> Any:
     """Some cases of an array (…, cases); what all share is there once."""
     return array if array.shape[-1] == 1 else array.take(some, axis=-1)

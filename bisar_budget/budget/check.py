@@ -166,7 +166,7 @@ def _unused_keys(mission: Mission) -> Iterator[Note]:
 
 
 # ---------------------------------------------------------------------- many files
-Found = MissionFindings | UnusableMission
+CheckedMission = MissionFindings | UnusableMission
 Kept = TypeVar("Kept")
 
 FILES_FOR_TWO_PROCESSES = 200  # a second process takes as long to start as half of them take to check
@@ -181,12 +181,12 @@ class Draws(NamedTuple):
     share: "Share | None" = None
 
 
-def without_analysis(findings: Found) -> Found:
+def without_analysis(findings: CheckedMission) -> CheckedMission:
     """Keep the findings without the analysis: a thousand analyses fill the memory."""
     return findings if isinstance(findings, UnusableMission) else findings._replace(analysis=None)
 
 
-def whole(findings: Found) -> Found:
+def whole(findings: CheckedMission) -> CheckedMission:
     """Keep the findings with the analysis. An analysis is too large to send between processes."""
     return findings
 
@@ -195,7 +195,7 @@ def check_files(
     files: Sequence[str],
     today: date,
     model: str | None,
-    keep: Callable[[Found], Kept],
+    keep: Callable[[CheckedMission], Kept],
     *,
     drawn: Draws | None = None,
     changes: Sequence[SetValue] = (),
@@ -263,7 +263,7 @@ def _kept(
     files: Sequence[str],
     today: date,
     model: str | None,
-    keep: Callable[[Found], Kept],
+    keep: Callable[[CheckedMission], Kept],
     drawn: Draws | None,
     changes: Sequence[SetValue],
     outside: Outside,

@@ -31,7 +31,7 @@ from bisar_budget.mission.model import Mission
 from bisar_budget.mission.quantities import FACTOR, Number, QuestionError, number_of, tree_of, with_number
 from bisar_budget.mission.stacked import picked, stacked
 from bisar_budget.mission.tree import Tree, read_tree
-from bisar_budget.ranges.exact_ranges import Places, Truths
+from bisar_budget.ranges.exact_ranges import Indices, Truths
 from bisar_budget.workers import Progress, unseen
 
 _SOON, _SELDOM = (2, 12), 48  # cases after which it is told how far many are
@@ -343,7 +343,7 @@ class Table:
         return found
 
     # ---------------------------------------------------------------- one mission for the same words
-    def _by_words(self, found: Mapping[str, Values]) -> Iterator[tuple["Table", Places]]:
+    def _by_words(self, found: Mapping[str, Values]) -> Iterator[tuple["Table", Indices]]:
         """Tables of the cases that have the same words; what is no mission by any number is said in `found`."""
         same: dict[tuple[str, ...], list[int]] = {}
         for place, words in enumerate(zip(*(found[key].tolist() for key in self.question.choices), strict=True)):
@@ -400,7 +400,7 @@ class Table:
         for mission, same in stacked(read()):
             self._check(found, np.array(places)[same], mission, mission.geometry)
 
-    def _arrays(self, found: Mapping[str, Values], cases: int) -> tuple[Places, Mission, BistaticGeometry]:
+    def _arrays(self, found: Mapping[str, Values], cases: int) -> tuple[Indices, Mission, BistaticGeometry]:
         """The cases whose numbers can be put into the mission, the mission with them, and its geometry."""
         direct = np.ones(cases, dtype=bool)
         for one in self.numbers:
@@ -420,7 +420,7 @@ class Table:
         mission = picked(mission, np.flatnonzero(is_sure))
         return some[is_sure], mission, mission.geometry
 
-    def _check(self, found: dict[str, Values], some: Places, mission: Mission, geometries: BistaticGeometry) -> None:
+    def _check(self, found: dict[str, Values], some: Indices, mission: Mission, geometries: BistaticGeometry) -> None:
         """Judge the cases of a mission together, those that need as many nodes."""
         for nodes, same, part, seen in by_nodes(mission, some.size, geometries):
             analysis = Analysis(

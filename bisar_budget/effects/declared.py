@@ -31,8 +31,8 @@ from bisar_budget.ranges.exact_ranges import (
     ExactRanges,
     Floats,
     FullEffect,
+    Indices,
     Lanes,
-    Places,
     TimeTags,
     Truths,
 )
@@ -46,11 +46,11 @@ MODELS = ("published", "full")
 OTHER_MODEL = {"published": "full", "full": "published"}
 
 # No navigation error: it takes the platform, within the aperture, farther than this part of its slant range.
-FARTHEST = 0.1
-SHARE = 0.004  # what the second order may add, of a phase, a displacement or a limit; the aim is 1 %
+FARTHEST_RANGE_FRACTION = 0.1
+SECOND_ORDER_FRACTION = 0.004  # what the second order may add, of a phase, a displacement or a limit; the aim is 1 %
 FLOOR_RAD, FLOOR_M = 1e-3, 2e-5  # and whatever the size
 
-_TOGETHER = 1 << 13  # lanes of a block
+_LANES_AT_ONCE_COUNT = 1 << 13  # lanes of a block
 _FLOORS = (FLOOR_RAD, FLOOR_RAD, FLOOR_M)
 
 
@@ -292,7 +292,7 @@ class ErrorBlock:
         size = np.abs(size)
         found = np.zeros(size.shape, dtype=bool)
         for added, per_unit, floor in zip(self.adds(size), self.per_unit("full"), _FLOORS, strict=True):
-            found |= added > np.maximum(floor, SHARE * per_unit * size)
+            found |= added > np.maximum(floor, SECOND_ORDER_FRACTION * per_unit * size)
         return found & (size > 0) & self._is_moving
 
     @cached_property
@@ -349,13 +349,13 @@ class ErrorBlock:
         return self.paths.known(lanes, both).reshape(len(ROWS), 2, -1).swapaxes(0, 1)
 
     @cached_property
-    def _lane(self) -> Places:
+    def _lane(self) -> Indices:
         """Lane of each error with a positive sign, in each case; those with the other sign follow."""
         found = np.zeros((len(self.sources), 1), dtype=int)
         found[self.moves, 0] = 2 * self.cases * np.arange(len(self.moves))
         return found + np.arange(self.cases)
 
-    def _lanes_of(self, some: Truths) -> tuple[Places, Places]:
+    def _lanes_of(self, some: Truths) -> tuple[Indices, Indices]:
         lanes = self._lane[some]
         return lanes, lanes + self.cases
 
@@ -401,7 +401,7 @@ class ErrorBlock:
             reached = [slant[one] for one in source.platforms]
             if reached:
                 nearer = np.minimum(*reached) if len(reached) > 1 else reached[0]
-                found[place] = FARTHEST * nearer / self.edge[place]
+                found[place] = FARTHEST_RANGE_FRACTION * nearer / self.edge[place]
             else:
                 # A clock takes no platform anywhere. No range sum is shorter than the distance of the platforms, and
                 # that is at least the sum less twice the nearer range: by then an image has ended.
@@ -467,7 +467,7 @@ class ErrorBlock:
             upto = np.minimum(most, np.where(is_alone, math.inf, found.min(axis=0)))
             with np.errstate(all="ignore"):
                 adds = np.take_along_axis(self.adds(np.minimum(first, upto)), turn[None], axis=0)[0]
-                some = self._is_moving & (adds > SHARE * of)
+                some = self._is_moving & (adds > SECOND_ORDER_FRACTION * of)
             at_once = np.where((first <= upto) & ~some, first, math.inf)
             np.put_along_axis(found, turn[None], at_once[None], axis=0)
             if not some.any():
@@ -535,7 +535,7 @@ class DeclaredErrors:
         self.per_stray = np.array((quadratic + self.gain * hidden, cubic, np.ones(cases)))[:, None]
         self.listed = list(ErrorListing(mission, geometries, exact, shown).listed())
         self.stated = [error for error in self.listed if error.declared is not None and error.is_independent]
-        size = max(1, _TOGETHER // (2 * cases))
+        size = max(1, _LANES_AT_ONCE_COUNT // (2 * cases))
         starts = range(0, len(self.listed), size)
         self.blocks = [ErrorBlock(self, self.listed[start : start + size]) for start in starts]
         self._place = {error.id: divmod(place, size) for place, error in enumerate(self.listed)}
@@ -731,7 +731,7 @@ class Model:
         with np.errstate(all="ignore"):
             first = np.minimum(np.where(per_unit > 0, limit / per_unit, math.inf), block.farthest)
             adds = block.adds(first)[which]
-        return self.is_published or not source.displaces or bool(adds[place, 0] <= SHARE * limit)
+        return self.is_published or not source.displaces or bool(adds[place, 0] <= SECOND_ORDER_FRACTION * limit)
 
     # ---------------------------------------------------------------- by exact ranges
     def is_small(self, source: ErrorSource, size: float) -> bool:

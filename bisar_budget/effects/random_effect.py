@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 # Nodes at which errors at random are sampled: fewer tell too few orders of a process apart. More cost seconds, and
 # these follow nine circles; on a race track of 70 pieces 16 give every effect to 1e-3.
 FEWEST_NODES, MOST_NODES = 16, 64
-_CANCELS = ROUNDING * 1e-2  # of a square: below it, its root is rounding
+_CANCELLED_SQUARE_FRACTION = ROUNDING * 1e-2  # of a square: below it, its root is rounding
 
 
 class RandomEffect(NamedTuple):
@@ -384,7 +384,7 @@ def sigmas(covariance: Floats, sizes: Floats) -> tuple[Sequence[Floats], Floats]
     a limit out of nothing.
     """
     squares = np.einsum("ffc->fc", covariance)
-    is_real = squares > _CANCELS * sizes
+    is_real = squares > _CANCELLED_SQUARE_FRACTION * sizes
     squares, is_held = np.where(is_real, squares, 0.0), is_real[:4]
     hidden = np.sqrt(squares[4:].sum(axis=0))
     return [*np.sqrt(squares[:4]), hidden], np.where(is_held & is_held[:, None], covariance[:4, :4], 0.0)

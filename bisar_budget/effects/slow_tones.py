@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from bisar_budget.effects.declared import FLOOR_RAD, SHARE
+from bisar_budget.effects.declared import FLOOR_RAD, SECOND_ORDER_FRACTION
 from bisar_budget.effects.effect import PLATFORMS, Subject, subject
 from bisar_budget.effects.sources import exact_ranges
 from bisar_budget.effects.vibration import ECHO_CYCLES, SLOWEST_ECHO_CYCLES, DeclaredPhase
@@ -27,7 +27,7 @@ from bisar_budget.geometry import BistaticGeometry, Vectors
 from bisar_budget.image_plane import nodes_for
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import MotionError
-from bisar_budget.ranges.exact_ranges import FINE, STILL, ExactRanges, Floats, Places, Truths, followed
+from bisar_budget.ranges.exact_ranges import FINE_NODE_COUNT, STILL, ExactRanges, Floats, Indices, Truths, followed
 
 TONE_PHASE_COUNT = 16  # in which a large vibration is followed
 ANGLES = 2 * math.pi * np.arange(TONE_PHASE_COUNT) / TONE_PHASE_COUNT
@@ -104,7 +104,7 @@ def slow_tones(mission: Mission, geometry: BistaticGeometry, cases: int) -> dict
                 continue
             if exact is None:
                 count = nodes_for(geometry, T, has_direct_path=is_heard)
-                exact = exact_ranges(mission, geometry, max(FINE, int(np.max(count))), cases)
+                exact = exact_ranges(mission, geometry, max(FINE_NODE_COUNT, int(np.max(count))), cases)
             tone = _Tone(exact, platform_index, line.frequency)
             value, hears_all = line.displacement, not (is_heard or isinstance(line.displacement, tuple))
             if hears_all:  # and what its displacement adds in second order is a rounding of it
@@ -170,16 +170,16 @@ class _Tone:
         reach = size * (1 + moved)
         grows = reach * reach / exact.nearest_node
         of_quadratic, of_cubic, of_hidden = (np.abs(phases).max(axis=0) for phases in small[:3])
-        share = SHARE * np.hypot(of_quadratic, of_hidden)
+        share = SECOND_ORDER_FRACTION * np.hypot(of_quadratic, of_hidden)
         is_large = np.asarray((quadratic + hidden) * grows > np.maximum(FLOOR_RAD, share))
-        is_large |= cubic * grows > np.maximum(FLOOR_RAD, SHARE * of_cubic)
+        is_large |= cubic * grows > np.maximum(FLOOR_RAD, SECOND_ORDER_FRACTION * of_cubic)
         large_cases = np.flatnonzero(is_large & (size > 0))
         for first in range(0, large_cases.size, MAX_LANE_COUNT // TONE_PHASE_COUNT):
             here = large_cases[first : first + MAX_LANE_COUNT // TONE_PHASE_COUNT]
             small[..., here] = self._of_large(way, size, here)
         return small
 
-    def _of_large(self, way: Vectors, size: Floats, cases: Places) -> Floats:
+    def _of_large(self, way: Vectors, size: Floats, cases: Indices) -> Floats:
         """The same in some cases by exact ranges.
 
         Where no ground point has the range history of a phase, that of the whole motion stands for each.
@@ -195,7 +195,7 @@ class _Tone:
         return np.where(np.isnan(phases), 2 * self.exact.k[cases] * size[cases], phases)
 
 
-def _of_case(component: Any, case: Places) -> Any:
+def _of_case(component: Any, case: Indices) -> Any:
     return component[..., case] if np.ndim(component) and np.shape(component)[-1] > 1 else component
 
 

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, cast
 from bisar_budget import __version__
 from bisar_budget.budget.check import (
     FILES_FOR_TWO_PROCESSES,
+    CheckedMission,
     Draws,
-    Found,
     check_files,
     check_mission,
     whole,
@@ -154,7 +154,7 @@ def checked(
     is_verified: bool = False,
     swept: Sequence[str] = (),
     is_illustrated: bool = False,
-) -> list[Found]:
+) -> list[CheckedMission]:
     """Check files, with all that a report shows.
 
     Parameters
@@ -252,7 +252,7 @@ def _watched(make: "Share", workers: "Workers | None", drawing: "Drawing") -> "I
 
 
 # ---------------------------------------------------------------------- images
-def with_images(missions: Sequence[Found], today: dt.date, *, is_illustrated: bool) -> list[Found]:
+def with_images(missions: Sequence[CheckedMission], today: dt.date, *, is_illustrated: bool) -> list[CheckedMission]:
     """Add the verdicts of images, and where pictures are shown the images of the rows that decide most."""
     from bisar_budget.budget.verdicts import with_verdicts
     from bisar_budget.front import imaging
@@ -260,7 +260,7 @@ def with_images(missions: Sequence[Found], today: dt.date, *, is_illustrated: bo
 
     usable = [found.analysed().mission for found in missions if isinstance(found, MissionFindings)]
     verified = iter(imaging.verify_all(usable) if usable else ())
-    result: list[Found] = []
+    result: list[CheckedMission] = []
     for found in missions:
         if isinstance(found, MissionFindings):
             found = with_verdicts(found, next(verified), today)
@@ -274,8 +274,8 @@ def with_images(missions: Sequence[Found], today: dt.date, *, is_illustrated: bo
 
 # ---------------------------------------------------------------------- studies
 def with_studies(
-    missions: Sequence[Found], asked: Sequence[str] | Mapping[str, Any], model: str | None, today: dt.date
-) -> list[Found]:
+    missions: Sequence[CheckedMission], asked: Sequence[str] | Mapping[str, Any], model: str | None, today: dt.date
+) -> list[CheckedMission]:
     """Add to each mission that can be used what a sweep of it finds; `asked` are texts `KEY=VALUES`, or a mapping.
 
     Raises
@@ -372,7 +372,7 @@ def gathered(
 
 
 # ---------------------------------------------------------------------- specifications
-def with_sheets(missions: Sequence[Found], model: str | None, today: dt.date) -> list[Found]:
+def with_sheets(missions: Sequence[CheckedMission], model: str | None, today: dt.date) -> list[CheckedMission]:
     """Add the sheet of specifications to each mission whose file names what to specify, or say why there is none."""
     return [_with_sheet(found, model, today) if isinstance(found, MissionFindings) else found for found in missions]
 

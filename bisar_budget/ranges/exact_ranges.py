@@ -43,38 +43,81 @@ if TYPE_CHECKING:
     from bisar_budget.mission.model import Radar
 
 Floats = NDArray[np.float64]
-Places = NDArray[np.intp]
+Indices = NDArray[np.intp]
 Truths = NDArray[np.bool_]
 
-FINE = 24  # nodes of courses that are not as smooth as those of (22)
-ITERATIONS = 40
-MEASURED, WORKED_ON = 8, 16  # arrays of all samples that hold measured paths; and these with what is worked on
-TOGETHER = 1 << 16  # samples of lanes: what is made of them stays in a cache
-FOLDED = 0.2  # of the area that gradients of V span at the centre; with less, a way is near a fold or beyond one
-ENDS_RAD = math.pi  # of hidden phase, where the way is folded: no point has the range history
-STEPS = (8, 40)  # in which a point is followed by errors of any course; more where it is lost
-MEETS = 1e-5  # of the nearest range; of a platform that is nearer, rounding decides in which direction it is seen
-SHRINKS = 0.5  # square of each step of the search over that of the one before; else it does not settle
-EPSILON = 2e-15  # of a range sum: what rounding of a few operations leaves
-BOWL = 0.05  # of the determinant of H; where V bends less, it is no bowl around the point
-DESCENTS = 80  # damped steps
-DAMPING, DAMPED = 1e-3, 4.0  # of the trace of H at the centre; and by how much more or less with each step
-AT_FOLD = (
-    0.1  # of the same area: with less it changes much in a small step, and a peak may fade into one beyond the fold
-)
-OF_UNSEEN = 1e-4  # of the square of a last step elsewhere, that is left of the last one there
-UNSEEN_RAD = 3e-5  # what the last step of the search may change a phase by beyond the part counted linearly
-
-STILL = [np.zeros((1, 1))] * 3  # a platform that no error moves
+FINE_NODE_COUNT = 24  # nodes of courses that are not as smooth as those of (22)
+RANGE_ROUNDING_FRACTION = 2e-15  # rounding error of a few operations, as a fraction of a range sum
+MAX_TURN_RAD = 1.0  # turn of a line of sight within the aperture up to which Legendre orders have a meaning
 
 # A quadratic phase φ at the aperture edge leaves the phase with a variance of 4φ²/45.
 QUADRATIC_OF_VARIANCE = math.sqrt(45 / 4)
-MAX_TURN_RAD = 1.0  # of a line of sight over the aperture, up to which its orders have a meaning
+
+STILL = [np.zeros((1, 1))] * 3  # shifts of a platform that no error moves
+
+
+@dataclass(frozen=True)
+class PointSettings:
+    """Tunings of the search for the image point.
+
+    Attributes
+    ----------
+    end_rad : float
+        Hidden phase from which a folded path has ended: no ground point has the range history. [rad]
+    folded_fraction : float
+        Area that the gradients of V span, as a fraction of their area at the centre. A path with a smaller area is
+        near a fold or beyond it.
+    near_fold_fraction : float
+        The same for a path on which the area changes much in a small step, and a peak may fade into another.
+    last_step_rad : float
+        Largest change of a phase by the last step, beyond the part that is counted linearly. [rad]
+    last_step_near_fold_fraction : float
+        Square of the last step near a fold, as a fraction of its square elsewhere.
+    nearest_fraction : float
+        Distance between a platform and a point, as a fraction of the nearest range. At a smaller distance rounding
+        decides the line of sight.
+    shrinking_ratio : float
+        Square of a step of Newton's method over the square of the step before. A larger ratio does not converge.
+    bowl_fraction : float
+        Determinant of the second derivative of V, as a fraction of the determinant of H. Where V bends less, a step
+        uses H alone.
+    damping_fraction : float
+        Damping of the first step of a descent, as a fraction of the trace of H at the centre.
+    damping_ratio : float
+        Factor by which the damping changes with each step.
+    max_newton_iterations, max_descent_steps : int
+        Largest number of steps of both searches.
+    course_steps : tuple of int
+        Numbers of steps in which `followed` increases an error. The second number is for points that the first loses.
+    samples_at_once : int
+        Number of samples of lanes whose arrays stay in a cache.
+    """
+
+    end_rad: float = math.pi
+    folded_fraction: float = 0.2
+    near_fold_fraction: float = 0.1
+    last_step_rad: float = 3e-5
+    last_step_near_fold_fraction: float = 1e-4
+    nearest_fraction: float = 1e-5
+    shrinking_ratio: float = 0.5
+    bowl_fraction: float = 0.05
+    damping_fraction: float = 1e-3
+    damping_ratio: float = 4.0
+    max_newton_iterations: int = 40
+    max_descent_steps: int = 80
+    course_steps: tuple[int, ...] = (8, 40)
+    samples_at_once: int = 1 << 16
+
+
+SETTINGS = PointSettings()
+
+# Arrays of all samples that hold measured paths, and those with the arrays that a step works on.
+_MEASURED_ARRAY_COUNT, _ARRAY_COUNT = 8, 16
 
 
 def aperture_nodes(aperture_time_s: float) -> Floats:
-    """Slow times of the nodes of an aperture for courses that are not smooth, (FINE,). [s]"""
-    return nodes(FINE).places * (aperture_time_s / 2)
+    """Slow times of the nodes of an aperture for courses that are not smooth, (FINE_NODE_COUNT,). [s]"""
+    return nodes(FINE_NODE_COUNT).places * (aperture_time_s / 2)
 
 
 class Effect(NamedTuple):
@@ -113,23 +156,23 @@ class TimeTags:
 
     paths: tuple[PlatformState, PlatformState]
     times: Floats
-    case: Places
+    case: Indices
 
-    def of(self, some: Places) -> "TimeTags | None":
+    def of(self, lanes: Indices) -> "TimeTags | None":
         """Some of the lanes; None where none of them is a time tag."""
-        case = self.case.take(some)
+        case = self.case.take(lanes)
         return replace(self, case=case) if (case >= 0).any() else None
 
     def put(self, platform: int, tag_s: Floats, along: Sequence[Floats], *, is_rate: bool = False) -> list[Any]:
         """Put what time tags (nodes, lanes) shift a platform by [m], or that per second more, into other motions."""
-        some = np.flatnonzero(self.case >= 0)
-        (times,), tag_s = _of([self.times], self.case[some]), tag_s[:, some]
-        path = self.paths[platform].of(self.case[some])
-        found = [np.array(np.broadcast_to(part, (len(times), self.case.size))) for part in along]
+        tagged = np.flatnonzero(self.case >= 0)
+        (times,), tag_s = _take_cases([self.times], self.case[tagged]), tag_s[:, tagged]
+        path = self.paths[platform].of(self.case[tagged])
+        shifts = [np.array(np.broadcast_to(component, (len(times), self.case.size))) for component in along]
         moved = path.at(times + tag_s)[1] if is_rate else path.later(times, tag_s)
-        for whole, part in zip(found, moved, strict=True):
-            whole[:, some] = part
-        return found
+        for shift, component in zip(shifts, moved, strict=True):
+            shift[:, tagged] = component
+        return shifts
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -154,7 +197,7 @@ class Lanes:
         What lanes that are time tags take for the path, where there are any.
     """
 
-    case: Places
+    case: Indices
     at_nodes: Floats
     moves: tuple[Any, Any] = (0.0, 0.0)
     direction: Vectors = (0.0, 0.0, 0.0)
@@ -170,44 +213,48 @@ class Lanes:
     @property
     def turns(self) -> bool:
         """Whether any direction turns within the aperture."""
-        return any(np.ndim(part) > 1 for direction in self.directions for part in direction)
+        return any(np.ndim(component) > 1 for direction in self.directions for component in direction)
 
     @property
     def platforms(self) -> list[int]:
         """Those that any of the lanes moves."""
         return [platform for platform in (0, 1) if np.any(self.moves[platform])]
 
-    def of(self, some: Places) -> "Lanes":
+    def of(self, lanes: Indices) -> "Lanes":
         """Some of the lanes."""
-        u, v, x, y, z, order, *others = (
-            part.take(some, axis=-1) if isinstance(part, np.ndarray) else part
-            for part in (*self.moves, *self.direction, self.order, *(self.of_receiver or ()))
+        u, v, x, y, z, order, *of_receiver_axes = (
+            component.take(lanes, axis=-1) if isinstance(component, np.ndarray) else component
+            for component in (*self.moves, *self.direction, self.order, *(self.of_receiver or ()))
         )
-        of_receiver = (others[0], others[1], others[2]) if others else None
-        tags = self.tags and self.tags.of(some)
-        at_nodes = self.at_nodes.take(some, axis=1)
-        return Lanes(self.case.take(some), at_nodes, (u, v), (x, y, z), order, of_receiver, tags)
+        of_receiver = (of_receiver_axes[0], of_receiver_axes[1], of_receiver_axes[2]) if of_receiver_axes else None
+        tags = self.tags and self.tags.of(lanes)
+        at_nodes = self.at_nodes.take(lanes, axis=1)
+        return Lanes(self.case.take(lanes), at_nodes, (u, v), (x, y, z), order, of_receiver, tags)
 
-    def there(self, case: Places) -> "Lanes":
+    def there(self, case: Indices) -> "Lanes":
         """The same of lanes, one a case, where cases are chosen anew: errors of `ExactRanges.at`."""
         return replace(self.of(case), case=np.arange(case.size))
 
     def shifts(self, size: Any) -> list[Any]:
         """Shift of each platform by errors of sizes at the nodes. [m]"""
-        along = [self.at_nodes * (size * part) for part in self.direction]
+        along = [self.at_nodes * (size * component) for component in self.direction]
         both = [along, along]
         if self.of_receiver is not None:
-            both[1] = [self.at_nodes * (size * part) for part in self.of_receiver]
+            both[1] = [self.at_nodes * (size * component) for component in self.of_receiver]
         if self.tags is not None:
-            both = [self.tags.put(place, self.at_nodes * size, one) for place, one in enumerate(both)]
-        return [_weighted(own, weight) for own, weight in zip(both, self.moves, strict=True)]
+            both = [
+                self.tags.put(platform, self.at_nodes * size, along_platform)
+                for platform, along_platform in enumerate(both)
+            ]
+        return [_weighted(shift, weight) for shift, weight in zip(both, self.moves, strict=True)]
 
     def ways(self, size: Any) -> tuple[Sequence[Any], Sequence[Any]]:
         """Directions in which larger errors move transmitter and receiver on; those of time tags turn as paths do."""
         if self.tags is None:
             return self.directions
         of_transmitter, of_receiver = (
-            self.tags.put(place, self.at_nodes * size, one, is_rate=True) for place, one in enumerate(self.directions)
+            self.tags.put(platform, self.at_nodes * size, direction, is_rate=True)
+            for platform, direction in enumerate(self.directions)
         )
         return of_transmitter, of_receiver
 
@@ -228,7 +275,7 @@ class SmallErrors(NamedTuple):
     """
 
     courses: Floats
-    course: Places
+    course: Indices
     ways: Floats
     turning: Mapping[int, Floats] = {}
 
@@ -236,35 +283,43 @@ class SmallErrors(NamedTuple):
     def of(cls, errors: Sequence[Lanes]) -> "SmallErrors":
         """Errors whose lanes are the cases."""
         courses: dict[Any, Floats] = {}
-        parts = [part for one in errors for direction in one.directions for part in direction]
-        cases = max((np.shape(part)[-1] for part in parts if np.ndim(part)), default=1)
+        components = [
+            component
+            for lanes_of_error in errors
+            for direction in lanes_of_error.directions
+            for component in direction
+        ]
+        cases = max((np.shape(component)[-1] for component in components if np.ndim(component)), default=1)
         ways, turning = np.zeros((len(errors), 7, cases)), dict[int, Floats]()
         for index, (lanes, way) in enumerate(zip(errors, ways, strict=True), 1):
             courses[lanes.order if lanes.platforms else -index] = lanes.at_nodes
             if lanes.turns:
                 way = turning[index - 1] = np.zeros((7, len(lanes.at_nodes), cases))
             for platform in lanes.platforms:
-                for axis, part in enumerate(lanes.directions[platform]):
-                    way[3 * platform + axis] = part * lanes.at_nodes if lanes.turns else part
+                for axis, component in enumerate(lanes.directions[platform]):
+                    way[3 * platform + axis] = component * lanes.at_nodes if lanes.turns else component
             way[6] = not lanes.platforms
         names = list(courses)
-        course = [names.index(one.order if one.platforms else -index) for index, one in enumerate(errors, 1)]
+        course = [
+            names.index(lanes_of_error.order if lanes_of_error.platforms else -index)
+            for index, lanes_of_error in enumerate(errors, 1)
+        ]
         return cls(np.array(list(courses.values())), np.array(course), ways, turning)
 
-    def there(self, case: Places) -> "SmallErrors":
+    def there(self, case: Indices) -> "SmallErrors":
         """The same errors where cases are chosen anew; as `Lanes.there`."""
-        courses, ways, *turning = _of([self.courses, self.ways, *self.turning.values()], case)
+        courses, ways, *turning = _take_cases([self.courses, self.ways, *self.turning.values()], case)
         return SmallErrors(courses, self.course, ways, dict(zip(self.turning, turning, strict=True)))
 
 
-class Found(NamedTuple):
-    """Effects of errors by exact ranges; `is_found` where they are certain at once.
+class ImagePoints(NamedTuple):
+    """Effects of errors by exact ranges; `is_settled` where they are certain at once.
 
     Displacement east, north [m]; quadratic and cubic phase at the aperture edge, signed like β̃; the `hidden` phase,
     and the rms beyond the cubic. [rad] `turn` is the area that the gradients of V span there, over the centre's.
     """
 
-    is_found: Truths
+    is_settled: Truths
     east: Floats
     north: Floats
     quadratic: Floats
@@ -367,14 +422,14 @@ class ExactRanges:
         times = sampling.places[:, None] * half
         middles = []
         for path in paths:
-            x, y, z = (np.broadcast_to(part, (cases,)) for part in path.position)
+            x, y, z = (np.broadcast_to(component, (cases,)) for component in path.position)
             middles.append((x, y, z))
         tracks = [path.place(times) for path in paths]
         return cls(half, k, band, sampling, tracks, middles, has_direct_path=has_direct_path)
 
-    def at(self, east: Floats, north: Floats, case: Places) -> "ExactRanges":
+    def at(self, east: Floats, north: Floats, case: Indices) -> "ExactRanges":
         """Exact ranges of cases at points of the ground, (case,), in place of the centre. [m]"""
-        tracks = [(x - east, y - north, z) for x, y, z in (_of([*track], case) for track in self.tracks)]
+        tracks = [(x - east, y - north, z) for x, y, z in (_take_cases([*track], case) for track in self.tracks)]
         positions = [(x[case] - east, y[case] - north, z[case]) for x, y, z in self.positions]
         half, k, band = self.half[case], self.k[case], self.band[case]
         return ExactRanges(half, k, band, self.sampling, tracks, positions, has_direct_path=self.has_direct_path)
@@ -402,7 +457,7 @@ class ExactRanges:
         least = np.full(self.half.shape, math.inf)
         if self.fit.shape[1] > FEWEST_NODES:  # with fewer nodes no platform gets so far
             for track, ranges in zip(self.tracks, self.ranges, strict=True):
-                looks = np.stack(np.broadcast_arrays(*(part / ranges for part in track)))
+                looks = np.stack(np.broadcast_arrays(*(component / ranges for component in track)))
                 looks = np.concatenate((looks, self.sampling.to_ends @ looks), axis=1)
                 for later in looks.swapaxes(0, 1):
                     least = np.minimum(least, np.einsum("an,amn->mn", later, looks).min(axis=0))
@@ -424,7 +479,7 @@ class ExactRanges:
         recorded = (self.ranges[0] + self.ranges[1]).max(axis=0)
         if self.has_direct_path:
             recorded = recorded + self.baselines.max(axis=0)
-        return np.asarray(EPSILON * self.k * recorded)
+        return np.asarray(RANGE_ROUNDING_FRACTION * self.k * recorded)
 
     @cached_property
     def _between(self) -> Vectors:
@@ -440,7 +495,7 @@ class ExactRanges:
     @cached_property
     def heard_along(self) -> tuple[Vectors, Vectors]:
         """Unit vectors along the direct path at the nodes, from the other platform to each."""
-        x, y, z = (part / self.baselines for part in self._between)
+        x, y, z = (component / self.baselines for component in self._between)
         return ((x, y, z), (-x, -y, -z))
 
     # ------------------------------------------------------------------ small errors
@@ -456,8 +511,8 @@ class ExactRanges:
 
     def along(self, platform: int, direction: Vectors) -> Floats:
         """Change of a platform's range at the nodes per metre along a direction, −u·d; if heard, −(u − b)·d."""
-        found: Floats = -dot(self.tracks[platform], direction) / self.ranges[platform]
-        return found + dot(self.heard_along[platform], direction) if self.has_direct_path else found
+        change: Floats = -dot(self.tracks[platform], direction) / self.ranges[platform]
+        return change + dot(self.heard_along[platform], direction) if self.has_direct_path else change
 
     def range_error(self, lanes: Lanes) -> Floats:
         """Range error at the nodes of a small unit of errors, one of each case, or all of a single case. [m/unit]"""
@@ -480,9 +535,9 @@ class ExactRanges:
         by_way = np.einsum("cnp,wnp->cwp", weights * errors.courses, along)
         phase = np.einsum("ewp,ewp->ep", errors.ways, by_way[errors.course])
         seen = (np.abs(weights).sum(axis=0) * np.abs(errors.courses).max(axis=1))[errors.course]
-        for place, ways in errors.turning.items():
-            phase[place] = np.einsum("np,wnp,wnp->p", weights, ways, along)
-            seen[place] = np.einsum("np,wnp->p", np.abs(weights), np.abs(ways))
+        for error_index, ways in errors.turning.items():
+            phase[error_index] = np.einsum("np,wnp,wnp->p", weights, ways, along)
+            seen[error_index] = np.einsum("np,wnp->p", np.abs(weights), np.abs(ways))
         return np.where(np.abs(phase) > ROUNDING * seen, phase, 0.0)
 
     @cached_property
@@ -531,10 +586,12 @@ class ExactRanges:
             ((weights * range_error).sum(axis=-2), (np.abs(weights) * size).sum(axis=-2))
             for weights in self.place_weights
         )
-        own, most = np.moveaxis(self.fit[2:] @ range_error, -2, 0), size.max(axis=-2)
+        orders_here, most = np.moveaxis(self.fit[2:] @ range_error, -2, 0), size.max(axis=-2)
         phases = []
-        for part, by_east, by_north in zip(own, *(one[2:] for one in self.gradient), strict=True):
-            phase = part + by_east * east + by_north * north
+        for order_phase, by_east, by_north in zip(
+            orders_here, *(by_metre[2:] for by_metre in self.gradient), strict=True
+        ):
+            phase = order_phase + by_east * east + by_north * north
             seen = most + np.abs(by_east) * seen_east + np.abs(by_north) * seen_north
             phases.append(self.k * _unless_rounding(phase, seen))
         # What is left of terms that cancel exactly is rounding, and would make a limit out of nothing.
@@ -542,19 +599,19 @@ class ExactRanges:
 
     def left_of_small(self, range_error: Floats, moved: tuple[Any, Any]) -> Floats:
         """Range error that small errors (..., nodes, cases) leave where they move the point, (..., cases). [m]"""
-        (by_east, by_north), (east, north) = self.slopes, (np.asarray(part)[..., None, :] for part in moved)
+        (by_east, by_north), (east, north) = self.slopes, (np.asarray(component)[..., None, :] for component in moved)
         return np.asarray(range_error + by_east * east + by_north * north)
 
-    def unresolved(self, left: Floats) -> tuple[Floats, Floats]:
+    def unresolved(self, remaining: Floats) -> tuple[Floats, Floats]:
         """Hidden phase, and rms beyond the cubic, of range errors left at the nodes, (..., nodes, cases). [rad]"""
-        orders = self.fit @ left
-        squares = self.mean_squares(left, orders)
+        orders = self.fit @ remaining
+        squares = self.mean_squares(remaining, orders)
         return _unresolved(np.moveaxis(orders, -2, 0), squares, self.k, self.band, self.is_turned)
 
-    def mean_squares(self, left: Floats, orders: Floats) -> tuple[Floats, Floats]:
+    def mean_squares(self, remaining: Floats, orders: Floats) -> tuple[Floats, Floats]:
         """Mean squares of range errors left at the nodes, and of what they have beyond orders 0 to 3. [m²]"""
-        beyond = left - self._legendre @ orders
-        return self.fit[0] @ (left * left), self.fit[0] @ (beyond * beyond)
+        beyond = remaining - self._legendre @ orders
+        return self.fit[0] @ (remaining * remaining), self.fit[0] @ (beyond * beyond)
 
     @cached_property
     def _legendre(self) -> Floats:
@@ -562,7 +619,7 @@ class ExactRanges:
         return np.asarray(np.polynomial.legendre.legvander(self.sampling.places, 3) / LEADING)
 
     # ------------------------------------------------------------------ errors of any size
-    def phases(self, lanes: Lanes, size: Floats, near: tuple[Any, Any], *, is_at_fold: bool = False) -> Found:
+    def phases(self, lanes: Lanes, size: Floats, near: tuple[Any, Any], *, is_at_fold: bool = False) -> ImagePoints:
         """Find where errors of given sizes move a point at the centre, and what defocuses there.
 
         The search starts `near` [m]. A point is found where the search settles at once; `is_at_fold`, where V leads
@@ -571,39 +628,39 @@ class ExactRanges:
         """
         return self.settled(lanes.clock(size), lanes.shifts(size), near, lanes.case, is_at_fold=is_at_fold)
 
-    def left_over(self, lanes: Lanes, size: Floats, place: tuple[Any, Any]) -> Floats:
+    def left_over(self, lanes: Lanes, size: Floats, point: tuple[Any, Any]) -> Floats:
         """Range error at the nodes that errors leave at ground points, (nodes, lanes). [m]"""
         room = self._room(lanes.case.size)
         measured = self._measured(lanes.clock(size), lanes.shifts(size), lanes.case, room)
-        return _left(measured, *place, room[MEASURED:])
+        return _remaining(measured, *point, room[_MEASURED_ARRAY_COUNT:])
 
-    def _heard(self, shifts: Sequence[Any], case: Places) -> Floats:
+    def _heard(self, shifts: Sequence[Any], case: Indices) -> Floats:
         """The c·t̃ at the nodes by shifts of the platforms where the direct path is the clock. [m]"""
-        a, b, c = (one - other for one, other in zip(*shifts, strict=True))
-        x, y, z, baseline = _of([*self._between, self.baselines], case)
+        a, b, c = (of_transmitter - of_receiver for of_transmitter, of_receiver in zip(*shifts, strict=True))
+        x, y, z, baseline = _take_cases([*self._between, self.baselines], case)
         grown = a * (2 * x + a) + b * (2 * y + b) + c * (2 * z + c)
         return np.asarray(grown / (baseline + np.sqrt(np.abs(baseline * baseline + grown))))
 
-    def way(self, lanes: Lanes, size: Floats, place: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
+    def way(self, lanes: Lanes, size: Floats, point: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
         """Where points go with larger errors, at the places that errors of sizes move them to. [m/unit]
 
         As the least of V does: by its second derivative, and by what a larger error changes of its slope.
         """
         course, ways = lanes.at_nodes, lanes.ways(size)
-        east, north = place
-        shifts, left, change = lanes.shifts(size), lanes.clock(size), lanes.clock(1.0)
+        east, north = point
+        shifts, remaining, change = lanes.shifts(size), lanes.clock(size), lanes.clock(1.0)
         looks, distances = np.empty((2, 2, *course.shape)), np.empty((2, *course.shape))
         turns = np.zeros((2, *course.shape))
         for platform, (track, weight, shift, (x, y, z)) in enumerate(
             zip(self.tracks, lanes.moves, shifts, ways, strict=True)
         ):
-            *true, own = _of([*track, self.ranges[platform]], lanes.case)
-            a, b, c = (one + moved for one, moved in zip(true, shift, strict=True))
+            *true, true_range = _take_cases([*track, self.ranges[platform]], lanes.case)
+            a, b, c = (first + moved for first, moved in zip(true, shift, strict=True))
             a, b = a - east, b - north
             R = np.sqrt(a * a + b * b + c * c)
             a, b, c = a / R, b / R, c / R
             looks[platform, 0], looks[platform, 1], distances[platform] = a, b, R
-            left = left + (own - R)
+            remaining = remaining + (true_range - R)
             if np.any(weight):
                 step = weight * course
                 along = a * x + b * y + c * z
@@ -612,50 +669,58 @@ class ExactRanges:
                 turns[1] += step * (y - b * along) / R
         if self.has_direct_path:
             ahead, back = lanes.moves
-            x, y, z = (ahead * one - back * other for one, other in zip(*ways, strict=True))
-            a, b, c, own = _of([*self._between, self.baselines], lanes.case)
-            a, b, c = (part + one - other for part, one, other in zip((a, b, c), *shifts, strict=True))
+            x, y, z = (ahead * first - back * second for first, second in zip(*ways, strict=True))
+            a, b, c, true_range = _take_cases([*self._between, self.baselines], lanes.case)
+            a, b, c = (between + first - second for between, first, second in zip((a, b, c), *shifts, strict=True))
             apart = np.sqrt(a * a + b * b + c * c)
-            left = left + (apart - own)
+            remaining = remaining + (apart - true_range)
             change = change + np.where(apart > 0, course * (a * x + b * y + c * z) / apart, 0.0)
-        (band,) = _of([self.band], lanes.case)
+        (band,) = _take_cases([self.band], lanes.case)
         matrix = GroundMatrix.of(looks[0] + looks[1], self.fit, band)
-        weights = matrix.projected(left)
+        weights = matrix.projected(remaining)
         slope = (matrix.projection * change + weights * turns).sum(axis=1)
         return _against(matrix, weights, looks, distances, slope)
 
     def settled(
-        self, clock: Floats, shifts: Sequence[Any], near: Any, case: Places, *, is_at_fold: bool = False
-    ) -> Found:
+        self, clock: Floats, shifts: Sequence[Any], near: Any, case: Indices, *, is_at_fold: bool = False
+    ) -> ImagePoints:
         """Newton's method for the least of V, or `is_at_fold` a descent.
 
         Range errors by clocks (nodes, lanes) [m], three shifts of each platform there [m], where the search starts
         [m], and the cases of the lanes.
         """
         lanes = clock.shape[1]
-        size = max(1, min(lanes, TOGETHER // self.fit.shape[1]))
-        found = Found(np.zeros(lanes, dtype=bool), *(np.full(lanes, math.nan) for _ in range(7)))
-        start = [np.broadcast_to(np.asarray(one, dtype=float), (lanes,)) for one in near]
+        size = max(1, min(lanes, SETTINGS.samples_at_once // self.fit.shape[1]))
+        points = ImagePoints(np.zeros(lanes, dtype=bool), *(np.full(lanes, math.nan) for _ in range(7)))
+        start = [np.broadcast_to(np.asarray(values, dtype=float), (lanes,)) for values in near]
         with np.errstate(all="ignore"):
             room = self._room(size)
             for first in range(0, lanes, size):
-                some = slice(first, first + size)
-                here = Found._make(one[some] for one in found)
-                moved = [[along if along.shape[-1] == 1 else along[:, some] for along in one] for one in shifts]
-                measured = self._measured(clock[:, some], moved, case[some], room)
-                places = np.arange(here.east.size)
-                near_by = start[0][some], start[1][some]
+                block = slice(first, first + size)
+                here = ImagePoints._make(values[block] for values in points)
+                moved = [
+                    [along if along.shape[-1] == 1 else along[:, block] for along in values] for values in shifts
+                ]
+                measured = self._measured(clock[:, block], moved, case[block], room)
+                lane_indices = np.arange(here.east.size)
+                near_by = start[0][block], start[1][block]
                 search = _PointSearch(
-                    self, here, places, case[some], *near_by, measured, room[MEASURED:, :, : places.size]
+                    self,
+                    here,
+                    lane_indices,
+                    case[block],
+                    *near_by,
+                    measured,
+                    room[_MEASURED_ARRAY_COUNT:, :, : lane_indices.size],
                 )
                 search.descend() if is_at_fold else search.run()
-        return found
+        return points
 
     def _room(self, lanes: int) -> Floats:
         """Room in which so many lanes are worked on: the system takes longer to give it than it takes to fill it."""
-        return np.empty((WORKED_ON, self.fit.shape[1], lanes))
+        return np.empty((_ARRAY_COUNT, self.fit.shape[1], lanes))
 
-    def _measured(self, clock: Floats, shifts: Sequence[Any], case: Places, room: Floats) -> list[Floats]:
+    def _measured(self, clock: Floats, shifts: Sequence[Any], case: Indices, room: Floats) -> list[Floats]:
         """Parts of errors that `_seen` takes, (nodes, lanes): the clock error, and five of each platform, in `room`.
 
         A range R grows by p/(R + √(R² + p)) where d is added to its vector r, with p = d·(2r + d): that has no
@@ -663,27 +728,29 @@ class ExactRanges:
         """
         if self.has_direct_path:  # whose own clock errors are nothing
             clock = clock + self._heard(shifts, case)
-        found = [clock]
-        for track, ranges, (a, b, c), own in zip(
+        measured = [clock]
+        for track, ranges, (a, b, c), room_of_platform in zip(
             self.tracks, self.ranges, shifts, (room[:4], room[4:8]), strict=True
         ):
-            x, y, z, R = _of([*track, ranges], case)
-            u, v, p, whole = own[..., : max(x.shape[-1], a.shape[-1])]  # what all lanes share is worked out once
+            x, y, z, R = _take_cases([*track, ranges], case)
+            u, v, p, squared_range = room_of_platform[
+                ..., : max(x.shape[-1], a.shape[-1])
+            ]  # what all lanes share is worked out once
             np.add(x, a, out=u)
             np.add(y, b, out=v)
             np.add(x, u, out=p)
             p *= a
-            np.add(y, v, out=whole)
-            whole *= b
-            p += whole
-            np.add(z, z, out=whole)
-            whole += c
-            whole *= c
-            p += whole
-            np.multiply(R, R, out=whole)
-            whole += p
-            found += [u, v, R, p, whole]
-        return found
+            np.add(y, v, out=squared_range)
+            squared_range *= b
+            p += squared_range
+            np.add(z, z, out=squared_range)
+            squared_range += c
+            squared_range *= c
+            p += squared_range
+            np.multiply(R, R, out=squared_range)
+            squared_range += p
+            measured += [u, v, R, p, squared_range]
+        return measured
 
 
 class _PointSearch:
@@ -695,34 +762,44 @@ class _PointSearch:
     def __init__(
         self,
         exact: ExactRanges,
-        found: Found,
-        alive: Places,
-        of: Places,
+        points: ImagePoints,
+        alive: Indices,
+        of: Indices,
         east: Floats,
         north: Floats,
         measured: list[Floats],
         room: Floats,
     ) -> None:
-        self.exact, self.found, self.alive, self.of = exact, found, alive, of
+        self.exact, self.points, self.alive, self.of = exact, points, alive, of
         self.east, self.north, self.measured, self.room = east, north, measured, room
 
     def run(self) -> None:
         """Search with the slopes of each point."""
         exact, before = self.exact, np.full(self.alive.size, math.inf)
-        for _ in range(ITERATIONS):
-            k, meets, band = _of([exact.k, exact.nearest, exact.band], self.of)
-            left, looks, distances = _seen(self.measured, self.east, self.north, self.room)
+        for _ in range(SETTINGS.max_newton_iterations):
+            k, meets, band = _take_cases([exact.k, exact.nearest, exact.band], self.of)
+            remaining, looks, distances = _seen(self.measured, self.east, self.north, self.room)
             nearest = distances.min(axis=(0, 1))
             matrix = GroundMatrix.of(looks[0] + looks[1], exact.fit, band)
-            step_east, step_north = _newton_step(matrix, left, looks, distances)
+            step_east, step_north = _newton_step(matrix, remaining, looks, distances)
             self.east, self.north = self.east + step_east, self.north + step_north
             step = step_east * step_east + step_north * step_north
-            is_apart = nearest >= MEETS * meets
+            is_apart = nearest >= SETTINGS.nearest_fraction * meets
             turn = matrix.turned_from(exact.matrix, self.of)
-            unseen = np.where(np.abs(turn) < AT_FOLD, OF_UNSEEN * UNSEEN_RAD, UNSEEN_RAD)
+            unseen = np.where(
+                np.abs(turn) < SETTINGS.near_fold_fraction,
+                SETTINGS.last_step_near_fold_fraction * SETTINGS.last_step_rad,
+                SETTINGS.last_step_rad,
+            )
             is_done = is_apart & (k * step < unseen * nearest)
-            self._keep(is_done & (turn > -FOLDED), left, matrix.slopes, (step_east, step_north), turn)
-            going = np.flatnonzero(~is_done & (step < SHRINKS * before) & is_apart)
+            self._keep(
+                is_done & (turn > -SETTINGS.folded_fraction),
+                remaining,
+                matrix.slopes,
+                (step_east, step_north),
+                turn,
+            )
+            going = np.flatnonzero(~is_done & (step < SETTINGS.shrinking_ratio * before) & is_apart)
             if not going.size:
                 return
             before = step
@@ -733,40 +810,48 @@ class _PointSearch:
     def descend(self) -> None:
         """Search by damped steps that only go down V: slower, and safe where V hardly bends, as near a fold."""
         exact = self.exact
-        k, meets, band = _of([exact.k, exact.nearest, exact.band], self.of)
-        damping = DAMPING * sum(_of([exact.matrix.xx + exact.matrix.yy], self.of))
+        k, meets, band = _take_cases([exact.k, exact.nearest, exact.band], self.of)
+        damping = SETTINGS.damping_fraction * sum(_take_cases([exact.matrix.xx + exact.matrix.yy], self.of))
         least, is_going = np.full(self.alive.size, math.inf), np.ones(self.alive.size, dtype=bool)
-        place, slope, bends = (np.zeros((count, least.size)) for count in (2, 2, 3))
-        for _ in range(DESCENTS):
-            left, looks, distances = _seen(self.measured, self.east, self.north, self.room)
+        best_point, slope, bends = (np.zeros((count, least.size)) for count in (2, 2, 3))
+        for _ in range(SETTINGS.max_descent_steps):
+            remaining, looks, distances = _seen(self.measured, self.east, self.north, self.room)
             matrix = GroundMatrix.of(looks[0] + looks[1], exact.fit, band)
-            weights, nearest = matrix.projected(left), distances.min(axis=(0, 1))
-            variance = (weights * left).sum(axis=0)
+            weights, nearest = matrix.projected(remaining), distances.min(axis=(0, 1))
+            variance = (weights * remaining).sum(axis=0)
             falls = variance <= least
-            least, damping = np.minimum(least, variance), np.where(falls, damping / DAMPED, damping * DAMPED)
-            place = np.where(falls, (self.east, self.north), place)
+            least, damping = (
+                np.minimum(least, variance),
+                np.where(falls, damping / SETTINGS.damping_ratio, damping * SETTINGS.damping_ratio),
+            )
+            best_point = np.where(falls, (self.east, self.north), best_point)
             bends = np.where(falls, _bends(matrix, weights, looks, distances), bends)
-            slope = np.where(falls, np.einsum("anc,nc->ac", matrix.projection, left), slope)
+            slope = np.where(falls, np.einsum("anc,nc->ac", matrix.projection, remaining), slope)
             xx, xy, yy = bends
             flattest = (xx + yy) / 2 - np.hypot((xx - yy) / 2, xy)
             more = np.maximum(damping, -2 * flattest)
             step = _solved((xx + more, xy, yy + more), slope)
             turn = matrix.turned_from(exact.matrix, self.of)
-            is_done = falls & (k * (step[0] ** 2 + step[1] ** 2) < OF_UNSEEN * UNSEEN_RAD * nearest)
-            is_done &= nearest >= MEETS * meets
-            self._keep(is_going & is_done & (turn > -FOLDED), left, matrix.slopes, step, turn)
+            is_done = falls & (
+                k * (step[0] ** 2 + step[1] ** 2)
+                < SETTINGS.last_step_near_fold_fraction * SETTINGS.last_step_rad * nearest
+            )
+            is_done &= nearest >= SETTINGS.nearest_fraction * meets
+            self._keep(is_going & is_done & (turn > -SETTINGS.folded_fraction), remaining, matrix.slopes, step, turn)
             is_going &= ~is_done
             if not is_going.any():
                 return
-            self.east, self.north = place + np.array(step)
+            self.east, self.north = best_point + np.array(step)
 
-    def _go_on(self, going: Places) -> None:
+    def _go_on(self, going: Indices) -> None:
         """Go on with some of the lanes."""
         self.alive, self.of = self.alive[going], self.of[going]
         self.east, self.north = self.east[going], self.north[going]
-        self.measured, self.room = _some(self.measured, going), self.room[..., : going.size]
+        self.measured, self.room = _take(self.measured, going), self.room[..., : going.size]
 
-    def _keep(self, is_done: Truths, left: Floats, slopes: Floats, step: tuple[Floats, Floats], turn: Floats) -> None:
+    def _keep(
+        self, is_done: Truths, remaining: Floats, slopes: Floats, step: tuple[Floats, Floats], turn: Floats
+    ) -> None:
         """Note the lanes that have settled; what is less than rounding leaves is none.
 
         Their range error is that which was `left` before the last step, and what the step adds to it.
@@ -774,29 +859,29 @@ class _PointSearch:
         done = np.flatnonzero(is_done)
         if not done.size:
             return
-        exact, found, places = self.exact, self.found, self.alive[done]
-        by_east, by_north, left = _some([*slopes, left], done)
-        left = left + by_east * step[0][done] + by_north * step[1][done]
-        orders = exact.fit @ left
-        k, band, rounding = _of([exact.k, exact.band, exact.rounding], self.of[done])
+        exact, points, lanes = self.exact, self.points, self.alive[done]
+        by_east, by_north, remaining = _take([*slopes, remaining], done)
+        remaining = remaining + by_east * step[0][done] + by_north * step[1][done]
+        orders = exact.fit @ remaining
+        k, band, rounding = _take_cases([exact.k, exact.band, exact.rounding], self.of[done])
         is_turned = exact.is_turned if exact.is_turned.size == 1 else exact.is_turned[self.of[done]]
-        hidden, rest = _unresolved(orders, exact.mean_squares(left, orders), k, band, is_turned)
-        found.is_found[places] = True
-        for kept, value in ((found.east, self.east), (found.north, self.north), (found.turn, turn)):
-            kept[places] = value[done]
-        phases = (k * orders[2], k * orders[3], hidden, rest)
-        for kept, phase in zip((found.quadratic, found.cubic, found.hidden, found.rest), phases, strict=True):
-            kept[places] = np.where(np.abs(phase) > rounding, phase, 0.0)
+        hidden, beyond_cubic = _unresolved(orders, exact.mean_squares(remaining, orders), k, band, is_turned)
+        points.is_settled[lanes] = True
+        for kept, value in ((points.east, self.east), (points.north, self.north), (points.turn, turn)):
+            kept[lanes] = value[done]
+        phases = (k * orders[2], k * orders[3], hidden, beyond_cubic)
+        for kept, phase in zip((points.quadratic, points.cubic, points.hidden, points.rest), phases, strict=True):
+            kept[lanes] = np.where(np.abs(phase) > rounding, phase, 0.0)
 
 
-def _newton_step(matrix: GroundMatrix, left: Floats, looks: Floats, distances: Floats) -> tuple[Floats, Floats]:
+def _newton_step(matrix: GroundMatrix, remaining: Floats, looks: Floats, distances: Floats) -> tuple[Floats, Floats]:
     """Step east and north to where V is least, by its slope and how that changes. [m]
 
     Range errors left at the nodes (nodes, lanes) [m], the components of the lines of sight of both platforms over the
     ground (2, 2, nodes, lanes), and their ranges. [m]
     """
-    slope = np.einsum("anc,nc->ac", matrix.projection, left)
-    return _against(matrix, matrix.projected(left), looks, distances, slope)
+    slope = np.einsum("anc,nc->ac", matrix.projection, remaining)
+    return _against(matrix, matrix.projected(remaining), looks, distances, slope)
 
 
 def _against(
@@ -804,7 +889,7 @@ def _against(
 ) -> tuple[Floats, Floats]:
     """Step that takes away half a slope of V, by how that changes; where V is no bowl, by H alone. [m]"""
     xx, xy, yy = _bends(matrix, weights, looks, distances)
-    is_bowl = (xx * yy - xy * xy > BOWL * matrix.determinant) & (xx > 0)
+    is_bowl = (xx * yy - xy * xy > SETTINGS.bowl_fraction * matrix.determinant) & (xx > 0)
     if not is_bowl.all():
         of_matrix = matrix.xx, matrix.xy, matrix.yy
         xx, xy, yy = (np.where(is_bowl, *both) for both in zip((xx, xy, yy), of_matrix, strict=True))
@@ -830,10 +915,10 @@ def _unresolved(
 ) -> tuple[Floats, Floats]:
     """Hidden phase, and rms beyond the cubic, by orders 0 to 3 at the edge [m] and mean squares. [m²], [rad]"""
     _, slope, _, cubic = orders
-    square, rest = squares
+    square, beyond_cubic = squares
     of_cubic = (cubic / 2.5) ** 2 / 7
-    hidden = band * square + slope * slope / 3 + np.where(is_turned, of_cubic + rest, 0.0)
-    return QUADRATIC_OF_VARIANCE * k * np.sqrt(hidden), k * np.sqrt(rest)
+    hidden = band * square + slope * slope / 3 + np.where(is_turned, of_cubic + beyond_cubic, 0.0)
+    return QUADRATIC_OF_VARIANCE * k * np.sqrt(hidden), k * np.sqrt(beyond_cubic)
 
 
 def _unless_rounding(value: Floats, seen: Floats) -> Floats:
@@ -843,33 +928,33 @@ def _unless_rounding(value: Floats, seen: Floats) -> Floats:
 def _weighted(along: Sequence[Any], weight: Any) -> Sequence[Any]:
     """A shift of a platform that lanes move or leave where it is."""
     if np.ndim(weight):
-        return [weight * part for part in along]
+        return [weight * component for component in along]
     return along if weight else STILL
 
 
 def _grow(platform: Sequence[Floats], east: Any, north: Any, room: Floats, distance: Floats) -> None:
     """Fill with how much longer than the true range a platform's range to points is, and with that range. [m]"""
-    u, v, R, p, whole = platform
-    grown, other = room[:2]
+    u, v, R, p, squared_range = platform
+    grown, scratch = room[:2]
     np.multiply(u, 2 * east, out=grown)
-    np.multiply(v, 2 * north, out=other)
-    grown += other
+    np.multiply(v, 2 * north, out=scratch)
+    grown += scratch
     np.subtract(east * east + north * north, grown, out=grown)
-    np.add(whole, grown, out=distance)
+    np.add(squared_range, grown, out=distance)
     np.sqrt(distance, out=distance)
     grown += p
-    np.add(distance, R, out=other)
-    grown /= other
+    np.add(distance, R, out=scratch)
+    grown /= scratch
 
 
-def _left(measured: Sequence[Floats], east: Any, north: Any, room: Floats) -> Floats:
+def _remaining(measured: Sequence[Floats], east: Any, north: Any, room: Floats) -> Floats:
     """Range error at the nodes that is left at points (lanes,), (nodes, lanes). [m]"""
     clock, first, second = measured[0], room[:3], room[3:6]
     _grow(measured[1:6], east, north, first, room[6])
     _grow(measured[6:], east, north, second, room[6])
-    left: Floats = np.subtract(clock, first[0], out=first[0])
-    left -= second[0]
-    return left
+    remaining: Floats = np.subtract(clock, first[0], out=first[0])
+    remaining -= second[0]
+    return remaining
 
 
 def _seen(measured: Sequence[Floats], east: Floats, north: Floats, room: Floats) -> tuple[Floats, Floats, Floats]:
@@ -883,12 +968,12 @@ def _seen(measured: Sequence[Floats], east: Floats, north: Floats, room: Floats)
         np.subtract(platform[0], east, out=out[1])
         np.subtract(platform[1], north, out=out[2])
         out[1:3] /= out[3]
-    left = measured[0] - both[0, 0]
-    left -= both[1, 0]
-    return left, both[:, 1:3], both[:, 3]
+    remaining = measured[0] - both[0, 0]
+    remaining -= both[1, 0]
+    return remaining, both[:, 1:3], both[:, 3]
 
 
-def followed(exact: ExactRanges, clock: Floats, shifts: Sequence[Any], case: Places) -> Found:
+def followed(exact: ExactRanges, clock: Floats, shifts: Sequence[Any], case: Indices) -> ImagePoints:
     """Find where errors of any course move a point at the centre, in steps from no error on where need be.
 
     Parameters
@@ -904,40 +989,40 @@ def followed(exact: ExactRanges, clock: Floats, shifts: Sequence[Any], case: Pla
 
     Returns
     -------
-    Found
+    ImagePoints
         NaN where no ground point has the recorded history, or only one to which no error leads from nothing.
         As on a way of `point_paths`, none has it where half a cycle is hidden and gradients of V span little.
     """
-    found = _within_ends(exact.settled(clock, shifts, (0.0, 0.0), case))
-    for steps in STEPS:
-        missed = np.flatnonzero(~found.is_found)
+    points = _within_ends(exact.settled(clock, shifts, (0.0, 0.0), case))
+    for steps in SETTINGS.course_steps:
+        missed = np.flatnonzero(~points.is_settled)
         if not missed.size:
             break
-        (noise,), moved = _some([clock], missed), [_some(shift, missed) for shift in shifts]
+        (noise,), moved = _take([clock], missed), [_take(shift, missed) for shift in shifts]
         near = np.zeros((2, missed.size))
         for step in range(steps):
-            part = (step + 1) / steps
-            ahead = [[part * along for along in shift] for shift in moved]
-            there = _within_ends(exact.settled(part * noise, ahead, near, case[missed]))
+            fraction = (step + 1) / steps
+            ahead = [[fraction * along for along in shift] for shift in moved]
+            there = _within_ends(exact.settled(fraction * noise, ahead, near, case[missed]))
             near = np.array((there.east, there.north)) * ((step + 2) / (step + 1))  # NaN from the first lost one on
-        for whole, later in zip(found, there, strict=True):
-            whole[missed] = later
-    has_ended = (np.abs(found.turn) < FOLDED) & (found.hidden > ENDS_RAD)
-    found.is_found[has_ended] = False
-    for values in found[1:]:
+        for column, later in zip(points, there, strict=True):
+            column[missed] = later
+    has_ended = (np.abs(points.turn) < SETTINGS.folded_fraction) & (points.hidden > SETTINGS.end_rad)
+    points.is_settled[has_ended] = False
+    for values in points[1:]:
         values[has_ended] = math.nan
-    return found
+    return points
 
 
-def _within_ends(found: Found) -> Found:
+def _within_ends(points: ImagePoints) -> ImagePoints:
     """The same without points beyond the end of the image."""
-    is_gone = (np.abs(found.turn) < FOLDED) & (found.hidden > ENDS_RAD)
-    return Found(found.is_found & ~is_gone, *(np.where(is_gone, math.nan, part) for part in found[1:]))
+    is_gone = (np.abs(points.turn) < SETTINGS.folded_fraction) & (points.hidden > SETTINGS.end_rad)
+    return ImagePoints(points.is_settled & ~is_gone, *(np.where(is_gone, math.nan, column) for column in points[1:]))
 
 
-def _some(arrays: Sequence[Floats], some: Places) -> list[Floats]:
+def _take(arrays: Sequence[Floats], indices: Indices) -> list[Floats]:
     """Some lanes of arrays (nodes, lanes); what all of them share stays as it is."""
-    return [array if array.shape[-1] == 1 else array.take(some, axis=-1) for array in arrays]
+    return [array if array.shape[-1] == 1 else array.take(indices, axis=-1) for array in arrays]
 
 
-_of = _some  # of cases, arrays (nodes, cases) or (cases,): a single case is shared by all lanes
+_take_cases = _take  # of cases, arrays (nodes, cases) or (cases,): a single case is shared by all lanes

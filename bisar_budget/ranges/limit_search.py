@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from bisar_budget.ranges.exact_ranges import Floats, Places, Truths
+from bisar_budget.ranges.exact_ranges import Floats, Indices, Truths
 from bisar_budget.ranges.point_paths import (
     AREA,
     CUBIC,
@@ -104,13 +104,13 @@ class LimitSearches:
         Whether only searches for the same requirement end the search.
     """
 
-    lane: Places
-    requirement: Places
+    lane: Indices
+    requirement: Indices
     limit: Floats
     gain: Floats
     first: Floats
     largest: Floats
-    group: Places
+    group: Indices
     is_alone: Truths
 
     @classmethod
@@ -176,7 +176,7 @@ class _SearchState:
         Largest known size below the limit.
     """
 
-    def __init__(self, paths: PointPaths, searches: LimitSearches, bound: Floats, tries: Places) -> None:
+    def __init__(self, paths: PointPaths, searches: LimitSearches, bound: Floats, tries: Indices) -> None:
         self.searches, self.bound, self.tries, every = searches, bound, tries, np.arange(tries.size)
         end = paths.end[searches.lane]
         points = paths.known_points.take(searches.lane, axis=1)
@@ -201,7 +201,7 @@ class _SearchState:
         result = np.where(self.is_between, between, np.minimum(end, self.ahead))
         self.result = np.where((result <= bound) & ~is_past, result, math.inf)
 
-    def _set_slopes(self, every: Places) -> None:
+    def _set_slopes(self, every: Indices) -> None:
         """Slopes at known points, of the parabola through each point and its neighbours."""
         self.width = self.size[:, 1:] - self.size[:, :-1]
         chord = (self.square[:, 1:] - self.square[:, :-1]) / self.width
@@ -212,7 +212,7 @@ class _SearchState:
         last = np.maximum(self.count - 1, 1)
         self.slope[every, last] = 2 * chord[every, last - 1] - self.slope[every, last - 1]
 
-    def _doubtful_sizes(self, first_above: Places) -> Floats:
+    def _doubtful_sizes(self, first_above: Indices) -> Floats:
         """Size to try within each interval below the limit; not a number where the interval holds no doubt."""
         low, width = self.size[:, :-1], self.width
         start, stop = self.square[:, :-1], self.square[:, 1:]
@@ -230,7 +230,7 @@ class _SearchState:
         is_below = np.arange(1, self.size.shape[1]) < first_above[:, None]
         return np.where(is_below & (low < self.bound[:, None]), size, math.nan)
 
-    def _between(self, every: Places, first_above: Places) -> tuple[Floats, Truths]:
+    def _between(self, every: Indices, first_above: Indices) -> tuple[Floats, Truths]:
         """Size at which a cubic between known points reaches the limit, and whether it is close enough."""
         high = np.minimum(first_above, self.size.shape[1] - 1)
         low = high - 1
@@ -262,7 +262,7 @@ class _SearchState:
         self.inside = np.where(is_steep, by_power, self.inside)
         return np.where(is_narrow, self.high - width, size), is_close | is_narrow
 
-    def _by_power(self, every: Places, low: Places, high: Places) -> Floats:
+    def _by_power(self, every: Indices, low: Indices, high: Indices) -> Floats:
         """Size at which a power of the size reaches the limit.
 
         The power of two points around the limit, or of two points beyond it where the lower point is the start.
@@ -274,7 +274,7 @@ class _SearchState:
         power = np.where(below < above, rise / growth, 2.0)
         return np.asarray(self.size[every, high] * self.square[every, high] ** (-1 / power))
 
-    def _ahead(self, every: Places, last: Places) -> tuple[Floats, Truths]:
+    def _ahead(self, every: Indices, last: Indices) -> tuple[Floats, Truths]:
         """Size at which a parabola through the last points reaches the limit, and whether it is close enough."""
         before = np.maximum(last - 1, 0)
         slope = self.slope[every, last]
@@ -291,7 +291,7 @@ class _SearchState:
         is_close = (missing < 2 * trusted) & (ahead < (1 + 1.5 * trusted) * self.low) & (self.area > 0.5)
         return ahead, is_close
 
-    def next_sizes(self, going: Places, *, is_several: bool) -> tuple[Places, Floats]:
+    def next_sizes(self, going: Indices, *, is_several: bool) -> tuple[Indices, Floats]:
         """Searches that go on and the sizes that they try next: one per lane, or several."""
         growth = SETTINGS.growth_factor
         low, bound, is_between = self.low[going], self.bound[going], self.is_between[going]

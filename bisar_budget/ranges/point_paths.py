@@ -15,7 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from bisar_budget.constants import ROUNDING
-from bisar_budget.ranges.exact_ranges import AT_FOLD, ENDS_RAD, FOLDED, ExactRanges, Floats, Lanes, Places, Truths
+from bisar_budget.ranges.exact_ranges import SETTINGS as POINT_SETTINGS
+from bisar_budget.ranges.exact_ranges import ExactRanges, Floats, Indices, Lanes, Truths
 
 # Rows of a known point: the size of the error [unit], then the fields of `Found`.
 SIZE, EAST, NORTH, QUADRATIC, CUBIC, HIDDEN, REST, AREA = ROWS = range(8)
@@ -117,19 +118,19 @@ class PointPaths:
         self._missed_last = np.zeros(lane_count, dtype=bool)  # whether the last step of the lane led nowhere
         self._missed_ever = np.zeros(lane_count, dtype=bool)  # then the start of the path predicts nothing any more
 
-    def known(self, lane: Places, size: Floats) -> Floats:
+    def known(self, lane: Indices, size: Floats) -> Floats:
         """Known points at sizes to which `follow_to` went, (rows, lanes); not a number beyond the end of a path."""
         points = self._point(lane, (self.known_points[SIZE, lane] <= size[:, None]).sum(axis=1) - 1)
         points[:, (points[SIZE] != size) | (size >= self.end[lane])] = math.nan
         return points
 
-    def _point(self, lane: Places, index: Places) -> Floats:
+    def _point(self, lane: Indices, index: Indices) -> Floats:
         """Known points of lanes by their index, (rows, lanes)."""
         return np.asarray(self.known_points[:, lane, index])
 
     # ---------------------------------------------------------------- steps
     @np.errstate(all="ignore")
-    def follow_to(self, lane: Places, size: Floats) -> None:
+    def follow_to(self, lane: Indices, size: Floats) -> None:
         """Follow the paths of lanes to sizes."""
         while True:
             is_short = (size < self.end[lane]) & (self.known_points[SIZE, lane] != size[:, None]).all(axis=1)
@@ -138,19 +139,19 @@ class PointPaths:
             lane, size = lane[is_short], size[is_short]
             self.step_toward(lane, size)
 
-    def step_toward(self, lane: Places, size: Floats) -> None:
+    def step_toward(self, lane: Indices, size: Floats) -> None:
         """Make one step toward each size, from the known point before it. A lane may be there several times."""
         lane, index, size, to_fold = self._sizes_of_step(lane, size)
         last = self._point(lane, index)
         expected = self._predicted(index, lane, last, size)
         found = self.exact.phases(self.lanes.of(lane), size, expected)
         point = np.array((size, *found[1:]))
-        is_on_path = found.is_found & _is_near(last, point, expected)
+        is_on_path = found.is_settled & _is_near(last, point, expected)
         begins = np.ones(lane.size, dtype=bool)
         begins[1:] = (lane[1:] != lane[:-1]) | (index[1:] != index[:-1])
 
         # The steps before may predict a later point better than the last known point does.
-        later = np.flatnonzero(~begins & ~is_on_path & found.is_found)
+        later = np.flatnonzero(~begins & ~is_on_path & found.is_settled)
         if later.size:
             is_second = begins[later - 1]
             near, middle = point[:, later - 1], np.where(is_second, last[:, later], point[:, later - 2])
@@ -158,7 +159,7 @@ class PointPaths:
             is_on_path[later] = _is_near(near, point[:, later], _extrapolated(far, middle, near, size[later]))
 
         # At a fold a peak fades into a wider one. A descent on V leads to the wider peak.
-        lost = np.flatnonzero(~is_on_path & (last[AREA] < AT_FOLD))
+        lost = np.flatnonzero(~is_on_path & (last[AREA] < POINT_SETTINGS.near_fold_fraction))
         if lost.size:
             start = last[:, lost]
             wider = self.exact.phases(
@@ -167,9 +168,13 @@ class PointPaths:
             point[1:, lost] = wider[1:]
             distance = np.hypot(wider.east - start[EAST], wider.north - start[NORTH])
             displacement = np.hypot(start[EAST], start[NORTH])
-            is_on_path[lost] = wider.is_found & (distance <= SETTINGS.fade_fraction * displacement)
+            is_on_path[lost] = wider.is_settled & (distance <= SETTINGS.fade_fraction * displacement)
 
-        is_end = is_on_path & (np.abs(point[AREA]) < FOLDED) & (point[HIDDEN] > ENDS_RAD)
+        is_end = (
+            is_on_path
+            & (np.abs(point[AREA]) < POINT_SETTINGS.folded_fraction)
+            & (point[HIDDEN] > POINT_SETTINGS.end_rad)
+        )
         # Several steps may start from one known point. Those before the first miss count.
         is_miss = ~is_on_path | is_end
         misses = np.cumsum(is_miss)
@@ -179,13 +184,13 @@ class PointPaths:
         self._missed_last[lane] = False
         if is_first_miss.any():
             before = np.where(begins, last, np.roll(point, 1, axis=1))
-            to_fold = np.where(begins & ~found.is_found, to_fold, math.inf)
+            to_fold = np.where(begins & ~found.is_settled, to_fold, math.inf)
             miss = np.flatnonzero(is_first_miss)
             reached = (before[SIZE] - last[SIZE])[miss]
             self._shorten_step(lane[miss], point[:, miss], before[:, miss], reached, to_fold[miss], is_end[miss])
         self._insert(lane[is_kept], point[:, is_kept])
 
-    def _sizes_of_step(self, lane: Places, size: Floats) -> tuple[Places, Places, Floats, Floats]:
+    def _sizes_of_step(self, lane: Indices, size: Floats) -> tuple[Indices, Indices, Floats, Floats]:
         """Lanes, indices of the known points before, sizes of the step, and distances to a fold, by lane and size."""
         index = (self.known_points[SIZE, lane] < size[:, None]).sum(axis=1) - 1
         last = self._point(lane, index)
@@ -212,7 +217,7 @@ class PointPaths:
         return lane[order], index[order], size[order], to_fold[order]
 
     def _shorten_step(
-        self, lane: Places, point: Floats, before: Floats, reached: Floats, to_fold: Floats, is_end: Truths
+        self, lane: Indices, point: Floats, before: Floats, reached: Floats, to_fold: Floats, is_end: Truths
     ) -> None:
         """Note the ends of paths where a step missed, or make the next step shorter."""
         end = _end_between(before, point)
@@ -226,7 +231,7 @@ class PointPaths:
         self._longest_step[lane], self._limited_from[lane] = step, before[SIZE]
         self._missed_last[lane] = self._missed_ever[lane] = True
 
-    def _insert(self, lane: Places, point: Floats) -> None:
+    def _insert(self, lane: Indices, point: Floats) -> None:
         """Insert known points, in the order of their sizes."""
         if not lane.size:
             return
@@ -243,7 +248,7 @@ class PointPaths:
             self.known_points[:, changed, :needed] = np.take_along_axis(points, order[None], axis=2)
 
     # ---------------------------------------------------------------- predictions
-    def _distance_to_fold(self, index: Places, lane: Places, last: Floats) -> Floats:
+    def _distance_to_fold(self, index: Indices, lane: Indices, last: Floats) -> Floats:
         """Size left until the gradients are parallel, infinite where no fold is ahead. [unit]
 
         Extrapolated by the parabola through the squares of the last three areas.
@@ -259,7 +264,7 @@ class PointPaths:
         is_ahead = (index > 0) & (decrease > 0) & (distance > SETTINGS.least_fold_fraction * step)
         return np.where(is_ahead, distance, math.inf)
 
-    def _predicted(self, index: Places, lane: Places, last: Floats, size: Floats) -> tuple[Floats, Floats]:
+    def _predicted(self, index: Indices, lane: Indices, last: Floats, size: Floats) -> tuple[Floats, Floats]:
         """Points east and north where the known points lead. [m]
 
         An almost straight path is predicted by a parabola from its start, a bent one from its last point.
@@ -281,7 +286,9 @@ class PointPaths:
             east[bent], north[bent] = self._predicted_from_last(index[bent], lane[bent], last[:, bent], size[bent])
         return east, north
 
-    def _predicted_from_last(self, index: Places, lane: Places, last: Floats, size: Floats) -> tuple[Floats, Floats]:
+    def _predicted_from_last(
+        self, index: Indices, lane: Indices, last: Floats, size: Floats
+    ) -> tuple[Floats, Floats]:
         """Points where the slopes at the last two known points lead. [m]
 
         The slope changes linearly with the size or, near a fold, with the root of the distance to the fold.
@@ -299,7 +306,7 @@ class PointPaths:
         (u, u_back), (v, v_back) = (slope.reshape(2, -1) * (of_here, of_back) for slope in slopes)
         return last[EAST] + (u + bend * (u - u_back)) * step, last[NORTH] + (v + bend * (v - v_back)) * step
 
-    def _slopes_at(self, lane: Places, points: Floats) -> tuple[Floats, Floats]:
+    def _slopes_at(self, lane: Indices, points: Floats) -> tuple[Floats, Floats]:
         """Slopes of the path at points, east and north. [m/unit]"""
         east, north = self.exact.way(self.lanes.of(lane), points[SIZE], (points[EAST], points[NORTH]))
         (u, v), is_start = self._slope_at_start[:, lane], points[SIZE] == 0
@@ -332,6 +339,10 @@ def _end_between(before: Floats, beyond: Floats) -> Floats:
     Near a fold the square of the area is linear in the size. Beyond it the hidden phase is.
     """
     low, high, square, square_beyond = before[HIDDEN], beyond[HIDDEN], before[AREA] ** 2, beyond[AREA] ** 2
-    to_hidden = np.where(low < ENDS_RAD, (ENDS_RAD - low) / (high - low), 0.0)
-    to_fold = np.where(square > FOLDED**2, (square - FOLDED**2) / (square - square_beyond), 0.0)
+    to_hidden = np.where(low < POINT_SETTINGS.end_rad, (POINT_SETTINGS.end_rad - low) / (high - low), 0.0)
+    to_fold = np.where(
+        square > POINT_SETTINGS.folded_fraction**2,
+        (square - POINT_SETTINGS.folded_fraction**2) / (square - square_beyond),
+        0.0,
+    )
     return np.asarray(before[SIZE] + (beyond[SIZE] - before[SIZE]) * np.maximum(to_hidden, to_fold))

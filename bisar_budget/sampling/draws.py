@@ -23,7 +23,7 @@ from bisar_budget.effects.effect import ErrorSource
 from bisar_budget.faults import printable
 from bisar_budget.geometry import PlatformState
 from bisar_budget.memory import is_spacious
-from bisar_budget.ranges.exact_ranges import STILL, ExactRanges, Floats, Found, followed
+from bisar_budget.ranges.exact_ranges import STILL, ExactRanges, Floats, ImagePoints, followed
 
 if TYPE_CHECKING:
     from bisar_budget.workers import MapBlocks
@@ -187,7 +187,7 @@ class Sums:
         self.tags: dict[str, Floats] = {}
         self.clock: dict[str, Floats] = {}
         self.alone: dict[str, Floats] = {}
-        self._exact: dict[tuple[str, ...], Found] = {}
+        self._exact: dict[tuple[str, ...], ImagePoints] = {}
         self._scaled = np.empty(size)
         self._square = np.empty(size)
 
@@ -263,7 +263,7 @@ class Sums:
         square = np.asarray(sum((by_ranges[column] + alone[column]) ** 2 for column in judged.columns))
         return square + (judged.gain * found.hidden) ** 2 if judged.columns == (0,) else square
 
-    def _by_exact_ranges(self, owners: tuple[str, ...]) -> Found:
+    def _by_exact_ranges(self, owners: tuple[str, ...]) -> ImagePoints:
         times = self.exact.times[:, 0]
         powers = times[:, None] ** np.arange(3) / (1, 1, 2)  # of (22)
         clock_powers = SPEED_OF_LIGHT * times[:, None] ** np.arange(4)

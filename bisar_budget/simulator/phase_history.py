@@ -476,7 +476,7 @@ def exact_effect(
     clock = np.broadcast_to(SPEED_OF_LIGHT * np.asarray(clock_error, dtype=float), slow_time.shape)[:, None]
     shifts = [_columns(one.measured - one.actual) for one in paths]
     found = followed(exact, clock, shifts, np.zeros(1, dtype=int))
-    if not found.is_found[0]:
+    if not found.is_settled[0]:
         raise NoGroundPointError("no ground point has the recorded range history")
     east, north, *phases = (float(one[0]) for one in found[1:-1])
     return ExactEffect((east, north), *phases)

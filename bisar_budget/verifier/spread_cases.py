@@ -38,7 +38,7 @@ from bisar_budget.findings.images import Verdict
 from bisar_budget.image_plane import nodes
 from bisar_budget.mission.model import Simulation
 from bisar_budget.phrases import Note
-from bisar_budget.ranges.exact_ranges import FINE, Found, aperture_nodes
+from bisar_budget.ranges.exact_ranges import FINE_NODE_COUNT, ImagePoints, aperture_nodes
 from bisar_budget.simulator.collection import CELLS, PointCollection
 from bisar_budget.simulator.impulse_response import upsampled
 from bisar_budget.simulator.phase_history import (
@@ -418,7 +418,7 @@ def _sigma(study: Study, error: RandomError, rng: np.random.Generator, is_cubic:
     return float(np.std(2.5 * fit[3] if is_cubic else 1.5 * fit[2])), draws
 
 
-def _drawn_effects(study: Study, error: RandomError, rng: np.random.Generator) -> Found:
+def _drawn_effects(study: Study, error: RandomError, rng: np.random.Generator) -> ImagePoints:
     """Effects of many histories of a sensor or the air, by exact ranges, (draws,)."""
     moments = aperture_nodes(study.collection.aperture_time)
     if error.subject.kind in CORRELATED:  # not smooth between the nodes, as what is integrated is
@@ -426,7 +426,7 @@ def _drawn_effects(study: Study, error: RandomError, rng: np.random.Generator) -
     if error.subject.kind != "propagation":
         return study.exact_effects(position_courses(study.mission, error, moments, _DRAWS, rng))
     group = group_delays(study.mission, error, moments, _delays_at_nodes(study, error, rng))
-    mean = (group @ nodes(FINE).fit[0])[:, None]
+    mean = (group @ nodes(FINE_NODE_COUNT).fit[0])[:, None]
     return study.exact_effects({"clock": seen_course(group, mean, error.subject.axis)})
 
 

@@ -14,7 +14,14 @@ from bisar_budget.effects.effect import PLATFORMS, ErrorSource, Subject
 from bisar_budget.effects.sources import exact_ranges
 from bisar_budget.findings.images import Verdict
 from bisar_budget.mission.model import Mission
-from bisar_budget.ranges.exact_ranges import FINE, QUADRATIC_OF_VARIANCE, STILL, ExactEffect, Found, followed
+from bisar_budget.ranges.exact_ranges import (
+    FINE_NODE_COUNT,
+    QUADRATIC_OF_VARIANCE,
+    STILL,
+    ExactEffect,
+    ImagePoints,
+    followed,
+)
 from bisar_budget.simulator.autofocus import ALGORITHMS
 from bisar_budget.simulator.collection import CELLS, MAX_CELLS, OVERSAMPLING, RANGE_CELLS, Chip, PointCollection
 from bisar_budget.simulator.impulse_response import highest
@@ -142,17 +149,17 @@ class Study:
         """Effect of several errors by exact ranges."""
         return self.collection.effect(self.together(sizes, scale))
 
-    def exact_effects(self, courses: Mapping[str, Floats]) -> Found:
+    def exact_effects(self, courses: Mapping[str, Floats]) -> ImagePoints:
         """Effects of many histories: of position errors of platforms, (draws, nodes, 3), or of the clock's. [m]
 
         They are by the name of what has them. That of the clock is a range error, (draws, nodes). The nodes are those
         of `aperture_nodes`.
         """
-        exact = exact_ranges(self.mission, self.geometry, FINE)
+        exact = exact_ranges(self.mission, self.geometry, FINE_NODE_COUNT)
         moved = {name: np.ascontiguousarray(one.T) for name, one in courses.items()}
         shifts = [moved.get(name, STILL) for name in PLATFORMS]
         draws = len(next(iter(courses.values())))
-        clock = moved.get("clock", np.zeros((FINE, draws)))
+        clock = moved.get("clock", np.zeros((FINE_NODE_COUNT, draws)))
         return followed(exact, clock, shifts, np.zeros(draws, dtype=int))
 
     def worse_sign(self, sizes: Sizes) -> float:

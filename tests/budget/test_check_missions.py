@@ -19,7 +19,7 @@ from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.quantities import QuestionError, with_number
 from bisar_budget.mission.stacked import stacked
-from bisar_budget.ranges.exact_ranges import UNSEEN_RAD
+from bisar_budget.ranges.exact_ranges import SETTINGS as POINT_SETTINGS
 from bisar_budget.ranges.limit_search import LIMIT_FRACTION
 from tests.conftest import ROOT, mission_text
 from tests.families import FAMILIES
@@ -56,7 +56,7 @@ def assert_alike(one: Any, other: Any, where: str) -> None:
     if isinstance(one, float) and isinstance(other, float):
         # A phase of 1e-10 rad is what terms cancel to.
         room = (100 if "allowable" in where else 2) * LIMIT_FRACTION
-        floor = UNSEEN_RAD if where.endswith("_rad") else 1e-9
+        floor = POINT_SETTINGS.last_step_rad if where.endswith("_rad") else 1e-9
         assert other == pytest.approx(one, rel=room, abs=floor, nan_ok=True), where
     elif isinstance(one, DecidingShare) and isinstance(other, DecidingShare):
         assert_alike(astuple(one), astuple(other), where)

@@ -1,6 +1,7 @@
 """Exact ranges of the check and of the simulator on random missions: one definition, two functions."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from bisar_budget.analysis.analysis import Analysis
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.ranges import exact_ranges
-from bisar_budget.ranges.exact_ranges import FINE, STILL, ExactRanges, Lanes, aperture_nodes, followed
+from bisar_budget.ranges.exact_ranges import FINE_NODE_COUNT, STILL, ExactRanges, Lanes, aperture_nodes, followed
 from bisar_budget.simulator.phase_history import cell_centres, exact_effect
 from bisar_budget.verifier.study import Study
 from tests.conftest import mission_text
@@ -34,7 +35,7 @@ def of_study(study: Study) -> ExactRanges:
     """Exact ranges of a mission at many nodes."""
     paths, seen = (study.geometry.transmitter, study.geometry.receiver), study.collection
     is_heard = study.mission.has_direct_path
-    return ExactRanges.of(paths, seen.radar, seen.aperture_time, FINE, has_direct_path=is_heard)
+    return ExactRanges.of(paths, seen.radar, seen.aperture_time, FINE_NODE_COUNT, has_direct_path=is_heard)
 
 
 @pytest.mark.parametrize("family", FAMILIES)
@@ -111,7 +112,7 @@ def test_errors_without_a_point_are_marked_and_leave_the_others_alone() -> None:
     study = Study(parse_mission(mission_text()))
     source = next(s for s in study.sources if s.id == "timing.constant")
     found = by_courses(study, source, [1e-9, -1e-3, 2e-9])  # 300 km nearer than the scene is
-    assert found.is_found.tolist() == [True, False, True]
+    assert found.is_settled.tolist() == [True, False, True]
     assert np.isnan(found.quadratic[1])
     assert np.isfinite(found.east[[0, 2]]).all()
 
@@ -121,25 +122,26 @@ def test_a_start_nearby_changes_nothing() -> None:
     source = next(s for s in study.sources if s.id == "receiver.velocity.y")
     exact, one = of_study(study), np.zeros(1, dtype=int)
     flown = study.collection.flight(study.errors(source, 0.5), aperture_nodes(6.0)).paths
-    given = np.zeros((FINE, 1)), [(path.measured - path.actual).T[..., None] for path in flown]
+    given = np.zeros((FINE_NODE_COUNT, 1)), [(path.measured - path.actual).T[..., None] for path in flown]
     first = exact.settled(*given, (0.0, 0.0), one)
     again = exact.settled(*given, (first.east + 0.5, first.north + 0.5), one)
     assert [again.east[0], again.north[0]] == pytest.approx([first.east[0], first.north[0]], abs=1e-6)
 
 
-@pytest.mark.parametrize("together", [1, 2 * FINE, 3 * FINE])
+@pytest.mark.parametrize("together", [1, 2 * FINE_NODE_COUNT, 3 * FINE_NODE_COUNT])
 def test_blocks_change_nothing(monkeypatch: pytest.MonkeyPatch, together: int) -> None:
     """Seven lanes, of which the last block is shorter; one platform is still, and one lane has no point."""
     study = Study(parse_mission(mission_text()))
     exact, generator, case = of_study(study), np.random.default_rng(1), np.zeros(7, dtype=int)
-    shifts = [STILL, generator.normal(scale=5.0, size=(3, FINE, 7))]
-    clock = generator.normal(size=(FINE, 7))
+    shifts = [STILL, generator.normal(scale=5.0, size=(3, FINE_NODE_COUNT, 7))]
+    clock = generator.normal(size=(FINE_NODE_COUNT, 7))
     clock[:, 3] = -3e5
     at_once = exact.settled(clock, shifts, (0.0, 0.0), case)
     with monkeypatch.context() as changed:
-        changed.setattr(exact_ranges, "TOGETHER", together)
+        settings = replace(exact_ranges.SETTINGS, samples_at_once=together)
+        changed.setattr(exact_ranges, "SETTINGS", settings)
         in_blocks = exact.settled(clock, shifts, (0.0, 0.0), case)
-    assert in_blocks.is_found.tolist() == [True] * 3 + [False] + [True] * 3
+    assert in_blocks.is_settled.tolist() == [True] * 3 + [False] + [True] * 3
     for one, other in zip(in_blocks, at_once, strict=True):
         assert one == pytest.approx(other, rel=1e-9, abs=1e-9, nan_ok=True)
 
@@ -151,14 +153,14 @@ def test_a_far_point_is_followed() -> None:
     nearest = float(exact.nearest[0])
     directions = np.random.default_rng(2).normal(size=(3, 1, 400))
     sizes = nearest * np.linspace(0.0, 0.9, 400)
-    shifts = [directions / np.linalg.norm(directions, axis=0) * sizes * np.ones((1, FINE, 1)), STILL]
-    case, clock = np.zeros(400, dtype=int), np.zeros((FINE, 400))
+    shifts = [directions / np.linalg.norm(directions, axis=0) * sizes * np.ones((1, FINE_NODE_COUNT, 1)), STILL]
+    case, clock = np.zeros(400, dtype=int), np.zeros((FINE_NODE_COUNT, 400))
     at_once = exact.settled(clock, shifts, (0.0, 0.0), case)
     found = followed(exact, clock, shifts, case)
-    assert (found.is_found & ~at_once.is_found).any()
-    assert not (at_once.is_found & ~found.is_found).any()
+    assert (found.is_settled & ~at_once.is_settled).any()
+    assert not (at_once.is_settled & ~found.is_settled).any()
     # V has no lower value within a metre of what is found, in eight directions.
-    some = np.flatnonzero(found.is_found)
+    some = np.flatnonzero(found.is_settled)
     tracks = [np.stack(track) for track in exact.tracks]
     band = (study.collection.radar.bandwidth / study.collection.radar.center_frequency) ** 2 / 12
 
@@ -203,4 +205,4 @@ def test_a_point_that_meets_a_platform_has_no_image(part: float, is_found: bool)
         ones = np.ones((len(analysis.exact.times), 1))
         lanes = Lanes(np.zeros(1, dtype=int), ones, moves=(1.0, 0.0), direction=position, order=0)
         found = analysis.exact.phases(lanes, np.array([-part]), (0.0, 0.0))
-        assert found.is_found[0] == is_found
+        assert found.is_settled[0] == is_found

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bisar_budget.analysis.analysis import Analysis
-from bisar_budget.effects.declared import CUBIC, FARTHEST, LOCATION, QUADRATIC
+from bisar_budget.effects.declared import CUBIC, FARTHEST_RANGE_FRACTION, LOCATION, QUADRATIC
 from bisar_budget.faults import SetValue
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.ranges import point_paths
@@ -148,7 +148,7 @@ def test_no_error_is_allowed_that_takes_its_platform_beyond_a_tenth_of_its_range
                 allowable = analysis.full.allowable(source, QUADRATIC, limit)
                 assert allowable is None or allowable <= farthest * (1 + 1e-9)
     receiver = next(s for s in analysis.sources if s.id == "receiver.position.x")
-    assert farthest_size(analysis, receiver) == pytest.approx(FARTHEST * math.hypot(6e3, 6e3, 2e3))
+    assert farthest_size(analysis, receiver) == pytest.approx(FARTHEST_RANGE_FRACTION * math.hypot(6e3, 6e3, 2e3))
     assert analysis.full.allowable(receiver, QUADRATIC, 1e4) is None
 
 

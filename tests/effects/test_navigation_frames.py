@@ -15,7 +15,14 @@ from bisar_budget.effects.random_effect import RandomError, SensorCases
 from bisar_budget.effects.random_errors import random_errors
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import Mission
-from bisar_budget.ranges.exact_ranges import FINE, STILL, ExactRanges, Found, aperture_nodes, followed
+from bisar_budget.ranges.exact_ranges import (
+    FINE_NODE_COUNT,
+    STILL,
+    ExactRanges,
+    ImagePoints,
+    aperture_nodes,
+    followed,
+)
 from bisar_budget.sampling.draws import HeldSum, Sums, Variable, drawing_of
 from bisar_budget.verifier.study import Study
 from tests.image_point import Collection, Path, Response, flight, no_error
@@ -71,15 +78,15 @@ def arm(times: np.ndarray) -> np.ndarray:
     return np.einsum("a,tad->td", ARM, body(times))
 
 
-def through(mission: Mission, receiver: np.ndarray | None, transmitter: np.ndarray | None = None) -> Found:
+def through(mission: Mission, receiver: np.ndarray | None, transmitter: np.ndarray | None = None) -> ImagePoints:
     """Effects of histories of position errors, (draws, nodes, 3) each."""
-    exact = ExactRanges.of(mission.geometry.both, mission.radar, T, FINE)
+    exact = ExactRanges.of(mission.geometry.both, mission.radar, T, FINE_NODE_COUNT)
     draws = len(receiver if receiver is not None else transmitter)
     shifts = [STILL if one is None else np.ascontiguousarray(one.T) for one in (transmitter, receiver)]
-    return followed(exact, np.zeros((FINE, draws)), shifts, np.zeros(draws, dtype=int))
+    return followed(exact, np.zeros((FINE_NODE_COUNT, draws)), shifts, np.zeros(draws, dtype=int))
 
 
-def agrees(error: RandomError, found: Found, rel: float = SIGMA) -> None:
+def agrees(error: RandomError, found: ImagePoints, rel: float = SIGMA) -> None:
     drawn = np.array((found.quadratic, found.cubic, found.east, found.north))
     computed = np.array(error.full[:2] + error.full[3:5]) * error.declared
     sigmas = np.sqrt(np.square(drawn).mean(axis=1))
@@ -203,7 +210,7 @@ class TestLeverArm:
         mission = parse_mission(text.replace("COMMON", ""))
         error = found_of(mission, "receiver.lever_arm.attitude")
         drawn = np.random.default_rng(4).standard_normal((DRAWS, 1, 3)) * 1e-3
-        moved = np.broadcast_to(np.cross(drawn, [0.0, 0, 2]), (DRAWS, FINE, 3))
+        moved = np.broadcast_to(np.cross(drawn, [0.0, 0, 2]), (DRAWS, FINE_NODE_COUNT, 3))
         agrees(error, through(mission, moved))
 
     def test_an_arm_of_nothing_changes_nothing(self) -> None:
@@ -331,7 +338,7 @@ platforms:
         (source,) = analysis.stated
         assert source.id == "common.time_tag"
         does = Case(analysis).does(analysis.full, source)
-        late = np.broadcast_to(VT * 1e-3, (1, FINE, 3))
+        late = np.broadcast_to(VT * 1e-3, (1, FINE_NODE_COUNT, 3))
         exact = through(mission, flown(1e-3)[None], late)
         assert does.displacement == pytest.approx((exact.east[0], exact.north[0]), rel=EXACT)
         assert does.qpe == pytest.approx(exact.quadratic[0], rel=EXACT)
@@ -379,9 +386,11 @@ class TestLargeTimeTags:
     def test_where_the_direct_path_is_the_clock(self) -> None:
         common = "common_motion_error: {time_tag: 0.3 s}\nsynchronization: {method: direct_path, error: 1 deg}"
         analysis = Analysis(mission_of(common=common))
-        exact = ExactRanges.of(analysis.geometry.both, analysis.mission.radar, T, FINE, has_direct_path=True)
+        exact = ExactRanges.of(
+            analysis.geometry.both, analysis.mission.radar, T, FINE_NODE_COUNT, has_direct_path=True
+        )
         shifts = [list((path(TIMES + 0.3) - path(TIMES)).T[..., None]) for path in (flight(PT, VT), flight(P, V, A))]
-        found = followed(exact, np.zeros((FINE, 1)), shifts, np.zeros(1, dtype=int))
+        found = followed(exact, np.zeros((FINE_NODE_COUNT, 1)), shifts, np.zeros(1, dtype=int))
         (does,) = (Case(analysis).does(analysis.full, one) for one in analysis.stated)
         assert does.displacement == pytest.approx((found.east[0], found.north[0]), rel=1e-6)
 
@@ -484,7 +493,7 @@ class TestCommonFrames:
         source = next(one for one in analysis.stated if one.id == "common.position.along")
         size, _ = analysis.full.allowed(source, (math.pi / 8, None, None))
         of_tx, of_rx = (axes[0] for axes in self.axes("track"))
-        course = np.ones((1, FINE, 1))
+        course = np.ones((1, FINE_NODE_COUNT, 1))
         phases = [
             abs(through(mission, signed * course * of_rx, signed * course * of_tx).quadratic[0])
             for signed in (size, -size)
@@ -533,7 +542,7 @@ class TestCourses:
         # Of t² − t³/5 over ±2 s: P₂ of t² has 4·2/3, at the edge 3/2 of it; P₃ of t³/5 has 8/5·2/5, 5/2 of it.
         assert published.quadratic == pytest.approx(4 * k)
         assert published.cubic == pytest.approx(8 / 5 * k)
-        fine = ExactRanges.of(mission.geometry.both, mission.radar, T, FINE)
+        fine = ExactRanges.of(mission.geometry.both, mission.radar, T, FINE_NODE_COUNT)
         x = TIMES[:, None]
         every = np.stack([1 + 0 * x, x, x**2 - x**3 / 5], axis=1)[..., 0] * 1e-4 * (1 + 0.05 * x)
         found = followed(fine, every, (STILL, STILL), np.zeros(3, dtype=int))
@@ -590,15 +599,17 @@ class TestOtherPlaces:
         link = "synchronization: {method: direct_path, error: 1 deg}"
         mission = mission_of(common=f"common_motion_error: {{{said}}}\n{link}")
         analysis = Analysis(mission)
-        exact = ExactRanges.of(mission.geometry.both, mission.radar, T, FINE, has_direct_path=True)
+        exact = ExactRanges.of(mission.geometry.both, mission.radar, T, FINE_NODE_COUNT, has_direct_path=True)
         frame = said.split(",")[0].removeprefix("frame: ")
         for index, source in enumerate(analysis.stated):
             if "time_tag" in said:
-                of_tx, of_rx = np.broadcast_to(VT * 1e-3, (FINE, 3)), flown(1e-3)
+                of_tx, of_rx = np.broadcast_to(VT * 1e-3, (FINE_NODE_COUNT, 3)), flown(1e-3)
             else:
-                of_tx, of_rx = (2.0 * np.tile(one[index], (FINE, 1)) for one in TestCommonFrames.axes(frame))
+                of_tx, of_rx = (
+                    2.0 * np.tile(one[index], (FINE_NODE_COUNT, 1)) for one in TestCommonFrames.axes(frame)
+                )
             shifts = [np.ascontiguousarray(one[None].T) for one in (of_tx, of_rx)]
-            found = followed(exact, np.zeros((FINE, 1)), shifts, np.zeros(1, dtype=int))
+            found = followed(exact, np.zeros((FINE_NODE_COUNT, 1)), shifts, np.zeros(1, dtype=int))
             does = Case(analysis).does(analysis.full, source)
             assert does.displacement == pytest.approx((found.east[0], found.north[0]), rel=EXACT, abs=1e-4)
             assert does.qpe == pytest.approx(found.quadratic[0], rel=0.01, abs=2e-3)

@@ -18,7 +18,14 @@ from bisar_budget.geometry import PlatformState
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.quantities import with_number
-from bisar_budget.ranges.exact_ranges import FINE, STILL, ExactRanges, Found, aperture_nodes, followed
+from bisar_budget.ranges.exact_ranges import (
+    FINE_NODE_COUNT,
+    STILL,
+    ExactRanges,
+    ImagePoints,
+    aperture_nodes,
+    followed,
+)
 
 HALF_PERCENT = 0.005
 SECOND_ORDER = 1e-3  # rad, of displacements by metres
@@ -51,15 +58,15 @@ def of(text: str, row_id: str) -> tuple[Mission, RandomError]:
     return analysis.mission, next(error for error in analysis.random if error.id == f"propagation.{row_id}")
 
 
-def through_exact_ranges(mission: Mission, range_error: Callable[[np.ndarray], np.ndarray]) -> Found:
+def through_exact_ranges(mission: Mission, range_error: Callable[[np.ndarray], np.ndarray]) -> ImagePoints:
     """Effect of a range error over the aperture [m], to any order."""
     T = mission.collection.aperture_time
     heard = mission.has_direct_path
-    exact = ExactRanges.of(mission.geometry.both, mission.radar, T, FINE, has_direct_path=heard)
+    exact = ExactRanges.of(mission.geometry.both, mission.radar, T, FINE_NODE_COUNT, has_direct_path=heard)
     return followed(exact, range_error(aperture_nodes(T))[:, None], (STILL, STILL), np.zeros(1, dtype=int))
 
 
-def is_what_was_found(error: RandomError, size: float, found: Found) -> None:
+def is_what_was_found(error: RandomError, size: float, found: ImagePoints) -> None:
     """Hold magnitudes, and the signs by which they go together, to exact ranges."""
     effects = np.array((found.quadratic, found.cubic, found.east, found.north))[:, 0]
     assert np.hypot(*effects[2:]) == pytest.approx(error.full.displacement * size, rel=HALF_PERCENT)

@@ -16,7 +16,14 @@ from bisar_budget.effects.spectra import PowerLawPiece, synchronized_parts
 from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.quantities import with_number
-from bisar_budget.ranges.exact_ranges import FINE, STILL, ExactRanges, Found, aperture_nodes, followed
+from bisar_budget.ranges.exact_ranges import (
+    FINE_NODE_COUNT,
+    STILL,
+    ExactRanges,
+    ImagePoints,
+    aperture_nodes,
+    followed,
+)
 from tests.conftest import ROOT
 from tests.image_point import Collection, flight, no_error
 
@@ -57,19 +64,19 @@ def of(analysis: Analysis, row_id: str) -> RandomError:
     return next(error for error in analysis.random if error.id == row_id)
 
 
-def through_exact_ranges(mission: Mission, position_error: np.ndarray, times: np.ndarray) -> Found:
+def through_exact_ranges(mission: Mission, position_error: np.ndarray, times: np.ndarray) -> ImagePoints:
     """Effects of position errors of the receiver, (draws, nodes, 3), sampled at the nodes."""
     T = mission.collection.aperture_time
     paths = (mission.geometry.transmitter, mission.geometry.receiver)
     assert np.allclose(times, aperture_nodes(T))
-    exact = ExactRanges.of(paths, mission.radar, T, FINE)
+    exact = ExactRanges.of(paths, mission.radar, T, FINE_NODE_COUNT)
     draws = len(position_error)
-    return followed(exact, np.zeros((FINE, draws)), (STILL, position_error.T), np.zeros(draws, dtype=int))
+    return followed(exact, np.zeros((FINE_NODE_COUNT, draws)), (STILL, position_error.T), np.zeros(draws, dtype=int))
 
 
-def through_the_clock(mission: Mission, phase: np.ndarray) -> Found:
+def through_the_clock(mission: Mission, phase: np.ndarray) -> ImagePoints:
     """Effects of phases of a clock, (draws, nodes), sampled at the nodes. [rad]"""
-    exact = ExactRanges.of(mission.geometry.both, mission.radar, mission.collection.aperture_time, FINE)
+    exact = ExactRanges.of(mission.geometry.both, mission.radar, mission.collection.aperture_time, FINE_NODE_COUNT)
     moved = phase.T * mission.radar.wavelength / (2 * math.pi)
     return followed(exact, moved, (STILL, STILL), np.zeros(len(phase), dtype=int))
 
@@ -89,7 +96,7 @@ def test_noise_of_a_link_displaces_by_its_slope_alone() -> None:
         assert np.std(drawn) == pytest.approx(computed * error.declared, rel=SIGMA)
 
 
-def agrees_with_draws(error: RandomError, found: Found) -> None:
+def agrees_with_draws(error: RandomError, found: ImagePoints) -> None:
     """Hold sigmas of phases and displacement, and how they go together, to what was drawn."""
     drawn = np.array((found.quadratic, found.cubic, found.east, found.north))
     computed = np.array(error.full[:2] + error.full[3:5]) * error.declared

@@ -16,7 +16,14 @@ from bisar_budget.effects.vibration import displacement_rms
 from bisar_budget.mission.load import parse_mission
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.quantities import with_number
-from bisar_budget.ranges.exact_ranges import FINE, STILL, ExactRanges, Found, aperture_nodes, followed
+from bisar_budget.ranges.exact_ranges import (
+    FINE_NODE_COUNT,
+    STILL,
+    ExactRanges,
+    ImagePoints,
+    aperture_nodes,
+    followed,
+)
 from tests.conftest import TODAY, row
 
 G = STANDARD_GRAVITY
@@ -215,16 +222,16 @@ def series(density, T: float, rng: np.random.Generator) -> np.ndarray:
     return rng.standard_normal((DRAWS, 2 * RATES.size)) @ of_tones
 
 
-def flown(found: Mission, metres: np.ndarray, *, is_path: bool) -> Found:
+def flown(found: Mission, metres: np.ndarray, *, is_path: bool) -> ImagePoints:
     """Range errors at the nodes, (draws, nodes) [m]: of the receiver along its line of sight, or of the clock."""
     T, paths = found.collection.aperture_time, found.geometry.both
-    exact = ExactRanges.of(paths, found.radar, T, FINE)
+    exact = ExactRanges.of(paths, found.radar, T, FINE_NODE_COUNT)
     draws, none = len(metres), np.zeros(len(metres), dtype=int)
     if not is_path:
         return followed(exact, metres.T, (STILL, STILL), none)
     places = np.array(paths[1].place(aperture_nodes(T)))
     shift = (places / np.linalg.norm(places, axis=0))[:, :, None] * metres.T
-    return followed(exact, np.zeros((FINE, draws)), (STILL, shift), none)
+    return followed(exact, np.zeros((FINE_NODE_COUNT, draws)), (STILL, shift), none)
 
 
 def density(f: np.ndarray) -> np.ndarray:
