@@ -65,7 +65,7 @@ class Analysis:
         Of the aperture, that all cases need.
     shown : mapping of str to Subject, optional
         Ids of rows of which the allowable is asked though nothing is declared; omitted: all.
-    is_whole : bool
+    is_complete : bool
         All of each row is asked for, not only what decides; a case is then the same however many there are.
     is_of_sums : bool
         Only what errors add up to is asked for: one that counts in a sum needs no allowable of its own.
@@ -79,12 +79,12 @@ class Analysis:
         geometry: BistaticGeometry | None = None,
         nodes: int | None = None,
         shown: Mapping[str, Subject] | None = None,
-        is_whole: bool = False,
+        is_complete: bool = False,
         is_of_sums: bool = False,
     ) -> None:
         self.mission, self.cases, self.nodes, self.shown = mission, cases, nodes, shown
         self.is_of_sums = is_of_sums and mission.allocation.combine != "each"
-        self.is_by_itself, self.is_whole = geometry is None, is_whole
+        self.is_by_itself, self.is_complete = geometry is None, is_complete
         self.geometry = mission.geometry if geometry is None else geometry
         self._together: dict[str, Together] = {}
 
@@ -113,7 +113,7 @@ class Analysis:
             self.exact,
             self.shown,
             gain=autofocus_gain_of(self.mission),
-            is_whole=self.is_whole,
+            is_complete=self.is_complete,
         )
 
     @cached_property

@@ -217,7 +217,7 @@ class ScenePhases:
         sizes, every = np.tile(np.abs(self.sizes[error, case]), 2), np.arange(2 * count)
         none = np.zeros(2 * count)
         way = np.array(there.way(lanes, none, (none, none)))
-        paths = PointPaths(there, lanes, way, is_alike=self.errors.is_whole)
+        paths = PointPaths(there, lanes, way, is_alike=self.errors.is_complete)
         paths.follow_to(every, sizes)
         known = paths.known(every, sizes).reshape(len(ROWS), 2, count)
         np.minimum.at(turns, place, np.nan_to_num(known[-1]).min(axis=0))

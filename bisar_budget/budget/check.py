@@ -59,7 +59,7 @@ def check_mission(mission: Mission, today: date, *, outside: Outside = NOTHING_O
     MissionFindings
         Rows of declared and undeclared errors, in the order of the contract.
     """
-    analysis = Analysis(mission, is_whole=True)
+    analysis = Analysis(mission, is_complete=True)
     return _findings(judged_mission(analysis, today), Case(analysis), today, outside)
 
 
@@ -84,7 +84,9 @@ def check_missions(
             for nodes, same_nodes, mission_of_nodes, geometry in by_nodes(
                 block_mission, block.size, block_mission.geometry
             ):
-                analysis = Analysis(mission_of_nodes, same_nodes.size, geometry=geometry, nodes=nodes, is_whole=True)
+                analysis = Analysis(
+                    mission_of_nodes, same_nodes.size, geometry=geometry, nodes=nodes, is_complete=True
+                )
                 judged = judged_mission(analysis, today)
                 for case_index, index in enumerate(block[same_nodes].tolist()):
                     yield index, _findings(judged, Case(analysis, missions[index], case_index), today, outside)
@@ -96,7 +98,7 @@ def _findings(judged: JudgedMission, case: Case, today: date, outside: Outside) 
     waived = apply_waivers(list(rows_in_words(judged, case)), mission, today)
     rows, requirements = waived.rows, requirements_in_words(judged, case, waived)
     return MissionFindings(
-        analysis=case.analysis if case.analysis.is_by_itself else Analysis(mission, is_whole=True),
+        analysis=case.analysis if case.analysis.is_by_itself else Analysis(mission, is_complete=True),
         file=mission.file,
         name=mission.name,
         model=mission.gating_model,

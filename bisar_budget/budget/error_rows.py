@@ -55,7 +55,7 @@ class ErrorRows:
             yield from self._of_block(block_index, gating)
 
     def _of_block(self, block_index: int, gating: str) -> Iterator["ErrorRow"]:
-        errors, block, asks_for_all = self.errors, self.errors.blocks[block_index], self.judging.is_whole
+        errors, block, asks_for_all = self.errors, self.errors.blocks[block_index], self.judging.is_complete
         other_model = OTHER_MODEL[gating]
         needs, sources = errors.mission.requirements, block.sources
         limit = np.array([self.limits[source.owner] for source in sources])
@@ -63,7 +63,7 @@ class ErrorRows:
         # Searches start from what declared errors are known to do.
         mine, theirs = errors.of_block(gating, block_index), errors.of_block(other_model, block_index)
         searched = (None, None, None) if self.is_of_sums else limits
-        allowed = block.allowed(gating, searched, is_whole=asks_for_all)
+        allowed = block.allowed(gating, searched, is_complete=asks_for_all)
         published, full = (mine, theirs) if gating == "published" else (theirs, mine)
         is_again = np.array([[not source.is_independent] for source in sources])
         judged = self.judging.row(
@@ -83,7 +83,7 @@ class ErrorRows:
             rest_rad=np.where(np.isfinite(full.qpe) & block.is_motion, full.rest, math.nan),
         )
         if asks_for_all:
-            allowed_by_other = block.allowed(other_model, (limit, None, None), is_whole=True)
+            allowed_by_other = block.allowed(other_model, (limit, None, None), is_complete=True)
             quadratic = {gating: allowed.quadratic, other_model: allowed_by_other.quadratic}
             judged = judged._replace(
                 allowable_published=quadratic["published"],

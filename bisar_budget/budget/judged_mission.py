@@ -117,7 +117,7 @@ class _Judgement:
     def __init__(self, analysis: Analysis, today: date) -> None:
         self.analysis, self.mission, self.today = analysis, analysis.mission, today
         self.cases, self.shown = analysis.cases, analysis.shown
-        self.judging = Judging(self.cases, self.mission.allocation.warn_above, analysis.is_whole)
+        self.judging = Judging(self.cases, self.mission.allocation.warn_above, analysis.is_complete)
 
     def judge(self) -> JudgedMission:
         """Judge every row and every requirement."""

@@ -170,12 +170,12 @@ def decibels(amplitude: Any) -> Floats:
 class Judging(NamedTuple):
     """How many cases there are, and from which utilization on a pass of each is a warning.
 
-    `is_whole` says whether all of a row is asked for, or what decides.
+    `is_complete` says whether all of a row is asked for, or what decides.
     """
 
     cases: int
     warn_above: Any
-    is_whole: bool = False
+    is_complete: bool = False
 
     def array(self, value: Any) -> Floats:
         """One number for each case; not a number for None."""

@@ -183,7 +183,7 @@ class RandomRows:
             ),
         )
         judged = judged._replace(utilization=np.where(is_open, math.nan, judged.utilization))
-        if self.judging.is_whole:
+        if self.judging.is_complete:
             by_published, by_full = (
                 np.where(error.judged(gain) > 0, limit * gain / error.judged(gain), math.nan)
                 for error in (published, full)

@@ -122,7 +122,7 @@ class Vibrations:
             judged = judged.held_to(metric)
         else:
             judged = phases.row(self.judging, row_subject, metric, declared, allowable, doubt=doubt | is_over_other)
-        if self.judging.is_whole:
+        if self.judging.is_complete:
             if limits is not None:
                 judged = self._with_limits(judged, limits)
             if phases is not None and declared is not None:
@@ -201,7 +201,7 @@ class Vibrations:
             quadratic_use=limits.quadratic_use,
         )
         both_limits = VibrationLimits(limits.quadratic, limits.quadratic)
-        if self.judging.is_whole:
+        if self.judging.is_complete:
             judged = self._with_limits(judged, both_limits)._replace(qpe_full_rad=qpe)
         return VibrationRow(
             judged,

@@ -287,7 +287,7 @@ class Table:
         wanted = {row for row, _ in self.fields.values()} | ({question.row} if question.row else set())
         rows = judged_mission(Analysis(self.mission), question.today).rows if wanted else ()
         self.subjects = {row.subject.id: row.subject for row in rows if row.subject.id in wanted}
-        self.is_whole = any(field in WHOLE for _, field in self.fields.values())
+        self.is_complete = any(field in WHOLE for _, field in self.fields.values())
         # Numbers that decide more than themselves: a case that has another value than the mission is read.
         self.to_read = {
             one.key
@@ -424,7 +424,7 @@ class Table:
         """Judge the cases of a mission together, those that need as many nodes."""
         for nodes, same, part, seen in by_nodes(mission, some.size, geometries):
             analysis = Analysis(
-                part, same.size, geometry=seen, nodes=nodes, shown=self.subjects, is_whole=self.is_whole
+                part, same.size, geometry=seen, nodes=nodes, shown=self.subjects, is_complete=self.is_complete
             )
             judged = judged_mission(analysis, self.question.today)
             rows = {row.subject.id: row for row in judged.rows}

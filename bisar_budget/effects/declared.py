@@ -24,6 +24,7 @@ from bisar_budget.effects.sources import ErrorListing
 from bisar_budget.geometry import BistaticGeometry, GroundVector, angle_between_lines, norm
 from bisar_budget.mission.model import Mission
 from bisar_budget.phrases import NOTHING, Note
+from bisar_budget.ranges import point_paths
 from bisar_budget.ranges.exact_ranges import (
     QUADRATIC_OF_VARIANCE,
     Effect,
@@ -94,22 +95,26 @@ class Declared(NamedTuple):
         east, north = (np.where(is_ahead, a, -b) for a, b in ((x, u), (y, v)))
         return np.where(is_gone, math.nan, east), np.where(is_gone, math.nan, north)
 
-    def of(self, some: Any) -> "Declared":
+    def of(self, errors: Any) -> "Declared":
         """The same of some of the errors."""
         (x, y), (u, v) = self.displacement, self.opposite
-        phases = self.qpe[some], self.cubic[some]
-        return Declared(*phases, (x[some], y[some]), (u[some], v[some]), self.hidden[some], self.rest[some])
+        phases = self.qpe[errors], self.cubic[errors]
+        return Declared(
+            *phases, (x[errors], y[errors]), (u[errors], v[errors]), self.hidden[errors], self.rest[errors]
+        )
 
     def in_one_case(self, case: int = 0) -> "Declared":
         """The same with plain numbers in the place of arrays, those of a case."""
         moved, opposite = point(self.displacement, case), point(self.opposite, case)
-        qpe, cubic, hidden, rest = (plain(part, case) for part in (self.qpe, self.cubic, self.hidden, self.rest))
-        return Declared(qpe, cubic, moved, opposite, hidden, rest)
+        qpe, cubic, hidden, beyond_cubic = (
+            plain(phase, case) for phase in (self.qpe, self.cubic, self.hidden, self.rest)
+        )
+        return Declared(qpe, cubic, moved, opposite, hidden, beyond_cubic)
 
 
-def point(place: tuple[Any, Any], case: int = 0) -> GroundVector | None:
+def point(displacement: tuple[Any, Any], case: int = 0) -> GroundVector | None:
     """A place of the ground in one case; None where there is none. [m]"""
-    east, north = (plain(part, case) for part in place)
+    east, north = (plain(component, case) for component in displacement)
     return None if math.isnan(east) else (east, north)
 
 
@@ -190,15 +195,15 @@ class ErrorBlock:
         self.declared = np.full(shape, math.nan)
         self.edge = np.empty(shape)  # of a position error at the aperture's, of a unit [m]
         published, full = np.empty((4, *shape)), np.empty((4, *shape))
-        for place, source in enumerate(sources):
+        for index, source in enumerate(sources):
             if source.declared is not None:
-                self.declared[place] = source.declared
-            self.edge[place] = table.edge_of(source)
-            for part, numbers in enumerate(zip(source.effect, source.full, strict=True)):
-                published[part, place], full[part, place] = numbers
+                self.declared[index] = source.declared
+            self.edge[index] = table.edge_of(source)
+            for column, numbers in enumerate(zip(source.effect, source.full, strict=True)):
+                published[column, index], full[column, index] = numbers
         self.effects: dict[str, Any] = {"published": Effect(*published), "full": FullEffect(*full)}
         self.is_motion = np.array([[source.is_motion] for source in sources])
-        self.moves = [place for place, source in enumerate(sources) if source.displaces]
+        self.moves = [index for index, source in enumerate(sources) if source.displaces]
         self._per_unit: dict[str, Floats] = {}
         self._follows: PointPaths | None = None
 
@@ -220,20 +225,20 @@ class ErrorBlock:
     @cached_property
     def hidden_per_unit(self) -> Floats:
         """Hidden phase, and rms beyond the cubic, by a small unit of each error, (2, errors, cases). [rad]"""
-        found = np.zeros((2, *self.declared.shape))
+        phases = np.zeros((2, *self.declared.shape))
         if self.moves:
-            left = self.left_per_unit(self.moves)
-            found[:, self.moves] = self.exact.unresolved(left)
-        return found
+            remaining = self.left_per_unit(self.moves)
+            phases[:, self.moves] = self.exact.unresolved(remaining)
+        return phases
 
-    def left_per_unit(self, places: Sequence[int]) -> Floats:
+    def left_per_unit(self, indices: Sequence[int]) -> Floats:
         """Range error at the nodes that a small unit of some errors leaves, (errors, nodes, cases). [m]"""
-        table, full, sources = self.table, self.effects["full"], [self.sources[place] for place in places]
+        table, full, sources = self.table, self.effects["full"], [self.sources[index] for index in indices]
         if self.cases == 1:
             range_error = self.exact.range_error(table.lanes(*sources)).T[..., None]
         else:
             range_error = np.stack([self.exact.range_error(table.lanes(source)) for source in sources])
-        return self.exact.left_of_small(range_error, (full.east[places], full.north[places]))
+        return self.exact.left_of_small(range_error, (full.east[indices], full.north[indices]))
 
     def adds(self, size: Floats) -> Floats:
         """Bounds of judged phase, cubic [rad] and displacement [m] that the second order adds, (3, errors, cases)."""
@@ -247,24 +252,24 @@ class ErrorBlock:
         as the phase does, V is less beside the point: by H⁻¹⟨r̃/R, ρ⟩.
         """
         full, exact, bent = self.effects["full"], self.exact, self._bent(size)
-        hidden, rest = self.hidden_per_unit
-        left_rad = np.sqrt(4 / 45 * (full.qpe**2 + hidden**2) + 4 / 175 * full.cubic**2 + rest**2)
+        hidden, beyond_cubic = self.hidden_per_unit
+        remaining_rad = np.sqrt(4 / 45 * (full.qpe**2 + hidden**2) + 4 / 175 * full.cubic**2 + beyond_cubic**2)
         turns = (np.abs(size) * self.edge + bent) / exact.nearest_node
-        left = np.abs(size) * left_rad / exact.k + bent
-        return np.asarray(turns * left * (1 + exact.band) / exact.matrix.least)
+        remaining_m = np.abs(size) * remaining_rad / exact.k + bent
+        return np.asarray(turns * remaining_m * (1 + exact.band) / exact.matrix.least)
 
     def _bent(self, size: Floats) -> Any:
         """How far errors take platforms from where small ones do, times what is known of them, (errors, cases). [m]
 
         Only a time tag is not proportional to its size. Where the direct path is the clock a metre is twice a metre.
         """
-        tags = [place for place, source in enumerate(self.sources) if source.is_time_tag]
+        tags = [index for index, source in enumerate(self.sources) if source.is_time_tag]
         if not tags:
             return 0.0
-        found = np.zeros(size.shape)
-        for place in tags:
-            found[place] = self.table.bent(self.sources[place], size[place]) * (1 + self.exact.has_direct_path)
-        return found
+        bends = np.zeros(size.shape)
+        for index in tags:
+            bends[index] = self.table.bent(self.sources[index], size[index]) * (1 + self.exact.has_direct_path)
+        return bends
 
     def _grows(self, size: Floats, strays: Floats) -> Floats:
         """Bound of the range error that the second order of errors adds, in metres.
@@ -274,26 +279,26 @@ class ErrorBlock:
         |P⊥r̃|²/2D, has the other sign: no more than the larger is added.
         """
         exact, bent = self.exact, self._bent(size)
-        own, moved = size * self.edge + bent, size * self.per_unit("full")[2] + strays
-        reach = own + moved
+        shift, moved = size * self.edge + bent, size * self.per_unit("full")[2] + strays
+        reach = shift + moved
         square = reach * reach
-        found = square / exact.nearest_node
+        growth = square / exact.nearest_node
         if exact.has_direct_path:
-            nearest, apart = [one.min(axis=0) for one in exact.ranges], exact.baselines.min(axis=0)
-            for place, source in enumerate(self.sources):
+            nearest, apart = [ranges.min(axis=0) for ranges in exact.ranges], exact.baselines.min(axis=0)
+            for index, source in enumerate(self.sources):
                 if source.owner in PLATFORMS:
                     platform = PLATFORMS.index(source.owner)
-                    of_ranges = square[place] / nearest[platform] + moved[place] ** 2 / nearest[1 - platform]
-                    found[place] = np.maximum(of_ranges, own[place] ** 2 / apart) / 2
-        return np.asarray(found + bent)
+                    of_ranges = square[index] / nearest[platform] + moved[index] ** 2 / nearest[1 - platform]
+                    growth[index] = np.maximum(of_ranges, shift[index] ** 2 / apart) / 2
+        return np.asarray(growth + bent)
 
     def is_large(self, size: Floats) -> Truths:
         """Where effects of errors are not proportional to their size, as far as anybody can see."""
         size = np.abs(size)
-        found = np.zeros(size.shape, dtype=bool)
+        large = np.zeros(size.shape, dtype=bool)
         for added, per_unit, floor in zip(self.adds(size), self.per_unit("full"), _FLOORS, strict=True):
-            found |= added > np.maximum(floor, SECOND_ORDER_FRACTION * per_unit * size)
-        return found & (size > 0) & self._is_moving
+            large |= added > np.maximum(floor, SECOND_ORDER_FRACTION * per_unit * size)
+        return large & (size > 0) & self._is_moving
 
     @cached_property
     def is_declared_large(self) -> Truths:
@@ -302,9 +307,9 @@ class ErrorBlock:
 
     @cached_property
     def _is_moving(self) -> Truths:
-        found = np.zeros((len(self.sources), 1), dtype=bool)
-        found[self.moves] = True
-        return found
+        moving = np.zeros((len(self.sources), 1), dtype=bool)
+        moving[self.moves] = True
+        return moving
 
     # ---------------------------------------------------------------- errors of any size
     def does(self, model: str, size: Floats) -> Declared:
@@ -312,38 +317,43 @@ class ErrorBlock:
         effect = self.effects[model]
         qpe, cubic = effect.qpe * size + 0.0, effect.cubic * size + 0.0
         moved = self.table.planes[model].displacement(effect, size)
-        east, north = (np.where(self.is_motion, part, math.nan) for part in moved)
-        hidden = rest = np.zeros(size.shape)
+        east, north = (np.where(self.is_motion, component, math.nan) for component in moved)
+        hidden = beyond_cubic = np.zeros(size.shape)
         if model == "full":
-            hidden, rest = self.hidden_per_unit * np.abs(size)
-        found = Declared(qpe, cubic, (east, north), (0.0 - east, 0.0 - north), hidden, rest)
+            hidden, beyond_cubic = self.hidden_per_unit * np.abs(size)
+        effects = Declared(qpe, cubic, (east, north), (0.0 - east, 0.0 - north), hidden, beyond_cubic)
         if model == "full":
             is_large = self.is_large(size)
             if is_large.any():
-                self._exactly(found, size, is_large)
-        return found
+                self._exactly(effects, size, is_large)
+        return effects
 
-    def _exactly(self, found: Declared, size: Floats, is_large: Truths) -> None:
+    def _exactly(self, effects: Declared, size: Floats, is_large: Truths) -> None:
         """Put what exact ranges say into the places that are too large for a first order."""
         sizes = size[is_large]
-        known = self.followed(is_large, np.abs(sizes))
-        ahead, back = (np.where(sizes > 0, *pair) for pair in (known, known[::-1]))
-        is_gone = np.isnan(ahead[0]) | np.isnan(back[0])  # no ground point: phases are infinite, none moves
-        for kept, row in ((found.qpe, 3), (found.cubic, 4), (found.rest, 6)):
+        points = self.followed(is_large, np.abs(sizes))
+        ahead, back = (np.where(sizes > 0, *pair) for pair in (points, points[::-1]))
+        # Without a ground point the phases are infinite, and there is no displacement.
+        is_gone = np.isnan(ahead[point_paths.SIZE]) | np.isnan(back[point_paths.SIZE])
+        phases = (effects.qpe, effects.cubic, effects.rest)
+        rows = (point_paths.QUADRATIC, point_paths.CUBIC, point_paths.REST)
+        for kept, row in zip(phases, rows, strict=True):
             largest = np.copysign(np.maximum(np.abs(ahead[row]), np.abs(back[row])), kept[is_large])
             kept[is_large] = np.where(is_gone, math.inf, largest)
         # The larger of the judged phases, of which the larger quadratic phase may be of the other sign.
         gain = np.broadcast_to(self.table.gain, size.shape)[is_large]
-        judged = np.maximum(*(np.hypot(one[3], gain * one[5]) for one in (ahead, back)))
+        judged = np.maximum(
+            *(np.hypot(each[point_paths.QUADRATIC], gain * each[point_paths.HIDDEN]) for each in (ahead, back))
+        )
         with np.errstate(invalid="ignore"):
-            hidden = np.sqrt(np.maximum(judged**2 - found.qpe[is_large] ** 2, 0.0)) / gain
-        found.hidden[is_large] = np.where(is_gone, 0.0, hidden)
-        for place, one in ((found.displacement, ahead), (found.opposite, back)):
-            place[0][is_large], place[1][is_large] = one[1:3]
+            hidden = np.sqrt(np.maximum(judged**2 - effects.qpe[is_large] ** 2, 0.0)) / gain
+        effects.hidden[is_large] = np.where(is_gone, 0.0, hidden)
+        for (east, north), each in ((effects.displacement, ahead), (effects.opposite, back)):
+            east[is_large], north[is_large] = each[point_paths.EAST], each[point_paths.NORTH]
 
-    def followed(self, some: Truths, sizes: Floats) -> Floats:
+    def followed(self, errors: Truths, sizes: Floats) -> Floats:
         """Rows of known points of some errors by sizes, of the positive sign and of the other, (2, rows, some)."""
-        lanes = np.concatenate(self._lanes_of(some))
+        lanes = np.concatenate(self._lanes_of(errors))
         both = np.tile(sizes, 2)
         self.paths.follow_to(lanes, both)
         return self.paths.known(lanes, both).reshape(len(ROWS), 2, -1).swapaxes(0, 1)
@@ -351,12 +361,12 @@ class ErrorBlock:
     @cached_property
     def _lane(self) -> Indices:
         """Lane of each error with a positive sign, in each case; those with the other sign follow."""
-        found = np.zeros((len(self.sources), 1), dtype=int)
-        found[self.moves, 0] = 2 * self.cases * np.arange(len(self.moves))
-        return found + np.arange(self.cases)
+        first_lane = np.zeros((len(self.sources), 1), dtype=int)
+        first_lane[self.moves, 0] = 2 * self.cases * np.arange(len(self.moves))
+        return first_lane + np.arange(self.cases)
 
-    def _lanes_of(self, some: Truths) -> tuple[Indices, Indices]:
-        lanes = self._lane[some]
+    def _lanes_of(self, errors: Truths) -> tuple[Indices, Indices]:
+        lanes = self._lane[errors]
         return lanes, lanes + self.cases
 
     @property
@@ -364,11 +374,11 @@ class ErrorBlock:
         """The ways of the point by the errors that displace it: of each positive sign first."""
         if self._follows is None:
             table, full = self.table, self.effects["full"]
-            lanes = table.lanes(*(self.sources[place] for place in self.moves), signs=(1.0, -1.0))
-            of_moving = FullEffect._make(part[self.moves] for part in full)
+            lanes = table.lanes(*(self.sources[index] for index in self.moves), signs=(1.0, -1.0))
+            of_moving = FullEffect._make(column[self.moves] for column in full)
             moved = np.array(table.planes["full"].displacement(of_moving, 1.0))  # (2, moving, cases)
             per_unit = np.stack((moved, -moved), axis=2).reshape(2, -1)
-            self._follows = PointPaths(self.exact, lanes, per_unit, is_alike=table.is_whole)
+            self._follows = PointPaths(self.exact, lanes, per_unit, is_alike=table.is_complete)
         return self._follows
 
     def forget(self) -> None:
@@ -381,11 +391,12 @@ class ErrorBlock:
 
         (2, errors, cases), not a number where they leave no image.
         """
-        found = np.full((2, *self.declared.shape), math.nan)
+        phases = np.full((2, *self.declared.shape), math.nan)
         is_large = self.is_declared_large
         if is_large.any():
-            found[:, is_large] = self.followed(is_large, np.abs(self.declared[is_large]))[:, 3]
-        return found
+            points = self.followed(is_large, np.abs(self.declared[is_large]))
+            phases[:, is_large] = points[:, point_paths.QUADRATIC]
+        return phases
 
     # ---------------------------------------------------------------- how large they may be
     @cached_property
@@ -395,21 +406,21 @@ class ErrorBlock:
         A larger error of a path is none of navigation.
         """
         slant = [path.slant_range for path in self.table.geometries.both]
-        found = np.full(self.declared.shape, math.inf)
-        for place in self.moves:
-            source = self.sources[place]
-            reached = [slant[one] for one in source.platforms]
+        size = np.full(self.declared.shape, math.inf)
+        for index in self.moves:
+            source = self.sources[index]
+            reached = [slant[platform] for platform in source.platforms]
             if reached:
                 nearer = np.minimum(*reached) if len(reached) > 1 else reached[0]
-                found[place] = FARTHEST_RANGE_FRACTION * nearer / self.edge[place]
+                size[index] = FARTHEST_RANGE_FRACTION * nearer / self.edge[index]
             else:
                 # A clock takes no platform anywhere. No range sum is shorter than the distance of the platforms, and
                 # that is at least the sum less twice the nearer range: by then an image has ended.
                 course = self.exact.clock_course(source.clock or ())
-                found[place] = 2 * np.minimum(*slant) / np.abs(course).max(axis=0)
-        return found
+                size[index] = 2 * np.minimum(*slant) / np.abs(course).max(axis=0)
+        return size
 
-    def allowed(self, model: str, limits: Sequence[Any], *, is_whole: bool) -> Allowed:
+    def allowed(self, model: str, limits: Sequence[Any], *, is_complete: bool) -> Allowed:
         """How large errors may be by a model.
 
         Parameters
@@ -418,69 +429,82 @@ class ErrorBlock:
             `published` or `full`.
         limits : three of (errors, cases) or (cases,) or None
             What quadratic, cubic phase [rad] and displacement [m] are held to; None: to nothing.
-        is_whole : bool
+        is_complete : bool
             Search for the size that the quadratic phase alone allows too.
         """
-        limit = np.array([self._limit(place, one) for place, one in enumerate(limits)])
+        limit = np.array([self._limit(requirement, sizes) for requirement, sizes in enumerate(limits)])
         per_unit = self.per_unit(model)
         with np.errstate(all="ignore"):
             small = np.where((per_unit > 0) & ~np.isnan(limit), limit / per_unit, math.inf)
-        held = [place for place, one in enumerate(limits) if one is not None]
-        found = self._searched(limit, small, held, is_whole=is_whole) if model == "full" and self.moves else small
-        smallest = found.min(axis=0)
-        binding = np.where(np.isfinite(smallest), found.argmin(axis=0), -1).astype(np.int8)
+        required = [requirement for requirement, sizes in enumerate(limits) if sizes is not None]
+        smallest_by_requirement = (
+            self._searched(limit, small, required, is_complete=is_complete)
+            if model == "full" and self.moves
+            else small
+        )
+        smallest = smallest_by_requirement.min(axis=0)
+        binding = np.where(np.isfinite(smallest), smallest_by_requirement.argmin(axis=0), -1).astype(np.int8)
         if model == "full":
             binding = np.where(self.ends_image(smallest), len(HELD), binding)
-        smallest, quadratic = (np.where(np.isfinite(one), one, math.nan) for one in (smallest, found[0]))
-        return Allowed(smallest, quadratic if is_whole else smallest, binding)
+        smallest, quadratic = (
+            np.where(np.isfinite(sizes), sizes, math.nan) for sizes in (smallest, smallest_by_requirement[0])
+        )
+        return Allowed(smallest, quadratic if is_complete else smallest, binding)
 
     def ends_image(self, size: Floats) -> Truths:
         """Whether allowables, as found, are where the image ends."""
-        found = np.zeros(size.shape, dtype=bool)
+        ends_there = np.zeros(size.shape, dtype=bool)
         if self._follows is not None:
             sizes = size[self.moves]
             ends = self._follows.end.reshape(len(self.moves), 2, -1)
-            found[self.moves] = (ends == sizes[:, None]).any(axis=1) & np.isfinite(sizes)
-        return found
+            ends_there[self.moves] = (ends == sizes[:, None]).any(axis=1) & np.isfinite(sizes)
+        return ends_there
 
-    def _limit(self, place: int, limit: Any) -> Floats:
+    def _limit(self, requirement: int, limit: Any) -> Floats:
         """A limit of each error, not a number: none; what only is a phase is held to that of the quadratic."""
         limit = math.nan if limit is None else limit
-        whole = np.broadcast_to(limit, self.declared.shape)
-        return whole if place == 0 else np.where(self.is_motion, whole, math.nan)
+        limits = np.broadcast_to(limit, self.declared.shape)
+        return limits if requirement == 0 else np.where(self.is_motion, limits, math.nan)
 
-    def _searched(self, limit: Floats, small: Floats, held: Sequence[int], *, is_whole: bool) -> Floats:
+    def _searched(self, limit: Floats, small: Floats, required: Sequence[int], *, is_complete: bool) -> Floats:
         """Smallest sizes, of either sign, at which errors reach limits, (3, errors, cases); infinite: none does.
 
         `small` are the sizes were effects those of small errors. None is looked for that takes its platform farther
         than a tenth of the slant range, or than the declared one does; nor, but for what the quadratic phase allows
-        where `is_whole`, beyond what another limit allows: the one that binds is likely to be found first.
+        where `is_complete`, beyond what another limit allows: the one that binds is likely to be found first.
         """
         most = np.fmax(self.farthest, np.abs(self.declared))
-        found = np.full(small.shape, math.inf)
+        smallest = np.full(small.shape, math.inf)
         searches = list[LimitSearches]()
         # Few are all searched for together.
-        is_together = tries_several_sizes(2 * len(held) * self.declared.size, self.table.is_whole)
-        for turn in np.array(held)[np.argsort(small[held], axis=0, kind="stable")]:
+        is_together = tries_several_sizes(2 * len(required) * self.declared.size, self.table.is_complete)
+        for turn in np.array(required)[np.argsort(small[required], axis=0, kind="stable")]:
             of, first = (np.take_along_axis(sizes, turn[None], axis=0)[0] for sizes in (limit, small))
-            is_alone = (turn == 0) & is_whole
-            upto = np.minimum(most, np.where(is_alone, math.inf, found.min(axis=0)))
+            is_alone = (turn == 0) & is_complete
+            upto = np.minimum(most, np.where(is_alone, math.inf, smallest.min(axis=0)))
             with np.errstate(all="ignore"):
                 adds = np.take_along_axis(self.adds(np.minimum(first, upto)), turn[None], axis=0)[0]
-                some = self._is_moving & (adds > SECOND_ORDER_FRACTION * of)
-            at_once = np.where((first <= upto) & ~some, first, math.inf)
-            np.put_along_axis(found, turn[None], at_once[None], axis=0)
-            if not some.any():
+                is_searched = self._is_moving & (adds > SECOND_ORDER_FRACTION * of)
+            at_once = np.where((first <= upto) & ~is_searched, first, math.inf)
+            np.put_along_axis(smallest, turn[None], at_once[None], axis=0)
+            if not is_searched.any():
                 continue
-            gain = np.broadcast_to(self.table.gain, some.shape)[some]
-            numbers = of[some], gain, first[some], upto[some], np.flatnonzero(some), is_alone[some]
-            for lane in self._lanes_of(some):
-                searches.append(LimitSearches(lane, turn[some], *numbers))
+            gain = np.broadcast_to(self.table.gain, is_searched.shape)[is_searched]
+            numbers = (
+                of[is_searched],
+                gain,
+                first[is_searched],
+                upto[is_searched],
+                np.flatnonzero(is_searched),
+                is_alone[is_searched],
+            )
+            for lane in self._lanes_of(is_searched):
+                searches.append(LimitSearches(lane, turn[is_searched], *numbers))
                 if not is_together:
-                    find_first_sizes(self.paths, searches.pop(), found.reshape(3, -1))
+                    find_first_sizes(self.paths, searches.pop(), smallest.reshape(3, -1))
         if searches:
-            find_first_sizes(self.paths, LimitSearches.joined(searches), found.reshape(3, -1))
-        return found
+            find_first_sizes(self.paths, LimitSearches.joined(searches), smallest.reshape(3, -1))
+        return smallest
 
 
 class DeclaredErrors:
@@ -500,7 +524,7 @@ class DeclaredErrors:
         Ids of rows: of what is not declared, nothing else is listed; omitted: everything is.
     gain : float or (cases,)
         Factor by which autofocus lets quadratic phases be larger; none of the hidden ones.
-    is_whole : bool
+    is_complete : bool
         All of each row is asked for, and alike whatever the number of cases.
 
     Attributes
@@ -518,10 +542,10 @@ class DeclaredErrors:
         shown: Container[str] | None = None,
         *,
         gain: Any = 1.0,
-        is_whole: bool = False,
+        is_complete: bool = False,
     ) -> None:
         self.mission, self.cases, self.geometries, self.exact = mission, cases, geometries, exact
-        self.gain, self.is_whole = gain, is_whole
+        self.gain, self.is_complete = gain, is_complete
         self.has_direct_path = mission.has_direct_path
         self.each = np.arange(cases)
         published, self.published_angle_deg = published_planes(geometries)
@@ -551,7 +575,7 @@ class DeclaredErrors:
         orders = [self._order(error) for error in errors]
         courses = np.array([self._course(error, order) for error, order in zip(errors, orders, strict=True)])
         at_nodes = np.moveaxis(courses[:, None] * np.array(signs)[:, None, None], 2, 0)
-        moves: list[list[Any]] = [[float(platform in one) for one in moved] for platform in (0, 1)]
+        moves: list[list[Any]] = [[float(platform in platforms) for platforms in moved] for platform in (0, 1)]
         u, v, order = (self._of_each(values, len(signs)) for values in (*moves, orders))
         x, y, z = (self._of_each([error.direction[axis] for error in errors], len(signs)) for axis in (0, 1, 2))
         of_receiver = None
@@ -568,21 +592,26 @@ class DeclaredErrors:
         """Position error at the aperture's edge by a unit of an error, the larger of both platforms; 0 of a clock."""
         if not error.is_time_tag:
             return self.edge.get(error.unit, 0.0)
-        return np.max([norm(error.direction_of(place)).max(axis=0) for place in error.platforms], axis=0)
+        return np.max([norm(error.direction_of(platform)).max(axis=0) for platform in error.platforms], axis=0)
 
     def bent(self, error: ErrorSource, size: Floats) -> Floats:
         """How far a time tag, of either sign, takes its platforms from where their velocities lead, added. [m]"""
-        times, found = self.exact.times, np.zeros(self.cases)
-        for place in error.platforms:
-            path, straight = self.geometries.both[place], error.direction_of(place)
-            found += np.max(
+        times, bend = self.exact.times, np.zeros(self.cases)
+        for platform in error.platforms:
+            path, straight = self.geometries.both[platform], error.direction_of(platform)
+            bend += np.max(
                 [
-                    norm(tuple(one - tag * way for one, way in zip(path.later(times, tag), straight, strict=True)))
+                    norm(
+                        tuple(
+                            component - tag * way
+                            for component, way in zip(path.later(times, tag), straight, strict=True)
+                        )
+                    )
                     for tag in (size, -size)
                 ],
                 axis=(0, 1),
             )
-        return found
+        return bend
 
     def _order(self, error: ErrorSource) -> int:
         """Power of slow time with which a position error grows: -1 of a clock, 0 of a time tag, whose way turns."""
@@ -612,13 +641,13 @@ class DeclaredErrors:
 
     def block_of(self, error: ErrorSource) -> tuple[ErrorBlock, int]:
         """The block that has an error, and its place there."""
-        block, place = self._place[error.id]
-        return self.blocks[block], place
+        block, index = self._place[error.id]
+        return self.blocks[block], index
 
     def does(self, model: str, error: ErrorSource) -> Declared:
         """Effect of a declared error by a model, (cases,)."""
-        block, place = self._place[error.id]
-        return self.of_block(model, block).of(place)
+        block, index = self._place[error.id]
+        return self.of_block(model, block).of(index)
 
     def of_block(self, model: str, block: int) -> Declared:
         """Effects of the declared errors of a block by a model, (errors, cases)."""
@@ -629,16 +658,16 @@ class DeclaredErrors:
 
     def is_large(self, error: ErrorSource) -> Truths:
         """In which cases effects of a declared error are not proportional to its size."""
-        block, place = self.block_of(error)
-        return np.asarray(block.is_declared_large[place])
+        block, index = self.block_of(error)
+        return np.asarray(block.is_declared_large[index])
 
     def quadratic_by_sign(self, error: ErrorSource) -> Floats:
         """Quadratic phases of a declared error of each sign, positive first, where it is large, (2, cases). [rad]
 
         Not a number where it leaves no image.
         """
-        block, place = self.block_of(error)
-        return block.quadratic_by_sign[:, place]
+        block, index = self.block_of(error)
+        return block.quadratic_by_sign[:, index]
 
     def doubts(self, model: str, is_over: Any) -> Any:
         """Where a model that does not gate casts a doubt; the published one does not know a direct path."""
@@ -683,24 +712,24 @@ class Model:
 
     def does(self, source: ErrorSource, size: float) -> Declared:
         """Effect of an error of a given size."""
-        block, place = self.errors.block_of(source)
+        block, index = self.errors.block_of(source)
         sizes = np.full(block.declared.shape, math.nan)
-        sizes[place] = size
-        return block.does(self.name, sizes).of(place).in_one_case()
+        sizes[index] = size
+        return block.does(self.name, sizes).of(index).in_one_case()
 
     def allowed(self, source: ErrorSource, limits: Sequence[float | None]) -> tuple[float | None, str | None]:
         """Smallest size, of either sign, at which an error reaches a limit, and which of `HELD` that is; or None.
 
         `limits` are those of quadratic and cubic phase [rad], and of the displacement. [m]
         """
-        block, place = self.errors.block_of(source)
-        held: list[Any] = []
+        block, index = self.errors.block_of(source)
+        limits_of_block: list[Any] = []
         for limit in limits:
             of_all = np.full(block.declared.shape, math.nan)
-            of_all[place] = math.nan if limit is None else limit
-            held.append(None if limit is None else of_all)
-        found = block.allowed(self.name, held, is_whole=False)
-        size, binding = plain(found.smallest[place]), int(found.binding[place, 0])
+            of_all[index] = math.nan if limit is None else limit
+            limits_of_block.append(None if limit is None else of_all)
+        allowed_of_block = block.allowed(self.name, limits_of_block, is_complete=False)
+        size, binding = plain(allowed_of_block.smallest[index]), int(allowed_of_block.binding[index, 0])
         return (None, None) if math.isnan(size) else (size, (*HELD, END_OF_IMAGE)[binding])
 
     def allowable(self, source: ErrorSource, requirement: str, limit: float) -> float | None:
@@ -709,59 +738,59 @@ class Model:
 
     def small(self, source: ErrorSource, requirement: str, limit: float) -> float:
         """Size at which an error would reach a limit, were its effects those of a small one; infinite: never."""
-        block, place = self.errors.block_of(source)
-        per_unit = float(block.per_unit(self.name)[HELD.index(requirement), place, 0])
+        block, index = self.errors.block_of(source)
+        per_unit = float(block.per_unit(self.name)[HELD.index(requirement), index, 0])
         return limit / per_unit if per_unit else math.inf
 
     def hidden_per_unit(self, source: ErrorSource) -> float:
         """Hidden phase of a small unit of an error; to the published model there is none. [rad/unit]"""
-        block, place = self.errors.block_of(source)
-        return 0.0 if self.is_published else float(block.hidden_per_unit[0, place, 0])
+        block, index = self.errors.block_of(source)
+        return 0.0 if self.is_published else float(block.hidden_per_unit[0, index, 0])
 
     def ends_image(self, source: ErrorSource, size: float) -> bool:
         """Whether an allowable, as found, is where the image ends; to a linear model none does."""
-        block, place = self.errors.block_of(source)
-        return not self.is_published and bool(block.ends_image(np.full(block.declared.shape, size))[place, 0])
+        block, index = self.errors.block_of(source)
+        return not self.is_published and bool(block.ends_image(np.full(block.declared.shape, size))[index, 0])
 
     def is_linear_at(self, source: ErrorSource, requirement: str, limit: float) -> bool:
         """Whether effects of an error are proportional to its size up to a limit."""
-        block, place = self.errors.block_of(source)
-        which = HELD.index(requirement)
-        per_unit = block.per_unit(self.name)[which]
+        block, index = self.errors.block_of(source)
+        requirement_index = HELD.index(requirement)
+        per_unit = block.per_unit(self.name)[requirement_index]
         with np.errstate(all="ignore"):
             first = np.minimum(np.where(per_unit > 0, limit / per_unit, math.inf), block.farthest)
-            adds = block.adds(first)[which]
-        return self.is_published or not source.displaces or bool(adds[place, 0] <= SECOND_ORDER_FRACTION * limit)
+            adds = block.adds(first)[requirement_index]
+        return self.is_published or not source.displaces or bool(adds[index, 0] <= SECOND_ORDER_FRACTION * limit)
 
     # ---------------------------------------------------------------- by exact ranges
     def is_small(self, source: ErrorSource, size: float) -> bool:
         """Whether effects of an error are proportional to its size, as far as anybody can see."""
-        block, place = self.errors.block_of(source)
-        return not block.is_large(np.full(block.declared.shape, size))[place, 0]
+        block, index = self.errors.block_of(source)
+        return not block.is_large(np.full(block.declared.shape, size))[index, 0]
 
     def at(self, source: ErrorSource, size: float) -> ExactEffect | None:
         """Phases and displacement of an error of a size, with its sign, by exact ranges; None: no ground point."""
-        block, place = self.errors.block_of(source)
-        some = np.zeros(block.declared.shape, dtype=bool)
-        some[place] = True
-        known = block.followed(some, np.array([abs(size)]))[0 if size > 0 else 1]
-        _, east, north, *phases, _ = known[:, 0].tolist()
+        block, index = self.errors.block_of(source)
+        is_asked = np.zeros(block.declared.shape, dtype=bool)
+        is_asked[index] = True
+        points = block.followed(is_asked, np.array([abs(size)]))[0 if size > 0 else 1]
+        _, east, north, *phases, _ = points[:, 0].tolist()
         return None if math.isnan(east) else ExactEffect((east, north), *phases)
 
     def largest_range_error(self, source: ErrorSource) -> float:
         """Largest range error at the nodes of a small unit of an error, before it displaces anything. [m/unit]"""
         return float(np.abs(self.exact.range_error(self.errors.lanes(source))).max())
 
-    def left_over(self, source: ErrorSource, size: float, place: GroundVector) -> Sequence[float]:
+    def left_over(self, source: ErrorSource, size: float, point: GroundVector) -> Sequence[float]:
         """Range error at the nodes that an error leaves at a ground point. [m]"""
-        left = self.exact.left_over(self.errors.lanes(source), np.array([size]), place)
-        found: list[float] = left[:, 0].tolist()
-        return found
+        remaining = self.exact.left_over(self.errors.lanes(source), np.array([size]), point)
+        range_error: list[float] = remaining[:, 0].tolist()
+        return range_error
 
     def left_over_small(self, source: ErrorSource, size: float) -> Sequence[float]:
         """The same at the displaced point, of an error so small that its effects are proportional to it. [m]"""
         east, north = self.displacement(source.full, size) or (0.0, 0.0)
         by_east, by_north = self.exact.slopes
-        left = size * self.exact.range_error(self.errors.lanes(source)) + east * by_east + north * by_north
-        found: list[float] = left[:, 0].tolist()
-        return found
+        remaining = size * self.exact.range_error(self.errors.lanes(source)) + east * by_east + north * by_north
+        range_error: list[float] = remaining[:, 0].tolist()
+        return range_error

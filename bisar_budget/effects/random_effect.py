@@ -79,8 +79,8 @@ class RandomEffect(NamedTuple):
         if covariance is not None:
             covariance = covariance[..., case if covariance.shape[-1] > 1 else 0]
         quadratic, cubic, spread, east, north = (plain(size, case) for size in self[:5])
-        hidden, rest = plain(self.hidden, case), plain(self.rest, case)
-        return RandomEffect(quadratic, cubic, spread, east, north, covariance, hidden, rest)
+        hidden, beyond_cubic = plain(self.hidden, case), plain(self.rest, case)
+        return RandomEffect(quadratic, cubic, spread, east, north, covariance, hidden, beyond_cubic)
 
     def times(self, factor: Any) -> "RandomEffect":
         """The same with phases and displacement of a coverage factor."""
@@ -183,15 +183,15 @@ class SensorCases:
 
     def vector(self, values: Sequence[Any]) -> Floats:
         """Three numbers for each case, (3, cases)."""
-        found = np.empty((3, self.cases))
-        for row, value in zip(found, values, strict=True):
+        numbers = np.empty((3, self.cases))
+        for row, value in zip(numbers, values, strict=True):
             row[:] = value
-        return found
+        return numbers
 
     def error(self, name: str) -> MotionError:
         """The motion error of a platform."""
-        found: MotionError = getattr(self.mission.platforms, name).motion_error
-        return found
+        motion_error: MotionError = getattr(self.mission.platforms, name).motion_error
+        return motion_error
 
     def axes(self, name: str, frame: str = "") -> Floats:
         """Axes of a platform's errors, or of another frame of it, (axes, 3, cases)."""
@@ -220,7 +220,7 @@ class SensorCases:
         """Q⁻¹ of the published model."""
         return published_planes(self.geometry)[0]
 
-    def of_courses(self, courses: Floats, held: Floats) -> tuple["RandomEffect", "RandomEffect"]:
+    def of_courses(self, courses: Floats, at_mid_aperture: Floats) -> tuple["RandomEffect", "RandomEffect"]:
         """Effects by both models of independent range errors of one course each, of 1 sigma of a unit. [m/unit]
 
         Parameters
@@ -230,8 +230,8 @@ class SensorCases:
         held : (errors, nodes, cases)
             The same with the line of sight held at mid-aperture, for the published model.
         """
-        k, orders = self.exact.k, np.einsum("fn,enc->fec", self.exact.fit, held)
-        orders = np.where(np.abs(orders) > ROUNDING * np.abs(held).max(axis=1), orders, 0.0)
+        k, orders = self.exact.k, np.einsum("fn,enc->fec", self.exact.fit, at_mid_aperture)
+        orders = np.where(np.abs(orders) > ROUNDING * np.abs(at_mid_aperture).max(axis=1), orders, 0.0)
         quadratic, cubic = np.sqrt(np.square(orders[2:]).sum(axis=1))
         # Both orders of a course are one error: unlike those of noise they add with their signs.
         (a, b), (c, d) = self.plane.adjugate
@@ -239,13 +239,13 @@ class SensorCases:
         constant, linear = orders[0], orders[1] / self.exact.half
         moved = [np.sqrt(np.square((u * constant + v * linear) * scale).sum(axis=0)) for u, v in ((a, b), (c, d))]
         published = RandomEffect(k * quadratic, k * cubic, 0.0 * k, *moved)
-        whole = effects_of_courses(self.exact, self.weights, courses)
-        (qpe, edge, east, north, hidden), covariance = sigmas(whole.covariance, whole.sizes)
-        rest, is_turned = k * np.sqrt(whole.left), self.exact.is_turned
+        effects = effects_of_courses(self.exact, self.weights, courses)
+        (qpe, edge, east, north, hidden), covariance = sigmas(effects.covariance, effects.sizes)
+        beyond_cubic, is_turned = k * np.sqrt(effects.left), self.exact.is_turned
         # Where a line of sight turns far, the phase of equal loss holds all that an error of motion leaves.
-        hidden = np.hypot(hidden, np.where(is_turned, QUADRATIC_OF_VARIANCE * rest, 0.0))
-        rest = np.where(is_turned, 0.0, rest) / self.factor
-        return published, RandomEffect(qpe, edge, 0.0 * k, east, north, covariance, hidden, rest)
+        hidden = np.hypot(hidden, np.where(is_turned, QUADRATIC_OF_VARIANCE * beyond_cubic, 0.0))
+        beyond_cubic = np.where(is_turned, 0.0, beyond_cubic) / self.factor
+        return published, RandomEffect(qpe, edge, 0.0 * k, east, north, covariance, hidden, beyond_cubic)
 
     def of_gauss_markov(
         self, courses: Floats, correlation_time: Any, *, is_phase_advanced: bool = False
@@ -270,21 +270,21 @@ class SensorCases:
         """Effect by the full model of a process of the range error: see `effects_of_process`."""
         return self._of_noise(effects_of_process(self.exact, self.weights, covariance, beyond))
 
-    def _of_noise(self, found: RangeEffects) -> RandomEffect:
-        (quadratic, cubic, east, north, hidden), covariance = sigmas(found.covariance, found.sizes)
+    def _of_noise(self, effects: RangeEffects) -> RandomEffect:
+        (quadratic, cubic, east, north, hidden), covariance = sigmas(effects.covariance, effects.sizes)
         # What spreads is a mean power, which has no coverage factor.
-        spread = self.exact.k * np.sqrt(np.maximum(found.left, 0.0)) / self.factor
+        spread = self.exact.k * np.sqrt(np.maximum(effects.left, 0.0)) / self.factor
         return RandomEffect(quadratic, cubic, spread, east, north, covariance, hidden)
 
-    def of_motion(self, place: int, moved: Floats) -> tuple["RandomEffect", "RandomEffect"]:
+    def of_motion(self, platform_index: int, moved: Floats) -> tuple["RandomEffect", "RandomEffect"]:
         """The same of independent position errors of a platform, (errors, 3, nodes, cases). [m/unit]"""
-        look = self.vector(self.geometry.both[place].look)
-        return self.of_courses(self.range_errors(place, moved), -np.einsum("ac,eanc->enc", look, moved))
+        look = self.vector(self.geometry.both[platform_index].look)
+        return self.of_courses(self.range_errors(platform_index, moved), -np.einsum("ac,eanc->enc", look, moved))
 
-    def range_errors(self, place: int, moved: Floats) -> Floats:
+    def range_errors(self, platform_index: int, moved: Floats) -> Floats:
         """Range errors at the nodes by small position errors of a platform, (errors, 3, nodes or 1, cases). [m]"""
         x, y, z = np.moveaxis(moved, 1, 0)
-        return self.exact.along(place, (x, y, z))
+        return self.exact.along(platform_index, (x, y, z))
 
     def moved(self, constant: Any, linear: Any, both: Any = 0.0) -> list[Any]:
         """Sigmas of the displacement by (25). [m]
@@ -310,20 +310,20 @@ class SensorCases:
         `covariance` (4, 4, ...) is that of each at the aperture edge [m²], `along` (errors, nodes, cases) what a
         metre of it does to the range; higher orders defocus and displace in second order of a turning line of sight.
         """
-        whole = covariance if covariance.ndim == 3 else covariance[..., None]
-        whole = np.broadcast_to(whole, (*whole.shape[:2], self.cases))
+        covariance_of_cases = covariance if covariance.ndim == 3 else covariance[..., None]
+        covariance_of_cases = np.broadcast_to(covariance_of_cases, (*covariance_of_cases.shape[:2], self.cases))
         orders = self.orders
         seen = np.broadcast_to(along, (np.shape(along)[0] if np.ndim(along) else 1, len(orders), self.cases))
         effects = np.einsum("fnc,anc,no->afoc", self.weights, seen, orders)
-        found = np.asarray(np.einsum("afoc,opc,agpc->fgc", effects, whole, effects))
-        return sigmas(found, np.einsum("ffc->fc", found))
+        total = np.asarray(np.einsum("afoc,opc,agpc->fgc", effects, covariance_of_cases, effects))
+        return sigmas(total, np.einsum("ffc->fc", total))
 
     def courses(self, covariance: Floats) -> Floats:
         """Independent courses that together have a covariance of these orders, (4, 4, ...); (4, nodes, ...)."""
         of_orders = factor(np.moveaxis(covariance.reshape(4, 4, -1), 2, 0))
         return np.asarray(np.einsum("no,cof->fnc", self.orders, of_orders))
 
-    def of_parts(self, found: Parts, along: Any = 1.0) -> tuple["RandomEffect", "RandomEffect"]:
+    def of_parts(self, noise: Parts, along: Any = 1.0) -> tuple["RandomEffect", "RandomEffect"]:
         """The same of a range error with these parts [m²]; `along` is what data have of a metre of it at the nodes.
 
         By orders 0 to 3, and what lies beyond spreads. Up to a turn of 1 rad of a line of sight that is right to 5 %
@@ -331,12 +331,12 @@ class SensorCases:
         the location by free clocks, 8 % (`tests/effects/test_long_noise.py`).
         """
         k = 2 * math.pi / np.asarray(self.mission.radar.wavelength)
-        quadratic, cubic, left = (k * np.sqrt(part) for part in found[:3])
-        published = RandomEffect(quadratic, cubic, left, *self.moved(found.constant, found.linear))
+        quadratic, cubic, spread = (k * np.sqrt(mean_square) for mean_square in noise[:3])
+        published = RandomEffect(quadratic, cubic, spread, *self.moved(noise.constant, noise.linear))
         along = along + np.zeros_like(self.exact.times)
-        (quadratic, cubic, east, north, hidden), covariance = self.of_orders(found.covariance, along[None])
-        left = left * np.sqrt(self.exact.fit[0] @ np.square(along))
-        return published, RandomEffect(quadratic, cubic, left, east, north, covariance, hidden)
+        (quadratic, cubic, east, north, hidden), covariance = self.of_orders(noise.covariance, along[None])
+        spread = spread * np.sqrt(self.exact.fit[0] @ np.square(along))
+        return published, RandomEffect(quadratic, cubic, spread, east, north, covariance, hidden)
 
     def alike(self, value: Any) -> Iterator[tuple[Any, NDArray[np.intp]]]:
         """Tell apart cases in which a value, or what is in it, differs: the value of each group, and its cases."""
@@ -345,19 +345,19 @@ class SensorCases:
             yield value, np.arange(self.cases)
             return
         rows, group = np.unique(np.stack(arrays, axis=1), axis=0, return_inverse=True)
-        for place, row in enumerate(rows.tolist()):
-            yield _with_numbers(value, iter(row)), np.flatnonzero(group.ravel() == place)
+        for group_index, row in enumerate(rows.tolist()):
+            yield _with_numbers(value, iter(row)), np.flatnonzero(group.ravel() == group_index)
 
 
-def orders_at(places: Floats) -> Floats:
+def orders_at(slow_times: Floats) -> Floats:
     """Orders 0 to 3 at places of the aperture, (places, 4), of a size of 1 at its edge as `Parts` has them."""
-    return np.asarray(np.polynomial.legendre.legvander(places, LEADING.size - 1) / LEADING)
+    return np.asarray(np.polynomial.legendre.legvander(slow_times, LEADING.size - 1) / LEADING)
 
 
 def _arrays_in(value: Any) -> Iterator[Floats]:
     if isinstance(value, tuple):
-        for part in value:
-            yield from _arrays_in(part)
+        for value_part in value:
+            yield from _arrays_in(value_part)
     elif isinstance(value, np.ndarray):
         yield value
 
@@ -365,8 +365,8 @@ def _arrays_in(value: Any) -> Iterator[Floats]:
 def _with_numbers(value: Any, numbers: Iterator[float]) -> Any:
     """The same with numbers in the places of its arrays."""
     if isinstance(value, tuple):
-        parts = [_with_numbers(part, numbers) for part in value]
-        return value._make(parts) if hasattr(value, "_make") else tuple(parts)
+        values = [_with_numbers(value_part, numbers) for value_part in value]
+        return value._make(values) if hasattr(value, "_make") else tuple(values)
     return next(numbers) if isinstance(value, np.ndarray) else value
 
 
@@ -385,9 +385,9 @@ def sigmas(covariance: Floats, sizes: Floats) -> tuple[Sequence[Floats], Floats]
     """
     squares = np.einsum("ffc->fc", covariance)
     is_real = squares > _CANCELLED_SQUARE_FRACTION * sizes
-    squares, is_held = np.where(is_real, squares, 0.0), is_real[:4]
+    squares, is_counted = np.where(is_real, squares, 0.0), is_real[:4]
     hidden = np.sqrt(squares[4:].sum(axis=0))
-    return [*np.sqrt(squares[:4]), hidden], np.where(is_held & is_held[:, None], covariance[:4, :4], 0.0)
+    return [*np.sqrt(squares[:4]), hidden], np.where(is_counted & is_counted[:, None], covariance[:4, :4], 0.0)
 
 
 def factor(covariance: Floats) -> Floats:

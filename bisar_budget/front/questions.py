@@ -336,4 +336,4 @@ def monte_carlo(mission: Mission, draws: int = 20_000, *, seed: int | None = Non
     ValueError
         So many draws cannot be made.
     """
-    return MonteCarloResult(monte_carlo_of(Analysis(mission, is_whole=True), *drawn_here(draws, seed)))
+    return MonteCarloResult(monte_carlo_of(Analysis(mission, is_complete=True), *drawn_here(draws, seed)))

@@ -499,8 +499,8 @@ def _filled(error: MotionError, stated: StatedAccuracy, state: PlatformState) ->
     along = block_turned(np.array(own), axes)
     kinds = KINDS[: len(along) // 3]
     sigmas = np.sqrt(np.diag(along))
-    is_whole = error.covariance is None and error.position is None and error.velocity is None
-    if is_whole and len(kinds) == 2 and error.distribution == "normal" and _is_correlated(along):
+    is_complete = error.covariance is None and error.position is None and error.velocity is None
+    if is_complete and len(kinds) == 2 and error.distribution == "normal" and _is_correlated(along):
         covariance = Covariance(tuple(sigmas.tolist()), correlations(along), is_matrix=False)
         parts = tuple((figure, stated.words) for figure in ("covariance", *kinds))
         return error._replace(covariance=covariance, of_parts=(*error.of_parts, *parts))

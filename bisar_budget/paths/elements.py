@@ -423,7 +423,7 @@ class _Message:
     where: str
     leaves: Mapping[str, Any]
     problem: str = ""
-    is_whole: bool = False  # as the standard has it; JSON and CSV of CelesTrak leave out what has one value only
+    is_complete: bool = False  # as the standard has it; JSON and CSV of CelesTrak leave out what has one value only
 
 
 _MANDATORY = {
@@ -456,7 +456,7 @@ def _entry(message: _Message, orientation: Orientation) -> Entry:
     try:
         if message.problem:
             raise PathFileError(message.problem)
-        for key in _MANDATORY if message.is_whole else ():
+        for key in _MANDATORY if message.is_complete else ():
             _value(message.leaves, key, message.where)
         elements = _from_message(message.leaves, message.where)
         covariance = _covariance(message.leaves, elements.epoch, orientation, message.where)
@@ -474,7 +474,7 @@ def _from_markup(data: bytes, name: str) -> Iterator[_Message]:
         for block in ("covarianceMatrix", "metadata", "meanElements", "tleParameters"):
             for found in message.all(block):
                 leaves.update({one.name: one.text.strip() for one in found.children})
-        yield _Message(where=f"{name}:{message.line}", leaves=leaves, is_whole=True)
+        yield _Message(where=f"{name}:{message.line}", leaves=leaves, is_complete=True)
 
 
 def _from_keywords(text: str, name: str) -> Iterator[_Message]:
@@ -488,7 +488,7 @@ def _from_keywords(text: str, name: str) -> Iterator[_Message]:
         key, equals, value = (part.strip() for part in line.partition("="))
         if key == _VERSION:
             if began:
-                yield _Message(where=f"{name}:{began}", leaves=leaves, problem=problem, is_whole=True)
+                yield _Message(where=f"{name}:{began}", leaves=leaves, problem=problem, is_complete=True)
             leaves, began, problem = {}, at, ""
         elif not equals:
             problem = problem or f"{name}:{at}: must be a keyword, = and its value (got {shown(line)})"
@@ -497,7 +497,7 @@ def _from_keywords(text: str, name: str) -> Iterator[_Message]:
         else:
             leaves[key] = value.partition("[")[0].strip()  # a unit, in brackets, is the standard's own
     if began:
-        yield _Message(where=f"{name}:{began}", leaves=leaves, problem=problem, is_whole=True)
+        yield _Message(where=f"{name}:{began}", leaves=leaves, problem=problem, is_complete=True)
 
 
 def _from_json(text: str, name: str) -> Iterator[_Message]:

@@ -336,7 +336,7 @@ def test_of_few_lanes_and_of_many_the_same_is_found(family: str, monkeypatch: py
         (block,) = analysis.errors.blocks
         nearest = min(path.slant_range for path in analysis.geometry.both)
         limits = (np.full((len(block.sources), 1), 0.2), 0.1, 0.01 * nearest)
-        allowed = block.allowed("full", limits, is_whole=True)
+        allowed = block.allowed("full", limits, is_complete=True)
         return np.array((allowed.smallest, allowed.quadratic))
 
     of_few = found()

@@ -107,8 +107,8 @@ def _block(block: doc.Block, assets: str, is_introduced: bool) -> Iterator[str]:
         case doc.TextTable():
             if not is_introduced:
                 caption = _text(block.caption)
-                is_whole = ":" in caption or caption.endswith(".")
-                yield f"{caption.removesuffix('.')}." if is_whole else f"{caption}:"
+                is_complete = ":" in caption or caption.endswith(".")
+                yield f"{caption.removesuffix('.')}." if is_complete else f"{caption}:"
             yield _table(block)
         case doc.Figure(title=title):
             if assets:
