@@ -198,7 +198,7 @@ def _with_path(mission: Mission, platform: Platform, axes: earth.SceneAxes | Non
         words = f"puts the platform below the scene's horizon, to z = {path.state.position[2]:.6g} m"
         raise _UnusablePathError((platform.way,), Problem(words))
     if axes is not None:
-        path = path._replace(state=_with_radial(path.state, axes))
+        path = path._replace(state=with_radial(path.state, axes))
     trajectory, error = platform.trajectory, platform.motion_error
     if trajectory is not None and trajectory.accuracy is not None:
         accuracy, digest = _by_accuracy(mission, trajectory, error, read)
@@ -221,7 +221,8 @@ def _known(axes: earth.SceneAxes | None, key: str) -> earth.SceneAxes:
     return axes
 
 
-def _with_radial(state: PlatformState, axes: earth.SceneAxes) -> PlatformState:
+def with_radial(state: PlatformState, axes: earth.SceneAxes) -> PlatformState:
+    """The path with the axes of its `ric` frame, of a scene on the Earth; without them where there are none."""
     try:
         return replace(state, radial=axes.radial(state.position, state.velocity))
     except ZeroDivisionError:  # at rest against the stars, on the Earth's axis: no plane
