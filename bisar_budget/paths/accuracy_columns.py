@@ -101,7 +101,7 @@ _SPELLINGS = (
 
 
 def meaning_of(name: str, unit: str | None) -> tuple[str | None, str | None]:
-    """What a column states, and the unit that it has, as it is given or by the end of its name.
+    """Meaning of a column, and its unit, as it is given or by the end of its name.
 
     It is `sigma_east` or of another axis, `variance_east`, `horizontal_accuracy`, `vertical_accuracy`,
     `position_accuracy` without a direction, `sigma_h` where another column has to say what h is, `BESIDE`, `UNCLEAR`,
@@ -136,7 +136,7 @@ def _without(tokens: list[str], tail: Sequence[str]) -> list[str]:
 
 
 def _of_tokens(tokens: Sequence[str]) -> str | None:
-    """What a name means by its words; None where it looks like no accuracy."""
+    """Meaning of a name by its words; None where it looks like no accuracy."""
     words = [token for token in tokens if token in _SIGMAS | _VARIANCES]
     is_unclear = any(_UNCLEAR.fullmatch(token) for token in tokens) or _LOOKS_LIKE.search("_".join(tokens))
     is_error = not words and not _ERRORS.isdisjoint(tokens)
@@ -167,7 +167,7 @@ def _of_tokens(tokens: Sequence[str]) -> str | None:
 
 
 def _of_variance(rest: Sequence[str]) -> str:
-    """What a variance or a covariance is of, by the names of its axes: `ee`, `e`, `e e`, `east`."""
+    """Meaning of a variance or a covariance by the names of its axes: `ee`, `e`, `e e`, `east`."""
     pair = list(rest[0]) if len(rest) == 1 and re.fullmatch(r"[enudxyz]{2}", rest[0]) else list(rest)
     axes = {_AXIS_OF.get(axis) for axis in pair}
     if None in axes or len(pair) > 2 or not axes:
