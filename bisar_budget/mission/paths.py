@@ -58,7 +58,7 @@ from bisar_budget.paths.flight import (
     widest_stretch,
 )
 from bisar_budget.paths.instant import DAY, Instant, later
-from bisar_budget.paths.log_places import LogKeys, hold_to_motion
+from bisar_budget.paths.log_places import LogKeys, filled_sigmas, hold_to_motion
 from bisar_budget.paths.orientation import UNKNOWN, Orientation, read_earth_rotation
 from bisar_budget.paths.path_formats import ORBIT_FORMATS, hold_to_format, hold_to_log, read_log
 from bisar_budget.paths.sbet import read_accuracy
@@ -198,7 +198,7 @@ def _with_path(mission: Mission, platform: Platform, axes: earth.SceneAxes | Non
         words = f"puts the platform below the scene's horizon, to z = {path.state.position[2]:.6g} m"
         raise _UnusablePathError((platform.way,), Problem(words))
     if axes is not None:
-        path = path._replace(state=_with_radial(path.state, axes))
+        path = path._replace(state=with_radial(path.state, axes))
     trajectory, error = platform.trajectory, platform.motion_error
     if trajectory is not None and trajectory.accuracy is not None:
         accuracy, digest = _by_accuracy(mission, trajectory, error, read)
@@ -221,7 +221,8 @@ def _known(axes: earth.SceneAxes | None, key: str) -> earth.SceneAxes:
     return axes
 
 
-def _with_radial(state: PlatformState, axes: earth.SceneAxes) -> PlatformState:
+def with_radial(state: PlatformState, axes: earth.SceneAxes) -> PlatformState:
+    """The path with the axes of its `ric` frame, of a scene on the Earth; without them where there are none."""
     try:
         return replace(state, radial=axes.radial(state.position, state.velocity))
     except ZeroDivisionError:  # at rest against the stars, on the Earth's axis: no plane
@@ -465,15 +466,16 @@ def _by_accuracy(
 def _stated_of_log(log: Log, near: slice, file: str) -> Iterator[StatedAccuracy]:
     """Accuracy that a log states of its fixes around the aperture: the largest sigmas, or what is usual of them.
 
-    The usual one counts for fixes of which the log states no sigmas.
+    Along an axis of which the log states none, the largest of the others counts. The usual one counts for fixes of
+    which the log does not state all sigmas.
     """
     unstated: Any = np.ones(log.times[near].shape, dtype=bool)
     if log.sigmas is not None:
         sigmas = np.nan_to_num(log.sigmas[near])
-        largest = sigmas.max(axis=0)
+        largest = filled_sigmas(sigmas.max(axis=0))
         unstated = np.logical_not((sigmas > 0).all(axis=1))
-        if largest.all():  # 0 is not known
-            yield StatedAccuracy(f"solution {file}", diagonal(largest**2))
+        if largest.any():  # 0 is not known
+            yield StatedAccuracy(f"solution {file}", diagonal((largest**2).tolist()))
     if log.typical_sigmas is not None:
         usual = np.where(unstated, np.nan_to_num(log.typical_sigmas[near]), 0.0)
         worst = int(usual.argmax())

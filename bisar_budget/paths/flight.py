@@ -141,7 +141,7 @@ class Log:
     "day", from the begin of a GPS week where it is "week". `words` says what the log is, for reports. `left_out` are
     records that are not among the places. A file of several tracks, of which no key chooses one, has the log of each
     in `tracks`; the log itself is then that of the first.
-    `sigmas` (n, 3) are one-sigma errors east, north, up, where the log states them; NaN at fixes without [m].
+    `sigmas` (n, 3) are one-sigma errors east, north, up, where the log states them; NaN for those it does not [m].
     `typical_sigmas` (n,) are those that a fix of the stated quality usually has, on each axis; NaN where the log
     says no quality [m]. `quality_words` names the quality of the fix of an index: "GGA quality 1, autonomous".
     `grid` is one step of each coordinate that the log writes, in the axes of the places [m].

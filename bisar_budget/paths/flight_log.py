@@ -9,8 +9,9 @@ Time is `time [s]`, counted from anywhere, or stamps of ISO 8601: `utc` with a Z
 `latitude`, `longitude` and `height` above the ellipsoid of WGS-84 or `altitude` above mean sea level, or Earth-fixed
 `x`, `y`, `z`, or `east`, `north`, `up` of the scene's centre. `geoid_separation` makes a height of an altitude.
 `sigma_east`, `sigma_north`, `sigma_up`, or what other programs call them, are one-sigma errors of a place; a cell of
-them without a number above 0 says nothing. Other columns are not read. Cells are parted by commas, semicolons or
-tabs. Exporters have headers of their own, see below.
+them without a number above 0 says nothing. A column that may be an accuracy, and is none that is known, is refused;
+other columns are not read. Cells are parted by commas, semicolons or tabs. Exporters have headers of their own, see
+below.
 """
 
 import csv
@@ -19,6 +20,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from types import MappingProxyType
 from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
@@ -26,6 +28,7 @@ from numpy.typing import NDArray
 
 from bisar_budget import units
 from bisar_budget.faults import InvalidValueError, fault_words, shown
+from bisar_budget.paths.accuracy_columns import ACCEPTED, BESIDE, UNCLEAR, meaning_of
 from bisar_budget.paths.earth import Floats, Geodetic, axes_at, earth_fixed_places, geodetic_places
 from bisar_budget.paths.flight import Log, PathFileError, hold_to_bytes
 from bisar_budget.paths.instant import DAY, GPS_EPOCH, SCALES, WEEK, Instant, parse_instant
@@ -34,6 +37,7 @@ from bisar_budget.paths.log_places import (
     LogKeys,
     LogRecords,
     counted,
+    filled_sigmas,
     from_sea_level,
     hold_to_ellipsoid,
     hold_to_scale,
@@ -58,37 +62,11 @@ _KINDS = (_GEODETIC, ("x", "y", "z"), ("east", "north", "up"))
 _STAMPS = {"utc": "utc", "gpst": "gps", "gps": "gps", "tai": "tai"}  # names of columns, or units of a time
 _SPARE = ("altitude", "geoid_separation")
 _LEVEL = ("horizontal_accuracy", "vertical_accuracy")
+_TOTAL = "position_accuracy"  # without a direction: along any axis
 _SIGMAS = tuple(tuple(f"sigma_{axis}" for axis in kind) for kind in (_KINDS[2], _KINDS[1]))
-_ACCURACY = (*_LEVEL, *_SIGMAS[0], *_SIGMAS[1])
-# Names of such columns: `sde` of RTKLIB, `std_lat`, `height_sigma`; `hAcc` of u-blox, `eph` of PX4.
-_SIGMA = r"(?:sigma|σ|sd|std|stdev|stddev|std_dev|accuracy)"
-_ALONG = r"(east|north|up|e|n|u|longitude|latitude|height|altitude|lon|lat|alt|x|y|z)"
-_SIGMA_NAME = re.compile(f"{_SIGMA}_?{_ALONG}|{_ALONG}_{_SIGMA}").fullmatch
-_LEVEL_NAMES = {
-    "horizontal_accuracy": ("horizontal_accuracy", "accuracy_horizontal", "hacc", "h_acc", "eph", "accuracy"),
-    "vertical_accuracy": (
-        "vertical_accuracy",
-        "accuracy_vertical",
-        "vacc",
-        "v_acc",
-        "epv",
-        "height_accuracy",
-        "altitude_accuracy",
-        "accuracy_height",
-    ),
-}
-_AXES = {
-    "e": "east",
-    "lon": "east",
-    "longitude": "east",
-    "n": "north",
-    "lat": "north",
-    "latitude": "north",
-    "u": "up",
-    "alt": "up",
-    "altitude": "up",
-    "height": "up",
-}
+_VARIANCE = "variance_"
+_NOT_GIVEN = frozenset(("", "nan", "n/a", "na", "null", "none", "-", "--"))
+_NO_NUMBER = -math.inf  # of a cell of an accuracy that cannot be read
 _DIMENSIONS = {"latitude": units.ANGLE, "longitude": units.ANGLE, "time": units.TIME}
 _HEADER = re.compile(r"([^\[\]()]*)(?:\[([^\[\]]*)\])?")
 _QUOTED = re.compile('"').search
@@ -202,6 +180,7 @@ def read_csv(data: bytes, name: str, keys: LogKeys = NOTHING_SAID) -> Log:
     words = header.vendor.words if header.vendor else f"CSV of {', '.join(header.axes)}"
     words += "" if keys.instance is None else f", instance {keys.instance}"
     is_earth_fixed = header.axes != _KINDS[2]
+    figures, figure_words = _figures(table, header, records)
     log = usable_log(
         records,
         words,
@@ -211,12 +190,12 @@ def read_csv(data: bytes, name: str, keys: LogKeys = NOTHING_SAID) -> Log:
         lambda kept: _earth_fixed(places[:, kept], header),
         clock_words=clock_words,
         is_earth_fixed=is_earth_fixed,
-        sigmas=_sigmas(table, header, places),
+        sigmas=_sigmas(figures, header, places),
         geodetic=tuple(places) if header.axes == _GEODETIC else None,
     )
     without_fix += found.empty
     said = f", {counted(without_fix, 'row')} without a fix left out" if without_fix else ""
-    return replace(log, words=log.words + said)
+    return replace(log, words=log.words + said + figure_words)
 
 
 def _with_fix(table: _Table, header: _Header, keys: LogKeys, name: str) -> tuple[_Table, int]:
@@ -374,27 +353,56 @@ def _earth_fixed(coordinates: Floats, header: _Header) -> Floats:
     return earth_fixed_places(*coordinates) if header.axes == _GEODETIC else np.ascontiguousarray(coordinates.T)
 
 
-def _sigmas(table: _Table, header: _Header, places: Floats) -> Floats | None:
-    """One-sigma errors (n, 3) east, north, up of places (3, n), NaN where none is stated; None without any. [m]"""
-    figures = {
-        column.name: table.numbers[:, header.names.index(column.name)] * column.scale for column in header.accuracy
-    }
+def _figures(table: _Table, header: _Header, records: LogRecords) -> tuple[dict[str, Floats], str]:
+    """Figures (n,) of each error [m], and how many cells have one that cannot be used.
+
+    Rows with a cell that no program writes are left out. Of a sigma and its variance the larger one counts.
+    """
+    figures: dict[str, Floats] = {}
+    negative = 0
+    for column in header.accuracy:
+        values = table.numbers[:, header.names.index(column.name)]
+        records.leave_out(
+            values == _NO_NUMBER,
+            lambda _, column=column: f"{column.name} must be a number, or empty",  # type: ignore[misc]
+        )
+        negative += int(np.count_nonzero(values[records.is_usable] < 0))
+        with np.errstate(over="ignore", invalid="ignore"):
+            own = values * column.scale
+            sigmas = np.sqrt(own) if column.name.startswith(_VARIANCE) else own
+        name = column.name.replace(_VARIANCE, "sigma_")
+        figures[name] = np.fmax(figures[name], sigmas) if name in figures else sigmas
+    words = f", {counted(negative, 'figure')} of accuracy that cannot be used left out" if negative else ""
+    return figures, words
+
+
+def _sigmas(figures: Mapping[str, Floats], header: _Header, places: Floats) -> Floats | None:
+    """One-sigma errors (n, 3) east, north, up of places (3, n), NaN where none is stated; None without any. [m]
+
+    Of what several columns state of the same axis the largest counts.
+    """
     local, fixed = (
-        np.column_stack([figures[name] for name in names]) if figures.keys() >= set(names) else None
+        known_sigmas(np.column_stack([figures[name] for name in names])) if figures.keys() >= set(names) else None
         for names in _SIGMAS
     )
-    if local is not None:
-        return known_sigmas(local)
-    if fixed is None:
-        return level_sigmas(*(figures.get(name) for name in _LEVEL))
+    if fixed is not None:
+        fixed = _level_axes(filled_sigmas(fixed), header, places)
+    level = level_sigmas(*(figures.get(name) for name in _LEVEL))
+    total = level_sigmas(figures.get(_TOTAL), None)
+    stated = [sigmas for sigmas in (local, fixed, level, total) if sigmas is not None]
+    return None if not stated else known_sigmas(np.fmax.reduce(stated))
+
+
+def _level_axes(fixed: Floats, header: _Header, places: Floats) -> Floats:
+    """Sigmas (n, 3) east, north, up from independent ones along the axes of the Earth. [m]"""
     if header.axes == _GEODETIC:
         latitude, longitude = places[:2]
     else:
         latitude, longitude, _ = geodetic_places(places.T)
     where: Any = (latitude, longitude, np.zeros_like(latitude))
     axes: Floats = np.moveaxis(np.array(axes_at(Geodetic(*where)).axes), -1, 0)
-    known = np.where(np.all(fixed > 0, axis=1, keepdims=True), fixed, np.nan)
-    return known_sigmas(np.sqrt(np.einsum("nij,nj->ni", axes**2, known**2)))
+    squares: Floats = np.einsum("nij,nj->ni", axes**2, fixed**2)
+    return np.sqrt(squares)
 
 
 def _text(data: bytes, name: str) -> str:
@@ -429,48 +437,75 @@ def _is_said(line: str) -> bool:
 
 def _name_of(cell: str) -> tuple[str, str | None]:
     """Name of a column in small letters, as far as a bracket, and the unit in square ones."""
+    name, unit = _written_name(cell)
+    return name.lower().replace(" ", "_"), unit
+
+
+def _written_name(cell: str) -> tuple[str, str | None]:
+    """The same in the letters of the file."""
     cell = cell.strip()
     match = _HEADER.fullmatch(cell)
-    name = (match[1] if match else re.split(r"[\[(]", cell)[0]).strip().strip('"').lower()
-    return name.replace(" ", "_"), match[2].strip() if match and match[2] is not None else None
-
-
-def _accuracy_of(column: str) -> str | None:
-    """The error that a column states, by its name; None of other columns."""
-    for level, names in _LEVEL_NAMES.items():
-        if column in names:
-            return level
-    match = _SIGMA_NAME(column)
-    if match is None:
-        return None
-    axis = match[1] or match[2]
-    return f"sigma_{_AXES.get(axis, axis)}"
+    name = (match[1] if match else re.split(r"[\[(]", cell)[0]).strip().strip('"')
+    return name, match[2].strip() if match and match[2] is not None else None
 
 
 def _accuracy_columns(
-    cells: Sequence[str], kind: Sequence[str], refuse: Callable[[str], NoReturn]
+    cells: Sequence[str],
+    kind: Sequence[str],
+    refuse: Callable[[str], NoReturn],
+    known: Mapping[str, _Column] = MappingProxyType({}),
 ) -> tuple[_Column, ...]:
-    """Columns of the errors of places of a kind."""
-    found: dict[str, _Column] = {}
+    """Columns of the errors of places of a kind, those that are `known` first."""
+    columns = dict(known)
+    is_beside = False
     for index, cell in enumerate(cells):
-        column, unit = _name_of(cell)
-        name = _accuracy_of(column)
-        if name is None:
-            continue
-        if name in found:
-            refuse(f"has two columns of {name}")
+        column, unit = _written_name(cell)
         in_brackets = re.search(r"\(([^()]*)\)", cell)
-        found[name] = _measured(column, index, unit or (in_brackets[1] if in_brackets else None), refuse)._replace(
-            name=name
-        )
+        meaning, unit = meaning_of(column, unit or (in_brackets[1] if in_brackets else None))
+        is_beside |= meaning == BESIDE
+        if meaning == UNCLEAR:
+            refuse(
+                f"{shown(column)} looks like an accuracy of the places, and is none that is read: name it as what it "
+                f"is, or leave it out where it is of something else; {ACCEPTED}"
+            )
+        if meaning in (None, BESIDE):
+            continue
+        if meaning in columns:
+            refuse(f"has two columns of {meaning}")
+        dimension = units.POSITION_VARIANCE if meaning.startswith(_VARIANCE) else units.LENGTH
+        column = column.lower().replace(" ", "_")
+        columns[meaning] = _measured(column, index, unit, refuse, dimension)._replace(name=meaning)
+    columns = _with_plain_heights(columns, refuse)
+    stated = {name.replace(_VARIANCE, "sigma_") for name in columns}
     for names in _SIGMAS:
-        missing = [name for name in names if name not in found]
+        missing = [name for name in names if name not in stated]
         if 0 < len(missing) < len(names):
-            has = next(name for name in names if name in found)
+            has = next(name for name in names if name in stated)
             refuse(f"has {has} and no {missing[0]}; write all of {', '.join(names)}")
-    if kind == _KINDS[2] and _SIGMAS[1][0] in found:
+    if is_beside and not stated.issuperset(_SIGMAS[0]):
+        refuse(f"has a covariance of two axes and no sigmas of them; {ACCEPTED}")
+    if kind == _KINDS[2] and _SIGMAS[1][0] in stated:
         refuse(f"has {_SIGMAS[1][0]} beside east; write {', '.join(_SIGMAS[0])}")
-    return tuple(found.values())
+    return tuple(columns.values())
+
+
+def _with_plain_heights(columns: dict[str, _Column], refuse: Callable[[str], NoReturn]) -> dict[str, _Column]:
+    """The columns with an h that is level beside a v, and the height beside east and north.
+
+    The error of a height without those of east and north is a vertical one.
+    """
+    level, vertical = _LEVEL
+    if "sigma_h" in columns:
+        of_h = columns.pop("sigma_h")
+        is_height = "sigma_east" in columns and "sigma_up" not in columns and vertical not in columns
+        meaning = level if vertical in columns else "sigma_up" if is_height else ""
+        if not meaning or meaning in columns:
+            refuse(f"has an error of h, which may be the height or horizontal; {ACCEPTED}")
+        columns[meaning] = of_h._replace(name=meaning)
+    is_alone = "sigma_up" in columns and "sigma_east" not in columns and "sigma_north" not in columns
+    if is_alone and vertical not in columns and level in columns:
+        columns[vertical] = columns.pop("sigma_up")._replace(name=vertical)
+    return columns
 
 
 def _header(lines: Sequence[str], name: str, keys: LogKeys) -> _Header:
@@ -567,7 +602,14 @@ def _vendor_header(
         hold_to_scale(scale, keys, where)
     elif keys.time_scale is not None:
         raise PathFileError(f"{where}: time counts since the start of the autopilot, and is in no scale")
-    accuracy = tuple(columns.pop(name) for name in _ACCURACY if name in columns)
+
+    def refuse(says: str) -> NoReturn:
+        raise PathFileError(f"{where}: {says}")
+
+    # What somebody has added to an exporter's columns counts like that of a plain log.
+    others = ["" if cell.strip().lower() in vendor.columns else cell for cell in cells]
+    level = {name: columns.pop(name) for name in _LEVEL if name in columns}
+    accuracy = _accuracy_columns(others, _GEODETIC, refuse, level)
     numbers = tuple(columns.values())
     return _Header(line, delimiter, len(cells), numbers, stamp, scale, _EITHER, vendor, accuracy)
 
@@ -576,11 +618,17 @@ def _example(scale: str) -> str:
     return _EXAMPLE if scale == "utc" else _EXAMPLE[:-1]
 
 
-def _measured(name: str, index: int, unit: str | None, refuse: Callable[[str], NoReturn]) -> _Column:
+def _measured(
+    name: str,
+    index: int,
+    unit: str | None,
+    refuse: Callable[[str], NoReturn],
+    dimension: units.Dimension | None = None,
+) -> _Column:
     """A column of numbers, whose unit is known and of the right dimension."""
-    dimension = _DIMENSIONS.get(name, units.LENGTH)
-    example = {units.ANGLE: f"{name} [deg]", units.TIME: "time [s]', 'time [UTC]' or 'time [GPST]"}.get(
-        dimension, f"{name} [m]"
+    dimension = dimension or _DIMENSIONS.get(name, units.LENGTH)
+    example = (
+        "time [s]', 'time [UTC]' or 'time [GPST]" if dimension is units.TIME else f"{name} [{_usual(dimension)}]"
     )
     if not unit:
         more = ", or say trajectory.time_scale" if name == "time" else ""
@@ -704,11 +752,12 @@ def _quoted_cells(texts: list[str], header: _Header) -> tuple[Floats, list[str] 
 
 
 def _or_nan(cell: str) -> float:
-    """The number of a cell; NaN of one that has none."""
+    """The number of a cell of an accuracy; NaN of an empty one, a negative number of others that give none."""
     try:
         return float(cell)
     except ValueError:
-        return math.nan
+        given = cell.strip().strip('"').lower()
+        return (-1.0 if given else math.nan) if given in _NOT_GIVEN else _NO_NUMBER
 
 
 def _instants(texts: list[str], header: _Header) -> tuple[Floats, Floats] | None:
@@ -732,6 +781,10 @@ def _minute(text: str) -> float | None:
     """Seconds since MJD 0 of the beginning of a stamp, which is that of many rows; None if it is none."""
     instant = parse_instant(f"{text}00Z")
     return None if instant is None else instant.day * DAY + instant.seconds
+
+
+def _usual(dimension: units.Dimension) -> str:
+    return "deg" if dimension is units.ANGLE else dimension.si
 
 
 def _cells(text: str, delimiter: str) -> list[str] | str:

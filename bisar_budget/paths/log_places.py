@@ -326,9 +326,17 @@ def level_sigmas(horizontal: Floats | None, vertical: Floats | None) -> Floats |
 
 
 def known_sigmas(sigmas: Floats) -> Floats | None:
-    """Sigmas (n, 3) of a log, NaN where one is not positive; None where no place has any. [m]"""
-    found = np.where(np.all(sigmas > 0, axis=1, keepdims=True), np.minimum(sigmas, _LARGEST_SIGMA_M), np.nan)
+    """Sigmas (n, 3) of a log, NaN for each figure that is not positive; None where no place has any. [m]"""
+    found = np.where(sigmas > 0, np.minimum(sigmas, _LARGEST_SIGMA_M), np.nan)
     return None if np.isnan(found).all() else found
+
+
+def filled_sigmas(sigmas: Floats) -> Floats:
+    """Sigmas (…, 3) with the largest known one along the axes of which none is known. [m]
+
+    The error there may be as large: what is left out must not count as 0.
+    """
+    return np.where(sigmas > 0, sigmas, np.fmax.reduce(sigmas, axis=-1, keepdims=True))
 
 
 def geodetic_log(

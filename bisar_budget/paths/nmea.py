@@ -7,8 +7,8 @@
 A height of a sentence is above mean sea level, and the geoid separation beside it makes one above the ellipsoid.
 Sentences may stand among other lines or behind something on their line. Fixes are those of one talker. A sentence
 whose checksum is wrong or missing is left out, and counted; of DTM only where another one is sound. GST states
-one-sigma errors of latitude, longitude and height. DTM states a datum, which has to be W84. Without a date, fixes
-have times of day.
+one-sigma errors of latitude, longitude and height, or the semi-major axis of the ellipse on the level alone. DTM
+states a datum, which has to be W84. Without a date, fixes have times of day.
 
 Source: NMEA 0183 4.10 as RTKLIB 2.4.3 reads it (src/solution.c, decode_nmeagga, decode_nmearmc, decode_nmeazda: a
 time of day is within half a day of the date before it). The fields of GNS, GST and DTM are those of pynmea2, which
@@ -38,6 +38,7 @@ from bisar_budget.paths.log_places import (
     from_sea_level,
     geodetic_log,
     hold_to_scale,
+    known_sigmas,
     most_left_out,
 )
 from bisar_budget.paths.messages import number_in
@@ -56,6 +57,7 @@ _KINDS = ("GGA", "GNS")  # of sentences with a place
 _DATES = ("RMC", "ZDA")
 _BESIDE = ("GST", "DTM")  # of sentences beside fixes; there may be one for each
 _CHECKED = re.compile(r"\$([^*]+)\*([0-9A-Fa-f]{2})", re.ASCII)
+_REFERENCES = ("W84", "")  # of DTM; an offset from another datum is none from WGS-84
 _GST_REACH_S = 5.0  # from a fix to a GST that speaks for it; receivers write one a second, or fewer than fixes
 
 
@@ -112,13 +114,21 @@ class _Fix(NamedTuple):
 
 
 class _Accuracy(NamedTuple):
-    """Line of a GST, seconds of its day, and one-sigma errors east, north and up [m]."""
+    """Line of a GST, seconds of its day, and one-sigma errors east, north and up; NaN for those it leaves out [m].
+
+    `unusable` is how many of its figures are no error.
+    """
 
     line: int
     seconds: float
     east: float
     north: float
     up: float
+    unusable: int = 0
+
+    @property
+    def sigmas(self) -> tuple[float, float, float]:
+        return (self.east, self.north, self.up)
 
 
 class _Datum(NamedTuple):
@@ -133,7 +143,9 @@ class _Datum(NamedTuple):
     def words(self) -> str:
         """The datum in a sentence."""
         north, east, up = (shown(offset) for offset in self.offsets)
-        known = {"W84": "WGS-84 with offsets", "999": "a user datum (999)"}
+        known = {"999": "a user datum (999)", "": "a datum without a code"}
+        if self.reference in _REFERENCES:
+            known["W84"] = "WGS-84 with offsets"
         return (
             f"{known.get(self.code, f'the datum {shown(self.code)}')}, {north}, {east} and {up} off "
             f"{shown(self.reference or 'its reference')}"
@@ -165,7 +177,8 @@ class _Sentences:
     """Sentences of a log that are read: fixes by talker and kind, other ones by talker, dates and datums with lines.
 
     `broken` are messages about fixes that cannot be used, by their lines, `undated` those about dates that are none.
-    `lost` counts sentences with a wrong checksum, `doubtful_datums` are what such a DTM says.
+    `lost` counts sentences with a wrong checksum, `doubtful_datums` are what such a DTM says. `unusable` counts
+    figures of GST that are no error, by talker.
     """
 
     fixes: defaultdict[tuple[str, str], list[_Fix]]
@@ -176,6 +189,7 @@ class _Sentences:
     doubtful_datums: defaultdict[str, list[tuple[int, _Datum]]]
     undated: list[str]
     lost: Counter[tuple[str, str]]
+    unusable: Counter[str]
 
     def talker_of_fixes(self, keys: LogKeys, name: str) -> str:
         """The talker whose fixes are read: the one that the mission file chooses, or the only one."""
@@ -274,6 +288,11 @@ class _Sentences:
         speakers = self.accuracies.keys() - self.other_receivers(talker)
         return self.accuracies.get(talker) or sorted(gst for one in speakers for gst in self.accuracies[one])
 
+    def unusable_words(self, talker: str) -> str:
+        """How many figures of accuracy of a talker, or of talkers without fixes, are none, for reports."""
+        count = sum(self.unusable[speaker] for speaker in self.unusable.keys() - self.other_receivers(talker))
+        return f", {counted(count, 'figure')} of accuracy that cannot be used left out" if count else ""
+
     def lost_words(self) -> str:
         """How many sentences are left out whose checksum is wrong or whose date is none, for reports."""
         lost, undated = self.lost.total(), len(self.undated)
@@ -297,6 +316,7 @@ def _sentences(data: bytes, name: str) -> _Sentences:
         doubtful_datums=defaultdict(list),
         undated=[],
         lost=Counter(),
+        unusable=Counter(),
     )
     # Bytes of another protocol between sentences are no text.
     for number, text in enumerate(data.decode("latin-1").split("\n"), 1):
@@ -323,13 +343,17 @@ def _sentences(data: bytes, name: str) -> _Sentences:
                 found.broken[talker, kind][number] = str(fault)
             elif kind in _DATES:
                 found.undated.append(str(fault))
+            elif kind == "GST":
+                found.unusable[talker] += 1
             continue
         if isinstance(read_one, _Fix):
             found.fixes[talker, kind].append(read_one)
         elif isinstance(read_one, Instant):
             found.dates[talker].append((number, read_one))
         elif isinstance(read_one, _Accuracy):
-            found.accuracies[talker].append(read_one)
+            found.unusable[talker] += read_one.unusable
+            if not all(map(math.isnan, read_one.sigmas)):
+                found.accuracies[talker].append(read_one)
         elif isinstance(read_one, _Datum):
             found.datums[talker].append((number, read_one))
     return found
@@ -353,6 +377,7 @@ def _log(talker: str, kind: str, found: _Sentences, name: str, keys: LogKeys) ->
         start = Instant(int(days[0]), float(seconds[0]))
         times = (days - days[0]) * DAY + (seconds - seconds[0])
     words = f"NMEA 0183 {kind}" + (f" of the talker {talker}" if keys.talker else "") + found.lost_words()
+    words += found.unusable_words(talker)
     log = geodetic_log(records, words, times, start, "utc", (latitude, longitude, heights))
     qualities = [fix.quality for fix, is_usable in zip(fixes, records.is_usable.tolist(), strict=True) if is_usable]
     # Without dates, times of day are those of day 0 or of its neighbours.
@@ -371,21 +396,21 @@ def _sigmas(
 ) -> Floats | None:
     """One-sigma errors (n, 3) of fixes at rising times: the larger one of the GST before a fix and of that behind it.
 
-    NaN where both are farther than 5 s; None where no fix has any. [m]
+    NaN where both are farther than 5 s, and for what they leave out; None where no fix has any. [m]
     """
     if not stated:
         return None
     days, seconds = _dated(stated, dates, middle)
     at = days * DAY + seconds
     order = np.argsort(at, kind="stable")
-    at, figures = at[order], np.array([gst[2:] for gst in stated])[order]
+    at, figures = at[order], np.array([gst.sigmas for gst in stated])[order]
     sigmas = np.full((len(times), 3), np.nan)
     behind = np.searchsorted(at, times - _TIME_STEP_S, "left")
     for index in (behind, np.searchsorted(at, times + _TIME_STEP_S, "right") - 1):
         index = np.clip(index, 0, len(at) - 1)
         is_near = np.abs(at[index] - times) <= _GST_REACH_S
         sigmas = np.where(is_near[:, None], np.fmax(sigmas, figures[index]), sigmas)
-    return None if np.isnan(sigmas).all() else sigmas
+    return known_sigmas(sigmas)
 
 
 def _dated(
@@ -472,18 +497,31 @@ def _gns(fields: Sequence[str], where: str, line: int) -> _Fix | None:
 
 
 def _gst(fields: Sequence[str], where: str, line: int) -> _Accuracy | None:
-    north, east, up = (float(field) if _NUMBER.fullmatch(field) else math.nan for field in fields[5:8])
-    is_stated = all(sigma > 0 for sigma in (north, east, up))  # a receiver without a fix writes zeros, or nothing
-    return _Accuracy(line, _clock(fields[0], where), east, north, up) if is_stated and fields[0] else None
+    given = (fields[2], *fields[5:8])
+    numbers = [number_in(field) for field in given]
+    unusable = sum(
+        field != "" and (number is None or number < 0) for field, number in zip(given, numbers, strict=True)
+    )
+    # A receiver without a fix writes zeros, or nothing.
+    semi_major, north, east, up = (number if number is not None and number > 0 else math.nan for number in numbers)
+    if all(map(math.isnan, (semi_major, north, east, up))) and not unusable:
+        return None
+    if semi_major > math.hypot(north, east) or math.isnan(north + east):
+        # No axis has a larger error than the ellipse, which none of them can belong to otherwise.
+        north, east = (float(np.fmax(sigma, semi_major)) for sigma in (north, east))
+    return _Accuracy(line, _clock(fields[0], where), east, north, up, unusable)
 
 
 def _dtm(fields: Sequence[str], where: str, line: int) -> _Datum | None:
-    """A datum; none where the receiver leaves its code empty."""
+    """A datum; none where the receiver leaves it empty."""
     code, subdivision, north, north_side, east, east_side, up, reference = fields[:8]
-    offsets = (f"{north}' {north_side}", f"{east}' {east_side}", f"{up} m")
+    offsets = (f"{north or 0}' {north_side}".strip(), f"{east or 0}' {east_side}".strip(), f"{up or 0} m")
     is_zero = all(number_in(offset or "0") == 0 for offset in (north, east, up))
     name = f"{code}-{subdivision}" if subdivision else code
-    return _Datum(name, offsets, reference, is_wgs84=code == "W84" and is_zero) if code else None
+    if not code and is_zero and reference in _REFERENCES:
+        return None
+    is_wgs84 = code == "W84" and is_zero and reference in _REFERENCES
+    return _Datum(name, offsets, reference, is_wgs84=is_wgs84)
 
 
 def _rmc(fields: Sequence[str], where: str, line: int) -> Instant | None:

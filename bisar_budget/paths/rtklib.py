@@ -28,11 +28,13 @@ from bisar_budget.paths.log_places import (
     LogKeys,
     LogRecords,
     counted,
+    filled_sigmas,
     from_sea_level,
     geodetic_log,
     hold_to_ellipsoid,
     hold_to_scale,
     is_wgs84,
+    known_sigmas,
     most_left_out,
     needs_separation,
 )
@@ -242,7 +244,7 @@ def _sigmas(
 ) -> Floats | None:
     """Standard deviations (n, 3) east, north, up [m]; None where the file has none, or zeros alone.
 
-    Those of x, y, z are turned with their covariances, of which the file has the signed roots.
+    A 0 states nothing. Those of x, y, z are turned with their covariances, of which the file has the signed roots.
     """
     is_turned = "sdx(m)" in header.columns
     names = ("sdx(m)", "sdy(m)", "sdz(m)") if is_turned else ("sde(m)", "sdn(m)", "sdu(m)")
@@ -256,10 +258,10 @@ def _sigmas(
             f"(got {', '.join(f'{one:g}' for one in own[i])})"
         ),
     )
-    if not own.any():
-        return None
-    if not is_turned:
-        return own
+    known = known_sigmas(own)
+    if known is None or not is_turned:
+        return known
+    own = filled_sigmas(known)
     covariance = np.zeros((len(own), 3, 3))
     covariance[:, range(3), range(3)] = own**2
     for column, i, j in (("sdxy(m)", 0, 1), ("sdyz(m)", 1, 2), ("sdzx(m)", 2, 0)):

@@ -231,6 +231,36 @@ class TestALog:
         found = self.logged(tmp_path, "a.csv", "\n".join(lines).encode(), position)
         assert (statuses(found, "receiver") == {"not_evaluated"}) == (status == "not_evaluated")
 
+    @pytest.mark.parametrize("cells", ["3,3,", "3,0,3", "n/a,3,3", ",,3"])
+    def test_sigmas_of_some_axes_count_for_the_others(self, cells: str, tmp_path: Path) -> None:
+        """3 m are stated of two axes, and of the third nothing: 2 cm are not judged, 3 m are."""
+        lines = geodetic_csv(flight()).decode().splitlines()
+        lines = [f"{lines[0]},sde(m),sdn(m),sdu(m)", *(f"{line},{cells}" for line in lines[1:])]
+        log = "\n".join(lines).encode()
+        assert statuses(self.logged(tmp_path, "a.csv", log, "2 cm"), "receiver") == {"not_evaluated"}
+        assert statuses(self.logged(tmp_path, "a.csv", log, "3.1 m"), "receiver") != {"not_evaluated"}
+        filled = self.logged(tmp_path, "a.csv", log, None).analysed().mission.platforms.receiver.motion_error
+        assert filled.position == pytest.approx((3.0, 3.0, 3.0))
+
+    @pytest.mark.parametrize(("position", "is_judged"), [("2 cm", False), ("4 m", True)])
+    def test_a_solution_without_a_sigma_of_the_height(self, position: str, is_judged: bool, tmp_path: Path) -> None:
+        found = self.logged(tmp_path, "a.pos", solution(flight(), sigmas=(3.0, 3.0, 0.0)), position)
+        assert ("not_evaluated" in statuses(found, "receiver")) != is_judged
+
+    def test_what_is_usual_of_a_fix_counts_beside_half_a_gst(self, tmp_path: Path) -> None:
+        """An autonomous fix whose GST states 1 cm along one axis alone."""
+        pytest.importorskip("pynmea2")
+        lines = self.fixes(1).decode().splitlines()
+        half = [line for line in lines for line in (line, *self.half_of_gst(line))]
+        found = self.logged(tmp_path, "a.nmea", "\r\n".join(half).encode(), "2 cm")
+        assert statuses(found, "receiver") == {"not_evaluated"}
+        assert "GGA quality 1," in str(row(found, "receiver.position.x").reason)
+
+    @staticmethod
+    def half_of_gst(line: str) -> list[str]:
+        cells = line.split(",")
+        return [sentence(f"GNGST,{cells[1]},,,,,0.01,,")] if cells[0].endswith("GGA") else []
+
     def test_a_covariance_in_place_of_position_and_velocity(self, tmp_path: Path) -> None:
         (tmp_path / "a.pos").write_bytes(solution(flight(), sigmas=SIGMAS))
         for position, is_enough in (("2 cm", True), ("1.9 cm", False)):

@@ -417,12 +417,107 @@ class TestAccuracyColumns:
             ("sde(m),sdn(m)", "has sigma_east and no sigma_up; write all of sigma_east, sigma_north, sigma_up"),
             ("sde(m),sigma_east [m]", "has two columns of sigma_east"),
             ("std_lat [deg],std_lon [deg],std_alt [m]", "std_lat "),
+            ("CEP [m]", "CEP looks like an accuracy of the places, and is none that is read: name it as what it is"),
+            ("EPE [m]", "EPE looks like"),
+            ("r95 [m]", "r95 looks like"),
+            ("position error [m]", "position error looks like"),
+            ("2 sigma [m]", "2 sigma looks like"),
+            ("sigma_foo [m]", "accepted: one sigma as sigma_east, sigma_north, sigma_up [m], or sigma_x"),
+            ("cov_xx [m^2],cov_yy [m^2],cov_zz [m^2],cov_xy [m^2]", "cov_xy looks like"),
+            ("cov_en [m^2]", "has a covariance of two axes and no sigmas of them"),
+            ("SD-H [m]", "has an error of h, which may be the height or horizontal"),
+            ("position accuracy", "position_accuracy has no unit"),
         ],
     )
     def test_columns_that_are_refused(self, columns: str, says: str) -> None:
         with pytest.raises(PathFileError) as error:
             self.sigmas(columns, ",".join("1" * (columns.count(",") + 1)))
         assert says in str(error.value)
+
+    @pytest.mark.parametrize(
+        ("columns", "cells", "wanted"),
+        [
+            ("sigma [m]", "3", [3, 3, 3]),
+            ("Position StdDev [m]", "3", [3, 3, 3]),
+            ("position accuracy [cm]", "300", [3, 3, 3]),
+            ("3D accuracy (m)", "3", [3, 3, 3]),
+            ("sigma_horizontal [m],sigma_vertical [m]", "2,3", [2, 2, 3]),
+            ("SD-H [m],SD-V [m]", "2,3", [2, 2, 3]),
+            ("SD-E [m],SD-N [m],SD-H [m]", "1,2,3", [1, 2, 3]),
+            ("latitude standard deviation [m],longitude standard deviation [m],altitude standard deviation [m]",
+             "1,2,3", [2, 1, 3]),
+            ("SDEast(m),SDNorth(m),SDHeight(m)", "1,2,3", [1, 2, 3]),
+            ("sigma_east_m,sigma_north_m,sigma_down_m", "1,2,3", [1, 2, 3]),
+            ("cov_ee [m^2],cov_en [m^2],cov_nn [m^2],cov_uu [m^2]", "1,-0.5,4,9", [1, 2, 3]),
+            ("latitude accuracy [m],longitude accuracy [m],altitude accuracy [m]", "1,2,3", [2, 1, 3]),
+            ("pAcc [mm]", "3000", [3, 3, 3]),
+        ],
+    )  # fmt: skip
+    def test_other_names_that_are_plain(self, columns: str, cells: str, wanted: list[float]) -> None:
+        assert self.sigmas(columns, cells) == pytest.approx(np.array([wanted]))
+
+    @pytest.mark.parametrize(
+        "columns",
+        [
+            "hdop,vdop,pdop",
+            "sdve(m/s),sdvn(m/s),sdvu(m/s)",
+            "SD-VE [m/s]",
+            "sigma_x [m/s],sigma_y [m/s],sigma_z [m/s]",
+            "speedAccuracy",
+            "velocity std [m/s],3D velocity accuracy [m/s]",
+            "s_variance_m_s,c_variance_rad",
+            "roll std [deg],sigma_h [deg],headingAccuracy [deg]",
+            "acc_x [m/s^2],clock sigma [s],time accuracy",
+            "cross track error [m],residual rms [m],magnetic variation [deg]",
+        ],
+    )
+    def test_accuracies_of_something_else_are_not_read(self, columns: str) -> None:
+        assert self.sigmas(columns, ",".join("3" * (columns.count(",") + 1))) is None
+
+    @pytest.mark.parametrize("cells", ["3,3,", "3,3,0", "n/a,3,3", "3,-1,3", "nan,3,nan", '3,"",3'])
+    def test_figures_that_are_known_count_without_the_others(self, cells: str) -> None:
+        """Those of the other axes are not known, and not 0."""
+        found = self.sigmas("sigma_east [m],sigma_north [m],sigma_up [m]", cells, "1,2,4")
+        known = [cell == "3" for cell in cells.split(",")]
+        assert found[0] == pytest.approx(np.where(known, 3, np.nan), nan_ok=True)
+        assert found[1] == pytest.approx([1, 2, 4])
+
+    def test_figures_along_x_y_z_count_without_the_third(self) -> None:
+        assert self.sigmas("sdx(m),sdy(m),sdz(m)", "3,3,0") == pytest.approx(np.array([[3, 3, 3]]))
+
+    def test_figures_that_cannot_be_used_are_counted(self) -> None:
+        header = f"{self.GEODETIC},sigma_east [m],sigma_north [m],sigma_up [m]"
+        rows = [f"{self.ROW.format(n)},3,{'n/a' if n else 3},{'-1' if n == 2 else ''}" for n in range(4)]
+        words = read("\n".join([header, *rows])).words
+        assert "4 figures of accuracy that cannot be used left out" in words
+        assert "figure" not in read("\n".join([header, rows[0]])).words
+
+    @pytest.mark.parametrize("cell", ["3 m", "3,0", "bad"])
+    def test_a_cell_that_no_number_is_leaves_its_row_out(self, cell: str) -> None:
+        header = f"{self.GEODETIC},accuracy [m]"
+        rows = [f"{self.ROW.format(n)},2" for n in range(120)]
+        rows[7] = f'{self.ROW.format(7)},"{cell}"'
+        log = read("\n".join([header, *rows]))
+        assert len(log.times) == 119
+        assert "1 record that cannot be used left out (line 9)" in log.words
+        with pytest.raises(PathFileError, match="horizontal_accuracy must be a number, or empty"):
+            self.sigmas("accuracy [m]", *[f'"{cell}"'] * 20)
+
+    def test_of_two_sets_the_larger_figure_counts(self) -> None:
+        sigmas = "sigma_east [m],sigma_north [m],sigma_up [m]"
+        for cells, wanted in (
+            ("3,2,0.001,0.001,0.001", [3, 3, 2]),
+            ("0.001,0.001,5,0.001,", [5, 0.001, 0.001]),
+            (",,1,2,3", [1, 2, 3]),
+        ):
+            found = self.sigmas(f"horizontal accuracy [m],vertical accuracy [m],{sigmas}", cells)
+            assert found == pytest.approx(np.array([wanted]))
+        found = self.sigmas(f"{sigmas},sigma_x [m],sigma_y [m],sigma_z [m]", ",,,3,3,3", "4,1,1,3,3,3")
+        assert found == pytest.approx(np.array([[3, 3, 3], [4, 3, 3]]))
+        found = self.sigmas(f"{sigmas},cov_ee [m^2],cov_nn [m^2],cov_uu [m^2]", "1,3,,4,4,4")
+        assert found == pytest.approx(np.array([[2, 3, 2]]))
+        found = self.sigmas("vertical accuracy [m],position accuracy [m]", "0.001,3")
+        assert found == pytest.approx(np.array([[3, 3, 3]]))
 
     def test_dilutions_of_precision_are_no_errors(self) -> None:
         assert self.sigmas("hdop,vdop,pdop", "1,2,3") is None

@@ -352,7 +352,9 @@ def test_a_second_60_is_a_rounded_one(clock: str, seconds: float, kind: str) -> 
 class TestADatum:
     USER = sentence("GPDTM,999,,0.08,N,0.07,E,-47.7,W84")
 
-    @pytest.mark.parametrize("datum", ["W84,,0.0,N,0.0,E,0.0,W84", "W84,,,,,,,W84", ",,,,,,,"])
+    @pytest.mark.parametrize(
+        "datum", ["W84,,0.0,N,0.0,E,0.0,W84", "W84,,,,,,,W84", "W84,,0,N,0,E,0,", ",,,,,,,", ",,0.0,N,0.0,E,0.0,W84"]
+    )
     def test_wgs84_is_read(self, datum: str) -> None:
         assert len(read(sentence(f"GPDTM,{datum}") + "\n" + nmea(SHORT).decode()).times) == 6
 
@@ -362,6 +364,9 @@ class TestADatum:
             ("999,,0.08,N,0.07,E,-47.7,W84", "a user datum (999), 0.08' N, 0.07' E and -47.7 m off W84"),
             ("W84,,0.08,N,0.0,E,0.0,W84", "WGS-84 with offsets, 0.08' N, 0.0' E and 0.0 m off W84"),
             ("P90,,0.001,S,0,W,1,W84", "the datum P90, 0.001' S, 0' W and 1 m off W84"),
+            (",,0.08,N,0.07,E,-47.7,W84", "a datum without a code, 0.08' N, 0.07' E and -47.7 m off W84"),
+            (",,,,,,,W72", "a datum without a code, 0', 0' and 0 m off W72"),
+            ("W84,,0.0,N,0.0,E,0.0,W72", "the datum W84, 0.0' N, 0.0' E and 0.0 m off W72"),
         ],
     )
     def test_another_one_is_refused_by_its_name(self, datum: str, words: str) -> None:
@@ -410,10 +415,38 @@ class TestALogSaysItsAccuracy:
         assert np.isfinite(log.sigmas[: 5 * 50 + 1]).all()
         assert np.isnan(log.sigmas[5 * 50 + 1 :]).all()
 
-    @pytest.mark.parametrize("fields", [",,,,,,", "9.9,,,,0,0,0", "9.9,,,,0.01,,0.02", "9.9,,,,-1,1,1"])
+    @pytest.mark.parametrize("fields", [",,,,,,", "9.9,,,,0,0,0", "9.9,0,0,0,,,", "9.9,,,,-1,,0"])
     def test_a_gst_that_states_nothing_is_none(self, fields: str) -> None:
         lines = [rmc(0), gga(0, 48, 11, 3000), sentence(f"GNGST,052001.25,{fields}")]
         assert read("\n".join(lines)).sigmas is None
+
+    @pytest.mark.parametrize(
+        ("fields", "east", "north", "up"),
+        [
+            ("9.9,0.9,0.9,0,0.9,0.8,", 0.8, 0.9, math.nan),
+            ("9.9,,,,0.9,,0.7", math.nan, 0.9, 0.7),
+            ("9.9,,,,.900,.800,.700", 0.8, 0.9, 0.7),
+            ("9.9,,,,9e-1,8e-1,7e-1", 0.8, 0.9, 0.7),
+            ("9.9,,,,0.9000000000000,0.8000000000000,0.7000000000000", 0.8, 0.9, 0.7),
+            ("9.9,0.9,0.5,0,,,", 0.9, 0.9, math.nan),
+            ("9.9,0.9,0.5,0,0.6,,0.7", 0.9, 0.9, 0.7),
+            ("9.9,3.0,0.5,0,0.6,0.5,0.7", 3.0, 3.0, 0.7),
+            ("9.9,0.75,0.5,0,0.6,0.5,0.7", 0.5, 0.6, 0.7),  # as large as both together
+        ],
+    )
+    def test_what_a_gst_states_counts_without_the_rest(
+        self, fields: str, east: float, north: float, up: float
+    ) -> None:
+        log = read("\n".join([rmc(0), gga(0, 48, 11, 3000), sentence(f"GNGST,052001.25,{fields}")]))
+        assert log.sigmas == pytest.approx(np.array([[east, north, up]]), nan_ok=True)
+        assert "figure" not in log.words
+
+    def test_figures_of_gst_that_cannot_be_used_are_counted(self) -> None:
+        lines = [rmc(0), gga(0, 48, 11, 3000)]
+        gsts = ["052001.25,,,,,x,-1,0.02", "052001.25,,,,,bad,,", "noon,,,,,1,1,1"]
+        log = read("\n".join([*lines, *(sentence(f"GNGST,{one}") for one in gsts)]))
+        assert log.sigmas == pytest.approx(np.array([[math.nan, math.nan, 0.02]]), nan_ok=True)
+        assert "4 figures of accuracy that cannot be used left out" in log.words
 
     @pytest.mark.parametrize("is_own", [True, False])
     def test_the_gst_of_the_talker_of_the_fixes_counts(self, is_own: bool) -> None:

@@ -78,6 +78,12 @@ def test_sigmas_are_those_of_the_columns() -> None:
     assert read(solution(SHORT, sigmas=(0.0, 0.0, 0.0))).sigmas is None
 
 
+def test_a_sigma_of_0_takes_nothing_from_the_others() -> None:
+    assert read(solution(SHORT, sigmas=(3.0, 2.0, 0.0))).sigmas == pytest.approx(
+        np.tile((3.0, 2.0, np.nan), (6, 1)), nan_ok=True
+    )
+
+
 def test_sigmas_along_x_y_z_are_turned_with_their_covariance() -> None:
     """The same matrix, turned by a rotation that is written down here from geocentric angles of the place itself."""
     east_north_up = np.array([[4.0, 1.0, -1.5], [1.0, 9.0, 2.0], [-1.5, 2.0, 25.0]]) * 1e-4

@@ -305,3 +305,14 @@ class TestAccuracy:
         assert np.isnan(log.sigmas[-1]).all()
         assert read("\n".join(lines), **OF_SEA, instance=1).sigmas == pytest.approx(np.full((2, 3), 9.0))
         assert read(dataflash(SHORT), **OF_SEA, instance=0).sigmas is None
+
+
+def test_an_accuracy_that_is_added_to_an_exporters_columns_counts() -> None:
+    """As in a plain log: one that is not plain is refused."""
+    fields = tuple(field for field in GPS_OF_NOW if field[1] != "eph")
+    text = px4_csv(SHORT, fields, gps_records(SHORT))
+    header, *rows = (text if isinstance(text, str) else text.decode()).splitlines()
+    added = [f"{header},position accuracy [m]", *(f"{line},3" for line in rows)]
+    assert read("\n".join(added)).sigmas == pytest.approx(np.full((6, 3), 3.0))
+    with pytest.raises(PathFileError, match="CEP looks like an accuracy of the places"):
+        read("\n".join([f"{header},CEP [m]", *added[1:]]))

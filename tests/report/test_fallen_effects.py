@@ -3,6 +3,7 @@
 import copy
 import math
 import re
+from pathlib import Path
 from random import Random
 from typing import Any
 
@@ -14,9 +15,11 @@ from bisar_budget.budget.check import check_mission
 from bisar_budget.effects.effect import MOTION
 from bisar_budget.faults import MissionError
 from bisar_budget.findings.mission import MissionFindings
-from bisar_budget.mission.load import parse_mission
+from bisar_budget.mission.load import load_mission, parse_mission
 from bisar_budget.report.change.comparison import Gate, compare
+from bisar_budget.report.change.names import plain, plain_file
 from tests.conftest import TODAY, findings
+from tests.conftest import mission_text as base_text
 from tests.families import FAMILIES, mission_text
 from tests.fuzz import _with_instruments, places, tree_of
 from tests.yaml_text import yaml_text
@@ -206,6 +209,146 @@ def test_a_fall_is_said_with_both_uses() -> None:
     assert old.split()[1] != new.split()[0]
 
 
+# ---------------------------------------------------------------------- the same collection, written another way
+PLACE = [("scene__latitude", "48 deg"), ("scene__longitude", "11 deg"), ("scene__height", 0)]
+SLOWER: tuple[str, object] = (f"{ERROR}/velocity", ["1 mm/s", "1.9 mm/s", "1 mm/s"])
+
+
+def gated(before: MissionFindings, after: MissionFindings) -> set[str]:
+    return {one.id for one in compare(before, after).refusals(Gate(1.0))}
+
+
+@pytest.mark.parametrize("frame", ["scene", "ric"])
+def test_a_place_on_the_earth_hides_no_fall(frame: str) -> None:
+    """Nor do `ric` axes, which need one. The place alone is no fall, added or taken away."""
+    common = ("common_motion_error", {"frame": frame, "position": "1 mm", "source": "service"})
+    added = findings(**at(*PLACE, common))
+    assert gated(findings(**DESIGN), added) == set()
+    assert gated(findings(**DESIGN), findings(**at(*PLACE, common, SLOWER))) == {"receiver.velocity.y"}
+    assert "receiver.velocity.y" in gated(added, findings(**at(SLOWER)))
+    assert gated(findings(**at(*PLACE)), findings(**DESIGN)) == set()
+
+
+def test_errors_along_ric_axes_are_compared_before_there_was_a_place() -> None:
+    ric = [*PLACE, (f"{TX}__motion_error/frame", "ric")]
+    assert gated(findings(**DESIGN), findings(**at(*ric))) == set()  # the same sizes along every axis
+    smaller = findings(**at(*ric, (f"{TX}__motion_error/velocity", "0.1 mm/s")))
+    assert {"transmitter.velocity.x", "transmitter.velocity.y"} <= gated(findings(**DESIGN), smaller)
+
+
+def _geodetic(**changes: str) -> MissionFindings:
+    """The design with a receiver by its geodetic place, near the one of before."""
+    tree = tree_of(base_text(**at(*PLACE)))
+    receiver = tree["platforms"]["receiver"]
+    kept = {"motion_error": receiver["motion_error"], "oscillator": receiver["oscillator"]}
+    tree["platforms"]["receiver"] = {
+        "latitude": "48.05 deg",
+        "longitude": "11.08 deg",
+        "altitude": "2 km",
+        "heading": "315 deg",
+        "speed": "57 m/s",
+        **kept,
+    }
+    tree["platforms"]["transmitter"]["motion_error"] |= changes
+    return check_mission(parse_mission(yaml_text(tree), "mission.yaml"), TODAY)
+
+
+def test_a_path_in_other_keys_hides_no_fall_of_the_other_platform() -> None:
+    allowed = gated(findings(**DESIGN), _geodetic())
+    fallen = gated(findings(**DESIGN), _geodetic(velocity="0.1 mm/s")) - allowed
+    assert {"transmitter.velocity.x", "transmitter.velocity.y"} <= fallen
+    assert not any(name.startswith("transmitter.velocity") for name in allowed)
+
+
+def test_what_the_earlier_collection_does_not_allow_is_refused() -> None:
+    """A bandwidth below one cycle of the earlier aperture: nothing could be compared, and nothing was refused."""
+    key, T = "platforms.receiver.oscillator.bandwidth", findings(**DESIGN).aperture_time
+    longer = ("collection__aperture_time", f"{2 * T} s")
+    below, above = ((f"{RX}__oscillator/bandwidth", f"{factor / T} Hz") for factor in (0.7, 1.3))
+    before = findings(**DESIGN)
+    (one,) = [one for one in compare(before, findings(**at(longer, below, SLOWER))).loosened if one.id == key]
+    assert one.words.startswith("effects compared in the earlier collection -> not comparable, since there it counts")
+    assert key not in gated(before, findings(**at(longer, above, SLOWER)))
+
+
+def test_axes_that_the_earlier_path_does_not_have_are_refused() -> None:
+    still = findings(**at((f"{RX}__velocity", [0, 0, 0])))
+    key = "platforms.receiver.motion_error.frame"
+    assert key in gated(still, findings(**at((f"{ERROR}/frame", "track"))))
+    assert key not in gated(still, findings(**DESIGN))
+
+
+# ---------------------------------------------------------------------- the same source, written another way
+@pytest.mark.parametrize(
+    "source",
+    [
+        "sheet, rev. C ",
+        "sheet rev C",
+        "Sheet, Rev. C",
+        "sheet,  rev.\u00a0C",
+        "SHEET-REV-C",
+        "sheet, rev. C\u200b",
+        "-",
+    ],
+)
+def test_a_source_that_is_spelled_otherwise_is_the_same(source: str) -> None:
+    assert refused(SLOWER, (f"{ERROR}/source", source)) == {"receiver.velocity.y"}
+    assert refused((f"{ERROR}/source", source)) == set()
+
+
+def test_names_differ_by_letters_and_digits() -> None:
+    assert plain("INS, rev. 1.1") == plain("ins REV 1-1") != plain("INS rev 11")
+    assert plain("HG 9900") == plain("HG-9900") != plain("HG 9901")
+    assert plain("report\u00e9") == plain("reporte\u0301")
+    assert plain(None) == plain(" ?! ") == ""
+    assert plain_file("parts/Near_1.yaml") == plain_file("./near 1.yml") != plain_file("parts/near_2.yaml")
+
+
+@pytest.mark.parametrize("source", [None, "sheet, rev. C"])
+def test_the_source_of_the_section_is_no_new_one(source: str | None) -> None:
+    """A line that is deleted, or repeated below, names nothing."""
+    assert "receiver.imu.attitude" in refused((f"{ERROR}/imu/attitude", "0.01 deg"), (f"{ERROR}/imu/source", source))
+    assert refused((f"{ERROR}/imu/attitude", "0.01 deg"), (f"{ERROR}/imu/source", "calibration 7")) == set()
+
+
+class TestParts:
+    @pytest.fixture
+    def parts(self, tmp_path: Path) -> Path:
+        (tmp_path / "parts").mkdir()
+        part = "kind: imu\nname: unit\naccelerometer_bias: {} ug\nsource: sheet\n"
+        for file, bias in (("unit", 100), ("parts/unit", 10), ("UNIT_", 10), ("better", 10)):
+            (tmp_path / f"{file}.yaml").write_text(part.format(bias))
+        return tmp_path
+
+    def found(self, folder: Path, **error: object) -> MissionFindings:
+        text = base_text(platforms__receiver__motion_error={"position": "1 cm", "source": "survey", **error})
+        (folder / "m.yaml").write_text(text)
+        return check_mission(load_mission(str(folder / "m.yaml")), TODAY)
+
+    @pytest.mark.parametrize(
+        ("error", "is_refused"),
+        [
+            ({"sensor": "parts/unit.yaml"}, True),
+            ({"sensor": "./UNIT_.yaml"}, True),
+            ({"sensor": "better.yaml"}, False),
+            ({"sensor": "unit.yaml", "imu": {"accelerometer_bias": "10 ug"}}, True),
+            ({"imu": {"accelerometer_bias": "10 ug"}}, True),
+            ({"imu": {"accelerometer_bias": "10 ug", "source": "Unit: Sheet"}}, True),
+            ({"sensor": "unit.yaml", "imu": {"accelerometer_bias": "10 ug", "source": "report 7"}}, False),
+        ],
+    )
+    def test_a_part_by_another_path_or_an_override_is_no_other(
+        self, parts: Path, error: dict[str, object], is_refused: bool
+    ) -> None:
+        before = self.found(parts, sensor="unit.yaml")
+        assert ("receiver.imu.accelerometer_bias" in gated(before, self.found(parts, **error))) == is_refused
+
+    def test_an_override_that_goes_names_no_part(self, parts: Path) -> None:
+        before = self.found(parts, sensor="unit.yaml", imu={"accelerometer_bias": "1 mg", "source": "report 7"})
+        assert "receiver.imu.accelerometer_bias" in gated(before, self.found(parts, sensor="unit.yaml"))
+        assert gated(before, self.found(parts, sensor="better.yaml")) == set()
+
+
 # ---------------------------------------------------------------------- random missions
 _GROWS = ["position", "velocity", "acceleration", "sigma", "amplitude", "rms", "error", "height_error"]
 _GROWS += ["accelerometer_bias", "attitude", "gyro_bias", "velocity_random_walk", "angle_random_walk"]
@@ -273,6 +416,13 @@ def test_a_random_figure_that_shrinks_or_goes_is_refused(family, seed, random, i
     is_balanced = "balanced" in str(tree.get("allocation"))
     if fallen and not is_balanced:
         assert compare(before, after).refusals(Gate(1.0)), fallen
+
+
+def test_a_total_that_makes_room_for_an_error_that_fails_alone_is_no_fall() -> None:
+    """With `each` its row is there only where no error fails alone."""
+    each = [("allocation/combine", "each")]
+    worse = findings(**at(*each, (f"{ERROR}/velocity", "1 m/s")))
+    assert not compare(findings(**at(*each)), worse).loosened
 
 
 @settings(max_examples=20, deadline=None)

@@ -69,6 +69,36 @@ class TestACovarianceOfAnEphemeris:
         before = orbiting(tmp_path, FAR, position="1 m")
         assert (OEM, LESS) not in refused(before, without_covariance(tmp_path, **error))
 
+    @pytest.mark.parametrize(
+        ("orbit", "is_refused"),
+        [
+            ({"oem": "./new/A.oem"}, True),
+            ({"oem": "new/a_.xml"}, True),
+            ({"oem": "a.oem", "object": "CIRCLE"}, True),
+            ({"oem": "b.oem"}, False),
+        ],
+    )
+    def test_the_same_name_elsewhere_or_with_its_only_object_is_no_other(
+        self, tmp_path: Path, orbit: dict[str, str], is_refused: bool
+    ) -> None:
+        before = orbiting(tmp_path, FAR, position="1 m")
+        file = tmp_path / orbit["oem"]
+        file.parent.mkdir(exist_ok=True)
+        file.write_text(oem(times=START.after))
+        error = {"frame": "ric", "position": "1 m", "velocity": "1 cm/s"}
+        text = ephemeris(
+            CENTER, oem(times=START.after), platforms__transmitter={"orbit": orbit, "motion_error": error}
+        )
+        (tmp_path / "m.yaml").write_text(text)
+        after = check_mission(load_mission(str(tmp_path / "m.yaml")), TODAY)
+        assert (OEM in [id for id, _ in refused(before, after)]) == is_refused
+
+    def test_a_source_that_is_spelled_otherwise_is_no_other(self, tmp_path: Path) -> None:
+        before = orbiting(tmp_path, FAR, position="1 m", source="POD, rev. A")
+        assert (OEM, LESS) in refused(before, without_covariance(tmp_path, position="1 m", source="POD rev A "))
+        before = orbiting(tmp_path, FAR, position="1 m", source="POD, rev. A")
+        assert (OEM, LESS) not in refused(before, without_covariance(tmp_path, position="1 m", source="POD, rev. B"))
+
     def test_where_it_was_the_error_the_error_is_gone(self, tmp_path: Path) -> None:
         before = orbiting(tmp_path, (1.0, 1.0, 1.0))
         assert "transmitter.position" in [id for id, _ in refused(before, without_covariance(tmp_path))]

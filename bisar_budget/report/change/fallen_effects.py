@@ -9,14 +9,21 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import date
 from itertools import zip_longest
+from typing import NamedTuple
 
 from bisar_budget.budget.check import check_mission
 from bisar_budget.effects.effect import MOTION, PLATFORMS
+from bisar_budget.faults import KeyPath
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.findings.requirement import NAMES
 from bisar_budget.findings.row import SPECIFICATION, Row
-from bisar_budget.mission.model import MetricSplits, Mission, flies_on_earth
-from bisar_budget.report.words.sentences import percent
+from bisar_budget.mission.model import MetricSplits, Mission
+from bisar_budget.mission.paths import with_radial
+from bisar_budget.mission.platforms import FlownPath, Platform, without_image
+from bisar_budget.mission.propagation import too_low
+from bisar_budget.paths.earth import SceneAxes
+from bisar_budget.report.change.names import plain, plain_file
+from bisar_budget.report.words.sentences import dotted, percent
 from bisar_budget.units import format_quantity
 
 SUMS = (*NAMES, "autofocus_pull_in")  # kinds of rows that are no error
@@ -54,23 +61,42 @@ class FallenEffect:
         return old, "nothing declared" if self.after is None else f"{new}, with the same part and source"
 
 
-def fallen_effects(before: MissionFindings, after: MissionFindings) -> list[FallenEffect]:
+class NotComparable(NamedTuple):
+    """A key of the later errors that the earlier collection does not allow, and why: no effect can be compared."""
+
+    id: str
+    problem: str
+
+    @property
+    def words(self) -> tuple[str, str]:
+        """How effects are compared, and why these cannot be."""
+        return "effects compared in the earlier collection", f"not comparable, since there it {self.problem}"
+
+
+def fallen_effects(before: MissionFindings, after: MissionFindings) -> Sequence[FallenEffect | NotComparable]:
     """List the rows whose declared effect fell while their part and their source kept their names.
 
-    A sum counts only where no error fell that could explain it.
+    A sum counts only where no error fell that could explain it. Where the earlier collection does not allow the later
+    errors, their keys are listed instead: a gate passes nothing that it cannot compare.
     """
-    held = _held_alike(before, after)
-    if held is None:
-        return []
+    mission = _held_alike(before, after)
+    if mission is None:
+        held = after
+    elif misfits := [NotComparable(dotted(path), problem) for path, problem in _misfits(mission).items()]:
+        return misfits
+    else:
+        held = check_mission(mission, _ANY_DAY)
     falls = list(_falls(_errors(before, held), _errors(held, before)))
     renamed = _named_anew(before, after)
     if falls:
         return [fall for fall in falls if fall.id not in renamed]
-    return list(_falls(_sums(before), _sums(held)))
+    # With `each` the row of a total is there only where no error fails alone.
+    is_judged = before.combine != "each"
+    return [fall for fall in _falls(_sums(before), _sums(held)) if is_judged or fall.after is not None]
 
 
-def _held_alike(before: MissionFindings, after: MissionFindings) -> MissionFindings | None:
-    """Findings on the later errors in the earlier collection; None where the two do not go together."""
+def _held_alike(before: MissionFindings, after: MissionFindings) -> Mission | None:
+    """The later errors in the earlier collection; None where that is the later mission."""
     old, new = (found.analysed().mission for found in (before, after))
     split = MetricSplits(before.allocation.qpe, before.allocation.pslr, before.allocation.islr)
     held = new._replace(
@@ -84,19 +110,40 @@ def _held_alike(before: MissionFindings, after: MissionFindings) -> MissionFindi
     if before.geometry != after.geometry:
         places = old.scene._replace(radius=new.scene.radius, height_error=new.scene.height_error)
         flown = {
-            name: getattr(old.platforms, name)._replace(
-                motion_error=getattr(new.platforms, name).motion_error,
-                oscillator=getattr(new.platforms, name).oscillator,
-            )
+            name: _flown_before(getattr(old.platforms, name), getattr(new.platforms, name), new.scene.axes)
             for name in PLATFORMS
         }
         held = held._replace(scene=places, platforms=old.platforms._replace(**flown))
     is_same = held._replace(allocation=new.allocation, specifications=new.specifications) == new
     if is_same and new.allocation == old.allocation and new.allocation.split == "equal":
-        return after
-    if flies_on_earth(old) != flies_on_earth(new) or any(Mission.problems(held._asdict())):
         return None
-    return check_mission(held, _ANY_DAY)
+    return held
+
+
+def _flown_before(old: Platform, new: Platform, axes: SceneAxes | None) -> Platform:
+    """The later errors of a platform on its earlier path, whichever way the two files state paths.
+
+    Errors along `ric` axes need the Earth's centre. Where the earlier file does not say it, it is that of the later.
+    """
+    path = old.path or FlownPath(old.state)
+    if path.state.radial is None and axes is not None:
+        path = path._replace(state=with_radial(path.state, axes))
+    return old._replace(motion_error=new.motion_error, oscillator=new.oscillator, path=path)
+
+
+def _misfits(held: Mission) -> dict[KeyPath, str]:
+    """Keys of errors that do not go with the collection that they are held to, and why."""
+    problems = [(problem.at, problem.problem) for problem in Mission.problems(held._asdict())]
+    for name, platform in held.platforms._asdict().items():
+        problems += [
+            (("platforms", name, *problem.at), problem.problem)
+            for problem in platform.without_image(platform.motion_error)
+        ]
+    T, common = held.collection.aperture_time, held.common_motion_error
+    wrong = [*without_image(held.platforms, held.radar, T, common, has_direct_path=held.has_direct_path)]
+    if held.propagation is not None:
+        wrong += too_low(held.propagation, held.platforms, T)
+    return dict(problems + [(problem.at, problem.problem) for problem in wrong])
 
 
 def _errors(found: MissionFindings, other: MissionFindings) -> list[Row]:
@@ -161,7 +208,10 @@ def _family(row: Row) -> tuple[str, ...]:
 
 
 def _named_anew(before: MissionFindings, after: MissionFindings) -> set[str]:
-    """Ids of rows whose source has another text than before, or whose part has a name that it had not."""
+    """Ids of rows that a source or a part stands behind which the earlier file does not name for them.
+
+    A key that is gone, or that overrides a part, names nothing: what its section names already stands behind the row.
+    """
     old = {row.id: row for row in before.rows}
     old_mission, mission = before.analysed().mission, after.analysed().mission
     return {
@@ -169,17 +219,49 @@ def _named_anew(before: MissionFindings, after: MissionFindings) -> set[str]:
         for row in after.rows
         if row.id in old
         and (
-            (row.evidence and row.evidence != old[row.id].evidence)
-            or not _parts(mission, row) <= _parts(old_mission, row)
+            not _is_known(_source(mission, row), old_mission, old[row.id])
+            or not _parts(mission, row) <= _sensors(old_mission, row)
         )
     }
 
 
+def _source(mission: Mission, row: Row) -> str:
+    """Plain name of what a row's figures are taken from; of the fixes of a log, its file."""
+    if row.subject.kind != "trajectory":
+        return plain(row.evidence)
+    path: FlownPath | None = getattr(mission.platforms, row.owner).path
+    return plain_file(path and path.file)
+
+
+def _is_known(source: str, mission: Mission, row: Row) -> bool:
+    """Whether a mission names a source for a row, or for the whole of its section, or a part of that name."""
+    if source in ("", _source(mission, row)):
+        return True
+    if row.owner not in PLATFORMS:
+        return False
+    platform: Platform = getattr(mission.platforms, row.owner)
+    section = platform.oscillator if row.subject.kind == "oscillator" else platform.motion_error
+    if section is None:
+        return False
+    overridden = [plain(one.part) for one in section.overridden]
+    return source == plain(section.source) or any(source.startswith(part) for part in overridden if part)
+
+
 def _parts(mission: Mission, row: Row) -> set[str]:
-    """Names of the parts that a row's figures are taken from."""
+    """Plain names of the parts that a row's figures are taken from."""
     start = f"platforms.{row.owner}."
     keys = {taken.key: set(taken.key.split(".")) for taken in mission.taken if taken.key.startswith(start)}
     word = next(
         (word for word in (row.subject.axis, row.subject.kind) if any(word in key for key in keys.values())), ""
     )
-    return {taken.part for taken in mission.taken if word in keys.get(taken.key, ())}
+    return {plain_file(taken.part) for taken in mission.taken if word in keys.get(taken.key, ())}
+
+
+def _sensors(mission: Mission, row: Row) -> set[str]:
+    """Plain names of the parts of a platform, whether a figure is taken from them or all are overridden."""
+    if row.owner not in PLATFORMS:
+        return set()
+    platform: Platform = getattr(mission.platforms, row.owner)
+    named = [platform.motion_error.sensor, platform.oscillator and platform.oscillator.sensor]
+    listed = [name for one in named if one for name in ((one,) if isinstance(one, str) else one)]
+    return {plain_file(name) for name in listed}

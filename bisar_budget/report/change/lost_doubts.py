@@ -6,16 +6,17 @@ states less of itself under the same name.
 """
 
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from bisar_budget.budget.doubts import RESIDUAL, InputDoubt, input_doubts
 from bisar_budget.effects.effect import MOTION_UNITS
 from bisar_budget.mission.model import Mission
 from bisar_budget.mission.platforms import SMOOTHED, FlownPath, Platform
+from bisar_budget.report.change.names import plain, plain_file
 from bisar_budget.units import format_quantity
 
 _CHOICES = ("object", "talker", "track", "instance")  # keys that name a source within a file
-_NOT_OF_FORM = (*_CHOICES, "planned")  # keys of an orbit beside its source
+_NOT_OF_FORM = ("object", "planned")  # keys of an orbit beside its source
 
 
 class LostDoubt(NamedTuple):
@@ -66,16 +67,31 @@ def _takes(doubt: InputDoubt, old: Platform, new: Platform) -> Iterator[tuple[st
         yield "trajectory.processed", SMOOTHED
     elif doubt.is_stated and was.accuracy is not None and now.accuracy is None:
         yield "trajectory.accuracy", "none"
-    elif doubt.is_stated and _source(old) == _source(new) and not _is_sourced_anew(doubt, old, new):
+    elif doubt.is_stated and _is_same_source(old, new) and not _is_sourced_anew(doubt, old, new):
         for file in _changed(was, now):
             yield _key(old), f"content of {file} states less of itself"
 
 
-def _source(platform: Platform) -> tuple[Any, ...]:
-    """Names of what a path is taken from."""
-    stated, path = getattr(platform, platform.way), platform.path
-    files = () if path is None else (path.file, path.accuracy and path.accuracy[0])
-    return (_key(platform), *files, *(getattr(stated, choice, None) for choice in _CHOICES))
+def _is_same_source(old: Platform, new: Platform) -> bool:
+    """Whether a path is taken from what had the same name; a format, a folder or an ending is no name.
+
+    A choice within a file that only one version makes is no other source: the other version has no choice to make.
+    """
+    return _files(old) == _files(new) and all(
+        plain(was) == plain(now) for was, now in zip(_chosen(old), _chosen(new), strict=True) if was and now
+    )
+
+
+def _files(platform: Platform) -> tuple[str, ...]:
+    """Plain names of the file of a path, and of the one that states its accuracy."""
+    path = platform.path
+    return () if path is None else (plain_file(path.file), plain_file(path.accuracy and path.accuracy[0]))
+
+
+def _chosen(platform: Platform) -> list[str]:
+    """What a path chooses of its file; empty where it does not choose."""
+    choices = [getattr(getattr(platform, platform.way), choice, None) for choice in _CHOICES]
+    return ["" if choice is None else str(choice) for choice in choices]
 
 
 def _key(platform: Platform) -> str:
@@ -87,13 +103,14 @@ def _key(platform: Platform) -> str:
 
 def _is_sourced_anew(doubt: InputDoubt, old: Platform, new: Platform) -> bool:
     """Whether the declared error has another source, by its name."""
-    named = new.motion_error.evidence(doubt.kind)
-    return bool(named) and named != old.motion_error.evidence(doubt.kind)
+    named = plain(new.motion_error.evidence(doubt.kind))
+    error = old.motion_error
+    return named not in ("", plain(error.source), plain(error.evidence(doubt.kind)))
 
 
 def _changed(was: FlownPath, now: FlownPath) -> Iterator[str]:
     """Files with other contents than before."""
-    if was.file is not None and was.sha256 != now.sha256:
-        yield was.file
-    if was.accuracy is not None and was.accuracy != now.accuracy:
-        yield was.accuracy[0]
+    if now.file is not None and was.sha256 != now.sha256:
+        yield now.file
+    if now.accuracy is not None and was.accuracy is not None and was.accuracy[1] != now.accuracy[1]:
+        yield now.accuracy[0]
