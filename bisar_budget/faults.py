@@ -39,17 +39,17 @@ class Place(int):
 
         It keeps four numbers and the text, and lets the parser's marks go: they are half the memory of a mission.
         """
-        known: dict[str, Any] = vars(event)
-        place: Place | None = known.get("place")
-        if place is None:
-            start, end = known["start_mark"], known["end_mark"]
+        fields: dict[str, Any] = vars(event)
+        position: Place | None = fields.get("place")
+        if position is None:
+            start, end = fields["start_mark"], fields["end_mark"]
             line = start.line + 1
-            place = known["place"] = cls(line)
-            is_scalar = known.get("value") is not None
+            position = fields["place"] = cls(line)
+            is_scalar = fields.get("value") is not None
             ends = (end.line + 1, end.column + 1) if is_scalar else (None, None)
-            place.region = Region(line, start.column + 1, *ends)
-            place.text = known["value"] if is_scalar else ""
-        return place
+            position.region = Region(line, start.column + 1, *ends)
+            position.text = fields["value"] if is_scalar else ""
+        return position
 
 
 def printable(text: str) -> str:
@@ -117,9 +117,9 @@ class SetNumber(SetValue):
     @classmethod
     def of(cls, key: str, number: float, unit: str) -> "SetNumber":
         """The number for a key; `unit` is the one of SI."""
-        found = cls(key, f"{number!r} {unit}".rstrip())
-        found.value = found.text if unit in _BY_UNIT else number
-        return found
+        set_number = cls(key, f"{number!r} {unit}".rstrip())
+        set_number.value = set_number.text if unit in _BY_UNIT else number
+        return set_number
 
 
 class Changed:

@@ -101,13 +101,13 @@ def _minus(a: Vectors, b: Vectors) -> Vectors:
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
 
 
-def _of_some(part: Any, cases: Any) -> Any:
+def _number_of_cases(number: Any, cases: Any) -> Any:
     """The numbers of some cases; a number that all cases share stays as it is."""
-    return part[cases] if isinstance(part, np.ndarray) and part.size > 1 else part
+    return number[cases] if isinstance(number, np.ndarray) and number.size > 1 else number
 
 
-def _some_of(vector: Vectors, cases: Any) -> Vectors:
-    x, y, z = (_of_some(part, cases) for part in vector)
+def _vector_of_cases(vector: Vectors, cases: Any) -> Vectors:
+    x, y, z = (_number_of_cases(component, cases) for component in vector)
     return (x, y, z)
 
 
@@ -165,25 +165,31 @@ class Pieces:
         starts, middles, powers = self._arrays
         times = np.asarray(tau, dtype=float)
         if middles.ndim == 1:
-            which: Any = np.searchsorted(starts, times, "right")
+            piece: Any = np.searchsorted(starts, times, "right")
         else:
             times = np.broadcast_to(times, np.broadcast_shapes(times.shape, middles.shape[1:]))
             begun = times >= starts.reshape(len(starts), *(1,) * (times.ndim - 1), middles.shape[1])
-            which = begun.sum(axis=0), np.arange(middles.shape[1])
-        since, of_piece = (times - middles[which])[..., None], powers[which]
-        place, rate = of_piece[..., -1, :], np.zeros((*times.shape, 3))
+            piece = begun.sum(axis=0), np.arange(middles.shape[1])
+        since, of_piece = (times - middles[piece])[..., None], powers[piece]
+        position, rate = of_piece[..., -1, :], np.zeros((*times.shape, 3))
         for power in range(of_piece.shape[-2] - 2, -1, -1):
-            rate = rate * since + place
-            place = place * since + of_piece[..., power, :]
-        (x, y, z), (u, v, w) = (np.moveaxis(one, -1, 0) for one in (place, rate))
+            rate = rate * since + position
+            position = position * since + of_piece[..., power, :]
+        (x, y, z), (u, v, w) = (np.moveaxis(vector, -1, 0) for vector in (position, rate))
         if np.ndim(x):
             return (x, y, z), (u, v, w)
         return (float(x), float(y), float(z)), (float(u), float(v), float(w))
 
     def of(self, cases: Any) -> "Pieces":
         """The paths of some cases, by their places; what all cases share stays as it is."""
-        starts, middles = (tuple(_of_some(part, cases) for part in parts) for parts in (self.starts, self.middles))
-        return Pieces(starts, middles, tuple(tuple(_some_of(one, cases) for one in powers) for powers in self.powers))
+        starts, middles = (
+            tuple(_number_of_cases(number, cases) for number in numbers) for numbers in (self.starts, self.middles)
+        )
+        return Pieces(
+            starts,
+            middles,
+            tuple(tuple(_vector_of_cases(vector, cases) for vector in powers) for powers in self.powers),
+        )
 
 
 @dataclass(frozen=True)
@@ -195,11 +201,11 @@ class _Apart:
 
     @property
     def count(self) -> int:
-        return sum(one.curve.count for one in (self.path, self.other) if one.curve is not None)
+        return sum(path.curve.count for path in (self.path, self.other) if path.curve is not None)
 
     def at(self, tau: Any) -> tuple[Vectors, Vectors]:
-        (place, rate), (from_place, from_rate) = self.path.at(tau), self.other.at(tau)
-        return _minus(place, from_place), _minus(rate, from_rate)
+        (position, rate), (from_place, from_rate) = self.path.at(tau), self.other.at(tau)
+        return _minus(position, from_place), _minus(rate, from_rate)
 
     def of(self, cases: Any) -> "_Apart":
         return _Apart(self.path.of(cases), self.other.of(cases))
@@ -272,10 +278,10 @@ class PlatformState:
     def of(self, cases: Any) -> "PlatformState":
         """The paths of some cases, by their places; what all cases share stays as it is."""
         return PlatformState(
-            position=_some_of(self.position, cases),
-            velocity=_some_of(self.velocity, cases),
-            acceleration=_some_of(self.acceleration, cases),
-            bends=tuple(_some_of(bend, cases) for bend in self.bends),
+            position=_vector_of_cases(self.position, cases),
+            velocity=_vector_of_cases(self.velocity, cases),
+            acceleration=_vector_of_cases(self.acceleration, cases),
+            bends=tuple(_vector_of_cases(bend, cases) for bend in self.bends),
             curve=self.curve and self.curve.of(cases),
         )
 
@@ -304,7 +310,7 @@ class PlatformState:
     def travelled(self, duration_s: Any) -> Any:
         """Bound of the way it makes from the midpoint in a time. [m]"""
         if self.curve is not None:
-            steps = norm(tuple(np.diff(part, axis=0) for part in self._looks(duration_s)))
+            steps = norm(tuple(np.diff(component, axis=0) for component in self._looks(duration_s)))
             before, after = np.split(steps, 2)
             return _of_cases(np.maximum(before.sum(axis=0), after.sum(axis=0)), duration_s)
         way = norm(self.velocity) * duration_s + norm(self.acceleration) * duration_s**2 / 2
@@ -448,7 +454,9 @@ class BistaticGeometry:
 
     def at(self, tau: Any) -> "BistaticGeometry":
         """The geometry at other slow times, of straight paths through them. [s]"""
-        transmitter, receiver = (PlatformState(position=p, velocity=v) for p, v in (one.at(tau) for one in self.both))
+        transmitter, receiver = (
+            PlatformState(position=p, velocity=v) for p, v in (path.at(tau) for path in self.both)
+        )
         return BistaticGeometry(transmitter=transmitter, receiver=receiver)
 
     def sights(self, *, has_direct_path: bool) -> tuple[Vectors, Vectors]:

@@ -70,11 +70,11 @@ class Sampling:
         """Weights (2, samples) that carry a smooth history from the samples to both ends of the aperture."""
         return self.weights_at(np.array((-1.0, 1.0)))
 
-    def weights_at(self, places: Floats) -> Floats:
+    def weights_at(self, slow_times: Floats) -> Floats:
         """Weights (places, samples) that carry a smooth history from the samples to other places over −1 … 1."""
         degree = min(self.places.size, OF_ENDS) - 1
         polynomials = np.polynomial.legendre.legvander(self.places, degree)
-        return np.asarray(np.polynomial.legendre.legvander(places, degree) @ np.linalg.pinv(polynomials))
+        return np.asarray(np.polynomial.legendre.legvander(slow_times, degree) @ np.linalg.pinv(polynomials))
 
 
 LEADING = np.array((1.0, 1.0, 1.5, 2.5))  # coefficient of xⁿ in the Legendre polynomial Pₙ
@@ -83,9 +83,9 @@ LEADING = np.array((1.0, 1.0, 1.5, 2.5))  # coefficient of xⁿ in the Legendre 
 @cache
 def nodes(count: int) -> Sampling:
     """Sampling at the nodes of Gauss-Legendre quadrature, which projects each order n: (2n + 1)/2 ∫ρPₙ."""
-    places, weights = np.polynomial.legendre.leggauss(count)
-    orders = np.polynomial.legendre.legvander(places, 3)
-    return Sampling(places, ((np.arange(4) + 0.5) * LEADING)[:, None] * orders.T * weights)
+    slow_times, weights = np.polynomial.legendre.leggauss(count)
+    orders = np.polynomial.legendre.legvander(slow_times, 3)
+    return Sampling(slow_times, ((np.arange(4) + 0.5) * LEADING)[:, None] * orders.T * weights)
 
 
 def nodes_for(geometry: BistaticGeometry, aperture_time_s: Any, *, has_direct_path: bool = False) -> Any:
@@ -94,12 +94,12 @@ def nodes_for(geometry: BistaticGeometry, aperture_time_s: Any, *, has_direct_pa
     turning = (*geometry.both, *((geometry.apart,) if has_direct_path else ()))
     way = reduce(np.maximum, [path.travelled(half) / path.slant_range for path in turning])
     limits, counts = zip(*NODES, strict=True)
-    found = np.array(counts)[np.searchsorted(limits, way)]
+    count = np.array(counts)[np.searchsorted(limits, way)]
     pieces = max((path.curve.count for path in turning if path.curve is not None), default=0)
     if pieces:
         least = np.searchsorted(_PIECE_NODES[:-1], _NODES_PER_PIECE * pieces)
-        found = np.maximum(found, _PIECE_NODES[least])
-    return found if np.ndim(way) else int(found)
+        count = np.maximum(count, _PIECE_NODES[least])
+    return count if np.ndim(way) else int(count)
 
 
 def band_variance(radar: Band) -> Any:
@@ -150,7 +150,7 @@ class GroundMatrix:
         u, v = along = band * gradient
         weighted *= 1 + band
         weighted += weights * along[:, None]
-        xx, xy, yy = ((1 + band) * covariance[place] for place in ((0, 0), (0, 1), (1, 1)))
+        xx, xy, yy = ((1 + band) * covariance[entry] for entry in ((0, 0), (0, 1), (1, 1)))
         return cls(slopes, fit, band, gradient, covariance, weighted, xx + u * x, xy + u * y, yy + v * y)
 
     @cached_property
@@ -201,8 +201,8 @@ class GroundMatrix:
         """Area between mean gradient and mean Doppler gradient, signed; 0 where the aperture resolves more."""
         (x, y), (by_x, by_y) = self.range_gradient, self.fit[1] @ self.slopes
         area = x * by_y - y * by_x
-        own = self.band * (1 + self.band) / 3 * area * area
-        return np.where(own >= OWN_AREA * self.determinant, area, 0.0)
+        determinant_of_both = self.band * (1 + self.band) / 3 * area * area
+        return np.where(determinant_of_both >= OWN_AREA * self.determinant, area, 0.0)
 
     def projected(self, values: Floats) -> Floats:
         """Weights of the product of V with values at the nodes, (nodes, cases): their sum with others is that."""
@@ -226,10 +226,10 @@ def spans_ground(geometry: BistaticGeometry, radar: Band, aperture_time_s: Any, 
     """
     half = np.array(np.broadcast_to(np.asarray(aperture_time_s, dtype=float) / 2, (cases,)))
     sampling = nodes(int(np.max(nodes_for(geometry, 2 * half), initial=FEWEST_NODES)))
-    places, fit = sampling.places, sampling.fit
-    slopes, turning = np.zeros((2, places.size, cases)), np.zeros(cases)
+    slow_times, fit = sampling.places, sampling.fit
+    slopes, turning = np.zeros((2, slow_times.size, cases)), np.zeros(cases)
     for path in geometry.both:
-        x, y, z = path.place(places[:, None] * half)
+        x, y, z = path.place(slow_times[:, None] * half)
         distance = np.sqrt(x * x + y * y + z * z)
         slopes[0] += x / distance
         slopes[1] += y / distance

@@ -25,7 +25,7 @@ def limit() -> int | None:
     except ImportError:  # Windows
         return None
     soft = [resource.getrlimit(kind)[0] for kind in (resource.RLIMIT_AS, resource.RLIMIT_DATA)]
-    return min((one for one in soft if one != resource.RLIM_INFINITY), default=None)
+    return min((resource_limit for resource_limit in soft if resource_limit != resource.RLIM_INFINITY), default=None)
 
 
 def limit_words() -> str:
@@ -46,11 +46,11 @@ def spare_threads() -> None:
         os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
 
-def hold_room(needed: int, what: str) -> None:
+def hold_room(needed: int, purpose: str) -> None:
     """Raise a `MemoryError` where the system allows less than is known to be needed for something. [B]"""
     allowed = limit()
     if allowed is not None and allowed < needed:
-        raise MemoryError(f"{what} needs at least {needed >> 20} MB of memory; {limit_words()}")
+        raise MemoryError(f"{purpose} needs at least {needed >> 20} MB of memory; {limit_words()}")
 
 
 def is_spacious() -> bool:
@@ -68,7 +68,7 @@ def _says_memory(error: BaseException) -> bool:
     if isinstance(error, MemoryError) or (isinstance(error, OSError) and error.errno == errno.ENOMEM):
         return True
     words = (*_WORDS, "can't start new thread") if limit() is not None else _WORDS
-    return any(one in str(error) for one in words)
+    return any(cause in str(error) for cause in words)
 
 
 def _causes(error: BaseException | None) -> Iterator[BaseException]:

@@ -28,15 +28,15 @@ _COLOURS = {
 }
 
 
-def page(*parts: str) -> str:
+def page(*elements: str) -> str:
     """HTML of an answer."""
-    return f'{_STYLE}<div class="bisar-budget">{"".join(parts)}</div>'
+    return f'{_STYLE}<div class="bisar-budget">{"".join(elements)}</div>'
 
 
 def heading(status: str, title: str, remark: str = "") -> str:
     """The verdict, what it is of, and a remark beside it."""
-    said = f' <span class="muted">{escape(remark)}</span>' if remark else ""
-    return f"<p>{badge(status)} <strong>{escape(title)}</strong>{said}</p>"
+    texts = f' <span class="muted">{escape(remark)}</span>' if remark else ""
+    return f"<p>{badge(status)} <strong>{escape(title)}</strong>{texts}</p>"
 
 
 def badge(status: str) -> str:

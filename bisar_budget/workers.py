@@ -35,7 +35,7 @@ def worker_pool(count: int, start: str | None = None) -> Iterator[ProcessPoolExe
     `start` is `spawn` for fresh interpreters: a fork would copy the threads of a numerical library half way. A
     `WorkerLostError` says that something ended a worker: the system does when memory runs out.
     """
-    others = set(threading.enumerate())
+    worker_count = set(threading.enumerate())
     pool = ProcessPoolExecutor(count, mp_context=get_context(start), initializer=_begin)
     try:
         yield pool
@@ -44,7 +44,7 @@ def worker_pool(count: int, start: str | None = None) -> Iterator[ProcessPoolExe
         pool.shutdown(wait=False, cancel_futures=True)
         for worker in active_children():
             worker.terminate()
-        for thread in set(threading.enumerate()) - others:
+        for thread in set(threading.enumerate()) - worker_count:
             if not thread.daemon:  # the pool's own: at its exit Python might write to the pipe that it is closing
                 thread.join(_PATIENCE)
         if isinstance(error, BrokenProcessPool):
@@ -66,8 +66,8 @@ def in_processes(count: int) -> MapBlocks:
                 if len(waiting) > 3 * count:
                     first, future = waiting.popleft()
                     yield first, future.result()
-            for left, future in waiting:
-                yield left, future.result()
+            for remaining, future in waiting:
+                yield remaining, future.result()
 
     return mapped
 

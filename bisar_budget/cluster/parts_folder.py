@@ -34,8 +34,8 @@ def check_libraries(option: str, room: int, extra: str, *modules: str) -> None:
         for module in modules:
             import_module(module)
     except ImportError as error:
-        said = f"{option} needs {error.name}, which is not installed; {install_command(extra)} brings it"
-        raise ClusterError(said) from None
+        message = f"{option} needs {error.name}, which is not installed; {install_command(extra)} brings it"
+        raise ClusterError(message) from None
 
 
 def question_of(asked: Asked) -> Question:
@@ -125,25 +125,25 @@ class PartsFolder:
             differ = "; ".join(f"{one} {old}, and now {new}" for one, old, new in words if old != new)
             raise ClusterError(f"{self.path} is of another sweep: {differ}")
 
-    def put(self, part: Part) -> None:
+    def put(self, sweep_part: Part) -> None:
         """Keep a part; a `ClusterError` says that it cannot be written."""
         import pyarrow as pa
         import pyarrow.parquet as pq
 
-        said = {"question": json.dumps(self.question), "start": str(part.start)}
-        kinds = {name: pa.string() if values.dtype == object else None for name, values in part.values.items()}
-        table = pa.table({name: pa.array(values, kinds[name]) for name, values in part.values.items()})
+        metadata = {"question": json.dumps(self.question), "start": str(sweep_part.start)}
+        kinds = {name: pa.string() if values.dtype == object else None for name, values in sweep_part.values.items()}
+        table = pa.table({name: pa.array(values, kinds[name]) for name, values in sweep_part.values.items()})
         temporary = os.path.join(self.path, f".part-{os.getpid()}")
         try:
             with open(temporary, "wb") as file:
-                pq.write_table(table.replace_schema_metadata(said), file, write_page_checksum=True)
-            os.replace(temporary, self._file(part.start))
+                pq.write_table(table.replace_schema_metadata(metadata), file, write_page_checksum=True)
+            os.replace(temporary, self._file(sweep_part.start))
         except OSError as error:
             raise ClusterError(f"cannot write {self.path}: {error.strerror or error}") from None
         finally:
             with suppress(OSError):
                 os.unlink(temporary)
-        self.done.add(part.start)
+        self.done.add(sweep_part.start)
 
     def parts(self, starts: Iterable[int]) -> Iterator[Part]:
         """Read parts in this order; a `ClusterError` says that one cannot be read, and then it is not kept."""
@@ -160,8 +160,8 @@ class PartsFolder:
                     self.done.discard(start)
                     with suppress(OSError):
                         os.unlink(file)
-                said = f"{file} cannot be read: {error}; the same command with --resume goes on"
-                raise ClusterError(said) from None
+                message = f"{file} cannot be read: {error}; the same command with --resume goes on"
+                raise ClusterError(message) from None
             yield Part(start, start + table.num_rows, values)
 
     def remove(self) -> None:

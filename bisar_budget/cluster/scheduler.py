@@ -61,15 +61,15 @@ def connected(address: str, patience: float, tell: Callable[[str], None]) -> "It
             cluster = _local_cluster(int(local[1]), ends) if local else address
             client: Any = Client(cluster, timeout=_CONNECTION, set_as_default=False)
         except Exception as error:
-            said = f"no answer within {_CONNECTION:g} s" if isinstance(error, TimeoutError) else _first_line(error)
-            raise ClusterError(f"--scheduler {address}: cannot be reached: {said}") from None
+            reason = f"no answer within {_CONNECTION:g} s" if isinstance(error, TimeoutError) else _first_line(error)
+            raise ClusterError(f"--scheduler {address}: cannot be reached: {reason}") from None
         ends.callback(_close, client, 2)
         client.loop.asyncio_loop.set_exception_handler(lambda *_: None)  # it would write of what is given up
         workers = Workers(client, address, patience, tell)
         workers.look()
         # By a function of Python's own, which a worker of any version has.
-        found = client.run(pydoc.locate, "bisar_budget.__version__", on_error="return")
-        for worker, version in sorted(found.items()):
+        versions = client.run(pydoc.locate, "bisar_budget.__version__", on_error="return")
+        for worker, version in sorted(versions.items()):
             if version != __version__:
                 raise ClusterError(f"--scheduler {address}: {_unlike(worker, version, __version__)}")
         yield workers
@@ -176,14 +176,14 @@ class Workers:
         # A task gives what is common, not the client: Dask makes it again where a worker that has it is lost.
         shared = self.client.submit(pickle.loads, pickle.dumps(common), pure=False)
         pending: dict[str, tuple[Any, Any]] = {}
-        left, next_look = iter(blocks), 0.0
+        remaining, next_look = iter(blocks), 0.0
         try:
             while True:
                 if monotonic() >= next_look:
                     self.look()
                     next_look = monotonic() + _LOOK
                 ahead = max(_LEAST_AHEAD, _AHEAD * self.threads)
-                for block in islice(left, max(0, ahead - len(pending))):
+                for block in islice(remaining, max(0, ahead - len(pending))):
                     future = self.client.submit(_called, __version__, function, shared, block, pure=False)
                     pending[future.key] = future, block
                     future.add_done_callback(finished.put)
@@ -192,7 +192,7 @@ class Workers:
                 with suppress(Empty):
                     future = finished.get(timeout=max(next_look - monotonic(), 0.05))
                     try:  # Dask makes again what a worker took with it between done and fetched
-                        found = future.result(timeout=_FETCH)
+                        result = future.result(timeout=_FETCH)
                     except Exception as error:
                         if future.status == "error":
                             raise _why(future.exception(), about(pending[future.key][1])) from None
@@ -200,7 +200,7 @@ class Workers:
                             raise self._gone() from error
                         finished.put(future)
                         continue
-                    yield pending.pop(future.key)[1], found
+                    yield pending.pop(future.key)[1], result
         finally:
             with suppress(Exception):
                 self.client.cancel([shared, *(future for future, _ in pending.values())])
@@ -222,8 +222,12 @@ def _called(version: str, function: Callable[[Any, Any], Any], common: Any, bloc
         raise ClusterError(f"worker {here} cannot use the mission: {'; '.join(error.lines())}") from None
 
 
-def _unlike(worker: str, found: object, version: str) -> str:
-    has = f"bisar-budget {found}" if isinstance(found, str) else "no bisar-budget that can be imported"
+def _unlike(worker: str, installed_version: object, version: str) -> str:
+    has = (
+        f"bisar-budget {installed_version}"
+        if isinstance(installed_version, str)
+        else "no bisar-budget that can be imported"
+    )
     return f"worker {worker} has {has}; accepted: {version}, as here"
 
 
@@ -238,10 +242,10 @@ def _why(error: BaseException, about: str) -> Exception:
         return ClusterError(
             f"{about} ended {error.allowed_failures + 1} workers, the last of them {last}, as when memory runs out"
         )
-    said = f"{about}, on a worker: {type(error).__name__}: {_first_line(error)}"
-    return (ClusterError if isinstance(error, ImportError | MemoryError) else RuntimeError)(said)
+    message = f"{about}, on a worker: {type(error).__name__}: {_first_line(error)}"
+    return (ClusterError if isinstance(error, ImportError | MemoryError) else RuntimeError)(message)
 
 
 def _first_line(error: BaseException) -> str:
-    said = getattr(error, "strerror", None) or str(error) or type(error).__name__
-    return printable(said.partition("\n")[0])
+    text = getattr(error, "strerror", None) or str(error) or type(error).__name__
+    return printable(text.partition("\n")[0])

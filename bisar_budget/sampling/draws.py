@@ -117,15 +117,15 @@ def drawing_of(
     analysis: Analysis, variables: Sequence[Variable], judged: Sequence[HeldSum], draws: int, seed: int
 ) -> Drawing:
     """Prepare draws of all variables; a sample decides whether they need exact ranges."""
-    given = (analysis.mission.name, tuple(variables), tuple(judged), analysis.exact, analysis.geometry.both)
-    drawing = Drawing(*given, draws, seed, False, CHUNK)
+    setting = (analysis.mission.name, tuple(variables), tuple(judged), analysis.exact, analysis.geometry.both)
+    drawing = Drawing(*setting, draws, seed, False, CHUNK)
     is_exact = bool(variables and judged) and _needs_exact_ranges(drawing)
 
     def counts(variable: Variable) -> bool:
         """Whether it does anything that is judged; each has a stream of its own, so that none misses it."""
         if is_exact and variable.parts:
             return any(size for _, size in variable.parts)
-        return any(variable.effects[column] for one in judged for column in one.columns)
+        return any(variable.effects[column] for requirement in judged for column in requirement.columns)
 
     return drawing._replace(variables=tuple(filter(counts, variables)), is_exact=is_exact)
 
@@ -180,9 +180,9 @@ class Sums:
 
     def __init__(self, drawing: Drawing, size: int, *, adds: bool, keeps_motion: bool) -> None:
         self.exact, self.size, self.keeps_motion, self.paths = drawing.exact, size, keeps_motion, drawing.paths
-        wanted = {column for one in drawing.judged for column in one.columns}
+        columns = {column for requirement in drawing.judged for column in requirement.columns}
         self.phases = {variable.owner: np.zeros(size) for variable in drawing.variables} if adds else {}
-        self.totals = {column: np.zeros(size) for column in sorted(wanted - {0})} if adds else {}
+        self.totals = {column: np.zeros(size) for column in sorted(columns - {0})} if adds else {}
         self.motion: dict[str, Floats] = {}
         self.tags: dict[str, Floats] = {}
         self.clock: dict[str, Floats] = {}
@@ -195,8 +195,8 @@ class Sums:
         """Begin another block."""
         every: list[Mapping[Any, Floats]] = [self.phases, self.totals, self.motion, self.tags, self.clock, self.alone]
         for kept in every:
-            for one in kept.values():
-                one.fill(0.0)
+            for sums in kept.values():
+                sums.fill(0.0)
         self._exact.clear()
 
     def add(self, variable: Variable, drawn: Floats) -> None:
@@ -246,9 +246,9 @@ class Sums:
                     square += phase
             square *= square
             return square
-        first, *others = judged.columns
+        first, *more_columns = judged.columns
         np.multiply(self.totals[first], self.totals[first], out=square)
-        for column in others:
+        for column in more_columns:
             np.multiply(self.totals[column], self.totals[column], out=self._scaled)
             square += self._scaled
         return square
@@ -258,10 +258,10 @@ class Sums:
         owners = judged.owners
         if owners not in self._exact:
             self._exact[owners] = self._by_exact_ranges(owners)
-        found, alone = self._exact[owners], _sum(self.alone, owners, np.zeros((4, 1)))
-        by_ranges = (found.quadratic, found.cubic, found.east, found.north)
+        points, alone = self._exact[owners], _sum(self.alone, owners, np.zeros((4, 1)))
+        by_ranges = (points.quadratic, points.cubic, points.east, points.north)
         square = np.asarray(sum((by_ranges[column] + alone[column]) ** 2 for column in judged.columns))
-        return square + (judged.gain * found.hidden) ** 2 if judged.columns == (0,) else square
+        return square + (judged.gain * points.hidden) ** 2 if judged.columns == (0,) else square
 
     def _by_exact_ranges(self, owners: tuple[str, ...]) -> ImagePoints:
         times = self.exact.times[:, 0]
@@ -270,18 +270,20 @@ class Sums:
         motion = _sum(self.motion, owners, np.broadcast_to(0.0, (2, 3, 3, self.size)))
         tags = _sum(self.tags, owners, np.broadcast_to(0.0, (2, self.size)))
         clock = _sum(self.clock, owners, np.broadcast_to(0.0, (4, self.size)))
-        shifts: list[Any] = [powers @ one.swapaxes(0, 1) if one.any() else STILL for one in motion]
+        shifts: list[Any] = [powers @ shift.swapaxes(0, 1) if shift.any() else STILL for shift in motion]
         for platform, tag in enumerate(tags):
             if tag.any():
                 late = self.paths[platform].later(times[:, None], tag)
-                shifts[platform] = [one + other for one, other in zip(shifts[platform], late, strict=True)]
+                shifts[platform] = [
+                    shift + late_shift for shift, late_shift in zip(shifts[platform], late, strict=True)
+                ]
         return followed(self.exact, clock_powers @ clock, shifts, np.zeros(self.size, dtype=int))
 
 
-def _sum(parts: Mapping[str, Floats], owners: Sequence[str], nothing: Floats) -> Floats:
+def _sum(by_owner: Mapping[str, Floats], owners: Sequence[str], nothing: Floats) -> Floats:
     """Sum of the parts of several owners; `nothing` where none has any."""
-    found = [parts[owner] for owner in owners if owner in parts]
-    return sum(found[1:], found[0]) if found else nothing
+    of_owners = [by_owner[owner] for owner in owners if owner in by_owner]
+    return sum(of_owners[1:], of_owners[0]) if of_owners else nothing
 
 
 class Drawer:
@@ -309,16 +311,16 @@ class Drawer:
                 sums = Sums(drawing, size, adds=not drawing.is_exact, keeps_motion=drawing.is_exact)
             self._draw(sums)
             together = np.ones(size, dtype=bool)
-            for index, one in enumerate(drawing.judged):
-                square = sums.exact_square(one) if drawing.is_exact else sums.square(one)
+            for index, requirement in enumerate(drawing.judged):
+                square = sums.exact_square(requirement) if drawing.is_exact else sums.square(requirement)
                 # What has no image holds nothing: it is not a number.
-                held = square <= (one.limit * (1 + UTILIZATION_TOLERANCE)) ** 2
-                holds[index] += int(np.count_nonzero(held))
+                holds_in_draw = square <= (requirement.limit * (1 + UTILIZATION_TOLERANCE)) ** 2
+                holds[index] += int(np.count_nonzero(holds_in_draw))
                 if drawing.is_exact:
                     square = square[np.isfinite(square)]
                 imaged[index] += square.size
                 squares[index] += float(square.sum())
-                together &= held
+                together &= holds_in_draw
             all_hold += int(np.count_nonzero(together))
         return Tally(tuple(holds), tuple(imaged), tuple(squares), all_hold)
 
@@ -354,9 +356,9 @@ def _needs_exact_ranges(drawing: Drawing) -> bool:
     for variable in drawing.variables:
         _Stream(variable, drawing.seed).fill(drawn)
         sums.add(variable, drawn)
-    for one in drawing.judged:
-        linear, exact = np.sqrt(sums.square(one)), np.sqrt(sums.exact_square(one))
-        if not np.all(np.abs(exact - linear) <= _DIFFERENT * one.limit):
+    for requirement in drawing.judged:
+        linear, exact = np.sqrt(sums.square(requirement)), np.sqrt(sums.exact_square(requirement))
+        if not np.all(np.abs(exact - linear) <= _DIFFERENT * requirement.limit):
             return True
     return False
 
@@ -373,10 +375,10 @@ def _compiled() -> Callable[[np.random.Generator, Floats], None]:
     try:
         from numba import njit
 
-        found: Callable[[np.random.Generator, Floats], None] = njit(cache=True, nogil=True)(_fill_each)
+        fill: Callable[[np.random.Generator, Floats], None] = njit(cache=True, nogil=True)(_fill_each)
     except (ImportError, RuntimeError):  # not installed, or nowhere to keep what it compiles
         return _fill_normal
-    return found
+    return fill
 
 
 def _fill_each(generator: np.random.Generator, out: Floats) -> None:

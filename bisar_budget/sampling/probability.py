@@ -76,7 +76,7 @@ def monte_carlo(
     holds, mean_squares, all_hold = joined((tally for _, tally in (share or in_turn)(drawing)), len(judged))
     predictions = _Predictions(analysis, variables)
     requirements = tuple(
-        _requirement(*one, draws, predictions) for one in zip(judged, holds, mean_squares, strict=True)
+        _requirement(*counted, draws, predictions) for counted in zip(judged, holds, mean_squares, strict=True)
     )
     low, high = _wilson(all_hold, draws, _QUANTILE) if judged else (None, None)
     return MonteCarlo(
@@ -96,16 +96,16 @@ def monte_carlo(
 def _variables(analysis: Analysis) -> Iterator[Variable]:
     mission, full = analysis.mission, analysis.full
     factor = mission.allocation.coverage_factor
-    left = {source.id: source for source in analysis.stated}
+    singles = {source.id: source for source in analysis.stated}
     for group in analysis.groups:
-        members = [left.pop(row_id) for row_id in group.ids]
+        members = [singles.pop(row_id) for row_id in group.ids]
         values, vectors = eigensystem(group.correlation)
         for index, value in enumerate(values):
             # To six decimals a correlation matrix may have an eigenvalue just below zero.
             scale = math.sqrt(max(0.0, value)) / factor
-            parts = [(s, (s.declared or 0.0) * vectors[i][index] * scale) for i, s in enumerate(members)]
-            yield _variable(f"{group.id}.{index}", group.id, group.platform, "normal", parts, full)
-    for source in left.values():
+            members_and_sizes = [(s, (s.declared or 0.0) * vectors[i][index] * scale) for i, s in enumerate(members)]
+            yield _variable(f"{group.id}.{index}", group.id, group.platform, "normal", members_and_sizes, full)
+    for source in singles.values():
         distribution = distribution_of(mission, source)
         size = abs(source.declared or 0.0) / (factor if source.is_covered else 1.0)
         if distribution == "uniform":
@@ -125,27 +125,32 @@ def _of_noise(error: RandomError, factor: float) -> Iterator[Variable]:
         return
     size = error.declared / (factor if error.is_covered else 1.0)  # that of an oscillator is in its effects
     distribution = "normal" if error.is_covered else "bound"
-    left = np.array(error.full.covariance) * size**2
-    scale = np.diagonal(left).copy()
-    for place, part in enumerate(_PARTS):
-        if left[place, place] <= _NOTHING_LEFT * scale[place]:
+    covariance = np.array(error.full.covariance) * size**2
+    scale = np.diagonal(covariance).copy()
+    for index, suffix in enumerate(_PARTS):
+        if covariance[index, index] <= _NOTHING_LEFT * scale[index]:
             continue
-        column = left[:, place] / math.sqrt(left[place, place])
-        left = left - np.multiply.outer(column, column)
-        yield Variable(f"{error.id}{part}", error.id, error.owner, distribution, (), tuple(column.tolist()))
+        column = covariance[:, index] / math.sqrt(covariance[index, index])
+        covariance = covariance - np.multiply.outer(column, column)
+        yield Variable(f"{error.id}{suffix}", error.id, error.owner, distribution, (), tuple(column.tolist()))
 
 
 def _variable(
-    id: str, of: str, owner: str, distribution: str, parts: Sequence[tuple[ErrorSource, float]], full: Model
+    id: str,
+    of: str,
+    owner: str,
+    distribution: str,
+    sources_and_sizes: Sequence[tuple[ErrorSource, float]],
+    full: Model,
 ) -> Variable:
-    moves = [full.displacement(source.full, size) or (0.0, 0.0) for source, size in parts]
+    moves = [full.displacement(source.full, size) or (0.0, 0.0) for source, size in sources_and_sizes]
     effects = (
-        math.fsum(source.full.qpe * size for source, size in parts),
-        math.fsum(source.full.cubic * size for source, size in parts),
+        math.fsum(source.full.qpe * size for source, size in sources_and_sizes),
+        math.fsum(source.full.cubic * size for source, size in sources_and_sizes),
         math.fsum(move[0] for move in moves),
         math.fsum(move[1] for move in moves),
     )
-    return Variable(id, of, owner, distribution, tuple(parts), effects)
+    return Variable(id, of, owner, distribution, tuple(sources_and_sizes), effects)
 
 
 def _requirements(
@@ -154,13 +159,13 @@ def _requirements(
     """Requirements of `check` that declared errors count against; the location where it is known (`is_placed`)."""
     present = {variable.owner for variable in variables}
     every = ("transmitter", "receiver", "clock", "mission")
-    wanted = {
+    owners_by_name = {
         "transmitter": ("transmitter",),
         "receiver": ("receiver",) if allocation.qpe.clock is not None else ("receiver", "clock"),
         "timing": ("clock",) if allocation.qpe.clock is not None else (),
         "mission": every,
     }
-    for name, owners in wanted.items():
+    for name, owners in owners_by_name.items():
         if present.intersection(owners):
             limit = allocation.qpe_allowed("clock" if name == "timing" else name)
             yield HeldSum(f"{name}.quadratic_phase_error", "rad", limit, owners, (0,), allocation.autofocus_gain)
@@ -182,7 +187,7 @@ class _Predictions:
 
     def combined(self, judged: HeldSum, rule: str) -> float | None:
         """Size that a rule of `allocation.combine` holds to the limit, coverage factor included; None: no image."""
-        members = [one for one in self.together.phases if one.owner in judged.owners]
+        members = [phase for phase in self.together.phases if phase.owner in judged.owners]
         if judged.columns == (0,):
             size = self.together.judged(members, rule)
         elif judged.columns == (1,):
@@ -193,12 +198,12 @@ class _Predictions:
 
     def variances(self, judged: HeldSum) -> dict[str, float]:
         """Variance that each error, or each covariance, brings."""
-        found: dict[str, float] = {}
+        by_error: dict[str, float] = {}
         for variable in self.variables:
             if variable.owner in judged.owners:
                 square = math.fsum(variable.effects[column] ** 2 for column in judged.columns)
-                found[variable.of] = found.get(variable.of, 0.0) + square
-        return found
+                by_error[variable.of] = by_error.get(variable.of, 0.0) + square
+        return by_error
 
     def is_normal(self, name: str) -> bool:
         """Whether an error has a normal distribution; a covariance, which is no single variable, always has."""
@@ -208,7 +213,7 @@ class _Predictions:
         """Probability that a normal distribution with these variances stays within the limit."""
         members = [variable.effects for variable in self.variables if variable.owner in judged.owners]
         a, b = judged.columns[0], judged.columns[-1]
-        xx, yy, xy = (math.fsum(one[i] * one[j] for one in members) for i, j in ((a, a), (b, b), (a, b)))
+        xx, yy, xy = (math.fsum(effects[i] * effects[j] for effects in members) for i, j in ((a, a), (b, b), (a, b)))
         if len(judged.columns) == 2:
             return _within(judged.limit, xx, yy, xy)
         return math.erf(judged.limit / math.sqrt(2 * xx)) if xx else 1.0
@@ -249,7 +254,7 @@ def _requirement(
     variance = math.fsum(variances.values())
     dominant = max(variances, key=lambda name: variances[name])
     low, high = _wilson(holds, draws, _QUANTILE)
-    found = Requirement(
+    requirement = Requirement(
         id=judged.id,
         unit=judged.unit,
         limit=judged.limit,
@@ -265,19 +270,19 @@ def _requirement(
         dominant_share=variances[dominant] / variance if variance else 0.0,
         warnings=(),
     )
-    return found._replace(warnings=tuple(_doubts(found, holds, draws, predictions)))
+    return requirement._replace(warnings=tuple(_doubts(requirement, holds, draws, predictions)))
 
 
-def _doubts(found: Requirement, holds: int, draws: int, predictions: _Predictions) -> Iterator[str]:
+def _doubts(requirement: Requirement, holds: int, draws: int, predictions: _Predictions) -> Iterator[str]:
     """Say where root-sum-square and the normal distribution do not describe the sum."""
     # A covariance, which is no single variable, is always normal.
-    if found.dominant_share > DOMINANT and not predictions.is_normal(found.dominant):
+    if requirement.dominant_share > DOMINANT and not predictions.is_normal(requirement.dominant):
         yield (
-            f"{found.dominant}, which is not normal, has {100 * found.dominant_share:.3g} % of the variance: the "
+            f"{requirement.dominant}, which is not normal, has {100 * requirement.dominant_share:.3g} % of the variance: the "
             "sum has its shape, and no multiple of sigma is the bound it would be of a normal distribution"
         )
     low, high = _wilson(holds, draws, _SURE_QUANTILE)
-    normal, drawn = found.probability_normal, found.probability
+    normal, drawn = requirement.probability_normal, requirement.probability
     fails = max(1 - normal, 1 - drawn)
     if not low <= normal <= high and abs(normal - drawn) > _MATERIAL * fails:
         kind = "optimistic" if normal > drawn else "pessimistic"
@@ -308,12 +313,12 @@ def _notes(mission: Mission, analysis: Analysis, *, is_exact: bool, is_placed: b
     if hidden:
         yield phrases.hidden_phase_is_not_drawn(hidden)
     vibrations = [getattr(mission.platforms, name).motion_error.vibration for name in PLATFORMS]
-    if analysis.displacing_tones or any(one.wideband for one in vibrations):
+    if analysis.displacing_tones or any(vibration.wideband for vibration in vibrations):
         yield phrases.vibration_is_not_drawn()
     if mission.requirements.location_error is not None and not is_placed:
         undriven = clocks_without_oscillator(mission)
         yield phrases.unknown_drift_is_not_drawn(undriven) if undriven else phrases.unset_clocks_are_not_drawn()
-    stated = any(other.islr is not None for other in mission.other_errors)
+    stated = any(stated_error.islr is not None for stated_error in mission.other_errors)
     if mission.requirements.islr is not None and (stated or has_instruments(mission)):
         yield phrases.mean_power_is_not_drawn()
     if mission.allocation.coverage_factor != 1:

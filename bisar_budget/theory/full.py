@@ -76,7 +76,7 @@ def look_series(platform: PlatformSymbols) -> tuple[Matrix, ...]:
     track = (platform.position, platform.velocity, platform.acceleration / 2)
     series = []
     for n in range(ORDER + 1):
-        terms = (part * inverse[n - k] for k, part in enumerate(track) if k <= n)
+        terms = (component * inverse[n - k] for k, component in enumerate(track) if k <= n)
         series.append(sum(terms, start=Matrix([0, 0, 0])) * factorial(n) / platform.slant_range)
     return tuple(series)
 
@@ -106,7 +106,7 @@ def direct_range_error(platform: PlatformSymbols) -> Expr:
 
     Its error is of any course; b is the unit vector from receiver to transmitter at that time.
     """
-    (other,) = (one for one in PLATFORMS if one is not platform)
+    (other,) = (of_platform for of_platform in PLATFORMS if of_platform is not platform)
     b = DIRECT_PATH if platform is TRANSMITTER else -DIRECT_PATH
     total = dr.direct_path_range_error().subs(dict.fromkeys(dr.error_track(other), 0))
     return expand(total.subs(dict(zip(other.position, platform.position - baseline * b, strict=True))))
@@ -114,8 +114,8 @@ def direct_range_error(platform: PlatformSymbols) -> Expr:
 
 def direct_sight(platform: PlatformSymbols) -> Matrix:
     """Decrease of the range per metre of each error where the direct path is the clock: u_t − b or u_r + b."""
-    own = dict(zip(platform.position, platform.slant_range * platform.look[0], strict=True))
-    return Matrix([-direct_range_error(platform).coeff(e).subs(own) for e in dr.error_track(platform)])
+    sight = dict(zip(platform.position, platform.slant_range * platform.look[0], strict=True))
+    return Matrix([-direct_range_error(platform).coeff(e).subs(sight) for e in dr.error_track(platform)])
 
 
 def ground_history() -> tuple[Matrix, ...]:
@@ -144,8 +144,8 @@ def amplitude_share(own: Expr, other: Expr) -> Expr:
 def motion_of_phase(phase: Expr) -> Expr:
     """Motion along the line of sight that makes a phase, one way. [m]"""
     motion = positive("A")
-    (found,) = solve(Eq(published.one_way_phase(motion), phase), motion)
-    return found
+    (motion_error,) = solve(Eq(published.one_way_phase(motion), phase), motion)
+    return motion_error
 
 
 def quartic_as_quadratic() -> Expr:
@@ -260,7 +260,7 @@ def vibration() -> Table:
     stays in the response, and a share E of that within its first nulls, so that the rest over it is (exp(σ²) - 1)/E.
     Both platforms at one frequency divide amplitudes, both with noise of their own divide powers.
     """
-    amplitude, rms, phase, part, energy = (positive(name) for name in ("A", "sigma", "phi", "a", "E"))
+    amplitude, rms, phase, component, energy = (positive(name) for name in ("A", "sigma", "phi", "a", "E"))
     over, under = (series(besselj(n, phase), phase, 0, 2).removeO() for n in (1, 0))
     echo = over / under
     (largest,) = solve(Eq(echo, sqrt(pslr)), phase)
@@ -268,7 +268,7 @@ def vibration() -> Table:
     (noise,) = (root for root in solve(Eq(spread, islr), phase) if root.is_nonnegative is not False)
     rows = (
         (amplitude, echo**2, motion_of_phase(largest), "one platform alone"),
-        (amplitude, echo**2, part * motion_of_phase(largest), "a part a of the amplitude of both, in phase"),
+        (amplitude, echo**2, component * motion_of_phase(largest), "a part a of the amplitude of both, in phase"),
         (rms, spread, sqrt(share) * motion_of_phase(noise), "share s of the power of both, independent"),
     )
     return Table(
