@@ -279,7 +279,8 @@ def _doubts(requirement: Requirement, holds: int, draws: int, predictions: _Pred
     if requirement.dominant_share > DOMINANT and not predictions.is_normal(requirement.dominant):
         yield (
             f"{requirement.dominant}, which is not normal, has {100 * requirement.dominant_share:.3g} % of the "
-            "variance: the sum has its shape, and no multiple of sigma is the bound it would be of a normal distribution"
+            "variance: the sum has its shape, and no multiple of sigma is the bound it would be of a normal "
+            "distribution"
         )
     low, high = _wilson(holds, draws, _SURE_QUANTILE)
     normal, drawn = requirement.probability_normal, requirement.probability
