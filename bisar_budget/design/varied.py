@@ -17,7 +17,7 @@ from bisar_budget.geometry import STILL, BistaticGeometry, norm
 from bisar_budget.image_plane import MIN_SINE, spans_ground
 from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.covariance import EIGENVALUE_TOLERANCE
-from bisar_budget.mission.instruments import RISE, STEEPEST
+from bisar_budget.mission.instruments import MAX_FALL_DB_PER_DECADE, MAX_RISE_DB_PER_DECADE
 from bisar_budget.mission.model import (
     MISSION,
     PLACE_KEYS,
@@ -145,7 +145,7 @@ def _has_possible_figures(mission: Mission, cases: int) -> NDArray[np.bool_]:
                 is_one &= np.asarray(platform.oscillator.bandwidth) > SAFE * least
             for (f, level), (g, next_level) in pairwise(platform.oscillator.phase_noise or ()):
                 slope = (np.asarray(next_level) - level) / math.log10(g / f)
-                is_one &= (slope * SAFE > -STEEPEST) & (slope * SAFE < RISE)
+                is_one &= (slope * SAFE > -MAX_FALL_DB_PER_DECADE) & (slope * SAFE < MAX_RISE_DB_PER_DECADE)
         covariance = platform.motion_error.covariance
         if covariance is not None:
             rows = [[np.broadcast_to(rho, (cases,)) for rho in row] for row in covariance.correlation]
