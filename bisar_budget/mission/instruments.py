@@ -165,7 +165,7 @@ _COEFFICIENT = Quantity(units.RATIO, ge=0, le=1)
 class _PowerLawReader(Reader):
     """A mapping of h-2 … h2 to coefficients."""
 
-    def coefficients(self, value: Any, path: KeyPath, report: Report) -> Any:
+    def read(self, value: Any, path: KeyPath, report: Report) -> Any:
         """Read each coefficient; a problem is reported at its own path."""
         accepted = f"accepted: {', '.join(POWERS)}"
         if not isinstance(value, dict) or not value:
