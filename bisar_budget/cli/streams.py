@@ -1,4 +1,4 @@
-"""Input and output of the commands: names of files, standard streams, files replaced whole, exit codes."""
+"""Input and output of the commands: names of files, standard streams, replacement of files, exit codes."""
 
 import io
 import os
@@ -22,14 +22,14 @@ if TYPE_CHECKING:
 
 MISSION_SUFFIXES = (".yaml", ".yml")
 PICTURE_SUFFIXES = (".svg", ".png", ".pdf")
-_TEMPORARY = (".bisar-budget.", ".tmp")  # how the name of a temporary folder begins and ends
+_TEMPORARY = (".bisar-budget.", ".tmp")  # first and last letters of the name of a temporary folder
 EXIT_BROKEN, EXIT_USAGE, EXIT_OUR_FAULT, EXIT_INTERRUPTED = 1, 2, 3, 130
 
 
 def expand(patterns: Iterable[str]) -> list[str]:
     """Expand the glob patterns that the shell left; a pattern without a match stays and fails to load.
 
-    A file that has the name of a pattern is one of many: else a file named `*.yaml` would take the place of all.
+    A file with the name of a pattern is added to the matches. Otherwise a file named `*.yaml` would hide all matches.
     """
     files: list[str] = []
     for pattern in patterns:
@@ -38,15 +38,15 @@ def expand(patterns: Iterable[str]) -> list[str]:
         if any(char in pattern for char in "*?["):
             from glob import glob
 
-            named = [pattern] if os.path.exists(pattern) else []
-            files += sorted({*glob(pattern, recursive=True), *named}) or [pattern]
+            namesake = [pattern] if os.path.exists(pattern) else []
+            files += sorted({*glob(pattern, recursive=True), *namesake}) or [pattern]
         else:
             files.append(pattern)
     return list(dict.fromkeys(files))
 
 
 def load_all(files: Sequence[str], model: str | None = None, changes: "Sequence[SetValue]" = ()) -> "list[Mission]":
-    """Load every mission with values in place of its own, or say every fault of every file and exit."""
+    """Load every mission with changed values, or write every fault of every file and exit."""
     from bisar_budget.mission.load import load_mission
 
     return read_all(partial(load_mission, file, model, changes) for file in files)
@@ -182,10 +182,10 @@ def harmless(text: str, format_name: str = "") -> str:
 
 
 def deliver_parts(texts: Iterable[str], format_name: str) -> None:
-    """Write to standard output as texts come; a reader that went away changes no exit code, and ends it.
+    """Write texts to standard output one by one; a reader that went away ends this and changes no exit code.
 
-    A person reads the format `text`, characters that the terminal's encoding lacks escaped. Programs read the others:
-    those are UTF-8, whatever a terminal would take.
+    The format `text` is for people: characters that the terminal's encoding lacks are escaped. Other formats are for
+    programs, and always UTF-8.
     """
     if sys.stdout is None:
         fail("cannot write: standard output is closed")
@@ -206,38 +206,38 @@ def deliver_parts(texts: Iterable[str], format_name: str) -> None:
 
 
 def drop_output() -> None:
-    """Send what is left of standard output nowhere: Python would complain of it again at exit."""
+    """Discard the remaining standard output, because Python would complain about it again at exit."""
     with suppress(OSError, ValueError, AttributeError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def complain(message: str) -> None:
-    """Say something on standard error; that nobody listens changes no exit code."""
+    """Write a message to standard error; a failure to write changes no exit code."""
     with suppress(OSError):
         click.echo(harmless(message), err=True)
 
 
 def fail(message: str) -> NoReturn:
-    """Say what is wrong with how the command was used, and exit with 2."""
+    """Write an error about the usage of the command, and exit with 2."""
     complain(f"Error: {printable(message)}")
     sys.exit(EXIT_USAGE)
 
 
 def deliver(text: str, output: str | None = None, format_name: str = "text") -> None:
-    """Write to a file, else, or if that is `-`, to standard output."""
+    """Write to a file, or without a file, or for `-`, to standard output."""
     if output is None or output == "-":
         deliver_parts([text], format_name)
     else:
         write_file(output, harmless(text, format_name).replace("\n", _LINE_ENDS.get(format_name, "\n")))
 
 
-def deliver_found(form: "ModuleType", found: Any, format_name: str, output: str | None) -> None:
-    """Write what was found in a format; `form` is the module that has a function for each."""
+def deliver_found(form: "ModuleType", results: Any, format_name: str, output: str | None) -> None:
+    """Write results in a format; `form` is the module with a function for each format."""
     from bisar_budget.report import Style
 
     root, is_checkout = root_of_names()
     style = Style(color=output is None and wants_color(), root=root, is_checkout=is_checkout)
-    deliver(getattr(form, f"as_{format_name}")(found, style), output, format_name)
+    deliver(getattr(form, f"as_{format_name}")(results, style), output, format_name)
 
 
 def write_file(path: str, content: str | bytes) -> None:
@@ -249,72 +249,73 @@ def write_file(path: str, content: str | bytes) -> None:
 
 @contextmanager
 def replacing(path: str) -> Iterator[str]:
-    """Give the name of a file to write, which replaces `path` at the end: it is in a folder beside it.
+    """Yield the name of a temporary file that replaces `path` at the end; it is in a folder next to `path`.
 
-    A link keeps pointing where it does; what is no file, a device or a pipe, is written to as it is. An error, or an
-    interrupt, leaves what was there. What a command that was killed left beside it is removed.
+    Links keep their target. Devices and pipes are written to directly. An error or an interrupt leaves the old file.
+    Temporary folders of killed commands are removed.
     """
     temporary = lock = None
     try:
         if kind := special_file(path):
             fail(f"cannot write {path}: {kind}; accepted: a regular file, or - for standard output")
         target = os.path.realpath(path)
-        with suppress(OSError):  # a file that a mission, or the project, names: an orbit, a log, a part, a list
-            there = os.stat(target)
-            if (there.st_dev, there.st_ino) in FILES_READ:
+        with suppress(OSError):  # a file that a mission or the project names: an orbit, a log, a part, a list
+            status = os.stat(target)
+            if (status.st_dev, status.st_ino) in FILES_READ:
                 fail(f"{path} was read by this command; a result would replace it")
         if os.path.exists(target) and not os.path.isfile(target):
             yield target
             return
         folder = os.path.dirname(target)
         os.makedirs(folder, exist_ok=True)
-        _remove_left(folder)
+        _remove_abandoned(folder)
         temporary, lock = _own_folder(folder)
         file = os.path.join(temporary, f"output{os.path.splitext(target)[1]}")
         yield file
         mask = os.umask(0)
         os.umask(mask)
-        os.chmod(file, 0o666 & ~mask)  # whatever a library made of it
+        os.chmod(file, 0o666 & ~mask)  # a library may have set other permissions
         os.replace(file, target)
     except BaseException as error:
         if not isinstance(error, OSError) and not (isinstance(error, ValueError) and temporary is None):  # a NUL
             raise
-        number = getattr(error, "errno", None)  # libraries put words of their own around the system's
+        number = getattr(error, "errno", None)  # libraries change the words of the system
         fail(f"cannot write {path}: {os.strerror(number) if number else error}")
     finally:
         if temporary is not None:
             with suppress(OSError):
                 os.unlink(file)
-            with suppress(OSError):  # to list it first would need memory, of which there may be none
+            with suppress(OSError):  # a listing would need memory, which may be exhausted
                 os.rmdir(temporary)
         if lock is not None:
             os.close(lock)
 
 
 def _own_folder(folder: str) -> tuple[str, int | None]:
-    """Make a folder in a folder, and lock it as long as this process lives: no other command takes it for left."""
+    """Make a folder in a folder, locked as long as this process lives, so that no other command removes it."""
     import tempfile
 
     while True:
-        made = tempfile.mkdtemp(_TEMPORARY[1], _TEMPORARY[0], folder)
+        temporary = tempfile.mkdtemp(_TEMPORARY[1], _TEMPORARY[0], folder)
         try:
-            lock = locked(made)
-        except (BlockingIOError, FileNotFoundError):  # another command just found it unlocked, and removes it
+            lock = locked(temporary)
+        except (BlockingIOError, FileNotFoundError):  # another command found it unlocked, and removes it
             continue
-        if os.path.isdir(made):
-            return made, lock
+        if os.path.isdir(temporary):
+            return temporary, lock
         if lock is not None:
             os.close(lock)
 
 
-def _remove_left(folder: str) -> None:
-    """Remove temporary folders of commands that are no more: nobody has their lock."""
+def _remove_abandoned(folder: str) -> None:
+    """Remove temporary folders of ended commands, which nobody locks."""
     import shutil
 
-    with os.scandir(folder) as found:
-        left = [one.path for one in found if one.name.startswith(_TEMPORARY[0]) and one.name.endswith(_TEMPORARY[1])]
-    for path in left:
-        with suppress(OSError):  # one that lives, that is gone by now, or that is another's
+    prefix, suffix = _TEMPORARY
+    with os.scandir(folder) as entries:
+        paths = [entry.path for entry in entries if entry.name.startswith(prefix) and entry.name.endswith(suffix)]
+    for path in paths:
+        with suppress(OSError):  # the command lives, the folder is gone by now, or belongs to another user
             lock = locked(path)
             if lock is not None:
                 shutil.rmtree(path, ignore_errors=True)
