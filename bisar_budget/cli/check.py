@@ -53,7 +53,7 @@ if TYPE_CHECKING:
 
 
 _PROJECTS = "bisar_budget.projects"  # in the context of a command
-_OF_RUN = ("format", "color")  # settings that are of a whole run, where all its projects have the same
+_OF_RUN = ("format", "color")  # settings of a whole run, if all its projects agree
 
 
 class _Gate(click.Command):
@@ -414,7 +414,7 @@ def _reports_of(projects: Sequence[Project]) -> list[tuple[Project, str, str]]:
 def _asked(
     project: Project, is_among_others: bool, today: datetime | None, changes: "Sequence[SetValue]"
 ) -> tuple[date, dict[str, Any]]:
-    """The day, and how the missions of a project are checked; of several projects each says its settings."""
+    """Day of waivers and arguments of the check for a project; one of several projects also names its settings."""
     from bisar_budget.findings.requirement import Override
 
     with project.options() as context:
@@ -426,7 +426,7 @@ def _asked(
 
 
 def _options(project: Project, judged_on: date | None, today: datetime | None) -> "list[Override]":
-    """Say what the options that bear on the result are, and where each came from."""
+    """Options with influence on the result, and their origins."""
     with project.options() as context:
         return list(_options_in(context, judged_on, today))
 
@@ -438,26 +438,26 @@ def _options_in(context: click.Context, judged_on: date | None, today: datetime 
     for parameter in context.command.params:
         name, value = str(parameter.name), context.params[str(parameter.name)]
         origin = origin_of(parameter)
-        said = None
+        text = None
         if name == "model":
-            said = value or "as each file says"
+            text = value or "as each file says"
         elif name == "today":
             if value is None and judged_on is not None:
                 origin = day_origin(today, COMMAND_LINE)
-            said = "the day of the run (not recorded: no waiver depends on it)"
-            said = judged_on.isoformat() if judged_on else said
+            text = "the day of the run (not recorded: no waiver depends on it)"
+            text = judged_on.isoformat() if judged_on else text
         elif name == "changes":
-            said = ", ".join(f"{change.key}={change.text}" for change in value)
+            text = ", ".join(f"{change.key}={change.text}" for change in value)
         elif name == "swept":
-            said = ", ".join(value)
+            text = ", ".join(value)
         elif name == "draws":
-            said = "no" if value is None else f"{value:,} draws"
+            text = "no" if value is None else f"{value:,} draws"
         elif name == "seed" and context.params["draws"] is not None:
-            said = "of each file" if value is None else str(value)
+            text = "of each file" if value is None else str(value)
         elif name in ("strict", "exit_zero", "verifying"):
-            said = "yes" if value else "no"
-        if said:
-            yield Override(parameter.opts[0], said, origin)
+            text = "yes" if value else "no"
+        if text:
+            yield Override(parameter.opts[0], text, origin)
 
 
 def _check_draws(context: click.Context, scheduler: str | None) -> None:

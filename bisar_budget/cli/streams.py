@@ -67,13 +67,13 @@ def read_all(reads: "Iterable[Callable[[], Mission]]") -> "list[Mission]":
 
 
 def say_faults(file: str, faults: "tuple[Fault, ...]") -> None:
-    """Say what is wrong with a file, a line for each fault."""
+    """Write the faults of a file, a line for each fault."""
     for line in MissionError(file, faults).lines():
         complain(line)
 
 
 def suffix_of(name: str | None, suffixes: Sequence[str]) -> str:
-    """Suffix of the name of a file, one of some, or the command ends; empty where there is no name."""
+    """Suffix of the name of a file, which must be one of `suffixes`; empty without a name."""
     suffix = os.path.splitext(name or "")[1].lower()
     if name is not None and suffix not in suffixes:
         raise click.UsageError(f"{name}: the suffix must be one of {', '.join(suffixes)}")
@@ -81,65 +81,65 @@ def suffix_of(name: str | None, suffixes: Sequence[str]) -> str:
 
 
 def spare(files: Sequence[str], targets: Iterable[str | None], folders: Iterable[str] = ()) -> None:
-    """Refuse to write over what is to be read, and to write two outputs to one file.
+    """Refuse to write over files that are to be read, and to write two outputs to one file.
 
-    What is read may also be the file of standard input, and the output that of standard output. Nothing else may be
-    in `folders`, which an output fills with files of its own.
+    The files of standard input and standard output count too. No other file may be in `folders`, which an output
+    fills with files of its own.
     """
     written: dict[str, str] = {}
     for target in [*targets, *folders]:
         if target is None or target == "-":
             continue
-        place = _place(target)
-        if place in written:
-            fail(f"two outputs would be written to one file: {written[place]} and {target}")
-        written[place] = target
-    inside = tuple((os.path.join(_place(folder), ""), folder) for folder in folders)
-    for place, name in [*written.items(), *((_place(file), file) for file in files if inside)]:
+        real_path = _real_path(target)
+        if real_path in written:
+            fail(f"two outputs would be written to one file: {written[real_path]} and {target}")
+        written[real_path] = target
+    inside = tuple((os.path.join(_real_path(folder), ""), folder) for folder in folders)
+    for real_path, name in [*written.items(), *((_real_path(file), file) for file in files if inside)]:
         for start, folder in inside:
-            if place.startswith(start):
+            if real_path.startswith(start):
                 fail(f"{name} is in the folder of a report's pictures, {folder}")
     for file in files:
-        for place, target in written.items():
-            if _is_same(0 if file == "-" else file, place):
+        for real_path, target in written.items():
+            if _is_same(0 if file == "-" else file, real_path):
                 fail(f"{target} is to be read; a result would replace it")
         if file != "-" and _is_same(1, file):
             fail(f"{file} is to be read; standard output goes to it")
 
 
-def _place(path: str) -> str:
-    """Where a path leads to, links followed."""
+def _real_path(path: str) -> str:
+    """A path with its links resolved; ends the command if that fails."""
     try:
         return os.path.realpath(path)
     except (OSError, ValueError) as error:  # a deleted working folder, a NUL in the name
         fail(f"cannot write {path}: {getattr(error, 'strerror', None) or error}")
 
 
-def _is_same(one: str | int, other: str) -> bool:
+def _is_same(file: str | int, path: str) -> bool:
     """Whether a path, or an open stream, and another path are one regular file."""
     try:
-        return os.path.isfile(one) and os.path.samestat(os.stat(one), os.stat(other))
-    except (OSError, ValueError):  # either is missing
+        return os.path.isfile(file) and os.path.samestat(os.stat(file), os.stat(path))
+    except (OSError, ValueError):  # one of them is missing
         return False
 
 
 def root_of_names() -> tuple[str, bool]:
-    """Folder that reports name files of no repository from, and whether it is GitHub's checkout."""
+    """Folder to which names of files without a repository are relative, and whether it is GitHub's checkout."""
     try:
         here = os.getcwd()
-    except OSError:  # somebody removed it under us
+    except OSError:  # somebody removed the current folder
         return "", False
     checkout = os.environ.get("GITHUB_WORKSPACE")
     return os.path.realpath(checkout or here), bool(checkout)
 
 
 def is_terminal() -> bool:
-    """Whether somebody sees both standard streams."""
+    """Whether both standard streams are terminals."""
     return all(stream is not None and stream.isatty() for stream in (sys.stdout, sys.stderr))
 
 
 def wants_color() -> bool:
-    """Whether standard output is a terminal that shows colour, and nobody objects."""
+    """Whether standard output is a terminal with colours, and NO_COLOR is not set."""
     return (
         sys.stdout is not None
         and sys.stdout.isatty()
@@ -148,22 +148,22 @@ def wants_color() -> bool:
     )
 
 
-# What does something to a terminal: controls but tabs and line ends, marks without width and those that turn the
-# reading direction.
+# Characters that change a terminal: controls except tabs and line ends, marks without width, and marks of the reading
+# direction.
 _ACTIVE = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200b-\u200f\u2028-\u202e\u2066-\u2069\ufeff]")
 _COLOR = re.compile(r"\x1b\[[0-9;]*m")
-# What a CI runner takes for a command: `::error` at the start of a line, `##[group]` and `##vso[...]` anywhere.
+# Texts that a CI runner takes for commands: `::error` at the start of a line, `##[group]` and `##vso[...]` anywhere.
 _COMMAND = re.compile(r"(?m)^([^\S\n]*):(?=:)")
 _COMMAND_WITHIN = re.compile(r"(?<=#)#(?=[\w.]*\[)")
-# How a format writes a character so that its readers read that character; the others show an escape.
+# Escapes of formats whose readers decode them to the character; readers of other formats see the escape.
 _ESCAPES = dict.fromkeys(("json", "sarif", "needs", "yaml"), "\\u{:04x}")
 _ESCAPES |= dict.fromkeys(("html", "markdown", "junit", "mathml"), "&#{};")
 _ESCAPES["ics"] = "\\\\x{:02x}"
-_LINE_ENDS = {"ics": "\r\n"}  # RFC 5545; others end a line with a line feed
+_LINE_ENDS = {"ics": "\r\n"}  # RFC 5545; lines of other formats end with a line feed
 
 
 def harmless(text: str, format_name: str = "") -> str:
-    """Make text do nothing to a terminal, or to a CI runner that reads the log.
+    """Text without effect on a terminal, or on a CI runner that reads the log.
 
     `github` keeps its own commands, `text` the colours of a report; a message has none.
     """
