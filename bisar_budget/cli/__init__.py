@@ -132,7 +132,7 @@ def cli() -> None:
 def main() -> None:
     """Run the command; a signal that asks it to end leaves no worker and no temporary file.
 
-    Warnings of libraries are ignored: users of the command cannot mend them, and PYTHONWARNINGS could make them errors.
+    Warnings of libraries are ignored: users cannot mend them, and PYTHONWARNINGS could turn them into errors.
     """
     warnings.simplefilter("ignore")
     # Workers begin with `python -c`, which imports from the current folder, where no installed command does.

@@ -205,7 +205,7 @@ def catalogue(mission: Mission) -> list[Entry]:
         return []
 
 
-def suitable_parts(mission: Mission, specified: Specified, most: float, entries: Sequence[Entry]) -> Iterator[str]:
+def suitable_parts(mission: Mission, specified: Specified, most: float, candidates: Sequence[Entry]) -> Iterator[str]:
     """Ids of the parts that meet a specification with the ordered number `most`; the mission states the error.
 
     A sensor meets it if its figure of the same name is no larger on any axis. An oscillator meets it if its phase
@@ -215,10 +215,10 @@ def suitable_parts(mission: Mission, specified: Specified, most: float, entries:
     """
     *above, section, figure = parts_of(specified.key)
     if section == "oscillator" and figure == "level":
-        yield from _quiet_oscillators(mission, above[-1], most, entries)
+        yield from _quiet_oscillators(mission, above[-1], most, candidates)
     kind = {"motion_error": "gnss", "imu": "imu"}.get(section)
     is_satellite = above[:1] == ["platforms"] and _is_satellite(getattr(mission.platforms, above[1]))
-    for entry in entries:
+    for entry in candidates:
         serves = not is_satellite or getattr(entry.part, "in_orbit", None)
         value = getattr(entry.part, figure, None) if entry.part.kind == kind and serves else None
         if value is not None and np.abs(value).max() <= most:
@@ -230,7 +230,7 @@ def _is_satellite(platform: Platform) -> bool:
     return platform.orbit is not None or bool(norm(platform.state.velocity) > FASTEST_FLIGHT)
 
 
-def _quiet_oscillators(mission: Mission, name: str, level: float, entries: Sequence[Entry]) -> Iterator[str]:
+def _quiet_oscillators(mission: Mission, name: str, level: float, candidates: Sequence[Entry]) -> Iterator[str]:
     """Ids of the oscillators whose phase noise is nowhere above a platform's spectrum at a level."""
     carrier, pieces = _spectrum(mission, name)
     aperture = mission.collection.aperture_time
@@ -238,7 +238,7 @@ def _quiet_oscillators(mission: Mission, name: str, level: float, entries: Seque
     first = min([_LEAST_CYCLES / aperture, *(piece.low for piece in pieces if piece.low)])
     offsets = np.geomspace(first, last * (1 - 1e-9), 1 + math.ceil(_OFFSETS_PER_DECADE * math.log10(last / first)))
     most = density(pieces, offsets) * 10 ** (level / 10) * _ROUNDING_FACTOR
-    for entry in entries:
+    for entry in candidates:
         part = entry.part
         if not isinstance(part, OscillatorPart):
             continue

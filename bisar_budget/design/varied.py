@@ -195,18 +195,16 @@ def _below(value: Any, reader: Reader, parts: Sequence[str], factor: Any, key: s
             return value, 0
         is_clock = parts_of(key)[0] == "timing_error" or name in _OF_ERRORS
         return _scaled(value, reader, factor, is_clock=is_clock)
-    name_of_child, *remaining = parts
+    child, *remaining = parts
     reader = _form(reader, value)
-    if isinstance(reader, Section) and name_of_child in reader.keys and value is not None:
-        inner, count = _below(
-            getattr(value, name_of_child), reader.keys[name_of_child].reader, remaining, factor, key
-        )
-        return value._replace(**{name_of_child: inner}), count
-    if isinstance(reader, ListOf | Triple) and name_of_child.isdigit() and value and int(name_of_child) < len(value):
+    if isinstance(reader, Section) and child in reader.keys and value is not None:
+        inner, count = _below(getattr(value, child), reader.keys[child].reader, remaining, factor, key)
+        return value._replace(**{child: inner}), count
+    if isinstance(reader, ListOf | Triple) and child.isdigit() and value and int(child) < len(value):
         below = reader.section if isinstance(reader, ListOf) else reader.component
-        inner, count = _below(value[int(name_of_child)], below, remaining, factor, key)
-        return (*value[: int(name_of_child)], inner, *value[int(name_of_child) + 1 :]), count
-    raise QuestionError(f"{key}: the mission has no {name_of_child}; {_ACCEPTED}")
+        inner, count = _below(value[int(child)], below, remaining, factor, key)
+        return (*value[: int(child)], inner, *value[int(child) + 1 :]), count
+    raise QuestionError(f"{key}: the mission has no {child}; {_ACCEPTED}")
 
 
 def _scaled(value: Any, reader: Reader, factor: Any, is_clock: bool) -> tuple[Any, int]:
