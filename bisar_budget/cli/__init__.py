@@ -36,7 +36,7 @@ _MODULES = {
     "sweep": "sweep",
     "verify": "images",
 }
-_FRUGAL = ("init", "schema")  # without NumPy
+_FRUGAL = ("init", "schema")  # commands without NumPy
 
 
 class _Commands(click.Group):
@@ -53,7 +53,7 @@ class _Commands(click.Group):
             memory.hold_room(memory.LEAST, cmd_name)
         module = import_module(f"bisar_budget.cli.{_MODULES[cmd_name]}")
         command: click.Command = getattr(module, "import_file" if cmd_name == "import" else cmd_name)
-        command.help = command.help or docstring(command.callback)  # without one under -OO
+        command.help = command.help or docstring(command.callback)  # functions have no docstrings under -OO
         return command
 
     def main(self, *args: Any, **kwargs: Any) -> Any:
@@ -62,7 +62,7 @@ class _Commands(click.Group):
         before = SAYING.set(complain)
         output = sys.stdout
         kwargs["standalone_mode"] = False  # click would exit with 1 on an interrupt or a broken pipe
-        kwargs["prog_name"] = "bisar-budget"  # whatever name it was called by
+        kwargs["prog_name"] = "bisar-budget"  # also if the program is called by another name
         try:
             sys.exit(super().main(*args, **kwargs))
         except SystemExit:
@@ -101,14 +101,14 @@ class _Commands(click.Group):
 
 
 def _own_fault(error: BaseException) -> NoReturn:
-    """Say that the tool crashed, or memory ran out, and exit; BISAR_BUDGET_DEBUG shows where, and changes no code."""
+    """Report a crash of the tool, or exhausted memory, and exit; BISAR_BUDGET_DEBUG adds the traceback."""
     if os.environ.get("BISAR_BUDGET_DEBUG"):
         import traceback
 
         complain("".join(traceback.format_exception(error)).rstrip("\n"))
     if memory.ran_out(error):
-        said = str(error) if isinstance(error, MemoryError) and error.args else memory.limit_words()
-        fail(f"the system refuses: memory ran out{f'; {said}' if said else ''}")
+        reason = str(error) if isinstance(error, MemoryError) and error.args else memory.limit_words()
+        fail(f"the system refuses: memory ran out{f'; {reason}' if reason else ''}")
     complain(
         f"bisar-budget {__version__}: a fault of the tool itself, nothing was judged "
         f"({type(error).__name__}: {printable(str(error))}).\n"
@@ -132,17 +132,19 @@ def cli() -> None:
 def main() -> None:
     """Run the command; a signal that asks it to end leaves no worker and no temporary file.
 
-    What a library warns of nobody who runs this command can mend, and PYTHONWARNINGS can make it an error.
+    Warnings of libraries are ignored: users cannot mend them, and PYTHONWARNINGS could turn them into errors.
     """
     warnings.simplefilter("ignore")
     # Workers begin with `python -c`, which imports from the current folder, where no installed command does.
     os.environ["PYTHONSAFEPATH"] = "1"
-    if len(sys.argv) > 1:  # a shell that completes gives none; else a check would write a completion, and exit with 0
+    if (
+        len(sys.argv) > 1
+    ):  # a completion has no arguments; a check with this variable would write one, and exit with 0
         os.environ.pop("_BISAR_BUDGET_COMPLETE", None)
     for name in ("SIGTERM", "SIGHUP"):
-        asked = getattr(signal, name, None)
-        if asked is not None and signal.getsignal(asked) is signal.SIG_DFL:
-            signal.signal(asked, _end)
+        signal_number = getattr(signal, name, None)
+        if signal_number is not None and signal.getsignal(signal_number) is signal.SIG_DFL:
+            signal.signal(signal_number, _end)
     gc.set_threshold(50_000)  # imports make objects that stay: to look through them each 700 takes 6 ms
     try:
         cli()

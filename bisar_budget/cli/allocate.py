@@ -92,19 +92,19 @@ def allocate(
     offer = None if other is None else load_all([other], model, changes)[0]
     kept_free = None if reserve is None else reserve / 100
     ask = partial(questions.allocate, keys=keys, reserve=kept_free, offer=offer)
-    found = [(one.found, one.offer) for one in ask_each(loaded, model, today, ask)]
-    if is_mission and output is not None:  # first: one that cannot be written leaves no output at all
-        _write_mission(found[0][0], output, model)
+    sheets = [(answer.found, answer.offer) for answer in ask_each(loaded, model, today, ask)]
+    if is_mission and output is not None:  # first, so that a failure leaves no output at all
+        _write_mission(sheets[0][0], output, model)
         output = None
-    deliver_found(specification_sheet, found, format_name, output)
-    complies = all(sheet.complies and (of_offer is None or of_offer.complies) for sheet, of_offer in found)
+    deliver_found(specification_sheet, sheets, format_name, output)
+    complies = all(sheet.complies and (of_offer is None or of_offer.complies) for sheet, of_offer in sheets)
     sys.exit(0 if complies else EXIT_BROKEN)
 
 
 def _write_mission(sheet: "SpecificationSheet", output: str, model: str | None) -> None:
-    """Write the mission with what is ordered in place and as specifications; nothing where there are none.
+    """Write the mission with the ordered sizes as its errors and as its specifications, if there are any.
 
-    It is read first as it will lie there, with the files that it names.
+    First the text is read as a file of its folder, with the files that it names.
     """
     from bisar_budget.faults import MissionError, SetValue
     from bisar_budget.mission.edited import in_folder, with_section, with_values
@@ -116,9 +116,9 @@ def _write_mission(sheet: "SpecificationSheet", output: str, model: str | None) 
         return
     text = (findings.mission.data or b"").decode("utf-8-sig")
     of_model = [SetValue("allocation.model", model)] if model else []
-    beside = in_folder(findings.mission, os.path.dirname(output) or os.curdir)
-    text = with_values(text, [*sheet.changes, *of_model, *beside, *sheet.ordered])
-    text = with_section(text, "specifications", {one.key: one.text for one in sheet.specifications if one.text})
+    file_names = in_folder(findings.mission, os.path.dirname(output) or os.curdir)
+    text = with_values(text, [*sheet.changes, *of_model, *file_names, *sheet.ordered])
+    text = with_section(text, "specifications", {each.key: each.text for each in sheet.specifications if each.text})
     try:
         parse_mission(text, output)
     except MissionError as error:

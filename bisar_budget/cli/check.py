@@ -53,25 +53,25 @@ if TYPE_CHECKING:
 
 
 _PROJECTS = "bisar_budget.projects"  # in the context of a command
-_OF_RUN = ("format", "color")  # settings that are of a whole run, where all its projects have the same
+_OF_RUN = ("format", "color")  # settings of a whole run, if all its projects agree
 
 
 class _Gate(click.Command):
-    """A command whose options default to the settings nearest to each mission; BISAR_BUDGET_… stands above them."""
+    """A command whose options default to the settings nearest to each mission; variables override them."""
 
     def make_context(self, info_name: str | None, args: list[str], *more: Any, **extra: Any) -> click.Context:
-        asked = self._context({}, info_name, list(args), *more, **extra)
-        if asked.resilient_parsing:
-            return asked
-        names = asked.params["missions"]
-        if not names and not asked.params["is_of_change"]:
-            raise click.UsageError("Missing argument 'MISSION...'.", asked)
-        files = _touched(names) if asked.params["is_of_change"] else expand(names)
+        first_context = self._context({}, info_name, list(args), *more, **extra)
+        if first_context.resilient_parsing:
+            return first_context
+        names = first_context.params["missions"]
+        if not names and not first_context.params["is_of_change"]:
+            raise click.UsageError("Missing argument 'MISSION...'.", first_context)
+        files = _touched(names) if first_context.params["is_of_change"] else expand(names)
         projects = []
-        for settings, of_settings in by_settings(files):
+        for settings, files_of_project in by_settings(files):
             context = self._context(self._defaults(settings), info_name, list(args), *more, **extra)
             context.obj = settings
-            projects.append(Project(settings, of_settings, context))
+            projects.append(Project(settings, files_of_project, context))
         context = projects[0].context
         if len(projects) > 1:
             defaults = self._common_defaults([project.settings for project in projects])
@@ -81,16 +81,16 @@ class _Gate(click.Command):
         return context
 
     def _common_defaults(self, settings: "Sequence[Settings | None]") -> dict[str, Any]:
-        """Defaults of a run of several projects: what is of the run, where all say the same."""
-        found = {}
+        """Defaults of a run of several projects: options of the whole run on which all settings agree."""
+        agreed = {}
         for key in _OF_RUN:
-            values = {one.values.get(key) if one else None for one in settings}
+            values = {each.values.get(key) if each else None for each in settings}
             if len(values) == 1:
-                found[key] = values.pop()
+                agreed[key] = values.pop()
             else:
                 complain(f"warning: the settings of the missions have different {key}s: none of them is taken.")
         options = {p.opts[0].removeprefix("--"): str(p.name) for p in self.params}
-        return {options[key]: value for key, value in found.items() if value is not None}
+        return {options[key]: value for key, value in agreed.items() if value is not None}
 
     def _context(self, defaults: dict[str, Any], *arguments: Any, **extra: Any) -> click.Context:
         try:
@@ -99,20 +99,22 @@ class _Gate(click.Command):
             if error.ctx is not None and error.param is not None and error.param.envvar:
                 source = error.ctx.get_parameter_source(str(error.param.name))
                 if source is ParameterSource.ENVIRONMENT:
-                    error.param_hint = str(error.param.envvar)  # not the option that nobody wrote
+                    error.param_hint = str(
+                        error.param.envvar
+                    )  # the variable, and not the option, which the user did not write
             raise
 
     def _defaults(self, settings: "Settings | None") -> dict[str, Any]:
         from bisar_budget.settings import TABLE
 
         options = {p.opts[0].removeprefix("--"): p for p in self.params if isinstance(p, click.Option) and p.envvar}
-        known = ["BISAR_BUDGET_DEBUG", *(str(option.envvar) for option in options.values())]
+        variables = ["BISAR_BUDGET_DEBUG", *(str(option.envvar) for option in options.values())]
         for name in os.environ:
-            if name.startswith("BISAR_BUDGET_") and name not in known:
+            if name.startswith("BISAR_BUDGET_") and name not in variables:
                 from bisar_budget.mission.readers import did_you_mean
 
-                near = did_you_mean(name, tuple(known))
-                problem = fault_words("is not a known variable", "", f"accepted: {', '.join(known)}", near)
+                near = did_you_mean(name, tuple(variables))
+                problem = fault_words("is not a known variable", "", f"accepted: {', '.join(variables)}", near)
                 raise click.UsageError(f"{printable(name)}: {closed(problem)}")
         defaults = {}
         for key, value in settings.values.items() if settings else ():
@@ -132,7 +134,7 @@ class _Gate(click.Command):
 
 
 def _touched(changed: Sequence[str]) -> list[str]:
-    """List the missions that a change touches; without any the command ends well, and says so."""
+    """Missions that a change touches; without any the command ends with 0 and a message."""
     from bisar_budget.cli.touched import touched_missions
 
     files = touched_missions(changed)
@@ -143,9 +145,9 @@ def _touched(changed: Sequence[str]) -> list[str]:
 
 
 def _hold_below(folder: str, report: str) -> None:
-    """Hold a report that settings ask for to their folder: a check of somebody's missions writes nowhere else."""
+    """Refuse a report of settings outside of their folder: a check of somebody's missions writes nowhere else."""
     inside = os.path.join(os.path.realpath(folder), "")
-    # A NUL in the name is said where the report is written.
+    # A NUL in the name is reported when the report is written.
     if "\0" not in report and not os.path.realpath(report).startswith(inside):
         shown = printable(os.path.relpath(report, folder))
         raise click.UsageError(f"{shown} leads out of the folder of this file; `--report` takes any place.")
@@ -174,7 +176,7 @@ class _Draws(ParamType[int]):
 @MISSIONS_OR_NONE
 @format_option(
     FORMATS,
-    f"Format of the report; {', '.join(f'{one.name}: {one.about}' for one in FORMATS.values() if one.about)}.",
+    f"Format of the report; {', '.join(f'{form.name}: {form.about}' for form in FORMATS.values() if form.about)}.",
     envvar="BISAR_BUDGET_FORMAT",
 )
 @output_option("Write the report to FILE instead of standard output.")
@@ -186,7 +188,7 @@ class _Draws(ParamType[int]):
     multiple=True,
     metavar="FILE",
     help="Also write a report to FILE, in the format of its suffix: "
-    f"{', '.join(one.suffixes[0] for one in FORMATS.values() if one.suffixes)}. Repeatable.",
+    f"{', '.join(form.suffixes[0] for form in FORMATS.values() if form.suffixes)}. Repeatable.",
 )
 @click.option(
     "--detail",
@@ -300,21 +302,25 @@ def check(
 
     files = list(missions)
     projects: list[Project] = click.get_current_context().meta[_PROJECTS]
-    given = click.get_current_context().get_parameter_source
-    if len(projects) > 1 and given("reports") not in (ParameterSource.COMMANDLINE, ParameterSource.ENVIRONMENT):
+    source_of = click.get_current_context().get_parameter_source
+    if len(projects) > 1 and source_of("reports") not in (ParameterSource.COMMANDLINE, ParameterSource.ENVIRONMENT):
         reports = ()
-    written = [(name, _format_of(name)) for name in reports]
+    named_reports = [(name, _format_of(name)) for name in reports]
     own_reports = _reports_of(projects) if len(projects) > 1 else []
-    formats = [format_name, *(its_format for _, its_format in written), *(each[2] for each in own_reports)]
-    places = [*written, *(each[1:] for each in own_reports), (output or "-", format_name)]
-    folders = [_folder_of_pictures(name, its_format) for name, its_format in places]
-    spare(files, [output, *(name for name, _ in places[:-1]), _step_summary(format_name)], [*filter(None, folders)])
+    formats = [format_name, *(its_format for _, its_format in named_reports), *(each[2] for each in own_reports)]
+    destinations = [*named_reports, *(each[1:] for each in own_reports), (output or "-", format_name)]
+    folders = [_folder_of_pictures(name, its_format) for name, its_format in destinations]
+    spare(
+        files,
+        [output, *(name for name, _ in destinations[:-1]), _step_summary(format_name)],
+        [*filter(None, folders)],
+    )
     for project in projects:
         _check_draws(project.context, scheduler)
     is_drawn = any(project.context.params["draws"] is not None for project in projects)
     if explain is not None:
         excluded = ("format_name", "reports", "draws", "scheduler", "swept")
-        if any(given(name) is ParameterSource.COMMANDLINE for name in excluded):
+        if any(source_of(name) is ParameterSource.COMMANDLINE for name in excluded):
             raise click.UsageError(
                 "--explain writes text; it cannot be combined with --format, --report, --monte-carlo, --scheduler or "
                 "--sweep."
@@ -330,50 +336,52 @@ def check(
         color=use_color, verbosity=verbosity, root=root, is_checkout=is_checkout, all_rows=all_rows, detail=detail
     )
     says_faults = format_name != "text" or output is not None or quiet or not is_terminal()
-    if FORMATS[format_name].is_piecewise and not (written or own_reports or verifying or is_drawn):
+    if FORMATS[format_name].is_piecewise and not (named_reports or own_reports or verifying or is_drawn):
         from bisar_budget.front.checks import pieces
 
         texts: dict[str, Piece] = {}
         for project in projects:
-            judged_on, asked = _asked(project, len(projects) > 1, today, changes)
-            texts |= zip(project.files, pieces(project.files, judged_on, format_name, style, **asked), strict=True)
+            judged_on, arguments = _asked(project, len(projects) > 1, today, changes)
+            texts |= zip(
+                project.files, pieces(project.files, judged_on, format_name, style, **arguments), strict=True
+            )
         ordered = [texts[file] for file in files]
         if says_faults:
-            _say_faults(one.unusable for one in ordered)
+            _say_faults(each.unusable for each in ordered)
         deliver(joined(format_name, ordered, __version__, style), output, format_name)
-        statuses = {file: one.statuses for file, one in texts.items()}
+        statuses = {file: each.statuses for file, each in texts.items()}
     else:
         from bisar_budget.findings.mission import Report
         from bisar_budget.front.checks import checked, drawn_by
         from bisar_budget.mission.quantities import QuestionError
 
-        more: dict[str, Any] = {"swept": swept, "is_verified": verifying, "is_illustrated": illustrated}
+        settings: dict[str, Any] = {"swept": swept, "is_verified": verifying, "is_illustrated": illustrated}
         found: dict[str, MissionFindings | UnusableMission] = {}
         for project in projects:
-            judged_on, asked = _asked(project, len(projects) > 1, today, changes)
+            judged_on, arguments = _asked(project, len(projects) > 1, today, changes)
             draws, seed = (project.context.params[name] for name in ("draws", "seed"))
             try:
                 with drawn_by(scheduler, patience, draws, seed, len(project.files)) as drawn:
-                    of_project = checked(project.files, judged_on, drawn=drawn, **asked, **more)
+                    results_of_project = checked(project.files, judged_on, drawn=drawn, **arguments, **settings)
             except QuestionError as error:
                 fail(str(error))
-            found |= zip(project.files, of_project, strict=True)
+            found |= zip(project.files, results_of_project, strict=True)
 
         def report_of(of: Sequence[Project], its_files: Sequence[str]) -> Report:
             """The report of some files, with the options of their projects."""
             its_missions = tuple(found[file] for file in its_files)
-            # The day that somebody gave, or that decides: with no other a report is reproducible.
+            # Only a day that was given, or that decides: without a day the report is reproducible.
             is_given = today is not None or os.environ.get("SOURCE_DATE_EPOCH")
-            told = [one.name for mission in its_missions for one in getattr(mission, "overrides", ())]
-            shown_day = judged_on if is_given or "--date" in told else None
-            options = dict.fromkeys(one for project in of for one in _options(project, shown_day, today))
+            reported = [each.name for mission in its_missions for each in getattr(mission, "overrides", ())]
+            shown_day = judged_on if is_given or "--date" in reported else None
+            options = dict.fromkeys(option for project in of for option in _options(project, shown_day, today))
             return Report(version=__version__, missions=its_missions, options=tuple(options), day=shown_day)
 
         report = report_of(projects, files)
         if says_faults:
             _say_faults(report.missions)
         plain = style._replace(color=False, verbosity=max(style.verbosity, 0))
-        for path, its_format in written:
+        for path, its_format in named_reports:
             _write_report(path, its_format, report, plain)
         for project, path, its_format in own_reports:
             _write_report(path, its_format, report_of([project], project.files), plain)
@@ -406,7 +414,7 @@ def _reports_of(projects: Sequence[Project]) -> list[tuple[Project, str, str]]:
 def _asked(
     project: Project, is_among_others: bool, today: datetime | None, changes: "Sequence[SetValue]"
 ) -> tuple[date, dict[str, Any]]:
-    """The day, and how the missions of a project are checked; of several projects each says its settings."""
+    """Day of waivers and arguments of the check for a project; one of several projects also names its settings."""
     from bisar_budget.findings.requirement import Override
 
     with project.options() as context:
@@ -418,7 +426,7 @@ def _asked(
 
 
 def _options(project: Project, judged_on: date | None, today: datetime | None) -> "list[Override]":
-    """Say what the options that bear on the result are, and where each came from."""
+    """Options with influence on the result, and their origins."""
     with project.options() as context:
         return list(_options_in(context, judged_on, today))
 
@@ -430,30 +438,30 @@ def _options_in(context: click.Context, judged_on: date | None, today: datetime 
     for parameter in context.command.params:
         name, value = str(parameter.name), context.params[str(parameter.name)]
         origin = origin_of(parameter)
-        said = None
+        text = None
         if name == "model":
-            said = value or "as each file says"
+            text = value or "as each file says"
         elif name == "today":
             if value is None and judged_on is not None:
                 origin = day_origin(today, COMMAND_LINE)
-            said = "the day of the run (not recorded: no waiver depends on it)"
-            said = judged_on.isoformat() if judged_on else said
+            text = "the day of the run (not recorded: no waiver depends on it)"
+            text = judged_on.isoformat() if judged_on else text
         elif name == "changes":
-            said = ", ".join(f"{change.key}={change.text}" for change in value)
+            text = ", ".join(f"{change.key}={change.text}" for change in value)
         elif name == "swept":
-            said = ", ".join(value)
+            text = ", ".join(value)
         elif name == "draws":
-            said = "no" if value is None else f"{value:,} draws"
+            text = "no" if value is None else f"{value:,} draws"
         elif name == "seed" and context.params["draws"] is not None:
-            said = "of each file" if value is None else str(value)
+            text = "of each file" if value is None else str(value)
         elif name in ("strict", "exit_zero", "verifying"):
-            said = "yes" if value else "no"
-        if said:
-            yield Override(parameter.opts[0], said, origin)
+            text = "yes" if value else "no"
+        if text:
+            yield Override(parameter.opts[0], text, origin)
 
 
 def _check_draws(context: click.Context, scheduler: str | None) -> None:
-    """Refuse a seed or a scheduler that has nothing to draw, and more draws than are made without one."""
+    """Refuse a seed or a scheduler without draws, and more draws than are possible without a scheduler."""
     draws, seed = context.params["draws"], context.params["seed"]
     if draws is None:
         if seed is not None and context.get_parameter_source("seed") is ParameterSource.COMMANDLINE:
@@ -468,7 +476,7 @@ def _check_draws(context: click.Context, scheduler: str | None) -> None:
 
 
 def _check_sweep(texts: Sequence[str], formats: Sequence[str]) -> None:
-    """Refuse a sweep that no report shows, and more keys than a drawing has axes."""
+    """Refuse a sweep that no report shows, and a sweep of more keys than a drawing has axes."""
     if not texts:
         return
     if not any(FORMATS[name].is_illustrated for name in formats):
@@ -497,48 +505,53 @@ def _explain(
     from bisar_budget.report.words.requirements import requirement_id
 
     texts: list[str] = []
-    known: dict[str, None] = {}
-    each = {project: _asked(project, len(projects) > 1, today, changes) for project in projects}
+    ids: dict[str, None] = {}
+    asked_by_project = {project: _asked(project, len(projects) > 1, today, changes) for project in projects}
     files = [file for project in projects for file in project.files]
-    reads = [partial(load_mission, file, each[one][1]["model"], changes) for one in projects for file in one.files]
-    asked = [each[project] for project in projects for _ in project.files]
-    for mission, (judged_on, how) in zip(read_all(reads), asked, strict=True):
-        found = ask(mission, date=judged_on, outside=how["outside"]).findings
-        required = {requirement_id(one): one for one in found.requirements}
-        known |= dict.fromkeys([*(row.id for row in found.rows), *required])
-        required |= {one.id: one for one in found.requirements}
-        if any(row.id == row_id for row in found.rows):
-            text = explain(mission, found, row_id)
+    reads = [
+        partial(load_mission, file, asked_by_project[project][1]["model"], changes)
+        for project in projects
+        for file in project.files
+    ]
+    asked_by_file = [asked_by_project[project] for project in projects for _ in project.files]
+    for mission, (judged_on, arguments) in zip(read_all(reads), asked_by_file, strict=True):
+        findings = ask(mission, date=judged_on, outside=arguments["outside"]).findings
+        required = {requirement_id(requirement): requirement for requirement in findings.requirements}
+        ids |= dict.fromkeys([*(row.id for row in findings.rows), *required])
+        required |= {requirement.id: requirement for requirement in findings.requirements}
+        if any(row.id == row_id for row in findings.rows):
+            text = explain(mission, findings, row_id)
         elif row_id in required:
-            text = explain_requirement(mission, found, required[row_id])
+            text = explain_requirement(mission, findings, required[row_id])
         else:
             continue
-        given = tuple(one for one in found.overrides if one.origin != DAY_OF_RUN)
-        said = overrides_lines(found._replace(overrides=given))
-        texts.append(text + "".join(f"{line}\n" for line in said))
+        shown_overrides = tuple(override for override in findings.overrides if override.origin != DAY_OF_RUN)
+        override_lines = overrides_lines(findings._replace(overrides=shown_overrides))
+        texts.append(text + "".join(f"{line}\n" for line in override_lines))
     if not texts:
-        problem = closed(unknown_id(row_id, known, files[0], "row or requirement"))
+        problem = closed(unknown_id(row_id, ids, files[0], "row or requirement"))
         raise click.UsageError(f"--explain {printable(row_id)}: {problem}")
     deliver("\n".join(texts), output)
 
 
 def _format_of(name: str) -> str:
+    """Format of a report by the suffix of its name."""
     from bisar_budget.report import format_of
 
     format_name = format_of(name)
     if format_name is None:
-        suffixes = (suffix for one in FORMATS.values() for suffix in one.suffixes)
+        suffixes = (suffix for form in FORMATS.values() for suffix in form.suffixes)
         raise click.UsageError(f"--report {name}: the suffix must be one of {', '.join(suffixes)}")
     return format_name
 
 
 def _step_summary(format_name: str) -> str | None:
-    """File that GitHub shows on the page of a run; None where there is none."""
+    """File that GitHub shows on the page of a run; None without such a file."""
     return (os.environ.get("GITHUB_STEP_SUMMARY") or None) if format_name == "github" else None
 
 
 def _append_step_summary(path: str, report: "Report", style: "Style") -> None:
-    """Add to the page of the run on GitHub; that it cannot be written changes no exit code."""
+    """Append to the page of the run on GitHub; a failure to write changes no exit code."""
     from bisar_budget.report.formats.annotations import step_summary
 
     try:
@@ -550,6 +563,7 @@ def _append_step_summary(path: str, report: "Report", style: "Style") -> None:
 
 
 def _say_faults(missions: "Iterable[MissionFindings | UnusableMission | None]") -> None:
+    """Write the faults of unusable missions to standard error."""
     from bisar_budget.findings.mission import UnusableMission
 
     for mission in missions:
@@ -558,7 +572,7 @@ def _say_faults(missions: "Iterable[MissionFindings | UnusableMission | None]") 
 
 
 def _write_report(path: str, format_name: str, report: "Report", style: "Style") -> None:
-    """Write a report to a file, its pictures first: a text never names a picture that is not there."""
+    """Write a report to a file, after its pictures, so that a text never names a missing picture."""
     from bisar_budget.report import pictures, render
 
     folder = _folder_of_pictures(path, format_name)
@@ -570,7 +584,7 @@ def _write_report(path: str, format_name: str, report: "Report", style: "Style")
 
 
 def _folder_of_pictures(path: str, format_name: str) -> str:
-    """Folder beside a report for its pictures; empty if the format has none, or nothing can stand beside it."""
+    """Folder next to a report for its pictures; empty if the format has none, or the report is no file."""
     if not FORMATS[format_name].has_pictures or path == "-" or (os.path.exists(path) and not os.path.isfile(path)):
         return ""
     return f"{os.path.splitext(path)[0]}.assets"

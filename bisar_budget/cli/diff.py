@@ -131,25 +131,29 @@ def diff(
 def _with_files(
     files: Sequence[str], changes: "tuple[SetValue, ...]", output: str | None, today: datetime | None
 ) -> "ChangeSet":
-    """Compare two files, or each with itself with other values."""
+    """Compare two files, or each file with itself with changed values."""
     from bisar_budget.mission.load import load_mission
     from bisar_budget.report.change.comparison import ChangeSet, loosened_settings
 
     files = expand(files) if changes else files
     spare(files, [output])
     old, new = (files, files) if changes else (files[:1], files[1:])
-    held_before, held_after = ([_settings(file) for file in of] for of in (old, new))
-    before = [partial(load_mission, file, held.get("model")) for file, held in zip(old, held_before, strict=True)]
-    after = [
-        partial(load_mission, file, held.get("model"), changes) for file, held in zip(new, held_after, strict=True)
+    settings_before, settings_after = ([_settings(file) for file in of] for of in (old, new))
+    before = [
+        partial(load_mission, file, settings.get("model"))
+        for file, settings in zip(old, settings_before, strict=True)
     ]
-    pairs = zip(held_before, held_after, strict=True)
-    loosened = dict.fromkeys(one for pair in pairs for one in loosened_settings(*pair))
+    after = [
+        partial(load_mission, file, settings.get("model"), changes)
+        for file, settings in zip(new, settings_after, strict=True)
+    ]
+    pairs = zip(settings_before, settings_after, strict=True)
+    loosened = dict.fromkeys(setting for pair in pairs for setting in loosened_settings(*pair))
     return ChangeSet(_compared(before, after, today), settings=tuple(loosened))
 
 
 def _with_revision(patterns: Sequence[str], base: str, output: str | None, today: datetime | None) -> "ChangeSet":
-    """Compare missions with themselves in a revision; patterns name those of now and of then."""
+    """Compare missions with themselves in a revision; patterns name missions of both."""
     from bisar_budget.mission.load import load_mission
     from bisar_budget.mission.revision import Revision, RevisionError, mission_at
     from bisar_budget.report.change.comparison import ChangeSet, loosened_settings
@@ -165,22 +169,22 @@ def _with_revision(patterns: Sequence[str], base: str, output: str | None, today
         for pattern in patterns:
             revision = Revision(pattern, base)
             revision = revisions.setdefault(revision.top, revision)
-            now = [file for file in expand([pattern]) if os.path.lexists(file)]
-            was = revision.matching(pattern)
-            gone += [revision.path_of(file) for file in was if not os.path.lexists(file)]
-            for file in now or ([] if was else [pattern]):
-                if now and not revision.has(file):
+            present = [file for file in expand([pattern]) if os.path.lexists(file)]
+            past = revision.matching(pattern)
+            gone += [revision.path_of(file) for file in past if not os.path.lexists(file)]
+            for file in present or ([] if past else [pattern]):
+                if present and not revision.has(file):
                     new.append(revision.path_of(file))
                     continue
-                then, held = _settings(file, revision), _settings(file)
-                loosened |= dict.fromkeys(loosened_settings(then, held))
-                before.append(partial(mission_at, file, revision, then.get("model")))
-                after.append(partial(load_mission, file, held.get("model")))
+                past_settings, settings = _settings(file, revision), _settings(file)
+                loosened |= dict.fromkeys(loosened_settings(past_settings, settings))
+                before.append(partial(mission_at, file, revision, past_settings.get("model")))
+                after.append(partial(load_mission, file, settings.get("model")))
         changes = _compared(before, after, today)
     except RevisionError as error:
         fail(str(error))
     bundled = str(resource("specs"))
-    outside = [one for revision in revisions.values() for one in revision.outside if not one.startswith(bundled)]
+    outside = [file for revision in revisions.values() for file in revision.outside if not file.startswith(bundled)]
     return ChangeSet(
         changes,
         gone=tuple(dict.fromkeys(gone)),
@@ -191,25 +195,25 @@ def _with_revision(patterns: Sequence[str], base: str, output: str | None, today
 
 
 def _compared(before: Sequence[_Read], after: Sequence[_Read], today: datetime | None) -> "tuple[MissionChange, ...]":
-    """Compare each mission with the other of its place; where one cannot be used, say every fault of all and exit."""
+    """Compare missions pair by pair; if a mission cannot be used, write every fault of all missions and exit."""
     from bisar_budget.front.checks import check
     from bisar_budget.report.change.comparison import compare
 
     missions = read_all(read for pair in zip(before, after, strict=True) for read in pair)
     judged_on, from_outside = day_and_outside(today)
-    found = [check(mission, date=judged_on, outside=from_outside).findings for mission in missions]
-    return tuple(compare(*pair) for pair in zip(found[::2], found[1::2], strict=True))
+    findings = [check(mission, date=judged_on, outside=from_outside).findings for mission in missions]
+    return tuple(compare(*pair) for pair in zip(findings[::2], findings[1::2], strict=True))
 
 
 def _settings(mission: str, files: Files = DISK) -> Mapping[str, Any]:
-    """Settings nearest to a mission: those that `check` takes for it, now or in a revision."""
+    """Settings nearest to a mission, as for `check`, on disk or in a revision."""
     from bisar_budget.settings import TABLE
 
-    found = settings_here(files, None if mission == "-" else folder_of_file(mission))
-    if found is None:
+    settings = settings_here(files, None if mission == "-" else folder_of_file(mission))
+    if settings is None:
         return {}
     try:
-        GATING_MODEL.convert(found.values.get("model", "full"), None, None)
+        GATING_MODEL.convert(settings.values.get("model", "full"), None, None)
     except click.UsageError as error:
-        raise click.UsageError(f"{printable(found.file)}: {TABLE}.model: {error.message}") from None
-    return found.values
+        raise click.UsageError(f"{printable(settings.file)}: {TABLE}.model: {error.message}") from None
+    return settings.values

@@ -140,19 +140,19 @@ def simulate(
     from bisar_budget.report.drawing import point_plot
 
     try:
-        found = imaging.simulate(loaded, standing, image_former=image_former).images
+        images = imaging.simulate(loaded, standing, image_former=image_former).images
     except (imaging.SimulationError, ValueError) as error:
         fail(f"{mission}: {error}")
     if output is not None:
-        write_file(output, point_plot.archive(found, changes))
+        write_file(output, point_plot.archive(images, changes))
     if plot is not None:
         title = f"{loaded.name} {changes_words(changes)}".rstrip()
-        write_file(plot, point_plot.drawn(found, title, kind))
-    deliver(point_plot.summary(found, loaded))
+        write_file(plot, point_plot.drawn(images, title, kind))
+    deliver(point_plot.summary(images, loaded))
 
 
 def _export(mission: str, loaded: "Mission", output: str, standing: "Targets") -> None:
-    """Write the phase history, and say what is in it."""
+    """Write the phase history, and a summary of its content."""
     from bisar_budget.formats.containers import MissingExtraError
     from bisar_budget.formats.exporting import export_phase_history
     from bisar_budget.front.imaging import SimulationError

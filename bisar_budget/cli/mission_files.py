@@ -1,4 +1,4 @@
-"""`bisar-budget init`, `schema` and `import`: mission files to start from, and what to write them with."""
+"""`bisar-budget init`, `schema` and `import`: mission files to start from, and their schema for editors."""
 
 import json
 import os
@@ -8,7 +8,7 @@ import click
 from bisar_budget.cli.options import FILE, OUTPUT
 from bisar_budget.cli.streams import complain, deliver, fail
 
-_SEEN = 20  # of a wavelength: what a place is off the path turns the phase by 0.3 rad
+_WAVELENGTH_PER_VISIBLE_OFFSET = 20  # a distance of a 20th from the path turns the phase by 0.3 rad
 _FORCE = click.option("--force", is_flag=True, help="Replace an existing file.")
 
 
@@ -85,21 +85,21 @@ def import_file(file: str, output: str | None, channel: str | None, force: bool)
         if os.path.exists(file) and os.path.samefile(file, output):
             fail(f"{output} is the file to read")
     try:
-        found = import_collection(file, channel)
-        text = mission_text(found)
+        collection = import_collection(file, channel)
+        text = mission_text(collection)
         parse_mission(text, "the mission")
     except (FormatError, MissingExtraError) as error:
         fail(str(error))
     except MissionError as error:
         fail(f"{file}: no mission can be made of it: {error.faults[0]}")
-    tracks = {"transmitter": found.transmitter, "receiver": found.receiver}
+    tracks = {"transmitter": collection.transmitter, "receiver": collection.receiver}
     away = {name: format_quantity(track.farthest, "m") for name, track in tracks.items()}
     for name, track in tracks.items():
         if track.farthest > track.state.slant_range / 100:
             fail(f"{file}: a place of the {name} is {away[name]} from its path, more than a hundredth of its range")
     farthest = max(track.farthest for track in tracks.values())
-    if found.unused or farthest > SPEED_OF_LIGHT / found.center_frequency / _SEEN:
-        doubts = [found.unused] if found.unused else []
+    if collection.unused or farthest > SPEED_OF_LIGHT / collection.center_frequency / _WAVELENGTH_PER_VISIBLE_OFFSET:
+        doubts = [collection.unused] if collection.unused else []
         doubts += [f"places of the {name} are up to {length} from its path" for name, length in away.items()]
         complain(f"warning: {'; '.join(doubts)}; the comments say more")
     deliver(text, output, "yaml")

@@ -1,4 +1,4 @@
-"""Options that commands share; where values come from: the command line, the environment, a project's settings."""
+"""Options that commands share, and the origins of their values: command line, environment, a project's settings."""
 
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -25,24 +25,24 @@ if TYPE_CHECKING:
 else:
 
     class ParamType(click.ParamType):
-        """Type of a parameter; that of Click before 8.4 takes no type of its values in brackets."""
+        """Type of a parameter that accepts the type of its values in brackets, which Click before 8.4 does not."""
 
         def __class_getitem__(cls, values: object) -> type:  # noqa: D105
             return cls
 
 
 COMMAND_LINE = "command line"
-_Option = Callable[[Callable[..., Any]], Callable[..., Any]]  # it is put on a command
-_BEARING = ("model", "strict", "exit_zero")  # on the verdict, besides the day and --set
+_Option = Callable[[Callable[..., Any]], Callable[..., Any]]  # a decorator of a command
+_BEARING = ("model", "strict", "exit_zero")  # options with influence on the verdict, besides the day and --set
 
 
 class FileName(click.types.StringParamType):
-    """Name of a file, which a shell completes; what can be read is seen when it is."""
+    """Name of a file, which a shell completes; reading checks whether it is readable."""
 
     name = "file"
 
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> "list[CompletionItem]":
-        """Leave it to the shell, which knows the files."""
+        """Leave the completion to the shell, which knows the files."""
         from click.shell_completion import CompletionItem
 
         return [CompletionItem(incomplete, type="file")]
@@ -54,19 +54,19 @@ MISSIONS_OR_NONE = click.argument("missions", type=FILE, nargs=-1, metavar="MISS
 
 
 def output_option(words: str = "Write to FILE instead of standard output.", metavar: str = "FILE") -> _Option:
-    """Give the option `--output`."""
+    """The option `--output`."""
     return click.option("-o", "--output", type=FILE, metavar=metavar, help=words)
 
 
 def plot_option(words: str) -> _Option:
-    """Give the option `--plot`."""
+    """The option `--plot`."""
     return click.option("--plot", type=FILE, metavar="FILE", help=words)
 
 
-def format_option(formats: Iterable[str], words: str, **more: Any) -> _Option:
-    """Give the option `--format`, of which text is the default."""
-    given: dict[str, Any] = {"default": "text", "show_default": True, **more}
-    return click.option("--format", "format_name", type=click.Choice([*formats]), help=words, **given)
+def format_option(formats: Iterable[str], words: str, **overrides: Any) -> _Option:
+    """The option `--format`; its default is text."""
+    settings: dict[str, Any] = {"default": "text", "show_default": True, **overrides}
+    return click.option("--format", "format_name", type=click.Choice([*formats]), help=words, **settings)
 
 
 OUTPUT = output_option()
@@ -74,6 +74,7 @@ TEXT_OR_JSON = format_option(("text", "json"), "Format of the output.")
 
 
 def _read_changes(ctx: click.Context, param: click.Parameter, texts: tuple[str, ...]) -> "tuple[SetValue, ...]":
+    """Values of the option `--set`; raises `click.UsageError`."""
     if not texts:
         return ()
     from bisar_budget.faults import InvalidValueError
@@ -85,10 +86,10 @@ def _read_changes(ctx: click.Context, param: click.Parameter, texts: tuple[str, 
         raise click.UsageError(f"--set: {error.problem.words}.") from None
 
 
-def set_option(what: str) -> _Option:
-    """Give the option `--set`; `what` says what it does with the value.
+def set_option(effect: str) -> _Option:
+    """The option `--set`; `effect` are words of the help.
 
-    It is no setting of a project, nor of the environment: a gate judges the file that is in the repository.
+    Settings and variables cannot set it, because a gate judges the file of the repository.
     """
     return click.option(
         "--set",
@@ -96,8 +97,8 @@ def set_option(what: str) -> _Option:
         multiple=True,
         metavar="KEY=VALUE",
         callback=_read_changes,
-        help=f"{what}: KEY is its path in the file, such as platforms.receiver.azimuth or other_errors.0.name, VALUE "
-        "as the file would have it; null takes the key out. Repeatable; every report says it.",
+        help=f"{effect}: KEY is its path in the file, such as platforms.receiver.azimuth or other_errors.0.name, "
+        "VALUE as the file would have it; null takes the key out. Repeatable; every report says it.",
     )
 
 
@@ -107,13 +108,13 @@ GATING_MODEL = click.Choice(GATING_MODELS)
 
 
 def model_option(variable: str | None = None) -> _Option:
-    """Give the option `--model`, which a variable of the environment may stand in for."""
+    """The option `--model`, which a variable of the environment may replace."""
     words = "Model that decides, instead of the mission file's."
     return click.option("--model", envvar=variable, type=GATING_MODEL, help=words)
 
 
 def date_option(more: str = "") -> _Option:
-    """Give the option `--date`; `more` is what else there is to say."""
+    """The option `--date`; `more` are further words of the help."""
     words = "Day on which waivers are judged (default: SOURCE_DATE_EPOCH, else today, UTC)." + more
     return click.option("--date", "today", type=click.DateTime(["%Y-%m-%d"]), help=words)
 
@@ -122,7 +123,7 @@ MODEL, DATE = model_option(), date_option()
 
 
 def scheduler_options(doing: str, more: str = "") -> _Option:
-    """Give `--scheduler` and its time-out; `doing` says what workers are for, `more` what else there is to say."""
+    """The options `--scheduler` and its time-out; `doing` and `more` are words of the help."""
     named = click.option(
         "--scheduler",
         metavar="ADDRESS",
@@ -142,7 +143,7 @@ def scheduler_options(doing: str, more: str = "") -> _Option:
 
 
 def origin_of(parameter: click.Parameter) -> str:
-    """Say where the value of a parameter comes from."""
+    """Origin of the value of a parameter, in words."""
     source = click.get_current_context().get_parameter_source(str(parameter.name))
     if source is ParameterSource.COMMANDLINE:
         return COMMAND_LINE
@@ -155,7 +156,7 @@ def origin_of(parameter: click.Parameter) -> str:
 
 
 def settings_here(files: Files = DISK, folder: str | None = None) -> "Settings | None":
-    """Settings of the project for the current folder, or another; now or in a revision; None where there are none."""
+    """Settings of the project of a folder, by default the current one, on disk or in a revision; None without any."""
     from bisar_budget.settings import SettingsError, project_settings
 
     try:
@@ -167,9 +168,9 @@ def settings_here(files: Files = DISK, folder: str | None = None) -> "Settings |
 
 
 def day_and_outside(today: datetime | None) -> "tuple[date, Outside]":
-    """Day on which waivers are judged, and the options of the command that bear on verdicts.
+    """Day on which waivers are judged, and the options of the command with influence on verdicts.
 
-    `today` is the value of --date; without it the day is that of SOURCE_DATE_EPOCH, else today, UTC.
+    `today` is the value of --date. Without it the day is that of SOURCE_DATE_EPOCH, or else today, UTC.
     """
     from bisar_budget.findings.requirement import Outside, Override
     from bisar_budget.front.checks import day_of, day_origin
@@ -179,19 +180,19 @@ def day_and_outside(today: datetime | None) -> "tuple[date, Outside]":
     except ValueError as error:
         raise click.UsageError(str(error)) from None
 
-    context, found = click.get_current_context(), []
+    context, overrides = click.get_current_context(), []
     for parameter in context.command.params:
         name, origin = str(parameter.name), origin_of(parameter)
         value = context.params.get(name)
         if name in _BEARING and origin != "default" and value is not None:
-            said = ("yes" if value else "no") if isinstance(value, bool) else value
-            found.append(Override(parameter.opts[0], said, origin))
-    return judged_on, Outside(tuple(found), day_origin(today, COMMAND_LINE), today is not None)
+            text = ("yes" if value else "no") if isinstance(value, bool) else value
+            overrides.append(Override(parameter.opts[0], text, origin))
+    return judged_on, Outside(tuple(overrides), day_origin(today, COMMAND_LINE), today is not None)
 
 
 @contextmanager
 def wrong_usage() -> Iterator[None]:
-    """Take a question that cannot be asked, whatever the mission, for wrong usage of the command."""
+    """Turn a `QuestionError` that does not depend on the mission into wrong usage of the command."""
     from bisar_budget.mission.quantities import QuestionError
 
     try:
@@ -203,7 +204,7 @@ def wrong_usage() -> Iterator[None]:
 def ask_each(
     missions: "Sequence[Mission]", model: str | None, today: datetime | None, ask: Callable[..., Any]
 ) -> Iterator[Any]:
-    """Ask each mission in turn; exits where one cannot be asked."""
+    """Answers of each mission in turn; exits if a mission cannot answer the question."""
     from bisar_budget.mission.quantities import QuestionError
 
     judged_on, from_outside = day_and_outside(today)

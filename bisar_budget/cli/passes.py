@@ -137,16 +137,16 @@ def passes(
     judged_on, from_outside = day_and_outside(today)
     with wrong_usage():
         least = questions.angle_of("--min-elevation", min_elevation, 0.0)
-        wanted = questions.angle_of("--squint", squint, -90.0)
+        squint_rad = questions.angle_of("--squint", squint, -90.0)
     (loaded,) = read_all([partial(load_mission, mission, model, changes, is_placed=False)])
     try:
-        found = questions.passes(
+        result = questions.passes(
             loaded,
             start or None,
             days=days,
             platform=platform,
             min_elevation=least,
-            squint=wanted,
+            squint=squint_rad,
             model=model,
             date=judged_on,
             outside=from_outside,
@@ -157,32 +157,34 @@ def passes(
         say_faults(error.file, error.faults)
         sys.exit(EXIT_USAGE)
     if is_folder and output is not None:
-        _write_missions(found, output, judged_on)
+        _write_missions(result, output, judged_on)
         output = None
     if plot is not None:
-        write_file(plot, found.plot().of(kind))
+        write_file(plot, result.plot().of(kind))
     if format_name == "ics":
-        deliver(pass_list.as_ics(found.found, judged_on), output, format_name)
+        deliver(pass_list.as_ics(result.found, judged_on), output, format_name)
     else:
-        deliver_found(pass_list, found.found, format_name, output)
-    sys.exit(0 if found.accepted else EXIT_BROKEN)
+        deliver_found(pass_list, result.found, format_name, output)
+    sys.exit(0 if result.accepted else EXIT_BROKEN)
 
 
 # ---------------------------------------------------------------- a mission file for each pass
-def _write_missions(found: "PassesResult", folder: str, today: date) -> None:
-    """Write the mission of each pass that complies or is waived, none where one would get another status.
+def _write_missions(result: "PassesResult", folder: str, today: date) -> None:
+    """Write the mission of each pass that complies or is waived, or none if one would get another status.
 
-    They are read first as they will lie there: files that they name are looked for from the folder.
+    First the missions are read as files of the folder, with the files that they name.
     """
-    texts = {os.path.join(folder, _name(one, found.file)): found.mission_text(one, folder) for one in found.accepted}
-    spare([found.file], texts)
+    texts = {
+        os.path.join(folder, _name(each, result.file)): result.mission_text(each, folder) for each in result.accepted
+    }
+    spare([result.file], texts)
     if not texts:
         complain(f"no mission file is written to {folder}: no pass complies or is waived")
         return
     is_new = not os.path.isdir(folder)
     try:
         os.makedirs(folder, exist_ok=True)
-        _hold_to_statuses(found.accepted, texts, today)
+        _hold_to_statuses(result.accepted, texts, today)
     except OSError as error:
         fail(f"cannot write {folder}: {error.strerror}")
     except SystemExit:
@@ -192,29 +194,33 @@ def _write_missions(found: "PassesResult", folder: str, today: date) -> None:
         raise
     for path, text in texts.items():
         write_file(path, text)
-    waived = len(texts) - len(found.complying)
-    apart = f": {len(found.complying)} comply, {waived_count(waived, found.waived_by)}" if waived else ""
+    waived = len(texts) - len(result.complying)
+    apart = f": {len(result.complying)} comply, {waived_count(waived, result.waived_by)}" if waived else ""
     complain(f"{len(texts)} mission file{'s' if len(texts) != 1 else ''} in {folder}{apart}")
 
 
-def _name(one: "SatellitePass", file: str) -> str:
-    """Name of the file of a pass: that of the mission, and the mid-time."""
+def _name(satellite_pass: "SatellitePass", file: str) -> str:
+    """Name of the file of a pass: the name of the mission file, and the mid-time."""
     stem, suffix = os.path.splitext(os.path.basename(file) if file != "-" else "mission.yaml")
     stem, suffix = (stem, suffix) if suffix.lower() in MISSION_SUFFIXES else (stem + suffix, MISSION_SUFFIXES[0])
-    time = "" if one.center is None else one.center.as_text()[:19].replace("-", "").replace(":", "")
+    time = (
+        ""
+        if satellite_pass.center is None
+        else satellite_pass.center.as_text()[:19].replace("-", "").replace(":", "")
+    )
     return f"{stem}_{time}Z{suffix}"
 
 
 def _hold_to_statuses(passes: "Sequence[SatellitePass]", texts: dict[str, str], today: date) -> None:
-    """Exit where a file cannot be read in its folder, or is checked to another status than its pass."""
+    """Exit if a file cannot be read in its folder, or its check has another status than its pass."""
     from bisar_budget.faults import MissionError
     from bisar_budget.front.checks import check
     from bisar_budget.front.missions import loads
 
-    for one, (path, text) in zip(passes, texts.items(), strict=True):
+    for satellite_pass, (path, text) in zip(passes, texts.items(), strict=True):
         try:
             status = check(loads(text, path), date=today).status
         except MissionError as error:
             fail(f"{path} is not written: {error.faults[0]}")
-        if status != one.status:
+        if status != satellite_pass.status:
             fail(f"{path} is not written: in its folder it is checked to {status}; does it name a part there?")

@@ -1,4 +1,4 @@
-"""Missions of a run by the settings that hold for them: those of the folder nearest to each mission."""
+"""Missions of a run, grouped by their settings, which are the nearest to each mission."""
 
 import os
 from collections.abc import Iterator, Sequence
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Project:
-    """Missions that the same settings hold for, and the options of the command with these as defaults."""
+    """Missions with the same settings, and the options of the command with these settings as defaults."""
 
     settings: "Settings | None"
     files: tuple[str, ...]
@@ -24,18 +24,18 @@ class Project:
 
     @property
     def settings_file(self) -> str | None:
-        """Where the settings stand, from the current folder; None without any."""
+        """Path of the settings relative to the current folder; None without settings."""
         return None if self.settings is None else os.path.relpath(self.settings.file)
 
     @contextmanager
     def options(self) -> Iterator[click.Context]:
-        """Take the options of this project for those of the command."""
+        """Use the options of this project as the options of the command."""
         with self.context.scope(cleanup=False):
             yield self.context
 
 
 def folder_of_file(file: str) -> str | None:
-    """Folder of a mission file, whether or not the file is there; None for a name that no folder has."""
+    """Folder of a mission file, which may be missing; None for a folder that does not exist."""
     folder = os.path.dirname(file) or os.curdir
     return os.path.abspath(folder) if "\0" not in file and os.path.isdir(folder) else None
 
@@ -43,10 +43,10 @@ def folder_of_file(file: str) -> str | None:
 def by_settings(files: Sequence[str]) -> "list[tuple[Settings | None, tuple[str, ...]]]":
     """Group mission files by the settings nearest to each, in the order of the files.
 
-    Standard input has those of the current folder.
+    Standard input has the settings of the current folder.
     """
-    found: dict[str, tuple[Settings | None, list[str]]] = {}
+    groups: dict[str, tuple[Settings | None, list[str]]] = {}
     for file in files:
         settings = settings_here(folder=None if file == "-" else folder_of_file(file))
-        found.setdefault(settings.file if settings else "", (settings, []))[1].append(file)
-    return [(settings, tuple(of_settings)) for settings, of_settings in found.values()]
+        groups.setdefault(settings.file if settings else "", (settings, []))[1].append(file)
+    return [(settings, tuple(of_settings)) for settings, of_settings in groups.values()]

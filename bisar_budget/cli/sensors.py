@@ -48,44 +48,44 @@ def sensors(patterns: Sequence[str], kind: str | None, checking: bool, format_na
         return
     chosen = _listed(patterns or ("*",), kind)
     if format_name == "json":
-        text = _document({"format": "bisar-budget/sensors/1", "parts": [_item(one) for one in chosen]})
+        text = _document({"format": "bisar-budget/sensors/1", "parts": [_item(entry) for entry in chosen]})
     else:
         text = _as_text(chosen)
     deliver(text, None, format_name)
 
 
 def _listed(patterns: Sequence[str], kind: str | None) -> "list[Entry]":
-    """Parts of the catalogue; ends the command where a pattern matches none."""
+    """Parts of the catalogue that match patterns; ends the command if a pattern matches none."""
     from fnmatch import fnmatchcase
 
     from bisar_budget.mission.parts import PartError, entries, folders
 
     try:
-        known = list(entries(folders("")))
+        catalogued = list(entries(folders("")))
     except PartError as error:
-        for said in error.args:
-            complain(f"error: {printable(said)}")
+        for reason in error.args:
+            complain(f"error: {printable(reason)}")
         sys.exit(EXIT_USAGE)
     matching = {
-        pattern: [one for one in known if fnmatchcase(one.id, pattern) and kind in (None, one.part.kind)]
+        pattern: [each for each in catalogued if fnmatchcase(each.id, pattern) and kind in (None, each.part.kind)]
         for pattern in patterns
     }
-    for pattern, found in matching.items():
-        if not found:
+    for pattern, matches in matching.items():
+        if not matches:
             from bisar_budget.mission.readers import did_you_mean
 
-            hint = did_you_mean(pattern, tuple(one.id for one in known))
+            hint = did_you_mean(pattern, tuple(each.id for each in catalogued))
             if os.path.exists(pattern):
                 hint = "It is a file: --check checks it"
             listed = "`bisar-budget sensors` lists them"
             complain(f"error: {sentences(f'no part of the catalogue matches {printable(pattern)}; {listed}', hint)}")
     if not all(matching.values()):
         sys.exit(EXIT_USAGE)
-    return [one for one in known if any(one in found for found in matching.values())]
+    return [each for each in catalogued if any(each in matches for matches in matching.values())]
 
 
 def _check(names: Sequence[str], format_name: str) -> None:
-    """Say of each file whether it is a part that missions can use; ends the command with 2 if one is not."""
+    """Write for each file whether it is a part that missions can use; ends the command with 2 if a file is not."""
     from bisar_budget.mission.parts import PartError, part_files, read_entry
 
     files: list[str] = []
@@ -107,72 +107,76 @@ def _check(names: Sequence[str], format_name: str) -> None:
         except PartError as error:
             checked[file] = error
     lines = []
-    for file, found in checked.items():
-        if isinstance(found, PartError):
-            say_faults(file, found.faults)
+    for file, result in checked.items():
+        if isinstance(result, PartError):
+            say_faults(file, result.faults)
         else:
-            count = len(found.figures)
+            count = len(result.figures)
             figures = f"{count} figures, each with a source" if count > 1 else "1 figure, with a source"
-            what = f"{printable(found.part.name)}, {_KINDS[found.part.kind]}, {figures}"
-            lines.append(f"{printable(file)}: fine: {what}\n")
+            description = f"{printable(result.part.name)}, {_KINDS[result.part.kind]}, {figures}"
+            lines.append(f"{printable(file)}: fine: {description}\n")
     deliver(_checked_as_json(checked) if format_name == "json" else "".join(lines), None, format_name)
     if len(lines) < len(checked):
         sys.exit(EXIT_USAGE)
 
 
 def _checked_as_json(checked: "Mapping[str, Entry | PartError]") -> str:
+    """JSON document of checked files."""
     from bisar_budget.mission.parts import PartError
     from bisar_budget.report.formats.json_document import fault_item
 
     parts = []
-    for file, found in checked.items():
-        if isinstance(found, PartError):
-            faults = [fault_item(fault) for fault in found.faults]
+    for file, result in checked.items():
+        if isinstance(result, PartError):
+            faults = [fault_item(fault) for fault in result.faults]
             parts.append({"file": file, "status": "error", "errors": faults})
         else:
-            parts.append({"file": file, "status": "pass", "errors": []} | _item(found))
+            parts.append({"file": file, "status": "pass", "errors": []} | _item(result))
     status = "error" if any(part["status"] == "error" for part in parts) else "pass"
     return _document({"format": "bisar-budget/sensors-check/1", "status": status, "parts": parts})
 
 
 def _document(content: dict[str, Any]) -> str:
+    """Text of a JSON document."""
     return json.dumps(content, indent=2, ensure_ascii=False) + "\n"
 
 
 def _as_text(chosen: "list[Entry]") -> str:
+    """Text of parts, by kind, with their figures and sources."""
     from bisar_budget.mission.parts import evidence
     from bisar_budget.report.words.sentences import wrapped
 
     lines: list[str] = []
     for kind, title in _TITLES.items():
-        of_kind = [one for one in chosen if one.part.kind == kind]
+        of_kind = [each for each in chosen if each.part.kind == kind]
         if of_kind:
             lines += [title, ""]
-        for one in of_kind:
-            lines += wrapped(f"{one.id}  {printable(one.part.name)}", "    ")
-            for figure, written in one.figures.items():
+        for entry in of_kind:
+            lines += wrapped(f"{entry.id}  {printable(entry.part.name)}", "    ")
+            for figure, written in entry.figures.items():
                 lines += wrapped(f"    {figure}: {printable(written)}", "        ")
-            if one.part.says:
-                lines += wrapped(f"    {printable(one.part.says)}", "    ")
-            texts = dict.fromkeys(evidence(one.part, figure) for figure in one.figures)
+            if entry.part.says:
+                lines += wrapped(f"    {printable(entry.part.says)}", "    ")
+            texts = dict.fromkeys(evidence(entry.part, figure) for figure in entry.figures)
             for text in texts:
-                said = text.removeprefix(f"{one.part.name}: ")
-                lines += wrapped(f"    source: {printable(said)}", "        ")
+                source = text.removeprefix(f"{entry.part.name}: ")
+                lines += wrapped(f"    source: {printable(source)}", "        ")
             lines.append("")
     return "\n".join(lines)
 
 
-def _item(one: "Entry") -> dict[str, Any]:
+def _item(entry: "Entry") -> dict[str, Any]:
+    """JSON item of a part."""
     from bisar_budget.mission.parts import evidence
 
     return {
-        "id": one.id,
-        "kind": one.part.kind,
-        "name": one.part.name,
+        "id": entry.id,
+        "kind": entry.part.kind,
+        "name": entry.part.name,
         "figures": {
-            figure: {"value": written, "source": evidence(one.part, figure).removeprefix(f"{one.part.name}: ")}
-            for figure, written in one.figures.items()
+            figure: {"value": written, "source": evidence(entry.part, figure).removeprefix(f"{entry.part.name}: ")}
+            for figure, written in entry.figures.items()
         },
-        "says": one.part.says,
-        "file": one.file,
+        "says": entry.part.says,
+        "file": entry.file,
     }

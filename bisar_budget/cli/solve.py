@@ -99,9 +99,9 @@ def solve(
     files = expand(missions)
     spare(files, [output])
     ask = partial(questions.solve, key=key, between=between, scale=is_scale, row=row, target=target, verify=is_imaged)
-    found = [one.found for one in ask_each(load_all(files, model, changes), model, today, ask)]
-    deliver_found(answers, found, format_name, output)
-    is_broken = any(one.status == "none" or (one.imaged and one.imaged.is_optimistic) for one in found)
+    solutions = [answer.found for answer in ask_each(load_all(files, model, changes), model, today, ask)]
+    deliver_found(answers, solutions, format_name, output)
+    is_broken = any(each.status == "none" or (each.imaged and each.imaged.is_optimistic) for each in solutions)
     sys.exit(EXIT_BROKEN if is_broken else 0)
 
 
@@ -141,7 +141,7 @@ def sensitivity(
         raise click.UsageError("--plot draws one mission.")
     spare(files, [output, plot])
     ask = partial(questions.sensitivity, row=row)
-    found = [*ask_each(load_all(files, model, changes), model, today, ask)]
+    results = [*ask_each(load_all(files, model, changes), model, today, ask)]
     if plot is not None:
-        write_file(plot, found[0].plot().of(kind))
-    deliver_found(answers, [one.found for one in found], format_name, output)
+        write_file(plot, results[0].plot().of(kind))
+    deliver_found(answers, [result.found for result in results], format_name, output)

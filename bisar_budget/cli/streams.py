@@ -1,4 +1,4 @@
-"""Input and output of the commands: names of files, standard streams, files replaced whole, exit codes."""
+"""Input and output of the commands: names of files, standard streams, replacement of files, exit codes."""
 
 import io
 import os
@@ -22,14 +22,14 @@ if TYPE_CHECKING:
 
 MISSION_SUFFIXES = (".yaml", ".yml")
 PICTURE_SUFFIXES = (".svg", ".png", ".pdf")
-_TEMPORARY = (".bisar-budget.", ".tmp")  # how the name of a temporary folder begins and ends
+_TEMPORARY = (".bisar-budget.", ".tmp")  # first and last letters of the name of a temporary folder
 EXIT_BROKEN, EXIT_USAGE, EXIT_OUR_FAULT, EXIT_INTERRUPTED = 1, 2, 3, 130
 
 
 def expand(patterns: Iterable[str]) -> list[str]:
     """Expand the glob patterns that the shell left; a pattern without a match stays and fails to load.
 
-    A file that has the name of a pattern is one of many: else a file named `*.yaml` would take the place of all.
+    A file with the name of a pattern is added to the matches. Otherwise a file named `*.yaml` would hide all matches.
     """
     files: list[str] = []
     for pattern in patterns:
@@ -38,15 +38,15 @@ def expand(patterns: Iterable[str]) -> list[str]:
         if any(char in pattern for char in "*?["):
             from glob import glob
 
-            named = [pattern] if os.path.exists(pattern) else []
-            files += sorted({*glob(pattern, recursive=True), *named}) or [pattern]
+            namesake = [pattern] if os.path.exists(pattern) else []
+            files += sorted({*glob(pattern, recursive=True), *namesake}) or [pattern]
         else:
             files.append(pattern)
     return list(dict.fromkeys(files))
 
 
 def load_all(files: Sequence[str], model: str | None = None, changes: "Sequence[SetValue]" = ()) -> "list[Mission]":
-    """Load every mission with values in place of its own, or say every fault of every file and exit."""
+    """Load every mission with changed values, or write every fault of every file and exit."""
     from bisar_budget.mission.load import load_mission
 
     return read_all(partial(load_mission, file, model, changes) for file in files)
@@ -67,13 +67,13 @@ def read_all(reads: "Iterable[Callable[[], Mission]]") -> "list[Mission]":
 
 
 def say_faults(file: str, faults: "tuple[Fault, ...]") -> None:
-    """Say what is wrong with a file, a line for each fault."""
+    """Write the faults of a file, a line for each fault."""
     for line in MissionError(file, faults).lines():
         complain(line)
 
 
 def suffix_of(name: str | None, suffixes: Sequence[str]) -> str:
-    """Suffix of the name of a file, one of some, or the command ends; empty where there is no name."""
+    """Suffix of the name of a file, which must be one of `suffixes`; empty without a name."""
     suffix = os.path.splitext(name or "")[1].lower()
     if name is not None and suffix not in suffixes:
         raise click.UsageError(f"{name}: the suffix must be one of {', '.join(suffixes)}")
@@ -81,65 +81,65 @@ def suffix_of(name: str | None, suffixes: Sequence[str]) -> str:
 
 
 def spare(files: Sequence[str], targets: Iterable[str | None], folders: Iterable[str] = ()) -> None:
-    """Refuse to write over what is to be read, and to write two outputs to one file.
+    """Refuse to write over files that are to be read, and to write two outputs to one file.
 
-    What is read may also be the file of standard input, and the output that of standard output. Nothing else may be
-    in `folders`, which an output fills with files of its own.
+    The files of standard input and standard output count too. No other file may be in `folders`, which an output
+    fills with files of its own.
     """
     written: dict[str, str] = {}
     for target in [*targets, *folders]:
         if target is None or target == "-":
             continue
-        place = _place(target)
-        if place in written:
-            fail(f"two outputs would be written to one file: {written[place]} and {target}")
-        written[place] = target
-    inside = tuple((os.path.join(_place(folder), ""), folder) for folder in folders)
-    for place, name in [*written.items(), *((_place(file), file) for file in files if inside)]:
+        real_path = _real_path(target)
+        if real_path in written:
+            fail(f"two outputs would be written to one file: {written[real_path]} and {target}")
+        written[real_path] = target
+    inside = tuple((os.path.join(_real_path(folder), ""), folder) for folder in folders)
+    for real_path, name in [*written.items(), *((_real_path(file), file) for file in files if inside)]:
         for start, folder in inside:
-            if place.startswith(start):
+            if real_path.startswith(start):
                 fail(f"{name} is in the folder of a report's pictures, {folder}")
     for file in files:
-        for place, target in written.items():
-            if _is_same(0 if file == "-" else file, place):
+        for real_path, target in written.items():
+            if _is_same(0 if file == "-" else file, real_path):
                 fail(f"{target} is to be read; a result would replace it")
         if file != "-" and _is_same(1, file):
             fail(f"{file} is to be read; standard output goes to it")
 
 
-def _place(path: str) -> str:
-    """Where a path leads to, links followed."""
+def _real_path(path: str) -> str:
+    """A path with its links resolved; ends the command if that fails."""
     try:
         return os.path.realpath(path)
     except (OSError, ValueError) as error:  # a deleted working folder, a NUL in the name
         fail(f"cannot write {path}: {getattr(error, 'strerror', None) or error}")
 
 
-def _is_same(one: str | int, other: str) -> bool:
+def _is_same(file: str | int, path: str) -> bool:
     """Whether a path, or an open stream, and another path are one regular file."""
     try:
-        return os.path.isfile(one) and os.path.samestat(os.stat(one), os.stat(other))
-    except (OSError, ValueError):  # either is missing
+        return os.path.isfile(file) and os.path.samestat(os.stat(file), os.stat(path))
+    except (OSError, ValueError):  # one of them is missing
         return False
 
 
 def root_of_names() -> tuple[str, bool]:
-    """Folder that reports name files of no repository from, and whether it is GitHub's checkout."""
+    """Folder to which names of files without a repository are relative, and whether it is GitHub's checkout."""
     try:
         here = os.getcwd()
-    except OSError:  # somebody removed it under us
+    except OSError:  # somebody removed the current folder
         return "", False
     checkout = os.environ.get("GITHUB_WORKSPACE")
     return os.path.realpath(checkout or here), bool(checkout)
 
 
 def is_terminal() -> bool:
-    """Whether somebody sees both standard streams."""
+    """Whether both standard streams are terminals."""
     return all(stream is not None and stream.isatty() for stream in (sys.stdout, sys.stderr))
 
 
 def wants_color() -> bool:
-    """Whether standard output is a terminal that shows colour, and nobody objects."""
+    """Whether standard output is a terminal with colours, and NO_COLOR is not set."""
     return (
         sys.stdout is not None
         and sys.stdout.isatty()
@@ -148,22 +148,22 @@ def wants_color() -> bool:
     )
 
 
-# What does something to a terminal: controls but tabs and line ends, marks without width and those that turn the
-# reading direction.
+# Characters that change a terminal: controls except tabs and line ends, marks without width, and marks of the reading
+# direction.
 _ACTIVE = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200b-\u200f\u2028-\u202e\u2066-\u2069\ufeff]")
 _COLOR = re.compile(r"\x1b\[[0-9;]*m")
-# What a CI runner takes for a command: `::error` at the start of a line, `##[group]` and `##vso[...]` anywhere.
+# Texts that a CI runner takes for commands: `::error` at the start of a line, `##[group]` and `##vso[...]` anywhere.
 _COMMAND = re.compile(r"(?m)^([^\S\n]*):(?=:)")
 _COMMAND_WITHIN = re.compile(r"(?<=#)#(?=[\w.]*\[)")
-# How a format writes a character so that its readers read that character; the others show an escape.
+# Escapes of formats whose readers decode them to the character; readers of other formats see the escape.
 _ESCAPES = dict.fromkeys(("json", "sarif", "needs", "yaml"), "\\u{:04x}")
 _ESCAPES |= dict.fromkeys(("html", "markdown", "junit", "mathml"), "&#{};")
 _ESCAPES["ics"] = "\\\\x{:02x}"
-_LINE_ENDS = {"ics": "\r\n"}  # RFC 5545; others end a line with a line feed
+_LINE_ENDS = {"ics": "\r\n"}  # RFC 5545; lines of other formats end with a line feed
 
 
 def harmless(text: str, format_name: str = "") -> str:
-    """Make text do nothing to a terminal, or to a CI runner that reads the log.
+    """Text without effect on a terminal, or on a CI runner that reads the log.
 
     `github` keeps its own commands, `text` the colours of a report; a message has none.
     """
@@ -182,10 +182,10 @@ def harmless(text: str, format_name: str = "") -> str:
 
 
 def deliver_parts(texts: Iterable[str], format_name: str) -> None:
-    """Write to standard output as texts come; a reader that went away changes no exit code, and ends it.
+    """Write texts to standard output one by one; a reader that went away ends this and changes no exit code.
 
-    A person reads the format `text`, characters that the terminal's encoding lacks escaped. Programs read the others:
-    those are UTF-8, whatever a terminal would take.
+    The format `text` is for people: characters that the terminal's encoding lacks are escaped. Other formats are for
+    programs, and always UTF-8.
     """
     if sys.stdout is None:
         fail("cannot write: standard output is closed")
@@ -206,38 +206,38 @@ def deliver_parts(texts: Iterable[str], format_name: str) -> None:
 
 
 def drop_output() -> None:
-    """Send what is left of standard output nowhere: Python would complain of it again at exit."""
+    """Discard the remaining standard output, because Python would complain about it again at exit."""
     with suppress(OSError, ValueError, AttributeError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def complain(message: str) -> None:
-    """Say something on standard error; that nobody listens changes no exit code."""
+    """Write a message to standard error; a failure to write changes no exit code."""
     with suppress(OSError):
         click.echo(harmless(message), err=True)
 
 
 def fail(message: str) -> NoReturn:
-    """Say what is wrong with how the command was used, and exit with 2."""
+    """Write an error about the usage of the command, and exit with 2."""
     complain(f"Error: {printable(message)}")
     sys.exit(EXIT_USAGE)
 
 
 def deliver(text: str, output: str | None = None, format_name: str = "text") -> None:
-    """Write to a file, else, or if that is `-`, to standard output."""
+    """Write to a file, or without a file, or for `-`, to standard output."""
     if output is None or output == "-":
         deliver_parts([text], format_name)
     else:
         write_file(output, harmless(text, format_name).replace("\n", _LINE_ENDS.get(format_name, "\n")))
 
 
-def deliver_found(form: "ModuleType", found: Any, format_name: str, output: str | None) -> None:
-    """Write what was found in a format; `form` is the module that has a function for each."""
+def deliver_found(form: "ModuleType", results: Any, format_name: str, output: str | None) -> None:
+    """Write results in a format; `form` is the module with a function for each format."""
     from bisar_budget.report import Style
 
     root, is_checkout = root_of_names()
     style = Style(color=output is None and wants_color(), root=root, is_checkout=is_checkout)
-    deliver(getattr(form, f"as_{format_name}")(found, style), output, format_name)
+    deliver(getattr(form, f"as_{format_name}")(results, style), output, format_name)
 
 
 def write_file(path: str, content: str | bytes) -> None:
@@ -249,72 +249,73 @@ def write_file(path: str, content: str | bytes) -> None:
 
 @contextmanager
 def replacing(path: str) -> Iterator[str]:
-    """Give the name of a file to write, which replaces `path` at the end: it is in a folder beside it.
+    """Yield the name of a temporary file that replaces `path` at the end; it is in a folder next to `path`.
 
-    A link keeps pointing where it does; what is no file, a device or a pipe, is written to as it is. An error, or an
-    interrupt, leaves what was there. What a command that was killed left beside it is removed.
+    Links keep their target. Devices and pipes are written to directly. An error or an interrupt leaves the old file.
+    Temporary folders of killed commands are removed.
     """
     temporary = lock = None
     try:
         if kind := special_file(path):
             fail(f"cannot write {path}: {kind}; accepted: a regular file, or - for standard output")
         target = os.path.realpath(path)
-        with suppress(OSError):  # a file that a mission, or the project, names: an orbit, a log, a part, a list
-            there = os.stat(target)
-            if (there.st_dev, there.st_ino) in FILES_READ:
+        with suppress(OSError):  # a file that a mission or the project names: an orbit, a log, a part, a list
+            status = os.stat(target)
+            if (status.st_dev, status.st_ino) in FILES_READ:
                 fail(f"{path} was read by this command; a result would replace it")
         if os.path.exists(target) and not os.path.isfile(target):
             yield target
             return
         folder = os.path.dirname(target)
         os.makedirs(folder, exist_ok=True)
-        _remove_left(folder)
+        _remove_abandoned(folder)
         temporary, lock = _own_folder(folder)
         file = os.path.join(temporary, f"output{os.path.splitext(target)[1]}")
         yield file
         mask = os.umask(0)
         os.umask(mask)
-        os.chmod(file, 0o666 & ~mask)  # whatever a library made of it
+        os.chmod(file, 0o666 & ~mask)  # a library may have set other permissions
         os.replace(file, target)
     except BaseException as error:
         if not isinstance(error, OSError) and not (isinstance(error, ValueError) and temporary is None):  # a NUL
             raise
-        number = getattr(error, "errno", None)  # libraries put words of their own around the system's
+        number = getattr(error, "errno", None)  # libraries change the words of the system
         fail(f"cannot write {path}: {os.strerror(number) if number else error}")
     finally:
         if temporary is not None:
             with suppress(OSError):
                 os.unlink(file)
-            with suppress(OSError):  # to list it first would need memory, of which there may be none
+            with suppress(OSError):  # a listing would need memory, which may be exhausted
                 os.rmdir(temporary)
         if lock is not None:
             os.close(lock)
 
 
 def _own_folder(folder: str) -> tuple[str, int | None]:
-    """Make a folder in a folder, and lock it as long as this process lives: no other command takes it for left."""
+    """Make a folder in a folder, locked as long as this process lives, so that no other command removes it."""
     import tempfile
 
     while True:
-        made = tempfile.mkdtemp(_TEMPORARY[1], _TEMPORARY[0], folder)
+        temporary = tempfile.mkdtemp(_TEMPORARY[1], _TEMPORARY[0], folder)
         try:
-            lock = locked(made)
-        except (BlockingIOError, FileNotFoundError):  # another command just found it unlocked, and removes it
+            lock = locked(temporary)
+        except (BlockingIOError, FileNotFoundError):  # another command found it unlocked, and removes it
             continue
-        if os.path.isdir(made):
-            return made, lock
+        if os.path.isdir(temporary):
+            return temporary, lock
         if lock is not None:
             os.close(lock)
 
 
-def _remove_left(folder: str) -> None:
-    """Remove temporary folders of commands that are no more: nobody has their lock."""
+def _remove_abandoned(folder: str) -> None:
+    """Remove temporary folders of ended commands, which nobody locks."""
     import shutil
 
-    with os.scandir(folder) as found:
-        left = [one.path for one in found if one.name.startswith(_TEMPORARY[0]) and one.name.endswith(_TEMPORARY[1])]
-    for path in left:
-        with suppress(OSError):  # one that lives, that is gone by now, or that is another's
+    prefix, suffix = _TEMPORARY
+    with os.scandir(folder) as entries:
+        paths = [entry.path for entry in entries if entry.name.startswith(prefix) and entry.name.endswith(suffix)]
+    for path in paths:
+        with suppress(OSError):  # the command lives, the folder is gone by now, or belongs to another user
             lock = locked(path)
             if lock is not None:
                 shutil.rmtree(path, ignore_errors=True)

@@ -159,7 +159,7 @@ def sweep(
 
 
 def _foresee(run: "SweepResult", force: bool) -> None:
-    """Say how many cases there are if they take long, and begin too many only by force."""
+    """Announce a long time, and refuse more than `MAX_CASES` cases without --force."""
     from bisar_budget.front.progress import foretell, lasting
 
     count, seconds = run.cases.count, run.foreseen()
@@ -172,7 +172,7 @@ def _foresee(run: "SweepResult", force: bool) -> None:
 
 
 def _write(run: "SweepResult", output: str | None, plot: str | None, plot_column: str | None, is_polar: bool) -> None:
-    """Write the table as cases are checked, then the plot, and say what was found."""
+    """Write the table while cases are checked, then the plot, and a summary."""
     from bisar_budget.report.drawing.figure import drawing_file
     from bisar_budget.report.drawing.trades import Gathered
     from bisar_budget.report.tables import texts, writer_of

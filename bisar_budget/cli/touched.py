@@ -1,4 +1,4 @@
-"""Missions that a change touches: those among its files, and those that read one of its files."""
+"""Missions that a change of files touches: changed missions, and missions that read a changed file."""
 
 import os
 import re
@@ -13,20 +13,20 @@ from bisar_budget.mission.tree import MAX_BYTES, read_tree
 from bisar_budget.resources import DISK, UnreadableError
 
 _SUFFIXES = (".yaml", ".yml")
-_FOLDER = "missions"  # every YAML file below one is a mission, but for parts
+_FOLDER = "missions"  # every YAML file below such a folder is a mission, except parts
 _IS_MISSION = re.compile(rb"(?m)^[\"']?(?:schema_version|platforms|radar|collection)[\"']?\s*:")
 _IS_PART = re.compile(rb"(?m)^[\"']?kind[\"']?\s*:")
 _SETTINGS = "pyproject.toml"
 
 
 class _ReadFiles:
-    """The files of the disk, and the real paths of those that were read."""
+    """The files of the disk, and the real paths of the files that were read."""
 
     def __init__(self) -> None:
         self.read: set[str] = set()
 
     def content(self, file: str, most: int, called: str | None = None) -> bytes:
-        """Content of a file; arguments and `UnreadableError` are those of `resources.Files`."""
+        """Content of a file; arguments and `UnreadableError` are as in `resources.Files`."""
         self.read.add(os.path.realpath(file))
         return DISK.content(file, most, called)
 
@@ -38,40 +38,42 @@ class _ReadFiles:
 def touched_missions(changed: Sequence[str]) -> list[str]:
     """List the missions below the current folder that a change of files touches, sorted.
 
-    A mission is a YAML file with the sections of one, or below a folder `missions`. The settings of a
-    `pyproject.toml` touch every mission below its folder. One that names files and cannot be read is touched: a file
-    that is gone is in no list of changes.
+    A mission is a YAML file with the sections of a mission, or below a folder `missions`. The settings of a
+    `pyproject.toml` touch every mission below its folder. A mission that names files and cannot be read is touched,
+    because a deleted file is in no list of changes.
     """
     paths = {os.path.realpath(file) for file in changed}
     tops = [os.path.join(os.path.dirname(path), "") for path in paths if os.path.basename(path) == _SETTINGS]
-    found = dict.fromkeys(file for file in changed if _is_mission(file))
+    files = dict.fromkeys(file for file in changed if _is_mission(file))
     for file in _missions_below(os.curdir):
         real = os.path.realpath(file)
         if real in paths or real.startswith(tuple(tops)) or _reads_any(file, paths):
-            found.setdefault(file)
-    unique = {os.path.realpath(file): os.path.relpath(file) for file in found}
+            files.setdefault(file)
+    unique = {os.path.realpath(file): os.path.relpath(file) for file in files}
     return sorted(unique.values())
 
 
 def _missions_below(top: str) -> Iterator[str]:
+    """Mission files below a folder, without hidden folders."""
     for folder, folders, names in os.walk(top):
         folders[:] = sorted(name for name in folders if not name.startswith("."))
         yield from (file for name in names if _is_mission(file := os.path.join(folder, name)))
 
 
 def _is_mission(file: str) -> bool:
+    """Whether a file is a mission by its content or its folder."""
     if not file.endswith(_SUFFIXES):
         return False
     try:
         data = DISK.content(file, MAX_BYTES, file)
     except UnreadableError:
-        return True  # a check says why
+        return True  # a check gives the reason
     parts = os.path.relpath(file).replace(os.sep, "/").split("/")
     return bool(_IS_MISSION.search(data)) or (_FOLDER in parts[:-1] and not _IS_PART.search(data))
 
 
 def _reads_any(file: str, paths: set[str]) -> bool:
-    """Whether a mission reads one of some files, or names files and cannot be used."""
+    """Whether a mission reads one of `paths`, or names files and cannot be used."""
     folder, files = folder_of(file), _ReadFiles()
     try:
         data = DISK.content(file, MAX_BYTES, file)
@@ -82,5 +84,5 @@ def _reads_any(file: str, paths: set[str]) -> bool:
         try:
             return names_files(read_tree(data, file).root)
         except MissionError:
-            return False  # no YAML: it was so before
+            return False  # no YAML, which no change of other files causes
     return not paths.isdisjoint(files.read)

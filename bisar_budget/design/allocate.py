@@ -1,14 +1,16 @@
 """Specifications that hold together: the largest sizes of errors with which a mission meets every requirement.
 
-Each row of the budget that can fail is held to what it may use. What an error adds to it is a power of the size: the
-square where errors combine by root-sum-square or powers add, the size itself where they add up. So much room as is
-left by the other errors is divided among the specified ones, so that the sum of weight·log(size) is largest
-(`geometric_program`). Errors of any size are followed by exact ranges: what each adds is seen by whole checks, of a
-fifth more and a fifth less of it, at the sizes found before, until these change no more. Values in SI and radians.
+Each row of the budget that can fail has an allowed utilization. An error adds a power of its size to the row: the
+square if errors combine by root-sum-square or powers add, the size itself if errors add up. The unspecified errors
+leave room in each row. The search divides this room among the specified errors so that the sum of weight·log(size) is
+largest (`geometric_program`). Exact ranges hold for errors of any size: full checks, with each error a fifth larger
+and a fifth smaller, measure what the error adds near the sizes of the step before. The search ends when the sizes
+change no more. Values in SI and radians.
 """
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from datetime import date
 from itertools import compress
 
@@ -29,13 +31,45 @@ from bisar_budget.mission.quantities import QuestionError, tree_of
 from bisar_budget.ranges.exact_ranges import Floats, Truths
 from bisar_budget.workers import Progress, unseen
 
-CHANGES = 1e-4  # of a size: less ends the search
-ROUNDS = 20  # of it; four are enough where effects are proportional to errors
-_ABOUT = 8  # rounds, after which only half of a step is made: where models change, steps go to and fro
-_STEPS = 24  # between two sizes, where it is looked for the last that leaves an image
-_SHRINKS = 400  # by a tenth: 18 powers of ten
-_FREE, _WAKING, _WAKES = 1e18, 73, 1e-3  # times a size, in so many steps, and what a row may use more, to be free
-_CLOSE = 1e-9  # of what a row may use
+
+@dataclass(frozen=True)
+class AllocationSettings:
+    """Tunings of the search for the largest sizes.
+
+    Attributes
+    ----------
+    settled_change : float
+        Change of the logarithm of every size below which the search ends.
+    max_rounds : int
+        Largest number of rounds. Four are enough where effects are proportional to errors.
+    full_step_rounds : int
+        Rounds with full steps. Later rounds make half a step, because steps oscillate where models change.
+    end_steps : int
+        Sizes between two known sizes that are tried to find the last size with an image.
+    max_shrinks : int
+        Largest number of times by which all sizes shrink by a tenth: 18 powers of ten.
+    free_ratio : float
+        Ratio of the largest to the smallest size that is tried for an error without an apparent limit.
+    free_steps : int
+        Sizes that are tried over this ratio.
+    free_fraction : float
+        Fraction of an allowed utilization that an error without a limit may use.
+    close_fraction : float
+        Distance to an allowed utilization that the sizes keep, as a fraction of it.
+    """
+
+    settled_change: float = 1e-4
+    max_rounds: int = 20
+    full_step_rounds: int = 8
+    end_steps: int = 24
+    max_shrinks: int = 400
+    free_ratio: float = 1e18
+    free_steps: int = 73
+    free_fraction: float = 1e-3
+    close_fraction: float = 1e-9
+
+
+SETTINGS = AllocationSettings()
 
 
 # ---------------------------------------------------------------- the search
@@ -50,52 +84,60 @@ def allocate(
 ) -> SpecificationSheet:
     """Find the largest sizes of errors with which a mission, as a whole, meets every requirement.
 
-    Arguments are those of `bisar_budget.allocate`; of `keys` the weights. Split, combination, coverage, autofocus and
-    model of the mission hold; waivers do not count. The sheet has the verdict of a full check with what is ordered in
-    place. `progress` is told how many rounds are done, and how many there may be.
+    Arguments are those of `bisar_budget.allocate`; `keys` have weights. Split, combination, coverage, autofocus and
+    model of the mission hold. Waivers do not count. The sheet has the verdict of a full check of the mission with the
+    ordered sizes. `progress` gets the number of rounds done and the largest number of rounds.
 
     Raises
     ------
     QuestionError
-        The question cannot be asked of this mission; says why.
+        The mission cannot answer the question; the message says why.
     """
     if mission.allocation.combine == "each":
         raise QuestionError(_each(mission, keys, model, today))
-    of = SpecifiedMission(mission, keys, reserve, model, today)
-    broken = _broken(of)
-    sizes, rows = (np.full(of.tiny.shape, math.nan), ()) if broken else _SizeSearch(of).found(progress)
-    return _sheet(of, sizes, rows, broken)
+    specified_mission = SpecifiedMission(mission, keys, reserve, model, today)
+    broken = _broken(specified_mission)
+    sizes, rows = (
+        (np.full(specified_mission.tiny.shape, math.nan), ())
+        if broken
+        else _SizeSearch(specified_mission).found(progress)
+    )
+    return _sheet(specified_mission, sizes, rows, broken)
 
 
 def _each(mission: Mission, keys: Mapping[str, float] | None, model: str | None, today: date) -> str:
-    """Say that each error alone is held to its limit, and list the limits."""
-    asked = specified_errors(mission, tree_of(mission), keys)
+    """Message for `combine: each`, with the limit of each error alone."""
+    errors = specified_errors(mission, tree_of(mission), keys)
     rows = check_mission(mission if model is None else Variation(mission, model).read(), today).rows
-    said = []
-    for one in asked:
-        owner, *_, kind = [part for part in parts_of(one.key) if part != "platforms"]
+    limits_in_words = []
+    for error in errors:
+        owner, *_, kind = [name for name in parts_of(error.key) if name != "platforms"]
         limits = [row for row in rows if row.subject.owner == owner and row.subject.kind == kind and row.allowable]
         if limits:
             least = min(limits, key=lambda row: row.allowable or math.inf)
-            said.append(f"{one.key} {one.ordered(least.allowable or 0.0)[1]}")
-    listed = f": {'; '.join(said)}" if said else ""
+            limits_in_words.append(f"{error.key} {error.ordered(least.allowable or 0.0)[1]}")
+    listed = f": {'; '.join(limits_in_words)}" if limits_in_words else ""
     return (
         "combine: each holds every error alone to its limit, and the single allowables are the answer"
         f"{listed}. accepted: combine: rss or sum, for specifications that hold together"
     )
 
 
-def _broken(of: SpecifiedMission) -> tuple[Broken, ...]:
-    """Rows in which the other errors leave no room."""
-    nothing = np.array([one.nothing for one in of.specified])
-    # What cannot be judged without these errors says nothing of them.
-    rows = of.judged(nothing[:, None]).rows
-    of.unjudged = {row.subject.id for row in rows if row.status[0] == CODE["not_evaluated"]}
-    found = of.uses(nothing[:, None])
+def _broken(specified_mission: SpecifiedMission) -> tuple[Broken, ...]:
+    """Rows in which the unspecified errors leave no room."""
+    no_errors = np.array([error.nothing for error in specified_mission.specified])
+    # Rows that cannot be judged even without the specified errors do not limit them.
+    rows = specified_mission.judged(no_errors[:, None]).rows
+    specified_mission.unjudged = {row.subject.id for row in rows if row.status[0] == CODE["not_evaluated"]}
+    row_uses = specified_mission.uses(no_errors[:, None])
     return tuple(
         Broken(row_id, requirement, float(use) if math.isfinite(use) else None, float(most))
         for row_id, requirement, use, most in zip(
-            found.ids, found.requirements, found.uses[:, 0], of.allowed(found.ids), strict=True
+            row_uses.ids,
+            row_uses.requirements,
+            row_uses.uses[:, 0],
+            specified_mission.allowed(row_uses.ids),
+            strict=True,
         )
         if use >= most * (1 - LEAST_ROOM)
     )
@@ -104,162 +146,169 @@ def _broken(of: SpecifiedMission) -> tuple[Broken, ...]:
 class _SizeSearch:
     """The search for the sizes of a mission's specified errors."""
 
-    def __init__(self, of: SpecifiedMission) -> None:
-        self.of = of
+    def __init__(self, mission: SpecifiedMission) -> None:
+        self.mission = mission
 
     def found(self, progress: Progress) -> tuple[Floats, tuple[RowUse, ...]]:
-        """The sizes, (sizes,), nan: limited by nothing; and the rows that limit any, the one that does most first.
+        """The sizes (sizes,), and the rows that limit them, the most restrictive first.
 
-        At each step what rows use is taken as it is near the sizes of the step before.
+        A size is nan if no row limits it. Each step uses utilizations near the sizes of the step before.
         """
-        sizes = self._begun()
-        inside, is_woken = np.minimum(self.of.tiny, sizes), False
+        sizes = self._first_sizes()
+        inside, is_extended = np.minimum(self.mission.tiny, sizes), False
         before = Rows(np.zeros((0, sizes.size)), np.zeros(0), np.zeros(0))
-        for done in range(ROUNDS):
-            progress(done, ROUNDS)
-            near = self.of.near(sizes)
-            if near is None:  # too far: half of the way back, and no farther again where there is no image
+        for done in range(SETTINGS.max_rounds):
+            progress(done, SETTINGS.max_rounds)
+            near = self.mission.near(sizes)
+            if near is None:  # too far: halfway back, and never again to sizes without an image
                 self._find_ends(inside, sizes)
-                sizes = np.sqrt(np.minimum(sizes, self.of.ends) * inside)
+                sizes = np.sqrt(np.minimum(sizes, self.mission.ends) * inside)
                 continue
-            some = ~near.is_free
-            if some.any():
-                log = largest_sizes(self.of.weights[some], before.with_rows(near.rows()).of_sizes(some)).log
+            is_limited = ~near.is_free
+            if is_limited.any():
+                log = largest_sizes(
+                    self.mission.weights[is_limited], before.with_rows(near.rows()).of_sizes(is_limited)
+                ).log
                 inside, sizes = sizes, sizes.copy()
-                sizes[some] = np.exp(log)
-                if done >= _ABOUT:
+                sizes[is_limited] = np.exp(log)
+                if done >= SETTINGS.full_step_rounds:
                     sizes = np.sqrt(sizes * inside)
-                # What adds up over all signs is the largest over all directions: what was seen before still holds.
-                if self.of.combine == "sum":
+                # A sum over all signs is the largest over all directions, so earlier directions still limit it.
+                if self.mission.combine == "sum":
                     before = before.with_rows(near.rows(f"mission.{LOCATION}"))
-            self.of.most = np.where(sizes > self.of.largest, self.of.largest, self.of.most)
-            if not some.any() or np.abs(np.log(sizes / inside)).max() < CHANGES:
-                if is_woken or some.all():
+            self.mission.most = np.where(sizes > self.mission.largest, self.mission.largest, self.mission.most)
+            if not is_limited.any() or np.abs(np.log(sizes / inside)).max() < SETTINGS.settled_change:
+                if is_extended or is_limited.all():
                     break
-                sizes, is_woken = self._woken(sizes, ~some), True
+                sizes, is_extended = self._free_sizes(sizes, ~is_limited), True
         return self._kept(sizes, before)
 
-    def _woken(self, sizes: Floats, is_free: Truths) -> Floats:
-        """Sizes at which errors that seem to be limited by nothing begin to use anything; of the others the same."""
-        found = sizes.copy()
-        for place in np.flatnonzero(is_free).tolist():
-            steps = np.geomspace(sizes[place], min(self.of.largest[place], sizes[place] * _FREE), _WAKING)
-            cases = np.repeat(sizes[:, None], _WAKING, axis=1)
-            cases[place] = steps
-            rows = self.of.uses(cases)
+    def _free_sizes(self, sizes: Floats, is_free: Truths) -> Floats:
+        """For errors without an apparent limit, the size just before they begin to use budget; others unchanged."""
+        extended = sizes.copy()
+        for index in np.flatnonzero(is_free).tolist():
+            steps = np.geomspace(
+                sizes[index],
+                min(self.mission.largest[index], sizes[index] * SETTINGS.free_ratio),
+                SETTINGS.free_steps,
+            )
+            cases = np.repeat(sizes[:, None], SETTINGS.free_steps, axis=1)
+            cases[index] = steps
+            rows = self.mission.uses(cases)
             with np.errstate(invalid="ignore"):
-                rises = (rows.uses - rows.uses[:, :1]) / self.of.allowed(rows.ids)[:, None] > _WAKES
-            first = int(rises.any(axis=0).argmax())
-            found[place] = steps[max(first - 1, 0)]
+                rise = (rows.uses - rows.uses[:, :1]) / self.mission.allowed(rows.ids)[:, None]
+                begins = rise > SETTINGS.free_fraction
+            first = int(begins.any(axis=0).argmax())
+            extended[index] = steps[max(first - 1, 0)]
             if first and np.isinf(rows.uses[:, first]).any():
-                self.of.ends[place] = self._end_between(place, found, float(steps[first]))
-        return found
+                self.mission.ends[index] = self._end_between(index, extended, float(steps[first]))
+        return extended
 
     def _find_ends(self, inside: Floats, sizes: Floats) -> None:
-        """Note the size from which an error leaves no image, of each that leaves none where the others are inside."""
+        """Update `ends`: sizes from which an error alone leaves no image, with the other errors at `inside`."""
         count = sizes.size
         cases = np.repeat(inside[:, None], count, axis=1)
         cases[np.arange(count), np.arange(count)] = sizes
-        for place in np.flatnonzero(np.isinf(self.of.uses(cases).uses).any(axis=0)).tolist():
-            self.of.ends[place] = self._end_between(place, inside, min(sizes[place], self.of.ends[place]))
+        for index in np.flatnonzero(np.isinf(self.mission.uses(cases).uses).any(axis=0)).tolist():
+            self.mission.ends[index] = self._end_between(index, inside, min(sizes[index], self.mission.ends[index]))
 
-    def _end_between(self, place: int, inside: Floats, high: float) -> float:
-        """Largest size of an error, between one that leaves an image and one that does not, that still does."""
-        low = float(inside[place])
+    def _end_between(self, index: int, inside: Floats, high: float) -> float:
+        """Largest size of an error with an image, between its size in `inside`, which has one, and `high`."""
+        low = float(inside[index])
         for _ in range(2):
-            steps = np.geomspace(low, high, _STEPS)
-            cases = np.repeat(inside[:, None], _STEPS, axis=1)
-            cases[place] = steps
-            is_lost = np.isinf(self.of.uses(cases).uses).any(axis=0)
-            first = int(is_lost.argmax()) if is_lost.any() else _STEPS - 1
+            steps = np.geomspace(low, high, SETTINGS.end_steps)
+            cases = np.repeat(inside[:, None], SETTINGS.end_steps, axis=1)
+            cases[index] = steps
+            is_lost = np.isinf(self.mission.uses(cases).uses).any(axis=0)
+            first = int(is_lost.argmax()) if is_lost.any() else SETTINGS.end_steps - 1
             low, high = float(steps[max(first - 1, 0)]), float(steps[first])
         return low
 
-    def _begun(self) -> Floats:
-        """Sizes that alone would each use so little of what limits it that all together have room."""
-        count = self.of.tiny.size
-        cases = np.repeat(self.of.tiny[:, None], count + 1, axis=1)
+    def _first_sizes(self) -> Floats:
+        """First sizes: small enough that all errors together have room in every row."""
+        count = self.mission.tiny.size
+        cases = np.repeat(self.mission.tiny[:, None], count + 1, axis=1)
         cases[np.arange(count), np.arange(1, count + 1)] *= 2
-        rows = self.of.judged(cases, is_of_sums=False).rows
+        rows = self.mission.judged(cases, is_of_sums=False).rows
         use = np.array([row.utilization for row in rows])
         is_end = np.array([row.binding[:1] == REQUIREMENTS.index(END_OF_IMAGE) for row in rows])
         with np.errstate(all="ignore"):
-            is_own = np.abs(use[:, 1:] / use[:, :1] - 2) < 0.02
-            reach = np.where(is_own & (use[:, :1] > 0), self.of.tiny / use[:, :1], math.inf)
-            alone = reach.min(axis=0)
-            self.of.ends = np.where(is_end, reach, math.inf).min(axis=0)
-        return np.where(np.isfinite(alone), alone / (2 * count), self.of.tiny)
+            is_proportional = np.abs(use[:, 1:] / use[:, :1] - 2) < 0.02
+            size_at_limit = np.where(is_proportional & (use[:, :1] > 0), self.mission.tiny / use[:, :1], math.inf)
+            alone = size_at_limit.min(axis=0)
+            self.mission.ends = np.where(is_end, size_at_limit, math.inf).min(axis=0)
+        return np.where(np.isfinite(alone), alone / (2 * count), self.mission.tiny)
 
     def _kept(self, sizes: Floats, before: Rows) -> tuple[Floats, tuple[RowUse, ...]]:
-        """Keep to what rows may use, to the last digit, and say what each error takes of it."""
-        near = self.of.near(sizes)
-        for _ in range(_SHRINKS):
+        """Sizes shrunk to the allowed utilizations, and the rows with the shares of each error."""
+        near = self.mission.near(sizes)
+        for _ in range(SETTINGS.max_shrinks):
             if near is not None:
                 break
             sizes = sizes * 0.9
-            near = self.of.near(sizes)
+            near = self.mission.near(sizes)
         if near is None:
             raise QuestionError("no sizes are found that leave an image")
-        for _ in range(ROUNDS):
+        for _ in range(SETTINGS.max_rounds):
             used = self._used(near, sizes)
             over = float((used / near.allowed)[near.is_limit].max(initial=0.0))
             if over <= 1:
                 break
-            sizes = np.where(near.is_free, sizes, sizes / (over * (1 + _CLOSE)))
+            sizes = np.where(near.is_free, sizes, sizes / (over * (1 + SETTINGS.close_fraction)))
         else:
             used = self._used(near, sizes)
-        some, limits = ~near.is_free, near.is_limit
-        whole = (near.allowed**near.found.powers)[limits]
-        parts, multipliers = near.part[limits] / whole[:, None], np.zeros(whole.size)
-        if some.any():
-            rows = before.with_rows(near.rows()).of_sizes(some)
-            of_room = largest_sizes(self.of.weights[some], rows).multipliers
-            multipliers = of_room[-whole.size :] * whole / near.room[limits]
-            self._with_earlier(before, of_room, near, sizes, parts, multipliers)
-        rows_used = tuple(self._row_uses(near, used, parts, multipliers))
+        is_limited, limits = ~near.is_free, near.is_limit
+        limit_powers = (near.allowed**near.found.powers)[limits]
+        shares, multipliers = near.part[limits] / limit_powers[:, None], np.zeros(limit_powers.size)
+        if is_limited.any():
+            rows = before.with_rows(near.rows()).of_sizes(is_limited)
+            program_multipliers = largest_sizes(self.mission.weights[is_limited], rows).multipliers
+            multipliers = program_multipliers[-limit_powers.size :] * limit_powers / near.room[limits]
+            self._with_earlier(before, program_multipliers, near, sizes, shares, multipliers)
+        rows_used = tuple(self._row_uses(near, used, shares, multipliers))
         return np.where(near.is_free, math.nan, sizes), rows_used
 
     @staticmethod
     def _with_earlier(
-        before: Rows, of_room: Floats, near: Near, sizes: Floats, parts: Floats, multipliers: Floats
+        before: Rows, program_multipliers: Floats, near: Near, sizes: Floats, shares: Floats, multipliers: Floats
     ) -> None:
-        """Count what a displacement is worth in other directions to its row: parts are those of all, by worth."""
+        """Add the multipliers of earlier directions of a displacement to its row; shares are means by multiplier."""
         if not before.room.size:
             return
-        place = list(compress(near.found.ids, near.is_limit)).index(f"mission.{LOCATION}")
-        allowed = near.allowed[near.is_limit][place]
-        worth = of_room[: before.room.size] * allowed / before.room
-        whole = multipliers[place] + worth.sum()
-        if whole > 0:
-            earlier = (worth[:, None] * before.share * sizes / allowed).sum(axis=0)
-            parts[place] = (multipliers[place] * parts[place] + earlier) / whole
-            multipliers[place] = whole
+        index = list(compress(near.found.ids, near.is_limit)).index(f"mission.{LOCATION}")
+        allowed = near.allowed[near.is_limit][index]
+        earlier_multipliers = program_multipliers[: before.room.size] * allowed / before.room
+        total = multipliers[index] + earlier_multipliers.sum()
+        if total > 0:
+            earlier_shares = (earlier_multipliers[:, None] * before.share * sizes / allowed).sum(axis=0)
+            shares[index] = (multipliers[index] * shares[index] + earlier_shares) / total
+            multipliers[index] = total
 
     def _used(self, near: Near, sizes: Floats) -> Floats:
-        """Utilizations with sizes of the rows that are seen near them, (rows,)."""
-        found = self.of.uses(sizes[:, None])
-        uses = dict(zip(found.ids, found.uses[:, 0].tolist(), strict=True))
+        """Utilizations at sizes of the rows of `near`, (rows,)."""
+        row_uses = self.mission.uses(sizes[:, None])
+        uses = dict(zip(row_uses.ids, row_uses.uses[:, 0].tolist(), strict=True))
         return np.array([uses.get(row, 0.0) for row in near.found.ids])
 
     def _row_uses(self, near: Near, used: Floats, parts: Floats, multipliers: Floats) -> Iterator[RowUse]:
-        """Rows by what they are worth; parts, (limits, sizes), are those of the power of what each may use."""
-        places = np.flatnonzero(near.is_limit)
+        """Rows by falling multiplier; `parts` (limits, sizes) are fractions of powers of allowed utilizations."""
+        row_indices = np.flatnonzero(near.is_limit)
         for limit in np.argsort(-multipliers, kind="stable").tolist():
-            place = int(places[limit])
-            use, allowed = float(used[place]), float(near.allowed[place])
-            taken = zip(self.of.specified, parts[limit].tolist(), strict=True)
-            shares = {one.key: part for one, part in taken if part > 0}
-            whole, worth = (use / allowed) ** float(near.found.powers[place]), float(multipliers[limit])
-            # An error that grows faster than its size takes less than what a little more of it would add.
-            excess = max(1.0, sum(shares.values()) / whole) if whole else 1.0
-            shares = {key: part / excess for key, part in shares.items()}
-            fixed = max(0.0, whole - sum(shares.values()))
-            row, requirement = near.found.ids[place], near.found.requirements[place]
-            yield RowUse(row, requirement, use, allowed, fixed, shares, worth * excess)
+            index = int(row_indices[limit])
+            use, allowed = float(used[index]), float(near.allowed[index])
+            parts_by_error = zip(self.mission.specified, parts[limit].tolist(), strict=True)
+            shares = {error.key: share for error, share in parts_by_error if share > 0}
+            used_power, multiplier = (use / allowed) ** float(near.found.powers[index]), float(multipliers[limit])
+            # The effect of an error that grows faster than its size is smaller than its slope times the size.
+            excess = max(1.0, sum(shares.values()) / used_power) if used_power else 1.0
+            shares = {key: share / excess for key, share in shares.items()}
+            fixed = max(0.0, used_power - sum(shares.values()))
+            row, requirement = near.found.ids[index], near.found.requirements[index]
+            yield RowUse(row, requirement, use, allowed, fixed, shares, multiplier * excess)
 
 
 def _shares(rows: Sequence[RowUse], key: str) -> dict[str, float]:
-    """Largest part that an error takes of what a row of each requirement may use."""
+    """Largest share of an error in the rows of each requirement."""
     shares: dict[str, float] = {}
     for row in rows:
         if row.requirement is not None and key in row.shares:
@@ -269,58 +318,60 @@ def _shares(rows: Sequence[RowUse], key: str) -> dict[str, float]:
 
 # ---------------------------------------------------------------- the sheet
 def _sheet(
-    of: SpecifiedMission, sizes: Floats, rows: tuple[RowUse, ...], broken: tuple[Broken, ...]
+    specified_mission: SpecifiedMission, sizes: Floats, rows: tuple[RowUse, ...], broken: tuple[Broken, ...]
 ) -> SpecificationSheet:
-    """Put what was found into words and units, and check the mission with what is ordered."""
-    among = catalogue(of.stated)
+    """The sheet of found sizes, in words and units, with a check of the mission with the ordered sizes."""
+    parts = catalogue(specified_mission.stated)
     specifications = tuple(
-        _specification(of.stated, one, float(one.numbers(np.array(size))), rows, among)
-        for one, size in zip(of.specified, sizes.tolist(), strict=True)
+        _specification(specified_mission.stated, error, float(error.numbers(np.array(size))), rows, parts)
+        for error, size in zip(specified_mission.specified, sizes.tolist(), strict=True)
     )
-    findings = check_mission(of.with_values([one.text for one in specifications]), of.today)
+    findings = check_mission(
+        specified_mission.with_values([each.text for each in specifications]), specified_mission.today
+    )
     return SpecificationSheet(
-        file=of.given.file,
-        name=of.given.name,
-        model=of.model,
-        combine=of.combine,
+        file=specified_mission.given.file,
+        name=specified_mission.given.name,
+        model=specified_mission.model,
+        combine=specified_mission.combine,
         status=findings.status,
-        reserve=of.reserve,
+        reserve=specified_mission.reserve,
         requirements=findings.requirements,
         specifications=specifications,
         rows=rows,
         broken=broken,
-        notes=tuple(of.notes),
-        changes=of.given.changes,
+        notes=tuple(specified_mission.notes),
+        changes=specified_mission.given.changes,
         findings=findings,
-        is_equal=of.equal,
+        is_equal=specified_mission.equal,
     )
 
 
 def _specification(
-    mission: Mission, one: Specified, value: float, rows: Sequence[RowUse], among: Sequence[Entry]
+    mission: Mission, error: Specified, value: float, rows: Sequence[RowUse], parts: Sequence[Entry]
 ) -> Specification:
-    """The size to order of an error, by its number as found; nan: nothing limits it."""
-    declared = one.number.value
-    silent = Specification(
-        key=one.key,
-        weight=one.weight,
-        unit=one.number.dimension.si,
+    """The specification of an error with a number; nan if no row limits it."""
+    declared = error.number.value
+    unlimited = Specification(
+        key=error.key,
+        weight=error.weight,
+        unit=error.number.dimension.si,
         value=None,
         ordered=None,
         text="",
         declared=declared,
-        declared_text="" if declared is None else one.number.text(declared),
+        declared_text="" if declared is None else error.number.text(declared),
         shares={},
     )
     if math.isnan(value):
-        return silent
-    ordered, text = one.ordered(value)
-    return silent._replace(
+        return unlimited
+    ordered, text = error.ordered(value)
+    return unlimited._replace(
         value=value,
         ordered=ordered,
         text=text,
-        shares=_shares(rows, one.key),
-        parts=tuple(suitable_parts(mission, one, ordered, among)),
-        found_text=one.said(value),
-        remark=ordered_noise(mission, one, ordered),
+        shares=_shares(rows, error.key),
+        parts=tuple(suitable_parts(mission, error, ordered, parts)),
+        found_text=error.said(value),
+        remark=ordered_noise(mission, error, ordered),
     )

@@ -1,4 +1,4 @@
-"""The cases of a sweep: which keys of a mission vary, and their values in each case."""
+"""The cases of a sweep: the varied keys of a mission, and their values in each case."""
 
 import io
 import math
@@ -30,10 +30,11 @@ from bisar_budget.units import Dimension, normal_unit, parse_quantity
 Values = Floats | NDArray[np.object_]  # numbers in SI, or words
 
 MAX_VALUES = 10_000_000  # of one key, and of all keys of a table: 80 MB
-LARGEST_TABLE = 256 << 20  # characters: of as many values, each of seventeen digits with sign and exponent
-_FAULTS = 20  # of a table that are said
-_STRETCHES, _GOLDEN = 100, (math.sqrt(5) - 1) / 2  # no step of a grid meets the same values again and again
-_DIGITS = 15  # decimal ones that a float always holds
+LARGEST_TABLE = 256 << 20  # characters; enough for `MAX_VALUES` values of seventeen digits with sign and exponent
+_MAX_FAULTS = 20  # of a table in a message
+# A sample of cases: number of stretches, and the fraction of all cases between them, which fits no step of a grid.
+_STRETCH_COUNT, _GOLDEN_FRACTION = 100, (math.sqrt(5) - 1) / 2
+_FLOAT_DIGITS = 15  # decimal digits that every float keeps
 _NUMBER = re.compile(r"^\s*[+-]?[\d.]*(?:[eE][+-]?\d+)?\s*", re.ASCII)
 _RANGE = "accepted: KEY=FROM:TO UNIT:COUNT, such as {key}=1:10 s:91, with :log behind it for equal ratios"
 _FORMS = "accepted: KEY=FROM:TO UNIT:COUNT or KEY=VALUE,VALUE,..., such as collection.aperture_time=1:10s:91"
@@ -44,10 +45,10 @@ _HEADER = re.compile(r"^([^\[\]\s]+(?:\[\d+\][^\[\]\s]*)*)\s*(?:\[([^\[\]]*)\])?
 
 @dataclass(frozen=True, eq=False)
 class Cases:
-    """Cases, by the keys that vary: a column of values in SI, or of words, for each.
+    """Cases by their varied keys: for each key a column of values in SI, or of words.
 
-    Of a grid every combination of the values of each key is a case, the last key the fastest; of any other table each
-    case has a value of its own of every key.
+    The cases of a grid are all combinations of the values of its keys, the last key the fastest. Otherwise a case is
+    a row of the columns.
     """
 
     varied: tuple[Varied, ...]
@@ -56,43 +57,43 @@ class Cases:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Number of values of each key of a grid, or of cases."""
+        """Number of values of each key of a grid; otherwise the number of cases."""
         return tuple(column.size for column in (self.columns if self.is_grid else self.columns[:1]))
 
     @property
     def count(self) -> int:
-        """Number of cases; beyond what an array could hold too."""
+        """Number of cases; it may be larger than the size of any array."""
         return math.prod(self.shape)
 
     def values(self, start: int, stop: int) -> Mapping[str, Values]:
-        """Values of some cases: (stop - start,) by the key."""
-        places: Any = [slice(start, stop)] * len(self.columns)
+        """Values of cases `start` to `stop` by key, (stop - start,)."""
+        indices: Any = [slice(start, stop)] * len(self.columns)
         if self.is_grid:
-            places = np.unravel_index(np.arange(start, stop), self.shape)
-        return {one.key: column[place] for one, column, place in zip(self.varied, self.columns, places, strict=True)}
+            indices = np.unravel_index(np.arange(start, stop), self.shape)
+        columns = zip(self.varied, self.columns, indices, strict=True)
+        return {varied.key: column[index] for varied, column, index in columns}
 
 
-# ---------------------------------------------------------------- cases at hand as arrays
+# ---------------------------------------------------------------- cases of arrays
 def grid_of(tree: dict[str, Any], values: Mapping[str, ArrayLike]) -> Cases:
-    """Every combination of values that are at hand as arrays; the last key is the fastest.
+    """Every combination of values in arrays; the last key is the fastest.
 
     Parameters
     ----------
     tree : dict
-        What the mission file says, as text.
+        Content of the mission file as text.
     values : mapping
-        Of each key its values: (n,) numbers in SI, or words. Whether a key can have a number is seen when the case is
-        checked.
+        Values (n,) of each key: numbers in SI, or words. The check of a case finds numbers that a key cannot have.
 
     Raises
     ------
     QuestionError
-        No such key, no number or word for it, no value.
+        A key is unknown, has neither number nor word, or has no value.
     """
     varied: list[Varied] = []
     arrays: list[Values] = []
-    for key, given in values.items():
-        array = np.asarray(given)
+    for key, column in values.items():
+        array = np.asarray(column)
         if array.ndim != 1 or not array.size:
             raise QuestionError(f"{key}: has values of the shape {array.shape}; accepted: (n,), n at least 1")
         if array.dtype.kind not in "US":
@@ -102,7 +103,7 @@ def grid_of(tree: dict[str, Any], values: Mapping[str, ArrayLike]) -> Cases:
         words = [str(word) for word in array.tolist()]
         choices = choices_of(tree, key, words[0])
         if choices is None:
-            number_of(tree, key)  # says it of what is neither
+            number_of(tree, key)  # raises the problem of a key with neither
             raise QuestionError(f"{key}: has words; accepted: numbers in SI")
         arrays.append(_texts(key, choices, words))
         varied.append(choices)
@@ -112,15 +113,15 @@ def grid_of(tree: dict[str, Any], values: Mapping[str, ArrayLike]) -> Cases:
 
 
 def _texts(option: str, choices: Choices, words: Sequence[str]) -> Values:
-    """Words as an array; names of parts and files are looked for when the mission is read with them."""
+    """Words as an array; names of parts and files are checked when the mission is read with them."""
     for word in dict.fromkeys(words):
         if problem := _wrong_word(choices, word):
             raise QuestionError(f"{option}: {problem}")
-    return np.array([*words, None], object)[:-1]  # words alone would be made a str array
+    return np.array([*words, None], object)[:-1]  # without None the array would be of type str
 
 
 def _wrong_word(choices: Choices, word: str) -> str:
-    """Problem with a word; empty if there is none, or if reading the mission says it."""
+    """Problem with a word; empty if there is none, or if reading the mission finds it."""
     if word.startswith("[") or isinstance(choices.reader, TextList):
         return ""
     try:
@@ -132,7 +133,7 @@ def _wrong_word(choices: Choices, word: str) -> str:
 
 # ---------------------------------------------------------------- cases of options
 class _Asked(NamedTuple):
-    """One `--vary`: what varies, and its words or values in SI, or of a range its ends and the text of its count."""
+    """An option `--vary`: the varied key with its words or values in SI, or with the ends and count of a range."""
 
     option: str
     varied: Varied
@@ -143,30 +144,31 @@ class _Asked(NamedTuple):
 
 
 def grid(tree: dict[str, Any], texts: Sequence[str], name: str = "--vary") -> Cases:
-    """Read `KEY=FROM:TO UNIT:COUNT`, with `:log` behind it in equal ratios, or `KEY=VALUE,VALUE,...` of each option.
+    """Cases of options `KEY=FROM:TO UNIT:COUNT`, with a further `:log` for equal ratios, or `KEY=VALUE,VALUE,...`.
 
-    Keys that have no number take `KEY=WORD,WORD,...`. Ends belong to the range. Values are those that have as few
-    digits in the unit given: 0:180deg:181 has 60 deg.
+    Keys without a number take `KEY=WORD,WORD,...`. Ends belong to the range. Values have few digits in the unit of
+    the option: 0:180deg:181 has 60 deg.
 
     Parameters
     ----------
     tree : dict
-        What the mission file says, as text.
+        Content of the mission file as text.
     texts : sequence of str
-        What stands behind each `--vary`; an end or a value without unit has that of the last.
+        Values of the options `--vary`; an end or a value without a unit has the unit of the last.
     name : str
-        Of the option, for messages.
+        Name of the option for messages.
 
     Raises
     ------
     QuestionError
-        No such key, no number, no range, an empty or reversed one, values that the key cannot have, a key twice.
+        A key is unknown, repeated or has no number, a range is empty or reversed, or a key cannot have a value.
     """
     every = [(asked.varied, _axis(asked)) for asked in _all_asked(tree, texts, name)]
     return Cases(tuple(varied for varied, _ in every), tuple(axis for _, axis in every), is_grid=True)
 
 
 def _axis(asked: _Asked) -> Values:
+    """Values of an option of a grid."""
     if asked.listed is not None:
         return asked.listed
     if not asked.size:
@@ -181,21 +183,21 @@ def _axis(asked: _Asked) -> Values:
 
 
 def sample(tree: dict[str, Any], texts: Sequence[str], how: str) -> Cases:
-    """Draw a Latin hypercube over ranges: of as many equal parts as there are cases, each has one value of each key.
+    """Draw a Latin hypercube over ranges: each of `COUNT` equal parts of a range has one value.
 
     Parameters
     ----------
     tree : dict
-        What the mission file says, as text.
+        Content of the mission file as text.
     texts : sequence of str
-        As for a grid; counts are not used, and a list of numbers is refused. Of words each is drawn as often.
+        As for a grid. Counts are not used, lists of numbers are refused, and all words are drawn equally often.
     how : str
         `latin:COUNT:SEED`; the same seed gives the same cases.
 
     Raises
     ------
     QuestionError
-        As for a grid; no such way to draw; no count or seed.
+        As for a grid; or the method, count or seed of `how` is invalid.
     """
     option = f"--sample {shown(how)}"
     kind, *parts = (part.strip() for part in how.split(":"))
@@ -223,6 +225,7 @@ def sample(tree: dict[str, Any], texts: Sequence[str], how: str) -> Cases:
 
 
 def _all_asked(tree: dict[str, Any], texts: Sequence[str], name: str) -> Iterator[_Asked]:
+    """Options of texts, each key once."""
     if not texts:
         raise QuestionError(f"no {name}: nothing would vary; {_FORMS}")
     seen: set[tuple[str, ...]] = set()
@@ -236,20 +239,20 @@ def _all_asked(tree: dict[str, Any], texts: Sequence[str], name: str) -> Iterato
 
 
 def _asked(tree: dict[str, Any], text: str, name: str) -> _Asked:
-    """Read one option, and hold its values to the bounds of the key."""
-    key, equals, given = (part.strip() for part in text.partition("="))
+    """Read one option; its values are checked against the bounds of the key."""
+    key, equals, values_text = (part.strip() for part in text.partition("="))
     option = f"{name} {shown(text)}"
-    if not (key and equals and given):
+    if not (key and equals and values_text):
         raise QuestionError(f"{option}: does not say which values; {_FORMS}")
     varied: Varied
-    if (choices := choices_of(tree, key, given)) is not None:
-        varied, values = choices, _texts(option, choices, [word.strip() for word in _WORDS.split(given)])
+    if (choices := choices_of(tree, key, values_text)) is not None:
+        varied, values = choices, _texts(option, choices, [word.strip() for word in _WORDS.split(values_text)])
     else:
         number = number_of(tree, key)
-        parts = [part.strip() for part in given.split(":")]
+        parts = [part.strip() for part in values_text.split(":")]
         if len(parts) > 1:
             return _range(option, number, parts)
-        texts = given.split(",")
+        texts = values_text.split(",")
         if len(texts) > MAX_VALUES:
             raise QuestionError(f"{option}: {len(texts)} values; accepted: up to {MAX_VALUES}")
         varied, listed = _read(option, number, texts)
@@ -260,6 +263,7 @@ def _asked(tree: dict[str, Any], text: str, name: str) -> _Asked:
 
 
 def _range(option: str, number: Number, parts: list[str]) -> _Asked:
+    """Read a range of an option from the parts between its colons."""
     if is_log := len(parts) > 2 and parts[-1] == "log":
         parts.pop()
     if len(parts) > 3 or "" in parts:
@@ -276,77 +280,81 @@ def _range(option: str, number: Number, parts: list[str]) -> _Asked:
 
 
 def _read(option: str, number: Number, texts: Sequence[str]) -> tuple[Number, tuple[float, ...]]:
-    """Read values, the unit of the last for those that have none; the number is then said in it."""
+    """Values in SI, and the number with the unit of the last; values without a unit have this unit."""
     units = [normal_unit(_NUMBER.sub("", text).strip()) for text in texts]
     values = []
     for text, unit in zip(texts, units, strict=True):
-        whole = f"{text.strip()} {units[-1]}" if not unit and units[-1] else text.strip()
+        full_text = f"{text.strip()} {units[-1]}" if not unit and units[-1] else text.strip()
         try:
-            values.append(number.reader.leaf(whole))
+            values.append(number.reader.leaf(full_text))
         except InvalidValueError as error:
             raise QuestionError(f"{option}: {shown(text.strip())!r} {error.problem.words}") from None
-    return number._replace(unit=_said_in(units[-1], number.dimension)), tuple(values)
+    return number._replace(unit=_usable_unit(units[-1], number.dimension)), tuple(values)
 
 
-def _said_in(unit: str, dimension: Dimension) -> str:
+def _usable_unit(unit: str, dimension: Dimension) -> str:
+    """A unit, or the SI unit for a unit with an offset; empty if the dimension has neither."""
     unit = unit if unit and unit not in dimension.offsets else dimension.si
     return unit if unit in dimension.scales else ""
 
 
-def _count(text: str, what: str, least: int, hint: str = "") -> int:
+def _count(text: str, subject: str, least: int, hint: str = "") -> int:
+    """Read a whole number; `subject` begins the message of the error."""
     if not (text.isascii() and text.isdigit() and len(text) <= 18 and int(text) >= least):
-        raise QuestionError(f"{what} is {shown(text)!r}; accepted: a whole number, at least {least}{hint}")
+        raise QuestionError(f"{subject} is {shown(text)!r}; accepted: a whole number, at least {least}{hint}")
     return int(text)
 
 
-def _spread(asked: _Asked, parts: Floats) -> Floats:
-    """Values at parts of the way from one end to the other, both ends as they were given."""
+def _spread(asked: _Asked, fractions: Floats) -> Floats:
+    """Values at fractions of a range, with its exact ends."""
     low, high = asked.ends
     factor, divisor = asked.varied.scale
     first, last = low / factor * divisor, high / factor * divisor
-    given = first * (last / first) ** parts if asked.is_log else first + (last - first) * parts
-    values = np.clip(_rounded(given) * factor / divisor, low, high)
-    values[parts == 0], values[parts == 1] = low, high
+    values_in_unit = first * (last / first) ** fractions if asked.is_log else first + (last - first) * fractions
+    values = np.clip(_rounded(values_in_unit) * factor / divisor, low, high)
+    values[fractions == 0], values[fractions == 1] = low, high
     return values
 
 
 # ---------------------------------------------------------------- values of cases
 def some_of(cases: Cases, count: int) -> Cases:
-    """Some cases, spread over all of them in short stretches, that stand for the others."""
-    length = max(1, count // _STRETCHES)
-    starts = [int((place * _GOLDEN + 0.5) % 1 * (cases.count - length)) for place in range(-(-count // length))]
-    found = [cases.values(start, start + length) for start in starts]
-    columns = (np.concatenate([values[one.key] for values in found]) for one in cases.varied)
+    """A sample of cases in short stretches, spread over all cases."""
+    length = max(1, count // _STRETCH_COUNT)
+    starts = [
+        int((number * _GOLDEN_FRACTION + 0.5) % 1 * (cases.count - length)) for number in range(-(-count // length))
+    ]
+    stretches = [cases.values(start, start + length) for start in starts]
+    columns = (np.concatenate([values[varied.key] for values in stretches]) for varied in cases.varied)
     return Cases(cases.varied, tuple(columns))
 
 
 def words_of(cases: Cases) -> Iterator[tuple[Choices, list[str]]]:
-    """Keys that have words, and the words that occur."""
-    for one, words in zip(cases.varied, cases.columns, strict=True):
-        if isinstance(one, Choices):
-            yield one, list(dict.fromkeys(words.tolist()))
+    """Keys with words, and the words that occur."""
+    for varied, words in zip(cases.varied, cases.columns, strict=True):
+        if isinstance(varied, Choices):
+            yield varied, list(dict.fromkeys(words.tolist()))
 
 
 def in_unit(number: Number, values: Floats) -> Floats:
-    """Values in the unit that the number is said in, with the fewest digits that give the same SI value again."""
+    """Values in the unit of the number, with few digits if these give the same SI value again."""
     factor, divisor = number.scale
-    given: Floats = values / factor * divisor
-    rounded = _rounded(given)
-    return np.where(rounded * factor / divisor == values, rounded, given)
+    values_in_unit: Floats = values / factor * divisor
+    rounded = _rounded(values_in_unit)
+    return np.where(rounded * factor / divisor == values, rounded, values_in_unit)
 
 
 def _rounded(values: Floats) -> Floats:
-    """Numbers as near as decimals of `_DIGITS` digits are, so that 0.30000000000000004 is 0.3."""
+    """Numbers rounded to `_FLOAT_DIGITS` digits, so that 0.30000000000000004 is 0.3."""
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        power = _DIGITS - 1 - np.floor(np.log10(np.abs(values)))
+        power = _FLOAT_DIGITS - 1 - np.floor(np.log10(np.abs(values)))
         scale = 10.0 ** np.abs(power)
-        found = np.where(power >= 0, np.rint(values * scale) / scale, np.rint(values / scale) * scale)
-    return np.where(np.isfinite(found), found, values)
+        rounded = np.where(power >= 0, np.rint(values * scale) / scale, np.rint(values / scale) * scale)
+    return np.where(np.isfinite(rounded), rounded, values)
 
 
 # ---------------------------------------------------------------- cases of a file
 def table_file(tree: dict[str, Any], path: str) -> Cases:
-    """Read the CSV of cases of a file, as `table` does; a `TableError` too where it is unreadable or too large."""
+    """Read a CSV file of cases, as `table` does; raises `TableError` also if the file is unreadable or too large."""
     if kind := special_file(path):
         raise TableError.of_file(path, f"cannot be read: {kind}; accepted: a regular file")
     try:
@@ -363,61 +371,66 @@ def table_file(tree: dict[str, Any], path: str) -> Cases:
 def table(tree: dict[str, Any], text: str, file: str) -> Cases:
     """Read a CSV of cases: a header `KEY [unit]` for each column, then one case in each line.
 
-    Lines that are empty or start with `#` are left out. A number alone needs no unit, and words have none. Whether a
-    value is one that the key can have is seen when the case is checked; a word that is none is a fault.
+    Empty lines and lines that begin with `#` are left out. Plain numbers need no unit, and words have none. The check
+    of a case finds numbers that a key cannot have; unknown words are faults of the table.
 
     Parameters
     ----------
     tree : dict
-        What the mission file says, as text.
+        Content of the mission file as text.
     text : str
         The content of the file.
     file : str
-        Its name, for messages.
+        Name of the file for messages.
 
     Raises
     ------
     TableError
-        A header that is no key with a unit of it, a key twice, a line with too few or too many cells, a cell that is
-        no number or none of the key's words, no case, too many; has every fault, up to twenty.
+        The header has a cell that is no key with its unit, or repeats a key; a line has too few or too many cells; a
+        cell is no number or unknown word; or there are no cases or too many. The error has at most twenty faults.
     """
     lines = (
-        (place, line.rstrip("\n"))
-        for place, line in enumerate(io.StringIO(text.removeprefix("\ufeff"), newline=None), 1)
+        (line_number, line.rstrip("\n"))
+        for line_number, line in enumerate(io.StringIO(text.removeprefix("\ufeff"), newline=None), 1)
         if line.strip() and not line.lstrip().startswith("#")
     )
-    place, header = next(lines, (1, ""))
-    varied = _headed(tree, header, place, file)
-    words: list[dict[str, int]] = [{} for _ in varied]  # of each column, with the number that stands for it
-    given = array("d")
+    line_number, header = next(lines, (1, ""))
+    varied = _headed(tree, header, line_number, file)
+    words: list[dict[str, int]] = [
+        {} for _ in varied
+    ]  # words of each column, with the numbers that replace them in `numbers`
+    numbers = array("d")
     faults: list[Fault] = []
-    for place, line in lines:
-        row = _row(line, varied, words, place)
+    for line_number, line in lines:
+        row = _row(line, varied, words, line_number)
         if isinstance(row, Fault):
             faults.append(row)
-            if len(faults) == _FAULTS:
+            if len(faults) == _MAX_FAULTS:
                 break
             continue
-        given.extend(row)
-        if len(given) > MAX_VALUES:
-            faults.append(Fault(place, 1, "", f"has more than {MAX_VALUES} values", accepted="accepted: fewer cases"))
+        numbers.extend(row)
+        if len(numbers) > MAX_VALUES:
+            faults.append(
+                Fault(line_number, 1, "", f"has more than {MAX_VALUES} values", accepted="accepted: fewer cases")
+            )
             break
-    if not given and not faults:
-        faults.append(Fault(place, 1, "", "the table has no case", accepted="accepted: lines below the header"))
+    if not numbers and not faults:
+        faults.append(Fault(line_number, 1, "", "the table has no case", accepted="accepted: lines below the header"))
     if faults:
         raise TableError.of_faults(file, faults)
     values: list[Values] = []
-    for one, column, known in zip(varied, np.array(given).reshape(-1, len(varied)).T, words, strict=True):
-        if isinstance(one, Choices):
-            values.append(np.array([*known, None], object)[column.astype(int)])
+    columns = np.array(numbers).reshape(-1, len(varied)).T
+    for key, column, column_words in zip(varied, columns, words, strict=True):
+        if isinstance(key, Choices):
+            values.append(np.array([*column_words, None], object)[column.astype(int)])
         else:
-            factor, divisor = one.scale
+            factor, divisor = key.scale
             values.append(column * factor / divisor)
     return Cases(varied, tuple(values))
 
 
 def _cells(line: str) -> Iterator[tuple[int, str]]:
-    """Column in characters, from 1, and text of each cell, without the quotes around it."""
+    """Column in characters, from 1, and text of each cell, without quotes."""
     at = 1
     for cell in line.split(","):
         word = cell.strip()
@@ -426,30 +439,32 @@ def _cells(line: str) -> Iterator[tuple[int, str]]:
         at += len(cell) + 1
 
 
-def _headed(tree: dict[str, Any], header: str, place: int, file: str) -> tuple[Varied, ...]:
-    """Keys of the header, numbers each with its unit."""
+def _headed(tree: dict[str, Any], header: str, line_number: int, file: str) -> tuple[Varied, ...]:
+    """Keys of the header; numbers have the unit of the header."""
     if not header:
         accepted = "accepted: KEY [unit], KEY [unit], ..."
-        raise TableError.of_faults(file, [Fault(place, 1, "", "has no header", accepted=accepted)])
+        raise TableError.of_faults(file, [Fault(line_number, 1, "", "has no header", accepted=accepted)])
     varied: dict[tuple[str, ...], Varied] = {}
     faults: list[Fault] = []
     for column, cell in _cells(header):
         try:
-            one = _column(tree, cell)
-            if varied.setdefault(tuple(parts_of(one.key)), one) is not one:
+            key = _column(tree, cell)
+            if varied.setdefault(tuple(parts_of(key.key)), key) is not key:
                 raise InvalidValueError("stands twice", "accepted: each key once")
         except InvalidValueError as error:
-            wrong = error.problem
-            faults.append(Fault(place, column, shown(cell), wrong.problem, "", wrong.accepted, wrong.hint))
+            problem = error.problem
+            faults.append(
+                Fault(line_number, column, shown(cell), problem.problem, "", problem.accepted, problem.hint)
+            )
         except QuestionError as error:
-            faults.append(Fault(place, column, "", str(error)))
+            faults.append(Fault(line_number, column, "", str(error)))
     if faults:
-        raise TableError.of_faults(file, faults[:_FAULTS])
+        raise TableError.of_faults(file, faults[:_MAX_FAULTS])
     return tuple(varied.values())
 
 
 def _column(tree: dict[str, Any], cell: str) -> Varied:
-    """Number and unit of one cell of the header, or the key of words."""
+    """Number with the unit of a cell of the header, or the key of words."""
     match = _HEADER.match(cell)
     if match is None:
         hint = "Cells are separated by commas" if ";" in cell or "\t" in cell else ""
@@ -462,43 +477,51 @@ def _column(tree: dict[str, Any], cell: str) -> Varied:
     number = number_of(tree, key)
     if not unit and "" not in number.dimension.units:
         usual = number.dimension.usual or (number.dimension.si,)
-        example = " or ".join(f"'{key} [{one}]'" for one in usual)
+        example = " or ".join(f"'{key} [{usual_unit}]'" for usual_unit in usual)
         raise InvalidValueError(
             "has no unit", number.dimension.accepted.partition(";")[0], f"Did you mean {example}?"
         )
     parse_quantity(f"1 {unit}", number.dimension)
     if unit in number.dimension.offsets:
         raise InvalidValueError(f"cannot be in {unit} in a table", f"accepted: '{key} [{number.dimension.si}]'")
-    return number._replace(unit=_said_in(unit, number.dimension))
+    return number._replace(unit=_usable_unit(unit, number.dimension))
 
 
-def _row(line: str, varied: Sequence[Varied], words: Sequence[dict[str, int]], place: int) -> list[float] | Fault:
-    """Numbers of a line, or what is wrong with it first; of a word the number that stands for it in `words`."""
+def _row(
+    line: str, varied: Sequence[Varied], words: Sequence[dict[str, int]], line_number: int
+) -> list[float] | Fault:
+    """Numbers of a line, with the number of each word in `words`; or the first fault of the line."""
     texts = line.split(",")
     if len(texts) != len(varied):
         behind = min(len(texts), len(varied) + 1)
         column = list(_cells(line))[behind - 1][0]
-        return Fault(place, column, "", f"has {len(texts)} cells", "", f"accepted: {len(varied)}, as the header has")
-    try:  # of many lines most are numbers alone
-        if line.isascii() and "_" not in line and not any(isinstance(one, Choices) for one in varied):
+        return Fault(
+            line_number, column, "", f"has {len(texts)} cells", "", f"accepted: {len(varied)}, as the header has"
+        )
+    try:  # most lines have only numbers
+        if line.isascii() and "_" not in line and not any(isinstance(key, Choices) for key in varied):
             row = [float(text) for text in texts]
             if all(map(math.isfinite, row)):
                 return row
     except ValueError:
         pass
     row = []
-    for one, known, (column, cell) in zip(varied, words, _cells(line), strict=True):
-        if isinstance(one, Choices):
-            if cell not in known and (problem := _wrong_word(one, cell)):
-                return Fault(place, column, one.key, problem)
-            row.append(float(known.setdefault(cell, len(known))))
+    for varied_key, column_words, (column, cell) in zip(varied, words, _cells(line), strict=True):
+        if isinstance(varied_key, Choices):
+            if cell not in column_words and (problem := _wrong_word(varied_key, cell)):
+                return Fault(line_number, column, varied_key.key, problem)
+            row.append(float(column_words.setdefault(cell, len(column_words))))
             continue
         try:
-            is_number = math.isfinite(parse_quantity(f"{cell} {one.unit}".rstrip(), one.dimension)) if cell else False
+            is_number = (
+                math.isfinite(parse_quantity(f"{cell} {varied_key.unit}".rstrip(), varied_key.dimension))
+                if cell
+                else False
+            )
         except InvalidValueError:
             is_number = False
         if not is_number:
-            accepted = f"accepted: a number of {one.unit}" if one.unit else "accepted: a number"
-            return Fault(place, column, one.key, "is no number", shown(cell) or "nothing", accepted)
+            accepted = f"accepted: a number of {varied_key.unit}" if varied_key.unit else "accepted: a number"
+            return Fault(line_number, column, varied_key.key, "is no number", shown(cell) or "nothing", accepted)
         row.append(float(cell))
     return row

@@ -1,4 +1,4 @@
-"""Which parts of the catalogue are good enough for a mission."""
+"""Comparison of parts of the catalogue in a mission."""
 
 import json
 import math
@@ -27,12 +27,24 @@ _KINDS = {"motion_error": ("imu", "gnss"), "oscillator": ("oscillator",)}
 
 
 class PartState(NamedTuple):
-    """How the mission stands with one part.
+    """The verdict of the mission with one part.
 
-    `figures` are those that the mission takes of it; the file's own stand before them. `silent_on` are figures that
-    the mission takes of other parts of the kind and this one does not state: they stay undeclared. `own_row` uses
-    most of its limit among the rows that rest on these figures alone. `is_given` marks the part that the file names.
-    `reason` says why it does not comply where no row does; empty else.
+    Attributes
+    ----------
+    id, name, kind, file : str
+        Name in the catalogue, full name, kind, and file of the part.
+    is_given : bool
+        Whether the mission file names this part.
+    figures : tuple of str
+        Figures that the mission takes from the part; figures of the mission file override them.
+    standing : Standing
+        Verdict of the mission.
+    own_row, own_utilization : str, float, optional
+        Row with the highest utilization among the rows that depend only on these figures.
+    reason : str
+        Why the mission does not comply, if no row is the cause; else empty.
+    silent_on : tuple of str
+        Figures that other parts of the kind have and this part does not state. They stay undeclared.
     """
 
     id: str
@@ -49,17 +61,17 @@ class PartState(NamedTuple):
 
     @property
     def complies(self) -> bool:
-        """Whether the mission does with it."""
+        """Whether the mission complies with the part."""
         return self.standing.complies
 
 
 class Comparison(NamedTuple):
     """Parts for one key of one mission.
 
-    `parts` has those that comply first, the smallest margin first, then the others, the nearest miss first. `kinds`
-    are those that were compared, `kept` parts of other kinds that stay. `overridden` are figures that parts have and
-    the file states itself. `imaged` is what images say of the part with the smallest margin, if any were formed.
-    `overrides` is what from outside the file bears on it.
+    `parts` has complying parts first, by smallest margin, and then the remaining parts by the nearest miss. `kinds`
+    are the compared kinds, `kept` the parts of other kinds that stay. `overridden` are figures of parts that the file
+    states itself. `imaged` is the result of images with the part of the smallest margin, if images were formed.
+    `overrides` are influences from outside the file.
     """
 
     file: str
@@ -78,12 +90,12 @@ class Comparison(NamedTuple):
 
     @property
     def complying(self) -> tuple[PartState, ...]:
-        """The parts with which the mission complies."""
+        """Parts with which the mission complies."""
         return tuple(part for part in self.parts if part.complies)
 
     @property
     def status(self) -> str:
-        """Whether `all`, `some` or `none` of the parts comply; `waived` where none does and some are waived."""
+        """Whether `all`, `some` or `none` of the parts comply; `waived` if no part complies and some are waived."""
         count = len(self.complying)
         if count:
             return "all" if count == len(self.parts) else "some"
@@ -91,7 +103,7 @@ class Comparison(NamedTuple):
 
 
 def is_of_parts(key: str) -> bool:
-    """Whether a key names parts of the catalogue, which are compared and not solved for."""
+    """Whether a key names parts of the catalogue, which `solve` compares."""
     return parts_of(key) in {("platforms", name, section, "sensor") for name in PLATFORMS for section in _KINDS}
 
 
@@ -107,8 +119,8 @@ def compare_parts(
 ) -> Comparison:
     """Check a mission with every part of the catalogue that a key can name; other arguments are those of `solve`.
 
-    A part takes the place of the file's part of its kind; parts of other kinds stay. Without one in the file, parts
-    of every kind that the key takes are tried alone.
+    A part replaces the file's part of the same kind; parts of other kinds stay. If the file names no part, parts
+    of every kind that the key accepts are tried alone.
 
     Parameters
     ----------
@@ -123,7 +135,7 @@ def compare_parts(
     Raises
     ------
     QuestionError
-        The catalogue cannot be read, no part is of the right kind, the mission takes nothing of any, or nothing
+        The catalogue cannot be read, no part has the right kind, the mission takes no figure from any part, or no row
         decides.
     """
     if not is_of_parts(key):
@@ -134,20 +146,20 @@ def compare_parts(
     except PartError as error:
         raise QuestionError(f"{key}: {error}") from None
     tried = []
-    for done, one in enumerate(search.candidates, 1):
-        tried.append(search.checked(one, today))
+    for done, candidate in enumerate(search.candidates, 1):
+        tried.append(search.checked(candidate, today))
         progress(done, len(search.candidates))
-    found = [one.judged for one in tried if one.judged is not None]
-    if not found:
-        why = tried[0].reason if tried else "the catalogue has none of its kind"
-        raise QuestionError(f"{key}: no part makes a mission: {why}")
-    hold_to_decisions(found, row)
-    # A frequency alone makes another scale of what the file states, and no part.
-    if all(set(one.figures) <= {"frequency"} for one in tried):
+    judged_missions = [candidate.judged for candidate in tried if candidate.judged is not None]
+    if not judged_missions:
+        reason = tried[0].reason if tried else "the catalogue has none of its kind"
+        raise QuestionError(f"{key}: no part makes a mission: {reason}")
+    hold_to_decisions(judged_missions, row)
+    # A part that gives only a frequency rescales the file's own figures, and is no part to compare.
+    if all(set(candidate.figures) <= {"frequency"} for candidate in tried):
         raise QuestionError(
             f"{key}: the file states every figure itself; no more than a frequency would be taken of a part"
         )
-    states = [search.state(one, row, breaking(target)) for one in tried]
+    states = [search.state(candidate, row, breaking(target)) for candidate in tried]
     return Comparison(
         file=mission.file,
         name=mission.name,
@@ -157,38 +169,40 @@ def compare_parts(
         model=variation.read().gating_model,
         kinds=search.kinds,
         kept=tuple(search.given) if len(search.given) > 1 else (),
-        overridden=tuple(sorted({figure for one in tried for figure in one.stated})),
+        overridden=tuple(sorted({figure for candidate in tried for figure in candidate.stated})),
         parts=tuple(sorted(_with_silence(states), key=_order)),
         changes=mission.changes,
     )
 
 
 def _with_silence(states: Sequence[PartState]) -> Iterator[PartState]:
-    """Note of inertial sensors and GNSS which figures only others of their kind have."""
+    """States of parts with the figures that only other parts of their kind have."""
     for state in states:
         if state.standing.status == "error":
             yield state
             continue
-        known = dict.fromkeys(figure for other in states if other.kind == state.kind for figure in other.figures)
-        if state.kind == "oscillator":  # whose forms of noise stand in for each other
-            known = {figure: None for figure in known if figure == "acceleration_sensitivity"}
-        yield state._replace(silent_on=tuple(figure for figure in known if figure not in state.figures))
+        figures_of_kind = dict.fromkeys(
+            figure for each in states if each.kind == state.kind for figure in each.figures
+        )
+        if state.kind == "oscillator":  # its forms of noise replace each other
+            figures_of_kind = {figure: None for figure in figures_of_kind if figure == "acceleration_sensitivity"}
+        yield state._replace(silent_on=tuple(figure for figure in figures_of_kind if figure not in state.figures))
 
 
 def _order(state: PartState) -> tuple[int, float, float, str]:
-    """Sort key: what complies first, the smallest margin first; what is waived; the nearest miss; no mission last."""
+    """Sort key: complying by smallest margin, then waived, then by the nearest miss, then parts without a mission."""
     sign = -1 if state.complies else 1
     uses = (state.standing.utilization, state.own_utilization)
-    # Parts that use the same but for a millionth are a tie.
+    # Utilizations that agree to six digits are a tie.
     worst, own = (math.inf if use is None else sign * float(f"{use:.6g}") for use in uses)
     rank = 0 if state.complies else 1 if state.standing.status == "waived" else 2
     return rank, worst, own, state.id
 
 
 class _Candidate(NamedTuple):
-    """A part; of the mission with it what was judged, or why there is none, and its figures.
+    """A part, with the judged mission, or the reason why there is none.
 
-    `figures` are those that it takes of the part, `stated` those that the file states in place of the part's.
+    `figures` are taken from the part; `stated` are figures of the mission file in place of the part's figures.
     """
 
     id: str
@@ -201,7 +215,7 @@ class _Candidate(NamedTuple):
 
 
 class _PartSearch:
-    """The parts that one key of a mission can name, and those that its file names; raises `PartError`."""
+    """Parts that a key of a mission can name, and parts that the file names; raises `PartError`."""
 
     def __init__(self, variation: Variation, key: str) -> None:
         self.variation, self.key = variation, key
@@ -211,67 +225,71 @@ class _PartSearch:
         named = None if section is None else section.sensor
         names = named if isinstance(named, tuple) else [named] if named else []
         self.given = {name: find_part(name, beside) for name in names}
-        of_given = {part.kind for part in self.given.values()}
-        self.kinds = tuple(kind for kind in _KINDS[self.section] if not of_given or kind in of_given)
-        listed = {entry.id: _Candidate(entry.id, entry.file, entry.part) for entry in entries(folders(beside))}
-        own = [
+        given_kinds = {part.kind for part in self.given.values()}
+        self.kinds = tuple(kind for kind in _KINDS[self.section] if not given_kinds or kind in given_kinds)
+        catalogued = {entry.id: _Candidate(entry.id, entry.file, entry.part) for entry in entries(folders(beside))}
+        project_files = [
             _Candidate(name, os.path.join(beside, name), part)
             for name, part in self.given.items()
-            if name not in listed
+            if name not in catalogued
         ]
-        self.candidates = [one for one in (*own, *listed.values()) if one.part.kind in self.kinds]
+        self.candidates = [each for each in (*project_files, *catalogued.values()) if each.part.kind in self.kinds]
 
     def value(self, name: str, kind: str) -> str:
-        """Write the key's value with a part, as the file would have it."""
-        others = [other for other, part in self.given.items() if part.kind != kind]
-        return json.dumps([*others, name] if others else name, ensure_ascii=False)
+        """Text of the key's value with a part; parts of other kinds stay."""
+        kept = [given for given, part in self.given.items() if part.kind != kind]
+        return json.dumps([*kept, name] if kept else name, ensure_ascii=False)
 
-    def checked(self, one: _Candidate, today: date) -> _Candidate:
+    def checked(self, candidate: _Candidate, today: date) -> _Candidate:
         """Check the mission with a part."""
         try:
-            mission = self.variation.read([SetValue(self.key, self.value(one.id, one.part.kind))])
+            mission = self.variation.read([SetValue(self.key, self.value(candidate.id, candidate.part.kind))])
         except MissionError as error:
             fault = error.faults[0]
-            return one._replace(reason=f"{fault.key}: {fault.problem}")
-        here = f"platforms.{self.platform}.{self.section}."
+            return candidate._replace(reason=f"{fault.key}: {fault.problem}")
+        prefix = f"platforms.{self.platform}.{self.section}."
         taken = {
-            each.key.rpartition(".")[2] for each in mission.taken if each.part == one.id and each.key.startswith(here)
+            each.key.rpartition(".")[2]
+            for each in mission.taken
+            if each.part == candidate.id and each.key.startswith(prefix)
         }
-        of_part = tuple(figure for figure in FIGURES[one.part.kind] if figure in taken and getattr(one.part, figure))
-        section = getattr(getattr(mission.platforms, self.platform), self.section)
-        stated = tuple(each.figure for each in section.overridden if each.part == one.part.name)
-        return one._replace(judged=judged_mission(Analysis(mission), today), figures=of_part, stated=stated)
-
-    def state(self, one: _Candidate, row: str | None, breaks: frozenset[str]) -> PartState:
-        """Say how the mission stands with a part."""
-        state = PartState(
-            id=one.id,
-            name=one.part.name,
-            kind=one.part.kind,
-            file=one.file,
-            is_given=one.id in self.given,
-            figures=one.figures,
-            standing=Standing(complies=False, status="error"),
-            reason=one.reason,
+        of_part = tuple(
+            figure for figure in FIGURES[candidate.part.kind] if figure in taken and getattr(candidate.part, figure)
         )
-        found = one.judged
-        if found is None:
+        section = getattr(getattr(mission.platforms, self.platform), self.section)
+        stated = tuple(each.figure for each in section.overridden if each.part == candidate.part.name)
+        return candidate._replace(judged=judged_mission(Analysis(mission), today), figures=of_part, stated=stated)
+
+    def state(self, candidate: _Candidate, row: str | None, breaks: frozenset[str]) -> PartState:
+        """State of the mission with a part."""
+        state = PartState(
+            id=candidate.id,
+            name=candidate.part.name,
+            kind=candidate.part.kind,
+            file=candidate.file,
+            is_given=candidate.id in self.given,
+            figures=candidate.figures,
+            standing=Standing(complies=False, status="error"),
+            reason=candidate.reason,
+        )
+        judged = candidate.judged
+        if judged is None:
             return state
-        if not one.figures or one.figures == ("frequency",):
-            taken = "nothing" if not one.figures else "no more than its frequency"
+        if not candidate.figures or candidate.figures == ("frequency",):
+            taken = "nothing" if not candidate.figures else "no more than its frequency"
             return state._replace(reason=f"{taken} would be taken of it: the file states the rest")
-        stands = standing(found, row, breaks)
-        if row is not None and not STATUS[stands.status].is_judged:
-            reason = f"{row} is {STATUS[stands.status].words} with it"
-            return state._replace(standing=stands._replace(complies=False), reason=reason)
-        texts = {evidence(one.part, figure) for figure in one.figures}
+        part_standing = standing(judged, row, breaks)
+        if row is not None and not STATUS[part_standing.status].is_judged:
+            reason = f"{row} is {STATUS[part_standing.status].words} with it"
+            return state._replace(standing=part_standing._replace(complies=False), reason=reason)
+        texts = {evidence(candidate.part, figure) for figure in candidate.figures}
         own = [
             (each.utilization, each.id)
-            for each in rows_in_words(found, Case(found.analysis))
+            for each in rows_in_words(judged, Case(judged.analysis))
             if each.owner == self.platform and each.evidence in texts and each.utilization is not None
         ]
         use, own_row = max(own, default=(None, None))
-        return state._replace(standing=stands, own_row=own_row, own_utilization=use)
+        return state._replace(standing=part_standing, own_row=own_row, own_utilization=use)
 
 
 def mission_with(variation: Variation, key: str, part: PartState) -> Mission:

@@ -1,8 +1,8 @@
-"""The largest sizes that powers of them leave room for: a geometric program, solved by a barrier.
+"""The largest sizes within limits on sums of their powers: a geometric program, solved by a barrier method.
 
 In the logarithms x of the sizes each row's Σ aᵢ·e^(p·xᵢ) is convex, and Σ wᵢ·xᵢ, which is maximised, is linear: there
 is one maximum. A barrier keeps inside the rows' room, and Newton's method follows the maximum as the barrier gives
-way. Derived here; of the method see Boyd & Vandenberghe, Convex Optimization, 4.5 and 11.3.
+way. Derived here; the method is that of Boyd & Vandenberghe, Convex Optimization, 4.5 and 11.3.
 """
 
 from typing import NamedTuple
@@ -18,24 +18,24 @@ _SETTLED = 1e-9  # half the square of Newton's decrement
 
 
 class Rows(NamedTuple):
-    """Rows Σ aᵢ·sᵢ^p ≤ room, (rows,), with a of (rows, sizes); a size that no row limits is not among them."""
+    """Rows Σ aᵢ·sᵢ^p ≤ room, (rows,), with `share` a (rows, sizes) and `power` p (rows,); a row limits every size."""
 
     share: Floats
     power: Floats
     room: Floats
 
     def at(self, x: Floats) -> Floats:
-        """Parts of each row at sizes e^x, over its room, (rows, sizes)."""
-        found: Floats = self.share * np.exp(self.power[:, None] * x) / self.room[:, None]
-        return found
+        """Fractions of the room of each row that sizes e^x take, (rows, sizes)."""
+        fractions: Floats = self.share * np.exp(self.power[:, None] * x) / self.room[:, None]
+        return fractions
 
-    def with_rows(self, others: "Rows") -> "Rows":
-        """These and other rows."""
-        return Rows(*(np.concatenate(both) for both in zip(self, others, strict=True)))
+    def with_rows(self, further: "Rows") -> "Rows":
+        """The rows, followed by other rows."""
+        return Rows(*(np.concatenate(both) for both in zip(self, further, strict=True)))
 
-    def of_sizes(self, some: Truths) -> "Rows":
+    def of_sizes(self, chosen: Truths) -> "Rows":
         """The rows for some of the sizes."""
-        return self._replace(share=self.share[:, some])
+        return self._replace(share=self.share[:, chosen])
 
 
 class Largest(NamedTuple):

@@ -1,4 +1,4 @@
-"""The solution of a design question, imaged: whether the row that binds there is at a true limit."""
+"""Images at the solution of a design question, which show whether the limit of the binding row is true."""
 
 from glob import escape
 from typing import NamedTuple
@@ -14,7 +14,7 @@ from bisar_budget.workers import Progress, unseen
 
 
 class ToImage(NamedTuple):
-    """A case to image: a mission with the solution, the row that binds, and the solution as text."""
+    """A case for images: the mission at the solution, the binding row, and the solution as text."""
 
     mission: Mission
     row: str
@@ -22,14 +22,14 @@ class ToImage(NamedTuple):
 
     @property
     def seconds(self) -> float:
-        """About how long the images take; 0 where that is far below a minute. [s]"""
+        """Estimated time of the images; 0 if it is far below a minute. [s]"""
         return seconds_to_verify(self.mission, escape(self.row))
 
 
 def to_image(mission: Mission, solution: Solution | Comparison, model: str | None) -> ToImage | None:
-    """Put a solution into its mission; None where nothing complies, or everything does, or no row binds.
+    """Mission at a solution; None if no value complies, if all values comply, or if no row binds.
 
-    The largest value at which compliance ends or begins is taken, or the part with the smallest margin.
+    The solution is the largest value at which compliance ends or begins, or the part with the smallest margin.
     """
     variation = Variation(mission, model)
     if isinstance(solution, Comparison):
@@ -47,10 +47,10 @@ def to_image(mission: Mission, solution: Solution | Comparison, model: str | Non
     return ToImage(variation.read([SetValue(solution.key, text)]), row, text)
 
 
-def imaged(asked: ToImage, progress: Progress = unseen) -> Imaged:
-    """Form the images at the limit of the row that binds, and say whether it is true."""
-    only = escape(asked.row)
-    if not rows_to_verify(asked.mission, only):
-        return Imaged(asked.row, asked.at, None, "its limit is not one that an image could show")
-    (verdict,) = verify_mission(asked.mission, only, progress=progress).rows
-    return Imaged(asked.row, asked.at, verdict, verdict.reason or "")
+def imaged(case: ToImage, progress: Progress = unseen) -> Imaged:
+    """Verdict of images at the limit of the binding row."""
+    only = escape(case.row)
+    if not rows_to_verify(case.mission, only):
+        return Imaged(case.row, case.at, None, "its limit is not one that an image could show")
+    (verdict,) = verify_mission(case.mission, only, progress=progress).rows
+    return Imaged(case.row, case.at, verdict, verdict.reason or "")

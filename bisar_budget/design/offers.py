@@ -1,4 +1,4 @@
-"""A supplier's offer against a sheet of specifications: each figure, and the mission with the offer as a whole."""
+"""A supplier's offer compared with a sheet of specifications: each figure, and the whole mission with the offer."""
 
 from datetime import date
 from typing import NamedTuple
@@ -16,9 +16,22 @@ _CURVES = ("frequency", "phase_noise", "power_law", "allan_deviation", "bandwidt
 
 
 class OfferedFigure(NamedTuple):
-    """The figure of an offer for a specification: None where its file is silent. `text` is that as the file has it.
+    """The figure of an offer for a specification.
 
-    `is_inside` is None where the two cannot be compared, or nothing is ordered; `remark` then says why.
+    Attributes
+    ----------
+    key : str
+        Path of the error in the mission file.
+    value : float, optional
+        The figure in SI; None if the offer's file states none.
+    text : str
+        The figure as the file writes it.
+    ordered : str
+        The ordered size.
+    is_inside : bool, optional
+        Whether the figure meets the order; None if they cannot be compared, or no size is ordered.
+    remark : str
+        Reason for None.
     """
 
     key: str
@@ -30,9 +43,9 @@ class OfferedFigure(NamedTuple):
 
 
 class Offer(NamedTuple):
-    """An offer: the file of a mission that has its figures, and how that mission stands as a whole.
+    """An offer: the file of a mission with its figures, and the verdict of that mission.
 
-    `notes` say what else of the mission differs from the one of the sheet.
+    `notes` name further differences from the mission of the sheet.
     """
 
     file: str
@@ -43,38 +56,41 @@ class Offer(NamedTuple):
 
     @property
     def complies(self) -> bool:
-        """Whether the mission meets every requirement with the offer, whatever single figures are."""
+        """Whether the mission with the offer meets every requirement, even if a figure exceeds its order."""
         return exit_code({self.status}, strict=False) == 0
 
 
 def offer(sheet: SpecificationSheet, mission: Mission, today: date) -> Offer:
-    """Hold the mission of an offer to a sheet.
+    """Compare the mission of an offer with a sheet.
 
-    A figure is inside where it is no larger than what is ordered, of three axes the largest one, those of parts that
-    the offer names too. A level shifts a spectrum: of another spectrum it says nothing. Specifications and
-    waivers in the offer's own file do not count.
+    A figure is inside if it is no larger than the ordered size; the largest of three axes counts, also for figures of
+    parts that the offer names. A level shifts a spectrum, so levels of different spectra cannot be compared.
+    Specifications and waivers in the offer's own file do not count.
     """
-    asked = None if sheet.findings is None else sheet.findings.mission
-    figures = tuple(_figure(one, sheet, mission, asked) for one in sheet.specifications)
-    found = check_mission(mission._replace(specifications={}, waivers=()), today)
-    notes = () if asked is None else tuple(_differences(asked, mission))
-    return Offer(mission.file, found.status, figures, found.requirements, notes)
+    sheet_mission = None if sheet.findings is None else sheet.findings.mission
+    figures = tuple(_figure(each, sheet, mission, sheet_mission) for each in sheet.specifications)
+    findings = check_mission(mission._replace(specifications={}, waivers=()), today)
+    notes = () if sheet_mission is None else tuple(_differences(sheet_mission, mission))
+    return Offer(mission.file, findings.status, figures, findings.requirements, notes)
 
 
-def _figure(one: Specification, sheet: SpecificationSheet, mission: Mission, asked: Mission | None) -> OfferedFigure:
+def _figure(
+    specification: Specification, sheet: SpecificationSheet, mission: Mission, sheet_mission: Mission | None
+) -> OfferedFigure:
+    """The figure of an offer for a specification of a sheet."""
     try:
-        number = specified_number(mission, tree_of(mission), one.key)
+        number = specified_number(mission, tree_of(mission), specification.key)
         value, text = number.value, "" if number.value is None else number.text(number.value)
     except QuestionError:
         value, text = None, ""
     if sheet.broken:
-        return OfferedFigure(one.key, value, text, one.text, None, "nothing is ordered")
-    parts = parts_of(one.key)
-    if asked is not None and parts[-1] in ("level", "spectrum_level"):
-        if _spectrum(mission, parts) != _spectrum(asked, parts):
-            return OfferedFigure(one.key, value, text, one.text, None, "another spectrum")
+        return OfferedFigure(specification.key, value, text, specification.text, None, "nothing is ordered")
+    parts = parts_of(specification.key)
+    if sheet_mission is not None and parts[-1] in ("level", "spectrum_level"):
+        if _spectrum(mission, parts) != _spectrum(sheet_mission, parts):
+            return OfferedFigure(specification.key, value, text, specification.text, None, "another spectrum")
         value, text = (0.0, "0 dB") if value is None else (value, text)
-    return OfferedFigure(one.key, value, text, one.text, one.holds(value))
+    return OfferedFigure(specification.key, value, text, specification.text, specification.holds(value))
 
 
 def _spectrum(mission: Mission, parts: tuple[str, ...]) -> object:
@@ -86,20 +102,24 @@ def _spectrum(mission: Mission, parts: tuple[str, ...]) -> object:
 
 
 def _rules(mission: Mission) -> AllocationRules:
-    """The rules of the allocation, whatever is specified, with balanced shares as a sheet takes them: as equal."""
+    """The rules of the allocation without `specify`, and with balanced shares as equal, as in a sheet."""
     split = mission.allocation.split
     if isinstance(split, MetricSplits) and split.quadratic_phase_error == "balanced":
         split = split._replace(quadratic_phase_error="equal")
     return mission.allocation._replace(split="equal" if split == "balanced" else split, specify={})
 
 
-def _differences(asked: Mission, offered: Mission) -> list[str]:
-    """Sections in which the mission of an offer is another one than that of the sheet."""
+def _differences(sheet_mission: Mission, offered: Mission) -> list[str]:
+    """Sections in which the mission of an offer differs from the mission of the sheet."""
     sections = ("radar", "collection", "scene", "requirements")
-    found = [name for name in sections if getattr(asked, name) != getattr(offered, name)]
-    found += ["allocation"] if _rules(asked) != _rules(offered) else []
+    names_of_sections = [name for name in sections if getattr(sheet_mission, name) != getattr(offered, name)]
+    names_of_sections += ["allocation"] if _rules(sheet_mission) != _rules(offered) else []
     for name in ("transmitter", "receiver"):
-        one, other = getattr(asked.platforms, name), getattr(offered.platforms, name)
-        found += [f"the place of the {name}"] if one.state != other.state else []
-        found += [f"the frame of the {name}'s errors"] if one.motion_error.frame != other.motion_error.frame else []
-    return found
+        sheet_platform, offered_platform = getattr(sheet_mission.platforms, name), getattr(offered.platforms, name)
+        names_of_sections += [f"the place of the {name}"] if sheet_platform.state != offered_platform.state else []
+        names_of_sections += (
+            [f"the frame of the {name}'s errors"]
+            if sheet_platform.motion_error.frame != offered_platform.motion_error.frame
+            else []
+        )
+    return names_of_sections

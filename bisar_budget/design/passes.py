@@ -35,21 +35,46 @@ from bisar_budget.workers import Progress, unseen
 
 CENTER_TIME = "collection.center_time"
 MIN_ELEVATION = math.radians(20)
-_TOGETHER = 64  # passes that are checked at once
-_YEARS = (1957, 2200)  # in which there are orbits
-_TRACK = 41  # places of a pass that a drawing shows
+_BLOCK_PASSES = 64  # that are checked together
+_YEARS = (1957, 2200)  # first year with orbits, and the year after the last
+_TRACK_POINTS = 41  # of a pass in a drawing
 
 
 class SatellitePass(NamedTuple):
-    """One pass: when it is, where the satellite then stands, and how the mission stands at its mid-time.
+    """One pass: its times, the path of the satellite, and the verdict of the mission at its mid-time.
 
-    `rises` and `sets` are false where the satellite is above at the beginning, or the end, of what was looked at.
-    `track` is azimuth and elevation (n, 2) along it [rad]. `center` is the mid-time, to a millisecond; None where it
-    never has the squint. `state` is the path at the mid-time in the axes of the scene, `side` that of the track on
-    which the scene lies. `status` is that of `check`; `error` where there is no mission then, `not_evaluated` where
-    there is no mid-time; `reason` says why. `row`, `requirement` and `utilization` are of the requirement that
-    decides. `waived_by` are the ids of waivers, where it is waived. `doubt` is how far the satellite may be from its
-    path [m].
+    Attributes
+    ----------
+    number : int
+        Number of the pass, from 1.
+    start, stop, culmination : Instant
+        Times above the least elevation, and of the largest elevation.
+    rises, sets : bool
+        False if the satellite is above at the beginning, or at the end, of the span.
+    max_elevation : float
+        Elevation at the culmination. [rad]
+    track : (n, 2)
+        Azimuth and elevation along the pass. [rad]
+    center : Instant, optional
+        Mid-time, to a millisecond; None if the satellite never has the squint.
+    state : PlatformState, optional
+        Path at the mid-time in the axes of the scene.
+    side : str
+        Side of the track on which the scene lies.
+    is_ascending : bool
+        Whether the satellite flies north at the mid-time.
+    doubt : float, optional
+        Largest distance of the satellite from its path. [m]
+    status, reason : str
+        Status of `check`, `error` without a mission, `not_evaluated` without a mid-time; and the reason.
+    bistatic_angle, gradient_angle : float, optional
+        Angles at the mid-time. [rad]
+    range_resolution, cross_range_resolution : float, optional
+        Resolutions at the mid-time. [m]
+    row, requirement, utilization : str, str, float, optional
+        Row, key and utilization of the requirement that decides.
+    waived_by : tuple of str
+        Ids of the waivers of a waived pass.
     """
 
     number: int
@@ -78,12 +103,12 @@ class SatellitePass(NamedTuple):
 
     @property
     def complies(self) -> bool:
-        """Whether the mission meets everything at the mid-time; what is waived does not."""
+        """Whether the mission meets every requirement at the mid-time; a waived mission does not."""
         return STATUS[self.status].complies
 
     @property
     def is_accepted(self) -> bool:
-        """Whether the mission complies, or is waived: `check` exits with 0 then."""
+        """Whether the mission complies or is waived, so that `check` exits with 0."""
         return self.complies or self.status == "waived"
 
     @property
@@ -98,7 +123,7 @@ def bearing(azimuth: float) -> float:
 
 
 class UnknownTime(NamedTuple):
-    """A part of the span in which the orbit of a platform is not known, and why."""
+    """A part of the span without a known orbit of a platform, and the reason."""
 
     platform: str
     start: Instant
@@ -107,7 +132,7 @@ class UnknownTime(NamedTuple):
 
 
 class Passes(NamedTuple):
-    """The passes of the orbit of one platform over the scene of a mission, in their order."""
+    """The passes of one platform's orbit over the scene of a mission, in order of time."""
 
     file: str
     name: str
@@ -125,39 +150,39 @@ class Passes(NamedTuple):
     @property
     def complying(self) -> list[SatellitePass]:
         """Passes in which the mission complies."""
-        return [one for one in self.found if one.complies]
+        return [each for each in self.found if each.complies]
 
     @property
     def accepted(self) -> list[SatellitePass]:
         """Passes in which the mission complies or is waived."""
-        return [one for one in self.found if one.is_accepted]
+        return [each for each in self.found if each.is_accepted]
 
     @property
     def counts(self) -> Counter[str]:
         """Number of passes of each status."""
-        return Counter(one.status for one in self.found)
+        return Counter(each.status for each in self.found)
 
     @property
     def waived_by(self) -> tuple[str, ...]:
         """Ids of the waivers of all passes."""
-        return tuple(dict.fromkeys(waiver for one in self.found for waiver in one.waived_by))
+        return tuple(dict.fromkeys(waiver for each in self.found for waiver in each.waived_by))
 
 
 def start_of(text: str) -> Instant:
-    """The instant that a day of UTC, or an instant of it, says.
+    """The instant of a text with a day or an instant of UTC.
 
     Raises
     ------
     QuestionError
-        It is neither.
+        The text is neither.
     """
-    found = parse_instant(f"{text.strip()}T00:00:00Z") or parse_instant(text)
-    if found is None or not _YEARS[0] <= found.as_datetime().year < _YEARS[1]:
+    instant = parse_instant(f"{text.strip()}T00:00:00Z") or parse_instant(text)
+    if instant is None or not _YEARS[0] <= instant.as_datetime().year < _YEARS[1]:
         raise QuestionError(
             f"--from {shown(text)}: is no day and no instant of UTC from {_YEARS[0]} to {_YEARS[1] - 1}; accepted: "
             "2026-07-01, 2026-07-01T05:30:00Z"
         )
-    return found
+    return instant
 
 
 def passes(
@@ -175,39 +200,41 @@ def passes(
     """Find the passes of a satellite over the scene, and check the mission in each.
 
     Arguments are those of `bisar_budget.passes`; elevation and squint, positive looking forward, are in radians. The
-    mission is as loaded, with its paths or without; its `collection.center_time` does not count. `progress` is told
-    how many passes are checked, and how many there are.
+    mission may be loaded with or without paths; its `collection.center_time` does not count. `progress` gets the
+    number of checked passes and of all passes.
 
     Raises
     ------
     QuestionError
-        No platform has an orbit, the scene has no place on the Earth, or there are too many days.
+        No platform has an orbit, the scene has no position on the Earth, or there are too many days.
     MissionError
-        The orbit cannot be used at any time of the span; with the place of its key.
+        The orbit cannot be used at any time of the span; the fault has the line of its key.
     """
     if not 0 < days <= MAX_DAYS:
         raise QuestionError(f"--days {days:g}: accepted: more than 0, up to {MAX_DAYS:g}")
     axes = mission.scene.axes
     if axes is None:
         raise QuestionError("scene: passes are over a place on the Earth; accepted: latitude, longitude and height")
-    listed = _listed(mission, platform)
+    chosen = _listed(mission, platform)
     variation = Variation(mission, model)
     seen = _watched(mission, axes, start, days, variation)
-    stretches = seen[listed].above(min_elevation)
+    stretches = seen[chosen].above(min_elevation)
     for name, other in seen.items():
-        if name != listed:
+        if name != chosen:
             stretches = shared(stretches, other.above(min_elevation))
-    found = [_at_mid_time(number, stretch, seen[listed], axes, squint) for number, stretch in enumerate(stretches, 1)]
+    unchecked = [
+        _at_mid_time(number, stretch, seen[chosen], axes, squint) for number, stretch in enumerate(stretches, 1)
+    ]
     return Passes(
         file=mission.file,
         name=mission.name,
         model=model if model is not None and not mission.has_direct_path else mission.gating_model,
-        platform=listed,
+        platform=chosen,
         start=start,
         stop=start.after(days * DAY),
         min_elevation=min_elevation,
         squint=squint,
-        found=tuple(_checked(found, listed, variation, today, progress)),
+        found=tuple(_checked(unchecked, chosen, variation, today, progress)),
         unknown=tuple(
             UnknownTime(name, start.after(gap.start), start.after(gap.stop), gap.reason)
             for name, one in seen.items()
@@ -218,7 +245,7 @@ def passes(
 
 
 def _listed(mission: Mission, platform: str | None) -> str:
-    """The platform whose passes are asked for."""
+    """The platform of the passes: the requested one, or else the first with an orbit."""
     flying = [name for name in PLATFORMS if getattr(mission.platforms, name).orbit is not None]
     if not flying:
         accepted = "accepted: platforms.transmitter.orbit or platforms.receiver.orbit"
@@ -231,9 +258,9 @@ def _listed(mission: Mission, platform: str | None) -> str:
 def _watched(
     mission: Mission, axes: SceneAxes, start: Instant, days: float, variation: Variation
 ) -> dict[str, Watched]:
-    """Each satellite as it is seen from the scene.
+    """Satellites as seen from the scene, by platform.
 
-    An orbit that cannot be used at all is what a check at the beginning of the span would say.
+    For an orbit that cannot be used at all, the error is that of a check at the beginning of the span.
     """
     read = reader_of(folder_of(mission.file))
     seen = {}
@@ -252,23 +279,23 @@ def _watched(
 
 
 def _hold_to_an_orbit(mission: Mission, variation: Variation, start: Instant) -> None:
-    """Say what a check at an instant says of an orbit, but that it was asked for then by an option."""
+    """Raise the error of a check at an instant, without the words about the option that set the instant."""
     try:
         variation.read(center_time(start))
     except MissionError as error:
-        asked = [change for change in mission.changes if change.key != CENTER_TIME]
-        read_with = f"Read with {changes_words([*asked, *center_time(start)])}"
-        given = f"Read with {changes_words(asked)}" if asked else ""
-        faults = [fault._replace(hint=fault.hint.replace(read_with, given).strip()) for fault in error.faults]
+        options = [change for change in mission.changes if change.key != CENTER_TIME]
+        read_with = f"Read with {changes_words([*options, *center_time(start)])}"
+        options_hint = f"Read with {changes_words(options)}" if options else ""
+        faults = [fault._replace(hint=fault.hint.replace(read_with, options_hint).strip()) for fault in error.faults]
         raise MissionError(error.file, tuple(faults)) from None
 
 
 def _at_mid_time(number: int, stretch: Stretch, satellite: Watched, axes: SceneAxes, squint: float) -> SatellitePass:
-    """A pass as the orbit alone says it, not yet checked."""
+    """A pass of the orbit, without a check of the mission."""
     culmination = satellite.culmination(stretch)
-    times = np.linspace(stretch.start, stretch.stop, _TRACK)
+    times = np.linspace(stretch.start, stretch.stop, _TRACK_POINTS)
     x, y, z = satellite.at(times)[0].T
-    found = SatellitePass(
+    orbit_pass = SatellitePass(
         number=number,
         start=satellite.origin.after(stretch.start),
         stop=satellite.origin.after(stretch.stop),
@@ -281,15 +308,15 @@ def _at_mid_time(number: int, stretch: Stretch, satellite: Watched, axes: SceneA
     time = satellite.with_squint(stretch, squint)
     if time is None:
         seen = np.degrees(satellite.squint(times))
-        return found._replace(
+        return orbit_pass._replace(
             reason=f"its squint is {seen.min():.1f} deg to {seen.max():.1f} deg, never {math.degrees(squint):.4g} deg"
         )
-    # To a millisecond, as the file of a mission has it: that is checked as the pass is.
+    # Rounded to a millisecond as in a mission file, so that a check of that file agrees with the pass.
     center = satellite.origin.after(time)
     center = parse_instant(center.as_text()) or center
     time = center.since(satellite.origin)
     state = satellite.state(time)
-    return found._replace(
+    return orbit_pass._replace(
         center=center,
         state=state,
         side=_side(state, axes),
@@ -309,34 +336,34 @@ def _checked(
     found: Sequence[SatellitePass], platform: str, variation: Variation, today: date, progress: Progress
 ) -> Iterator[SatellitePass]:
     """Check the mission at the mid-time of each pass."""
-    for first in range(0, len(found), _TOGETHER):
-        some = list(found[first : first + _TOGETHER])
+    for first in range(0, len(found), _BLOCK_PASSES):
+        block = list(found[first : first + _BLOCK_PASSES])
         missions, places = [], []
-        for place, one in enumerate(some):
-            if one.center is None:
+        for position, unjudged in enumerate(block):
+            if unjudged.center is None:
                 continue
             try:
-                missions.append(variation.read(center_time(one.center)))
-                places.append(place)
+                missions.append(variation.read(center_time(unjudged.center)))
+                places.append(position)
             except MissionError as error:
                 fault = error.faults[0]
-                some[place] = one._replace(status="error", reason=f"{fault.key}: {fault.problem}")
+                block[position] = unjudged._replace(status="error", reason=f"{fault.key}: {fault.problem}")
         for index, findings in check_missions(missions, today):
-            some[places[index]] = _judged(some[places[index]], findings, missions[index], platform)
-        yield from some
-        progress(first + len(some), len(found))
+            block[places[index]] = _judged(block[places[index]], findings, missions[index], platform)
+        yield from block
+        progress(first + len(block), len(found))
 
 
 def center_time(instant: Instant) -> list[SetValue]:
-    """The value of a mission file that takes the aperture at an instant."""
+    """The change of a mission file that puts the middle of the aperture at an instant."""
     return [SetValue(CENTER_TIME, instant.as_text())]
 
 
-def _judged(one: SatellitePass, findings: MissionFindings, mission: Mission, platform: str) -> SatellitePass:
-    """A pass with what a check of it finds."""
+def _judged(unjudged: SatellitePass, findings: MissionFindings, mission: Mission, platform: str) -> SatellitePass:
+    """A pass with the findings of its check."""
     path = getattr(mission.platforms, platform).path
     row, requirement, utilization, reason = _deciding(findings)
-    return one._replace(
+    return unjudged._replace(
         state=path.state,
         doubt=path.largest_doubt_m,
         status=findings.status,
@@ -352,20 +379,20 @@ def _judged(one: SatellitePass, findings: MissionFindings, mission: Mission, pla
     )
 
 
-def _deciding(found: MissionFindings) -> tuple[str | None, str | None, float | None, str]:
-    """Row, requirement and utilization of the requirement that decides, and why the status is what it is.
+def _deciding(findings: MissionFindings) -> tuple[str | None, str | None, float | None, str]:
+    """Row, key and utilization of the requirement that decides, and the reason for the status of the mission.
 
-    Of requirements of one status the one decides that is used most. Where none has the status of the mission, a row
-    has it, or a warning that doubts the whole. What cannot be judged has no utilization.
+    Among requirements with the status of the mission, the one with the highest utilization decides. If no requirement
+    has this status, a row or a warning about the whole mission decides. Without a verdict there is no utilization.
     """
-    worst = min(found.requirements, key=lambda one: (RANK[one.status], -(one.utilization or 0.0)))
-    if worst.status == found.status:
+    worst = min(findings.requirements, key=lambda each: (RANK[each.status], -(each.utilization or 0.0)))
+    if worst.status == findings.status:
         return worst.row, worst.key, worst.utilization, str(worst.reason or "")
-    for row in worst_first(found.rows):
-        if row.status == found.status:
+    for row in worst_first(findings.rows):
+        if row.status == findings.status:
             use = None if row.is_unjudged else row.utilization
             return row.id, row.binding_requirement or row.metric, use, str(row.reason or "")
-    doubts = [str(warning.message) for warning in found.warnings if warning.is_doubt]
-    reason = doubts[0] if doubts else "nothing is declared" if found.is_empty else ""
-    use = None if found.status == "not_evaluated" else worst.utilization
+    doubts = [str(warning.message) for warning in findings.warnings if warning.is_doubt]
+    reason = doubts[0] if doubts else "nothing is declared" if findings.is_empty else ""
+    use = None if findings.status == "not_evaluated" else worst.utilization
     return worst.row, worst.key, use, printable(reason)

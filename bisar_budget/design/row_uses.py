@@ -1,7 +1,7 @@
-"""Rows of the budget with errors of given sizes: how much each uses, and what each error adds to it. SI, radians.
+"""Rows of the budget with errors of given sizes: the utilization of each row, and the part of each error in it.
 
-Each row that can fail is held to what it may use. What an error adds to it is a power of the size: the square where
-errors combine by root-sum-square or powers add, the size itself where they add up.
+Each row that can fail has an allowed utilization. An error adds a power of its size to the row: the square if errors
+combine by root-sum-square or powers add, the size itself if errors add up. Values in SI and radians.
 """
 
 import math
@@ -28,15 +28,15 @@ from bisar_budget.mission.model import MetricSplits, Mission
 from bisar_budget.mission.quantities import QuestionError, tree_of, with_number
 from bisar_budget.ranges.exact_ranges import Floats, Truths
 
-BESIDE = (0.8, 1.2)  # of a size, at which it is seen what an error adds
-_FARTHEST = 3.0  # of what a row may use, up to which a step of the search may go
-_SURELY = 1 - 1e-5  # of a limit: a case by itself settles to digits of its own
-_SHORT_OF_END = 0.995  # of the size from which there is no image: that is found to 0.1 %
-_NOTHING = 1e-13  # of a row: what rounding leaves of it
-# What the ids of rows begin with that have no requirement: effects that none takes, and what a file may state.
+NEIGHBOUR_FACTORS = (0.8, 1.2)  # of a size, at which the effect of an error is measured
+_MAX_STEP_RATIO = 3.0  # of utilization to allowed utilization, after a step of the search
+_SURE_FRACTION = 1 - 1e-5  # of a limit, because a single case settles to other last digits
+_END_FRACTION = 0.995  # of the size without an image, which is found to 0.1 %
+_ROUNDING_FRACTION = 1e-13  # of a row; a smaller part of an error is a rounding error
+# First words of the ids of rows without a requirement: effects that no row takes, and sizes beyond a file's bounds.
 NEGLIGIBLE, ACCEPTED = "negligible", "accepted"
 _WARN_ONLY = ("autofocus_pull_in",)  # kinds of rows that warn and never fail
-_HAVE_THEIR_OWN_ROW = (Why.EFFECT_NOT_TAKEN, Why.AIR_STAYS)  # below: why rows that have no number are not judged
+_HAVE_THEIR_OWN_ROW = (Why.EFFECT_NOT_TAKEN, Why.AIR_STAYS)  # reasons of rows without a number; see `uses`
 _AS_COMBINED = (
     QUADRATIC,
     CUBIC,
@@ -47,7 +47,7 @@ _AS_COMBINED = (
 
 
 class RowUses(NamedTuple):
-    """Utilizations of the rows that can fail in some cases, (rows, cases), by their ids; and what judges each."""
+    """Utilizations of rows that can fail, (rows, cases), with their ids, requirements and powers of sizes (rows,)."""
 
     ids: Sequence[str]
     requirements: Sequence[str | None]
@@ -56,9 +56,24 @@ class RowUses(NamedTuple):
 
 
 class Near(NamedTuple):
-    """The use of rows near sizes, (sizes,): the part of each, of the power of the utilization, and the room for all.
+    """Utilizations of rows near sizes.
 
-    `is_limit` are the rows that any of the sizes takes part in, `is_free` the sizes that take part in none.
+    Attributes
+    ----------
+    found : RowUses
+        Utilizations at the sizes and at their neighbours.
+    allowed : (rows,)
+        Allowed utilizations.
+    sizes : (sizes,)
+        The sizes.
+    part : (rows, sizes)
+        Part of each size in the power of the utilization.
+    room : (rows,)
+        Power of the allowed utilization that is left for all sizes.
+    is_limit : (rows,)
+        Whether any size has a part in the row.
+    is_free : (sizes,)
+        Whether the size has no part in any row.
     """
 
     found: RowUses
@@ -70,17 +85,23 @@ class Near(NamedTuple):
     is_free: Truths
 
     def rows(self, of: str = "") -> Rows:
-        """Rows of a program: every one that limits any size, or one."""
+        """Rows of a geometric program: all rows that limit a size, or the row with the id `of`."""
         limits = self.is_limit & np.array([not of or row == of for row in self.found.ids])
         power = self.found.powers[limits]
         return Rows(self.part[limits] / self.sizes ** power[:, None], power, self.room[limits])
 
 
 class SpecifiedMission:
-    """One mission and the errors of it that are specified; without its waivers and the specifications that it has.
+    """A mission and its specified errors, without waivers and without specifications of the file.
 
-    `ends` are sizes that end an image, and `most` those beyond what a mission file may state, once they were met;
-    `unjudged` are rows that cannot be judged without these errors.
+    Attributes
+    ----------
+    ends : (sizes,)
+        Sizes from which there is no image, infinite until they are met.
+    most : (sizes,)
+        Largest sizes that a mission file may state, infinite until they are exceeded.
+    unjudged : set of str
+        Ids of rows that cannot be judged even without the specified errors.
     """
 
     def __init__(
@@ -97,26 +118,28 @@ class SpecifiedMission:
         self.variation, self.equal = Variation(mission, model), tuple(self._equal(mission))
         base = self._read(())
         self.specified = specified_errors(base, tree_of(mission), keys)
-        self.weights = np.array([one.weight for one in self.specified])
-        least = 1 - base.allocation.warn_above
-        self.reserve = least if reserve is None else reserve
+        self.weights = np.array([error.weight for error in self.specified])
+        default_reserve = 1 - base.allocation.warn_above
+        self.reserve = default_reserve if reserve is None else reserve
         self.combine, self.model = base.allocation.combine, base.gating_model
-        # A mission that states each of them: where arrays are put into their places.
-        tiny = np.array([one.tiny for one in self.specified])
+        # A mission that states every specified error, so that arrays can replace the numbers.
+        tiny = np.array([error.tiny for error in self.specified])
         try:
-            self.stated = self.with_values([one.text(size) for one, size in zip(self.specified, tiny, strict=True)])
+            self.stated = self.with_values(
+                [error.text(size) for error, size in zip(self.specified, tiny, strict=True)]
+            )
         except MissionError as error:
             fault = error.faults[0]
             raise QuestionError(f"{fault.key}: {fault.problem}; it cannot be specified beside the rest") from None
-        for one in self.specified:
-            if not is_held(self.stated, one.key, is_stated=True):
-                raise QuestionError(f"{one.key}: decides more than its own size; {ACCEPTED_ERRORS}")
+        for specified in self.specified:
+            if not is_held(self.stated, specified.key, is_stated=True):
+                raise QuestionError(f"{specified.key}: decides more than its own size; {ACCEPTED_ERRORS}")
         self.tiny, self.unjudged = tiny, set[str]()
         self.ends, self.most = np.full(tiny.shape, math.inf), np.full(tiny.shape, math.inf)
-        self.largest = np.array([one.largest for one in self.specified])
+        self.largest = np.array([error.largest for error in self.specified])
 
     def _equal(self, mission: Mission) -> Iterator[SetValue]:
-        """Balanced shares follow what is declared, and what is declared is looked for: they are taken as equal."""
+        """Changes that make balanced shares equal, because the errors that balance them are unknown here."""
         split = mission.allocation.split
         key = "allocation.split"
         if isinstance(split, MetricSplits):
@@ -126,29 +149,33 @@ class SpecifiedMission:
             yield SetValue(key, "equal")
 
     def with_values(self, texts: Sequence[str]) -> Mission:
-        """The mission with numbers, as the file would have them; empty: as it is."""
-        return self._read([SetValue(one.key, text) for one, text in zip(self.specified, texts, strict=True) if text])
+        """The mission with texts of numbers for the specified errors; an empty text leaves the number as it is."""
+        return self._read(
+            [SetValue(error.key, text) for error, text in zip(self.specified, texts, strict=True) if text]
+        )
 
     def _read(self, changes: Sequence[SetValue]) -> Mission:
+        """The mission with changes, without waivers and specifications."""
         return self.variation.read([*self.equal, *changes])._replace(waivers=(), specifications={})
 
     def judged(self, sizes: Floats, *, is_of_sums: bool = True) -> JudgedMission:
-        """Judge the mission with sizes, (sizes, cases): what errors add up to, or each by itself too."""
+        """The mission judged with sizes (sizes, cases): sums of errors, and without `is_of_sums` each error too."""
         mission = self.stated
-        for one, column in zip(self.specified, sizes, strict=True):
-            mission = with_number(mission, one.key, one.numbers(column))
+        for error, column in zip(self.specified, sizes, strict=True):
+            mission = with_number(mission, error.key, error.numbers(column))
         cases, geometry = sizes.shape[1], self.stated.geometry
         analysis = Analysis(mission, cases, geometry=geometry, nodes=self._nodes, shown={}, is_of_sums=is_of_sums)
         return judged_mission(analysis, self.today)
 
     @cached_property
     def _nodes(self) -> int:
+        """Number of nodes of the fit over the aperture."""
         return int(Analysis(self.stated).exact.fit.shape[1])
 
     def uses(self, sizes: Floats) -> RowUses:
-        """Utilizations of the rows that can fail, with sizes."""
+        """Utilizations of the rows that can fail, with sizes (sizes, cases)."""
         judged = self.judged(sizes)
-        found: list[tuple[str, str | None, float, Floats]] = []
+        rows: list[tuple[str, str | None, float, Floats]] = []
         for row in judged.rows:
             is_judged = ~np.isin(row.status, (CODE["info"], CODE["not_declared"]))
             if not is_judged.any():
@@ -162,52 +189,52 @@ class SpecifiedMission:
             use = np.where(is_lost, math.inf, use)
             binding = int(row.binding.max())
             requirement = row.metric if binding < 0 or binding >= len(REQUIREMENTS) - 1 else REQUIREMENTS[binding]
-            found.append((row.subject.id, requirement, self._power(row.subject.kind), use))
+            rows.append((row.subject.id, requirement, self._power(row.subject.kind), use))
         level = min(NEGLIGIBLE_FRACTION * float(np.max(self.stated.requirements.quadratic_phase_error)), SMALL_RAD)
         for air in judged.air.uses.values():
             power = self._power(air.key if air.key != ISLR else "")
-            found.append(
+            rows.append(
                 (f"{NEGLIGIBLE}.{air.row_id}", air.key, power, judged.air.is_long * air.use / NEGLIGIBLE_FRACTION)
             )
-        untaken = [(one.kind, one) for one in judged.untaken]
-        untaken += [(f"air.{one.kind}", one) for one in judged.air.untaken]
-        for name, one in untaken:
-            use = np.broadcast_to(one.total, sizes.shape[1:]) / level
-            found.append((f"{NEGLIGIBLE}.{name}", None, 1.0 if self.combine == "sum" else 2.0, use))
+        untaken = [(effect.kind, effect) for effect in judged.untaken]
+        untaken += [(f"air.{effect.kind}", effect) for effect in judged.air.untaken]
+        for name, effect in untaken:
+            use = np.broadcast_to(effect.total, sizes.shape[1:]) / level
+            rows.append((f"{NEGLIGIBLE}.{name}", None, 1.0 if self.combine == "sum" else 2.0, use))
         for name, limits in ((END_OF_IMAGE, self.ends), (ACCEPTED, self.most)):
-            for place in np.flatnonzero(np.isfinite(limits)).tolist():
-                found.append((f"{name}.{self.specified[place].key}", None, 2.0, sizes[place] / limits[place]))
-        ids, requirements, powers, uses = zip(*found, strict=True)
+            for index in np.flatnonzero(np.isfinite(limits)).tolist():
+                rows.append((f"{name}.{self.specified[index].key}", None, 2.0, sizes[index] / limits[index]))
+        ids, requirements, powers, uses = zip(*rows, strict=True)
         return RowUses(ids, requirements, np.array(powers), np.array(uses))
 
     def _power(self, kind: str) -> float:
-        """Power of a size that adds up in a row."""
+        """Power of a size that adds up in a row of a kind."""
         is_summed = self.combine == "sum" and kind in _AS_COMBINED
         return 1.0 if is_summed or kind in _WARN_ONLY else 2.0
 
     def allowed(self, ids: Sequence[str]) -> Floats:
-        """Largest utilization of each row; one without a requirement, or without an image beyond, stays below 1."""
-        usual = (1 - self.reserve) * _SURELY
-        most = {NEGLIGIBLE: _SURELY, END_OF_IMAGE: min(usual, _SHORT_OF_END), ACCEPTED: _SURELY}
+        """Allowed utilization of each row; it is less than 1 without a requirement, and at the end of the image."""
+        usual = (1 - self.reserve) * _SURE_FRACTION
+        most = {NEGLIGIBLE: _SURE_FRACTION, END_OF_IMAGE: min(usual, _END_FRACTION), ACCEPTED: _SURE_FRACTION}
         return np.array([most.get(row.partition(".")[0], usual) for row in ids])
 
     def near(self, sizes: Floats) -> Near | None:
-        """The use of rows near sizes; None where it is far beyond what they may use."""
+        """Utilizations of rows near sizes; None if they are far beyond the allowed utilizations."""
         count = sizes.size
         cases = np.repeat(sizes[:, None], 2 * count + 1, axis=1)
-        for place, factor in enumerate(BESIDE):
-            cases[np.arange(count), 1 + place * count + np.arange(count)] *= factor
+        for number, factor in enumerate(NEIGHBOUR_FACTORS):
+            cases[np.arange(count), 1 + number * count + np.arange(count)] *= factor
         found = self.uses(cases)
         allowed, power = self.allowed(found.ids), found.powers[:, None]
-        if not (found.uses[:, 0] <= _FARTHEST * allowed).all():
+        if not (found.uses[:, 0] <= _MAX_STEP_RATIO * allowed).all():
             return None
-        whole = found.uses**power
-        base, (less, more) = whole[:, :1], np.split(whole[:, 1:], 2, axis=1)
+        powers = found.uses**power
+        base, (less, more) = powers[:, :1], np.split(powers[:, 1:], 2, axis=1)
         is_lost = ~np.isfinite(more)
-        low, high = (factor**power for factor in BESIDE)
+        low, high = (factor**power for factor in NEIGHBOUR_FACTORS)
         with np.errstate(invalid="ignore"):
             part: Floats = np.where(is_lost, (base - less) / (1 - low), (more - less) / (high - low))
-        part = np.where(part > _NOTHING * base, part, 0.0)
+        part = np.where(part > _ROUNDING_FRACTION * base, part, 0.0)
         room = allowed**found.powers - (base[:, 0] - part.sum(axis=1))
         is_limit: Truths = np.any(part > 0, axis=1)
         if (room[is_limit] <= 0).any():

@@ -1,8 +1,8 @@
 """Solve a mission for one of its numbers: every value at which compliance begins or ends.
 
-The range is looked at in places, and between two places where compliance differs, the border is bracketed. Where the
-worst utilization turns between places, the turn is looked for first: compliance may change there and back. All of
-these look at many values at once, in the case table. Values in SI and radians; factors are plain numbers.
+The search samples the range. Between two samples with different compliance it brackets the border. Where the worst
+utilization has a maximum or minimum between samples, the search finds it first, because compliance may change there
+and back. Each step checks many values at once in the case table. Values in SI and radians; factors are plain numbers.
 """
 
 import math
@@ -39,24 +39,25 @@ from bisar_budget.mission.quantities import FACTOR, Number, QuestionError, Range
 from bisar_budget.workers import Progress, unseen
 
 _OF_ALL = ", or --scale for all of them"
-PLACES = 65  # of a range
-PLACES_OF_CIRCLE = 181  # every 2 degrees: geometry changes fast where gradients are nearly parallel
-_NARROW = 2e-7  # of the value, between the two sides of a crossing before they are written
+PLACES = 65  # samples of a range
+PLACES_OF_CIRCLE = 181  # samples of a circle, every 2 degrees: geometry changes fast near parallel gradients
+_NARROW_FRACTION = 2e-7  # of the value, between the two sides of a crossing before they are rounded
 _GOLDEN = (math.sqrt(5) - 1) / 2
-_STEPS_TO_TURN = 20  # a golden section to 7e-5 of two places
-_TURNS = 16  # that are looked for
-_LEVELS, _LEVELS_READ = 5, 2  # steps of a search that are looked ahead; where each case is read, it costs more
+_TURN_STEPS = 20  # of a golden section, which end at 7e-5 of the distance between samples
+_MAX_TURNS = 16  # that are searched
+# Steps that a search looks ahead: usually, and if each case is read, which takes longer.
+_LOOK_AHEAD_STEPS, _LOOK_AHEAD_STEPS_OF_READING = 5, 2
 
-# With what is known of values it has an outcome, or a set of values that it needs to know more of.
+# A function of the known states by value; it returns its result, or the set of values whose states it needs.
 Search = Callable[[Mapping[float, "State"]], Any]
 
 
 class State(NamedTuple):
-    """How the mission stands at one value.
+    """Verdict of the mission at one value.
 
-    `row` has the highest utilization of the rows that decide, `requirement` is what sets its allowable; None where
-    nothing is judged. `reason` says why there is no mission at this value; empty where there is one. `waived_by` are
-    ids of waivers where it is waived, which does not comply. Resolutions are peak to first null on the ground. [m]
+    `row` has the highest utilization of the rows that decide; `requirement` sets its allowable. Both are None if no
+    row is judged. `reason` is why there is no mission at this value; empty if there is one. `waived_by` are the ids
+    of waivers of a waived state, which does not comply. Resolutions are peak to first null on the ground. [m]
     """
 
     value: float
@@ -74,8 +75,8 @@ class State(NamedTuple):
 class Crossing(NamedTuple):
     """A border of compliance: the last value that complies and the first beyond it that does not.
 
-    `inside` and `outside` are 1e-6 of the value apart, `is_upper` is whether values below comply. `is_verified` is
-    whether `check` of the mission with each of the two, as text, says so.
+    `inside` and `outside` are 1e-6 of the value apart. `is_upper` tells whether lower values comply. `is_verified`
+    tells whether checks of the mission with the texts of both values confirm the border.
     """
 
     inside: State
@@ -87,8 +88,8 @@ class Crossing(NamedTuple):
 class Imaged(NamedTuple):
     """Verdict of the image on the row that binds at a solution.
 
-    `at` is the solution as text; `verdict` is None where a row has no image. `reason` says why there is no verdict,
-    or what it rests on; empty where there is nothing to say.
+    `at` is the solution as text. `verdict` is None if the row has no image. `reason` is why there is no verdict, or
+    the basis of the verdict; it may be empty.
     """
 
     row: str
@@ -98,21 +99,39 @@ class Imaged(NamedTuple):
 
     @property
     def is_optimistic(self) -> bool:
-        """Whether the image, with autofocus or without, shows more than the limit promises."""
+        """Whether the image, with autofocus or without, shows a larger error than the limit allows."""
         return self.verdict is not None and "optimistic" in (self.verdict.verdict, self.verdict.verdict_autofocus)
 
 
 class Solution(NamedTuple):
     """The crossings of one mission in a range, in rising order.
 
-    `key` is what was solved for, `unit` that of its values, `is_scale` whether they are factors of all numbers
-    below the key. `low` and `high` are the ends of the range, `is_circle` whether they are one direction. `nearest`
-    is the nearest miss where nothing complies, or where everything does the value with the least left. `given` is
-    the value of the file. `texts` has every value as the file would have it. `is_constant` is whether the number
-    changes no utilization that decides. `skipped` counts the places of the range at which there is no mission,
-    `waived` those that are waived, by the waivers `waived_by`.
-    `imaged` is what images say at the best crossing, if any were formed. `overrides` is what from outside the file
-    bears on it.
+    Attributes
+    ----------
+    key, unit : str
+        Key of the number, and unit of its values.
+    is_scale : bool
+        Whether the values are factors of all numbers below the key.
+    low, high : float
+        Ends of the range.
+    is_circle : bool
+        Whether the ends are the same direction.
+    given : State, optional
+        State at the value of the file.
+    nearest : State
+        The nearest miss if no value complies; the value with the smallest margin if all values comply.
+    is_constant : bool
+        Whether the number changes no utilization that decides.
+    skipped, waived : int
+        Number of samples without a mission, and of waived samples.
+    waived_by : tuple of str
+        Ids of the waivers of waived samples.
+    texts : mapping of float to str
+        Every value as the file would write it.
+    imaged : Imaged, optional
+        Verdict of images at the best crossing, if images were formed.
+    overrides : tuple of Override
+        Influences from outside the file.
     """
 
     file: str
@@ -140,22 +159,22 @@ class Solution(NamedTuple):
 
     @property
     def value(self) -> float | None:
-        """Largest value at which compliance ends or begins; None if it does so nowhere."""
+        """Largest value at which compliance ends or begins; None without such a value."""
         return max((crossing.inside.value for crossing in self.crossings), default=None)
 
     @property
     def best(self) -> Crossing | None:
-        """The crossing of that value."""
+        """The crossing with the largest value; None without crossings."""
         return max(self.crossings, key=lambda crossing: crossing.inside.value, default=None)
 
     @property
     def is_monotonic(self) -> bool:
-        """Whether compliance changes once at most."""
+        """Whether compliance changes at most once."""
         return len(self.crossings) <= 1
 
     @property
     def status(self) -> str:
-        """`crossing`, or `all` or `none` of the range complies; `waived` where none does and some of it is waived."""
+        """`crossing`; `all` or `none` if all or no values comply; `waived` if none complies and some are waived."""
         if self.crossings:
             return "crossing"
         return "all" if self.nearest.complies else "waived" if self.waived else "none"
@@ -175,14 +194,14 @@ def solve(
 ) -> Solution:
     """Find every value of a number of a mission at which its compliance begins or ends.
 
-    Arguments are those of `bisar_budget.solve`; `between` is `A..B` with units, of a factor 0.1 to 10 where it is
-    omitted. By the target `fail` complies what `check` exits with 0 on, by `warn` what `check --strict` does.
-    `progress` is told how many values are done, and how many there are. Values found are in SI.
+    Arguments are those of `bisar_budget.solve`; `between` is `A..B` with units, by default 0.1 to 10 for a factor.
+    With the target `fail` a value complies if `check` exits with 0, with `warn` if `check --strict` does. `progress`
+    gets the number of finished values and of all values. Values of the solution are in SI.
 
     Raises
     ------
     QuestionError
-        The question cannot be asked of this mission; says why.
+        The mission cannot answer the question; the message says why.
     """
     search = _Search(mission, key, between, row, target, model, is_scale, today)
     scanned, given = search.scanned(progress)
@@ -209,7 +228,8 @@ def solve(
         nearest=nearest,
         is_constant=missions[0].status != "not_evaluated"
         and all(
-            one.row == missions[0].row and _is_alike(one.utilization, missions[0].utilization) for one in missions[1:]
+            state.row == missions[0].row and _is_alike(state.utilization, missions[0].utilization)
+            for state in missions[1:]
         ),
         skipped=sum(bool(state.reason) for state in scanned),
         waived=sum(state.status == "waived" for state in scanned),
@@ -220,10 +240,10 @@ def solve(
 
 
 def _nearest(states: Sequence[State]) -> State:
-    """The first place with the least left where all comply, else the first that lacks the least.
+    """The first state with the smallest margin if all comply, else the first with the smallest excess.
 
-    Of places that do not comply those that are waived come first. Where something is not evaluated nothing is broken:
-    no limit is nearer.
+    Waived states come before other states that do not comply. A state that is not evaluated breaks no limit, so it
+    is the nearest.
     """
     if all(state.complies for state in states):
         uses = [state.utilization or 0.0 for state in states]
@@ -238,15 +258,15 @@ def _nearest(states: Sequence[State]) -> State:
     return next(state for state, use in zip(states, uses, strict=True) if _is_alike(use, decides))
 
 
-def _is_alike(one: float | None, other: float | None) -> bool:
-    """Whether two utilizations are one, but for rounding."""
-    return one == other or (
-        one is not None and other is not None and math.isclose(one, other, rel_tol=EQUAL_USE_FRACTION)
+def _is_alike(first: float | None, second: float | None) -> bool:
+    """Whether two utilizations are equal but for rounding."""
+    return first == second or (
+        first is not None and second is not None and math.isclose(first, second, rel_tol=EQUAL_USE_FRACTION)
     )
 
 
 class _Search:
-    """One mission and one number of it."""
+    """The search for crossings of one number of a mission."""
 
     def __init__(
         self,
@@ -263,13 +283,13 @@ class _Search:
         self.base, self.breaks = variation.read(), breaking(target)
         if is_scale:
             self.number, of_table = Number("the factor", FACTOR, 1.0, ""), Number(key, FACTOR, 1.0, "")
-            scaled(self.base, key, 1.0)  # says what is wrong with the key
+            scaled(self.base, key, 1.0)  # raises the problem of the key
         else:
             self.number = of_table = number_of(tree_of(mission), key, _OF_ALL).said_like(between)
         self.range: Range = range_of(self.number, between)
 
         def judged() -> Iterator[JudgedMission]:
-            """The mission, and that at the end of the range: the number may be an error that is not declared."""
+            """The mission of the file and at the end of the range, because the file may not declare the error."""
             yield judged_mission(Analysis(self.base), today)
             with suppress(MissionError):
                 end = self.range.high
@@ -280,31 +300,31 @@ class _Search:
         self.table = Table(
             Question.of(mission, [key], model, today, row=row, breaks=self.breaks), mission, [of_table]
         )
-        self.levels = _LEVELS_READ if self.table.to_read else _LEVELS
+        self.levels = _LOOK_AHEAD_STEPS_OF_READING if self.table.to_read else _LOOK_AHEAD_STEPS
 
     def scanned(self, progress: Progress) -> tuple[list[State], State | None]:
-        """Look at every place of the range, and where the utilization turns; beside it the state of the file."""
-        places = self.range.places(PLACES_OF_CIRCLE if self.range.is_circle else PLACES)
+        """States at the samples of the range and at turns of the utilization, and the state of the file."""
+        values = self.range.places(PLACES_OF_CIRCLE if self.range.is_circle else PLACES)
         value = self.number.value
         if value is not None and self.range.low < value < self.range.high:
-            places = sorted({*places, value})
-        states = self.states(places if value is None else [*places, value], progress)
+            values = sorted({*values, value})
+        states = self.states(values if value is None else [*values, value], progress)
         given = None if value is None else states.pop()
-        # Between places without a change of compliance it may change there and back, where the utilization turns.
-        searches = [partial(_turn, *turn, self.levels - 1) for turn in _turns(states)[:_TURNS]]
+        # Between samples with equal compliance it may change there and back, at a turn of the utilization.
+        searches = [partial(_turn, *turn, self.levels - 1) for turn in _turns(states)[:_MAX_TURNS]]
         turned = [state for state in self._searched(searches) if state is not None]
         return sorted([*states, *turned], key=lambda state: state.value), given
 
     def states(self, values: Sequence[float], progress: Progress = unseen) -> list[State]:
-        """Check the mission with each of many values."""
+        """States of the mission at values."""
         (number,) = self.table.numbers
-        found = self.table.watched({number.key: np.array(values)}, progress)
+        columns_by_name = self.table.watched({number.key: np.array(values)}, progress)
         columns = (*VERDICT, *GEOMETRY[:2], WAIVED_BY, REASON)
         states = []
-        for value, *line in zip(values, *(found[column.name].tolist() for column in columns), strict=True):
-            status, row, use, requirement, range_m, cross_range_m, waived_by, why = line
-            if why:
-                states.append(State(value, complies=False, status=status, reason=why))
+        for value, *line in zip(values, *(columns_by_name[column.name].tolist() for column in columns), strict=True):
+            status, row, use, requirement, range_m, cross_range_m, waived_by, reason = line
+            if reason:
+                states.append(State(value, complies=False, status=status, reason=reason))
                 continue
             complies, utilization = status not in self.breaks, None if math.isnan(use) else use
             states.append(
@@ -323,30 +343,30 @@ class _Search:
         return states
 
     def crossings(self, borders: Sequence[tuple[State, State]]) -> tuple[Crossing, ...]:
-        """Bracket borders between two places, write both sides with few digits, check them as they are written."""
-        least = 1e-9 * (self.range.high - self.range.low)  # around 0, where no part of the value is small
+        """Crossings of borders: bracketed, with both sides rounded to few digits and checked as rounded."""
+        least = 1e-9 * (self.range.high - self.range.low)  # near 0, where a fraction of the value is no useful width
         narrow = self._searched([partial(_bracketed, low, high, least, self.levels) for low, high in borders])
         texts = [
             text
             for low, high in narrow
             for text in (self.number.text(low.value, is_up=False), self.number.text(high.value, is_up=True))
         ]
-        written = iter(self.states([self.number.read(text) for text in texts]) if texts else ())
-        return tuple(_crossing(low, high, next(written), next(written)) for low, high in narrow)
+        rounded = iter(self.states([self.number.read(text) for text in texts]) if texts else ())
+        return tuple(_crossing(low, high, next(rounded), next(rounded)) for low, high in narrow)
 
     def _searched(self, searches: Sequence[Search]) -> list[Any]:
-        """Go on with all searches at once, until each has what it looks for."""
+        """Results of searches that take their steps together."""
         known: dict[float, State] = {}
         while True:
-            found = [search(known) for search in searches]
-            needed = {value for one in found if isinstance(one, set) for value in one} - known.keys()
+            results = [search(known) for search in searches]
+            needed = {value for result in results if isinstance(result, set) for value in result} - known.keys()
             if not needed:
-                return found
+                return results
             values = sorted(needed)
             known.update(zip(values, self.states(values), strict=True))
 
     def texts(self, crossings: Sequence[Crossing], nearest: State) -> dict[float, str]:
-        """Every value that is said, as the file would have it."""
+        """Texts of all values of the answer, as the file would write them."""
         values = [self.range.low, self.range.high, nearest.value]
         values += [state.value for crossing in crossings for state in (crossing.inside, crossing.outside)]
         values += [] if self.number.value is None else [self.number.value]
@@ -356,8 +376,8 @@ class _Search:
 def _bracketed(
     low: State, high: State, least: float, levels: int, known: Mapping[float, State]
 ) -> tuple[State, State] | set[float]:
-    """Halve the interval with a border in it until it is narrow; without a state, the values that may come next."""
-    while high.value - low.value > _NARROW * max(abs(low.value), abs(high.value), least):
+    """Bisect an interval with a border until it is narrow, or return the values of the next steps."""
+    while high.value - low.value > _NARROW_FRACTION * max(abs(low.value), abs(high.value), least):
         middle = (low.value + high.value) / 2
         if not low.value < middle < high.value:
             break
@@ -369,11 +389,11 @@ def _bracketed(
 
 
 def _ahead(points: Callable[[float, float], tuple[float, ...]], low: float, high: float, levels: int) -> set[float]:
-    """Every value that so many steps may look at: each goes on below its last point, or above its first."""
-    found = points(low, high)
-    if not levels or not low < found[0] < high:
+    """All values that the next `levels` steps may need: a step goes on below its last point, or above its first."""
+    values = points(low, high)
+    if not levels or not low < values[0] < high:
         return set()
-    return {*found, *_ahead(points, low, found[-1], levels - 1), *_ahead(points, found[0], high, levels - 1)}
+    return {*values, *_ahead(points, low, values[-1], levels - 1), *_ahead(points, values[0], high, levels - 1)}
 
 
 def _middle(low: float, high: float) -> tuple[float]:
@@ -385,24 +405,24 @@ def _golden(low: float, high: float) -> tuple[float, float]:
 
 
 def _turns(states: Sequence[State]) -> list[tuple[float, float, State]]:
-    """Places between which the utilization turns without a change of compliance, and the state between them."""
-    found = []
+    """Intervals (low, high, middle state) with a turn of the utilization and without a change of compliance."""
+    turns = []
     for before, here, after in zip(states, states[1:], states[2:], strict=False):
         uses = [state.utilization for state in (before, here, after)]
         if not before.complies == here.complies == after.complies or any(use is None for use in uses):
             continue
         first, middle, last = (_sign(here) * use for use in uses if use is not None)
-        ends = [end for end in (first, last) if not _is_alike(end, middle)]  # a turn that rounding makes is none
+        ends = [end for end in (first, last) if not _is_alike(end, middle)]  # turns within rounding do not count
         if ends and max(ends) < middle:
-            found.append((before.value, after.value, here))
-    return found
+            turns.append((before.value, after.value, here))
+    return turns
 
 
 def _turn(
     low: float, high: float, here: State, levels: int, known: Mapping[float, State]
 ) -> State | set[float] | None:
-    """The first state around a turn whose compliance differs, None if none does, or the values that may come next."""
-    for _ in range(_STEPS_TO_TURN):
+    """A state near a turn with another compliance, None if there is none, or the values of the next steps."""
+    for _ in range(_TURN_STEPS):
         values = _golden(low, high)
         if not known.keys() >= set(values):
             return _ahead(_golden, low, high, levels)
@@ -418,15 +438,15 @@ def _turn(
 
 
 def _crossing(low: State, high: State, below: State, above: State) -> Crossing:
-    """The border between two states, which stand beside it as they are written."""
+    """The crossing between two states; `below` and `above` are the states at the rounded values."""
     is_upper = low.complies
     is_verified = below.complies == low.complies and above.complies == high.complies
-    if not is_verified:  # compliance changes again within the digits that are written
+    if not is_verified:  # compliance changes again within the rounding
         below, above = low, high
     inside, outside = (below, above) if is_upper else (above, below)
     return Crossing(inside, outside, is_upper, is_verified)
 
 
 def _sign(state: State) -> float:
-    """Sign of utilization: 1 where a state complies, as the highest may not; else -1, as the lowest may."""
+    """1 for a state that complies, since a higher utilization may not comply; -1 for a state that does not."""
     return 1.0 if state.complies else -1.0

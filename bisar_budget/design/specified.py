@@ -1,4 +1,4 @@
-"""The errors that are specified: which keys name one, in which units sizes are ordered, which parts keep to them."""
+"""Specified errors: their keys, the units of ordered sizes, and the parts that meet a specification."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -22,9 +22,9 @@ from bisar_budget.mission.quantities import Number, QuestionError, as_number, nu
 from bisar_budget.ranges.exact_ranges import Floats
 from bisar_budget.units import Dimension, format_quantity, parse_quantity
 
-DIGITS = 2  # of a number that is ordered
-_SILENT_DB = -400.0  # a level of nothing
-# Units in which the sizes are ordered, where the file has none: the first in which the number is at least 1.
+DIGITS = 2  # of an ordered number
+_SILENT_DB = -400.0  # level without an error
+# Units of ordered sizes, if the file states no number: the first in which the number is at least 1.
 _ORDERED_IN: Mapping[Dimension, tuple[str, ...]] = {
     units.LENGTH: ("m", "mm", "um"),
     units.SPEED: ("m/s", "mm/s", "um/s"),
@@ -35,7 +35,7 @@ _ORDERED_IN: Mapping[Dimension, tuple[str, ...]] = {
     units.VELOCITY_RANDOM_WALK: ("m/s/sqrt(h)", "ug/sqrt(Hz)"),
     units.ANGLE_RANDOM_WALK: ("deg/sqrt(h)",),
 }
-# A size so small that effects are proportional to it, from which the search begins.
+# First sizes of the search, in SI: small enough that effects are proportional to them.
 _TINY: Mapping[Dimension, float] = {
     units.LENGTH: 1e-4,
     units.SPEED: 1e-6,
@@ -48,16 +48,16 @@ _TINY: Mapping[Dimension, float] = {
     units.PHASE_NOISE: 1e-10,
     units.TONE: 1e-9,
 }
-_LEAST = 1e-18
-_CURVES = ("phase_noise", "power_law", "allan_deviation", "spurs")  # that a level shifts
-_OFFSETS = (1.0, 10.0, 100.0, 1e3)  # at which the phase noise of an ordered level is said [Hz]
-_PER_DECADE = 20  # offsets at which spectra are compared
-_SLOW = 0.1  # cycles per aperture, from which on phase noise is seen
-_SAME = 1 + 1e-9
+_TINY_OF_OTHER_UNITS = 1e-18
+_CURVES = ("phase_noise", "power_law", "allan_deviation", "spurs")  # forms of noise that a level shifts
+_OFFSETS_HZ = (1.0, 10.0, 100.0, 1e3)  # of the remark with the phase noise of an ordered level
+_OFFSETS_PER_DECADE = 20  # at which spectra are compared
+_LEAST_CYCLES = 0.1  # per aperture, of phase noise that counts
+_ROUNDING_FACTOR = 1 + 1e-9
 
 
 class Specified(NamedTuple):
-    """An error that is specified: its number in the file, and its weight."""
+    """A specified error: its number in the file, and its weight."""
 
     number: Number
     weight: float
@@ -69,7 +69,7 @@ class Specified(NamedTuple):
 
     @property
     def nothing(self) -> float:
-        """The size that stands for no error."""
+        """The size of no error."""
         return float(10 ** (_SILENT_DB / 20)) if self.number.is_level else 0.0
 
     @property
@@ -81,36 +81,36 @@ class Specified(NamedTuple):
     @property
     def tiny(self) -> float:
         """A size so small that effects are proportional to it."""
-        return _TINY.get(self.number.dimension, _LEAST)
+        return _TINY.get(self.number.dimension, _TINY_OF_OTHER_UNITS)
 
     def numbers(self, sizes: Floats) -> Floats:
-        """Numbers of the file for sizes: themselves, or levels of amplitudes."""
+        """Numbers of the file for sizes: the sizes, or for levels the decibels of amplitudes."""
         if not self.number.is_level:
             return sizes
         with np.errstate(divide="ignore"):
-            found: Floats = np.maximum(20 * np.log10(sizes), _SILENT_DB)
-        return found
+            levels: Floats = np.maximum(20 * np.log10(sizes), _SILENT_DB)
+        return levels
 
     def text(self, size: float) -> str:
-        """A size as the file would have it, in SI."""
+        """A size as the file would write it, in SI."""
         return f"{float(self.numbers(np.array(size)))!r} {self.number.dimension.si}".rstrip()
 
     def unit_of(self, value: float) -> str:
-        """Unit in which a number is ordered: that of the file, else the one that suits it."""
+        """Unit of an ordered number: the unit of the file, or else a suitable one."""
         dimension = self.number.dimension
         if self.number.value is not None or dimension not in _ORDERED_IN:
             return self.number.unit
-        among = _ORDERED_IN[dimension]
-        return next((one for one in among if abs(value) >= np.divide(*dimension.scales[one])), among[-1])
+        candidates = _ORDERED_IN[dimension]
+        return next((unit for unit in candidates if abs(value) >= np.divide(*dimension.scales[unit])), candidates[-1])
 
     def said(self, value: float) -> str:
-        """The number with four digits, in the unit that it is ordered in."""
+        """The number with four digits, in its ordered unit."""
         unit = self.unit_of(value)
         factor, divisor = self.number.dimension.scales[unit]
         return f"{value / factor * divisor:.4g} {unit}".rstrip()
 
     def ordered(self, value: float) -> tuple[float, str]:
-        """The number rounded down to two digits in the unit that it is ordered in: in SI, and as the file has it."""
+        """The number rounded down to two digits in its ordered unit: in SI, and as the file would write it."""
         unit = self.unit_of(value)
         factor, divisor = self.number.dimension.scales[unit]
         number = value / factor * divisor
@@ -121,30 +121,30 @@ class Specified(NamedTuple):
 
 
 def specified_errors(mission: Mission, tree: dict[str, object], keys: Mapping[str, float] | None) -> list[Specified]:
-    """Errors to specify: those of the keys, else those that the mission names, else the usual ones.
+    """Errors to specify: of `keys`, or else of the mission's `allocation.specify`, or else of the usual keys.
 
     Raises
     ------
     QuestionError
-        A key names no error; there is none to specify.
+        A key names no error, or there is no error to specify.
     """
-    asked = keys or mission.allocation.specify or dict.fromkeys(usual_keys(mission), 1.0)
-    if not asked:
+    weights = keys or mission.allocation.specify or dict.fromkeys(usual_keys(mission), 1.0)
+    if not weights:
         raise QuestionError(
             "nothing to specify: every error of the mission comes from a part, a covariance or a path; "
             "name one with --for KEY"
         )
-    found = [Specified(_number(mission, tree, key), weight) for key, weight in asked.items()]
-    if pair := multiplied(list(asked)):
+    errors = [Specified(_number(mission, tree, key), weight) for key, weight in weights.items()]
+    if pair := multiplied(list(weights)):
         raise QuestionError(f"{pair[0]} multiplies {pair[1]}: only both together are limited; accepted: one of them")
-    for one, other in ((a, b) for a in found for b in found if a is not b):
-        if parts_of(other.key)[: len(parts_of(one.key))] == parts_of(one.key):
-            raise QuestionError(f"{other.key}: is specified twice, by {one.key} too; accepted: each error once")
-    return found
+    for error, inner in ((a, b) for a in errors for b in errors if a is not b):
+        if parts_of(inner.key)[: len(parts_of(error.key))] == parts_of(error.key):
+            raise QuestionError(f"{inner.key}: is specified twice, by {error.key} too; accepted: each error once")
+    return errors
 
 
 def usual_keys(mission: Mission) -> Iterator[str]:
-    """Keys of position, velocity, acceleration and clocks that come from no part and no covariance."""
+    """Keys of position, velocity, acceleration and clocks, without figures of parts and covariances."""
     for name in PLATFORMS:
         platform = getattr(mission.platforms, name)
         error = platform.motion_error
@@ -162,6 +162,7 @@ def usual_keys(mission: Mission) -> Iterator[str]:
 
 
 def _number(mission: Mission, tree: dict[str, object], key: str) -> Number:
+    """The number of a key that can be specified; raises `QuestionError`."""
     parts = parts_of(key)
     if not is_error(key):
         raise QuestionError(f"{key}: is no error that can be specified; {ACCEPTED_ERRORS}")
@@ -173,51 +174,51 @@ def _number(mission: Mission, tree: dict[str, object], key: str) -> Number:
 
 
 def specified_number(mission: Mission, tree: dict[str, object], key: str) -> Number:
-    """The number of a key with what the file has today: of three axes the largest, else the figure of a part."""
+    """The number of a key with the file's value, the largest of three axes, or else with the figure of a part."""
     number = number_of(tree, key, is_for_each=True)
     if number.value is not None:
         return number
-    taken = next((one.value for one in mission.taken if one.key == key), None)
-    of_each = [as_number(key, number.reader, one) for one in (taken if isinstance(taken, list) else [taken])]
-    return max(of_each, key=lambda one: abs(one.value or 0.0))
+    taken = next((figure.value for figure in mission.taken if figure.key == key), None)
+    components = [as_number(key, number.reader, text) for text in (taken if isinstance(taken, list) else [taken])]
+    return max(components, key=lambda component: abs(component.value or 0.0))
 
 
 def multiplied(keys: Sequence[str]) -> tuple[str, str] | None:
-    """Two of the keys that multiply each other: only their product is limited, and either could be anything."""
+    """Two keys whose values multiply, so that only their product is limited; None without such keys."""
     for key in keys:
         *section, name = parts_of(key)
         if name not in ("level", "spectrum_level"):
             continue
-        for other in keys:
-            within = parts_of(other)[: len(section)] == tuple(section) and other != key
-            if within and (name == "spectrum_level" or parts_of(other)[len(section)] in _CURVES):
-                return key, other
+        for second_key in keys:
+            within = parts_of(second_key)[: len(section)] == tuple(section) and second_key != key
+            if within and (name == "spectrum_level" or parts_of(second_key)[len(section)] in _CURVES):
+                return key, second_key
     return None
 
 
-# ---------------------------------------------------------------- parts that keep to what is ordered
+# ---------------------------------------------------------------- parts that meet a specification
 def catalogue(mission: Mission) -> list[Entry]:
-    """Parts that the file of a mission may name: those that come with the tool, and those of its project."""
+    """Parts that the file of a mission may name: parts of this package, and of the mission's project."""
     try:
         return list(entries(folders(folder_of(mission.file))))
     except PartError:  # a folder of the project has a file that is no part; `sensors` says which
         return []
 
 
-def suitable_parts(mission: Mission, one: Specified, most: float, among: Sequence[Entry]) -> Iterator[str]:
-    """Ids of the parts that keep to a specification, whose ordered number is `most`; the mission states its error.
+def suitable_parts(mission: Mission, specified: Specified, most: float, candidates: Sequence[Entry]) -> Iterator[str]:
+    """Ids of the parts that meet a specification with the ordered number `most`; the mission states the error.
 
-    A sensor does with a figure of the same name that is no larger in any axis. An oscillator does whose phase noise
-    is nowhere above the spectrum that is ordered, at the same frequency; one that says nothing of some offsets not.
-    A satellite is offered sensors that serve in orbit alone: receivers for the ground and the air stop at 515 m/s or
-    18 km by export rules, and inertial sensors feel nothing in free fall.
+    A sensor meets it if its figure of the same name is no larger on any axis. An oscillator meets it if its phase
+    noise, at the same frequency, is nowhere above the ordered spectrum; an oscillator without noise at some offsets
+    does not. A satellite gets only sensors that serve in orbit: receivers for the ground and the air stop at 515 m/s
+    or 18 km by export rules, and inertial sensors measure nothing in free fall.
     """
-    *above, section, figure = parts_of(one.key)
+    *above, section, figure = parts_of(specified.key)
     if section == "oscillator" and figure == "level":
-        yield from _quiet_oscillators(mission, above[-1], most, among)
+        yield from _quiet_oscillators(mission, above[-1], most, candidates)
     kind = {"motion_error": "gnss", "imu": "imu"}.get(section)
     is_satellite = above[:1] == ["platforms"] and _is_satellite(getattr(mission.platforms, above[1]))
-    for entry in among:
+    for entry in candidates:
         serves = not is_satellite or getattr(entry.part, "in_orbit", None)
         value = getattr(entry.part, figure, None) if entry.part.kind == kind and serves else None
         if value is not None and np.abs(value).max() <= most:
@@ -225,17 +226,19 @@ def suitable_parts(mission: Mission, one: Specified, most: float, among: Sequenc
 
 
 def _is_satellite(platform: Platform) -> bool:
+    """Whether a platform has an orbit, or is faster than any aircraft."""
     return platform.orbit is not None or bool(norm(platform.state.velocity) > FASTEST_FLIGHT)
 
 
-def _quiet_oscillators(mission: Mission, name: str, level: float, among: Sequence[Entry]) -> Iterator[str]:
+def _quiet_oscillators(mission: Mission, name: str, level: float, candidates: Sequence[Entry]) -> Iterator[str]:
+    """Ids of the oscillators whose phase noise is nowhere above a platform's spectrum at a level."""
     carrier, pieces = _spectrum(mission, name)
     aperture = mission.collection.aperture_time
     last = max(piece.high for piece in pieces)
-    first = min([_SLOW / aperture, *(piece.low for piece in pieces if piece.low)])
-    offsets = np.geomspace(first, last * (1 - 1e-9), 1 + math.ceil(_PER_DECADE * math.log10(last / first)))
-    most = density(pieces, offsets) * 10 ** (level / 10) * _SAME
-    for entry in among:
+    first = min([_LEAST_CYCLES / aperture, *(piece.low for piece in pieces if piece.low)])
+    offsets = np.geomspace(first, last * (1 - 1e-9), 1 + math.ceil(_OFFSETS_PER_DECADE * math.log10(last / first)))
+    most = density(pieces, offsets) * 10 ** (level / 10) * _ROUNDING_FACTOR
+    for entry in candidates:
         part = entry.part
         if not isinstance(part, OscillatorPart):
             continue
@@ -245,21 +248,21 @@ def _quiet_oscillators(mission: Mission, name: str, level: float, among: Sequenc
             yield entry.id
 
 
-def ordered_noise(mission: Mission, one: Specified, level: float) -> str:
-    """The phase noise that a level of an oscillator asks for, where the file states it by its points; else empty."""
-    _, name, *below = parts_of(one.key)
+def ordered_noise(mission: Mission, specified: Specified, level: float) -> str:
+    """Words for the phase noise of an oscillator at an ordered level; empty for another error."""
+    _, name, *below = parts_of(specified.key)
     if below != ["oscillator", "level"]:
         return ""
     carrier, pieces = _spectrum(mission, name)
-    found = zip(_OFFSETS, density(pieces, np.array(_OFFSETS)).tolist(), strict=True)
+    levels = zip(_OFFSETS_HZ, density(pieces, np.array(_OFFSETS_HZ)).tolist(), strict=True)
     points = [
-        f"{10 * math.log10(size / 2) + level:.1f} dBc/Hz at {offset:g} Hz" for offset, size in found if size > 0
+        f"{10 * math.log10(size / 2) + level:.1f} dBc/Hz at {offset:g} Hz" for offset, size in levels if size > 0
     ]
     return f"{', '.join(points)} from {format_quantity(carrier, 'Hz', 4)}" if points else ""
 
 
 def _spectrum(mission: Mission, name: str) -> tuple[float, Sequence[PowerLawPiece]]:
-    """Frequency of a platform's oscillator, else of the radar, and the spectrum of its phase there at 0 dB."""
+    """Frequency of a platform's oscillator, or else of the radar, and the phase spectrum there at 0 dB."""
     oscillator = getattr(mission.platforms, name).oscillator
     carrier = oscillator.frequency or mission.radar.center_frequency
     return carrier, noise_of(oscillator.noise_alone, carrier, mission.collection.aperture_time).pieces

@@ -1,6 +1,6 @@
-"""Check a mission in many cases: arrays of numbers in, columns of what `check` finds out.
+"""Checks of a mission in many cases: arrays of numbers in, columns of results out.
 
-Memory does not grow with the number of cases: they are checked in parts, as they are asked for.
+Memory does not grow with the number of cases, because the cases are checked in parts when a part is needed.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -35,14 +35,14 @@ from bisar_budget.mission.quantities import Choices, Number, QuestionError
 from bisar_budget.mission.tree import read_tree
 from bisar_budget.workers import MapBlocks, in_processes
 
-_SLOW = 1 / 8  # of cases that are read one by one, from which processes share them out
-_MANY = 8  # parts, from which processes of their own are worth their start
-_TOGETHER = 8192  # cases of a part: their arrays stay in a processor's cache
-_FEW = 64  # cases of a part where each is read
+_SLOW_FRACTION = 1 / 8  # of cases that are read one by one, from which processes share the cases
+_MANY = 8  # parts, from which it is worth to start processes
+_PART_CASES = 8192  # of a part; their arrays stay in a processor's cache
+_FEW = 64  # cases of a part if each case is read
 
 Block = tuple[int, int, Mapping[str, Any]]  # first case, the one after the last, values of each key
 
-# Fields of a row that a column may have, and what they hold.
+# Fields of a row that a column may have, with descriptions.
 _FIELDS = {
     "status": "Status of {0}.",
     "declared": "Declared value of {0}.",
@@ -59,18 +59,18 @@ _FIELDS = {
     "equal_loss_qpe_rad": "Quadratic phase of as much loss of the peak as {0} by the full model.",
     "rest_rad": "Rms phase of {0} beyond the cubic.",
 }
-_UNITS = {"rad": "rad", "db": "dB"}  # by what a field's name ends with
+_UNITS = {"rad": "rad", "db": "dB"}  # by the last word of a field's name
 
 
 class Asked:
     """A mission that is to be checked in many cases, in chunks.
 
-    Arguments are those of `bisar_budget.sweep`. A column that is named twice is there once.
+    Arguments are those of `bisar_budget.sweep`. Repeated columns count once.
 
     Raises
     ------
     QuestionError
-        A column is of no row, or of no field; a key makes no mission whatever its value.
+        A column names an unknown row or field, or no value of a key makes a mission.
     """
 
     def __init__(
@@ -82,26 +82,28 @@ class Asked:
         model: str | None = None,
         today: date,
     ) -> None:
-        choices = tuple(one.key for one in cases.varied if isinstance(one, Choices))
-        keys = tuple(one.key for one in cases.varied if one.key not in choices)
+        choices = tuple(each.key for each in cases.varied if isinstance(each, Choices))
+        keys = tuple(each.key for each in cases.varied if each.key not in choices)
         if model is not None and "allocation.model" in choices:
             raise QuestionError("allocation.model: --model stands in for it; accepted: one of the two")
-        each = tuple(dict.fromkeys(columns))  # Parquet could not be read with a column twice
-        self.question = Question.of(mission, keys, model, today, columns=each, choices=choices)
+        unique = tuple(dict.fromkeys(columns))  # Parquet files with repeated columns cannot be read
+        self.question = Question.of(mission, keys, model, today, columns=unique, choices=choices)
         self.mission, self.cases, self.table = mission, cases, Table(self.question, mission)
         missions = [self.table.mission, *self._chosen()]
         self.columns = tuple(self._columns(missions) if columns else ())
         for number in cases.varied:
-            if isinstance(number, Number) and number.value is None:  # the file may state its path in another way
+            if (
+                isinstance(number, Number) and number.value is None
+            ):  # the file may state the path of a platform in another way
                 self._hold_to_a_mission(number)
 
     def _chosen(self) -> Iterator[Mission]:
-        """The mission with each word alone, where there is one.
+        """Missions with one word each; words that make no mission are left out.
 
         Raises
         ------
         QuestionError
-            A word is at fault by itself, such as a part that is not in the catalogue; or no word makes a mission.
+            A word is invalid by itself, such as a part that is not in the catalogue; or no word makes a mission.
         """
         for choices, words in words_of(self.cases):
             problems = set()
@@ -109,12 +111,12 @@ class Asked:
                 try:
                     chosen = self.table.variation.read([SetValue(choices.key, word)])
                 except MissionError as error:
-                    of_word = [fault for fault in error.faults if fault.option == f"--set {choices.key}"]
-                    if of_word:
-                        key = of_word[0].key
-                        said = f"{'' if key == choices.key else f'{key} '}{_said(of_word[0])}"
-                        raise QuestionError(f"{choices.key}={shown(word)}: {said}") from None
-                    problems.add(f"{error.faults[0].key} {_said(error.faults[0])}")
+                    faults_of_word = [fault for fault in error.faults if fault.option == f"--set {choices.key}"]
+                    if faults_of_word:
+                        key = faults_of_word[0].key
+                        problem_text = f"{'' if key == choices.key else f'{key} '}{_fault_text(faults_of_word[0])}"
+                        raise QuestionError(f"{choices.key}={shown(word)}: {problem_text}") from None
+                    problems.add(f"{error.faults[0].key} {_fault_text(error.faults[0])}")
                 else:
                     problems.add("")
                     yield chosen
@@ -122,21 +124,21 @@ class Asked:
                 raise QuestionError(f"{choices.key}: no value of it makes a mission: {problem}")
 
     def _hold_to_a_mission(self, number: Number) -> None:
-        """Refuse a key that makes no mission at its first, middle and last value, for one reason."""
+        """Refuse a key whose first, middle and last value make no mission, for the same reason."""
         problems = set()
-        for place in {0, self.cases.count // 2, self.cases.count - 1}:
-            values = self.cases.values(place, place + 1)
+        for index in {0, self.cases.count // 2, self.cases.count - 1}:
+            values = self.cases.values(index, index + 1)
             words = [SetValue(key, values[key][0]) for key in self.question.choices]
             try:
                 self.table.variation.at({number: float(values[number.key][0])}, words)
                 return
             except MissionError as error:
-                problems.add(f"{error.faults[0].key} {_said(error.faults[0])}")
+                problems.add(f"{error.faults[0].key} {_fault_text(error.faults[0])}")
         if len(problems) == 1:
             raise QuestionError(f"{number.key}: no value of it makes a mission: {problems.pop()}")
 
     def _columns(self, missions: Sequence[Mission]) -> Iterator[Column]:
-        """The columns that were asked for; a row is there if any of the missions has it."""
+        """The requested columns; a row is known if any of the missions has it."""
         rows: dict[str, Row] = {}
         for mission in missions:
             rows = {row.id: row for row in check_mission(mission, self.question.today).rows} | rows
@@ -151,10 +153,12 @@ class Asked:
             yield Column(name, unit, _FIELDS[field].format(row), is_text=is_status(name))
 
     def swept(self, parts: Iterator[Part]) -> Swept:
-        """The sweep that has these parts."""
+        """The sweep with parts."""
         varied = [
-            Column(one.key, one.dimension.si if isinstance(one, Number) else "", "Varies.", isinstance(one, Choices))
-            for one in self.cases.varied
+            Column(
+                each.key, each.dimension.si if isinstance(each, Number) else "", "Varies.", isinstance(each, Choices)
+            )
+            for each in self.cases.varied
         ]
         return Swept(
             mission_name=self.mission.name,
@@ -166,31 +170,31 @@ class Asked:
         )
 
     def checked(self, jobs: int = 1) -> Swept:
-        """The sweep, whose parts are checked as they are asked for, by so many processes."""
+        """The sweep; its parts are checked when they are needed, by `jobs` processes."""
         return self.swept(self.shared_out(self.chunks.starts, jobs))
 
     @cached_property
     def chunks(self) -> "Chunks":
-        """How the cases are cut: into few where many are read by themselves, which some of them show."""
+        """Division of the cases into chunks, smaller if many cases are read one by one; a sample of cases decides."""
         cases, is_slow = self.cases, False
         if cases.count > _FEW:
-            places = np.linspace(0, cases.count - 1, _FEW).astype(int)
-            some = [cases.values(place, place + 1) for place in places.tolist()]
-            values = {one.key: np.concatenate([each[one.key] for each in some]) for one in cases.varied}
-            is_slow = self.table.reads(values) > _SLOW * _FEW
-        return Chunks(cases.count, _FEW if is_slow else _TOGETHER, is_slow)
+            indices = np.linspace(0, cases.count - 1, _FEW).astype(int)
+            sample = [cases.values(index, index + 1) for index in indices.tolist()]
+            values = {varied.key: np.concatenate([each[varied.key] for each in sample]) for varied in cases.varied}
+            is_slow = self.table.reads(values) > _SLOW_FRACTION * _FEW
+        return Chunks(cases.count, _FEW if is_slow else _PART_CASES, is_slow)
 
     @cached_property
     def travelling(self) -> Question:
-        """The question with all that the mission names: other processes see what this one saw."""
-        words = [SetValue(one.key, word) for one, chosen in words_of(self.cases) for word in chosen]
+        """The question with the files that the mission names, so that other processes read the same content."""
+        words = [SetValue(choices.key, word) for choices, chosen in words_of(self.cases) for word in chosen]
         return self.question._replace(named=named_by(self.mission, words))
 
     def shared_out(self, starts: Sequence[int], jobs: int, mapped: MapBlocks | None = None) -> Iterator[Part]:
-        """Check the chunks that begin at `starts`, in their order; processes share out what is read case by case.
+        """Check the chunks that begin at `starts`, in this order; processes share cases that are read one by one.
 
-        What arrays hold takes less time than to send it from one process to another. Where `mapped` has others do it,
-        they do all, and parts come in any order.
+        Arrays of cases take less time to check than to send to another process. With `mapped`, other workers check
+        all chunks, and parts come in any order.
         """
         stops = ((start, self.chunks.stop(start)) for start in starts)
         blocks = ((start, stop, self.cases.values(start, stop)) for start, stop in stops)
@@ -199,13 +203,15 @@ class Asked:
         if mapped is None:
             yield from (self.table.part(*block) for block in blocks)
         else:
-            found = mapped(part_of, self.travelling, blocks, lambda block: f"cases {block[0]} to {block[1] - 1}")
-            yield from (part for _, part in found)
+            checked_parts = mapped(
+                part_of, self.travelling, blocks, lambda block: f"cases {block[0]} to {block[1] - 1}"
+            )
+            yield from (part for _, part in checked_parts)
 
 
 @dataclass(frozen=True)
 class Chunks:
-    """How cases up to `end` are cut; `is_slow` where many are read by themselves."""
+    """Division of cases up to `end` into chunks; `is_slow` if many cases are read one by one."""
 
     end: int
     size: int
@@ -223,16 +229,17 @@ class Chunks:
 
 @lru_cache(maxsize=1)
 def _table(question: Question) -> Table:
+    """Table of a question; the last one is kept."""
     parse = mission_of if question.named is None else question.named.parse
     tree = read_tree(question.data, question.file)
     return Table(question, parse(tree, question.data, question.file, question.model, changes=question.changes))
 
 
 def part_of(question: Question, block: Block) -> Part:
-    """Check a block of cases in a process that knows nothing else; it keeps the last question."""
+    """Check a block of cases in another process, which keeps the table of the last question."""
     return _table(question).part(*block)
 
 
-def _said(fault: Fault) -> str:
-    """Words for a fault: what is wrong, and what would not be."""
+def _fault_text(fault: Fault) -> str:
+    """Text of a fault: the problem, and accepted values."""
     return fault_words(fault.problem, "", fault.accepted, "" if "Read with" in fault.hint else fault.hint)

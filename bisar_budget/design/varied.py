@@ -17,7 +17,7 @@ from bisar_budget.geometry import STILL, BistaticGeometry, norm
 from bisar_budget.image_plane import MIN_SINE, spans_ground
 from bisar_budget.mission.changes import parts_of
 from bisar_budget.mission.covariance import EIGENVALUE_TOLERANCE
-from bisar_budget.mission.instruments import RISE, STEEPEST
+from bisar_budget.mission.instruments import MAX_FALL_DB_PER_DECADE, MAX_RISE_DB_PER_DECADE
 from bisar_budget.mission.model import (
     MISSION,
     PLACE_KEYS,
@@ -42,15 +42,15 @@ from bisar_budget.mission.quantities import QuestionError
 from bisar_budget.mission.readers import ListOf, OneOf, Quantity, Reader, Section, Triple
 from bisar_budget.mission.vibrations import Spectrum
 
-# ---------------------------------------------------------------- where arrays can stand, which cases are missions
-SAFE = 1 + 1e-6  # nearer to a border of what forms an image, a case is checked by itself
+# ---------------------------------------------------------------- keys for arrays, and cases that are missions
+SAFE = 1 + 1e-6  # factor around a limit of image formation within which a case is checked alone
 
 
 def is_held(mission: Mission, key: str, *, is_stated: bool) -> bool:
-    """Whether an array can take the place of a number, which the file states or does not.
+    """Whether an array can replace a number; `is_stated` tells whether the file states the number.
 
-    It cannot where the number decides more than itself: a path of an orbit or a log, the place of the scene on the
-    Earth and how the Earth is turned, an element of a covariance matrix.
+    An array cannot replace a number that decides more than its own value: a number of an orbit or a log, the position
+    of the scene on the Earth, the orientation of the Earth, an element of a covariance matrix.
     """
     section, *parts = parts_of(key)
     if section == "platforms":
@@ -59,7 +59,7 @@ def is_held(mission: Mission, key: str, *, is_stated: bool) -> bool:
             return _is_held_of_error(platform.motion_error, parts[2:], is_stated)
         if parts[1] == "oscillator":
             if platform.oscillator is None or (parts[2] == "frequency" and platform.oscillator.sensor is not None):
-                return False  # a part holds at the frequency of its own
+                return False  # the noise of a part holds at the part's frequency
             return is_stated or parts[2] in ("frequency", "bandwidth", "level")
         return not flies_on_earth(mission) and _is_held_of_path(platform, parts[1], is_stated)
     if section == "earth_orientation":
@@ -70,22 +70,24 @@ def is_held(mission: Mission, key: str, *, is_stated: bool) -> bool:
 
 
 def _is_held_of_error(error: MotionError, parts: Sequence[str], is_stated: bool) -> bool:
+    """Whether an array can replace a number of a motion error."""
     if parts[0] in MOTION:
-        return parts[0] == "acceleration" or error.covariance is None  # which replaces the others
+        return parts[0] == "acceleration" or error.covariance is None  # a covariance replaces position and velocity
     if parts[0] == "covariance" and error.covariance is not None:
         return is_stated and not error.covariance.is_matrix  # an element of a matrix has a twin
     if parts == ["vibration", "spectrum_level"]:
-        return error.vibration.spectrum is not None  # which it shifts
+        return error.vibration.spectrum is not None  # the level shifts the spectrum
     return is_stated or parts[0] == "imu" or tuple(parts) in (("time_tag",), ("lever_arm", "uncertainty"))
 
 
 def _is_held_of_path(platform: Platform, name: str, is_stated: bool) -> bool:
+    """Whether an array can replace a number of a path."""
     if name == "speed":
-        return is_stated and platform.motion_azimuth is not None  # a fixed one has no direction
+        return is_stated and platform.motion_azimuth is not None  # a fixed platform has no direction
     return is_stated or (name == "climb" and platform.slant_range is not None)
 
 
-# Sections and keys that a file may leave out and that may be stated by themselves.
+# Optional sections and keys that may be stated alone.
 _FREE = {
     *("timing_error", "common_motion_error", "requirements", "autofocus", "simulation"),
     *("scene.radius", "scene.height_error", "allocation.coverage_factor", "allocation.warn_above"),
@@ -94,70 +96,70 @@ _FREE = {
 
 
 def is_image(mission: Mission, geometries: BistaticGeometry, cases: int) -> NDArray[np.bool_]:
-    """Whether each case forms an image, with room to spare; `mission` may hold arrays, (cases,).
+    """Whether each case certainly forms an image; `mission` may hold arrays (cases,).
 
-    A file that is read says so to the last digit, and why not.
+    Cases near a limit are False; reading them as a file decides exactly, and gives the reason.
     """
-    is_one = _has_possible_figures(mission, cases)
+    is_safe = _has_possible_figures(mission, cases)
     half = np.asarray(mission.collection.aperture_time) / 2
     still: Any = True
     for name, paths in zip(PLATFORMS, geometries.both, strict=True):
         platform = getattr(mission.platforms, name)
-        is_one &= (paths.slant_range > SAFE) & (np.asarray(paths.position[2]) - paths.sinks(half) >= 0)
-        is_one &= paths.has_frame(platform.motion_error.frame, SAFE)
+        is_safe &= (paths.slant_range > SAFE) & (np.asarray(paths.position[2]) - paths.sinks(half) >= 0)
+        is_safe &= paths.has_frame(platform.motion_error.frame, SAFE)
         if mission.common_motion_error is not None:
-            is_one &= paths.has_frame(mission.common_motion_error.frame, SAFE)
+            is_safe &= paths.has_frame(mission.common_motion_error.frame, SAFE)
         if platform.motion_error.lever_arm is not None:
-            is_one &= has_body_axes(paths, np.broadcast_to(half, (cases,)), SAFE)
+            is_safe &= has_body_axes(paths, np.broadcast_to(half, (cases,)), SAFE)
         still = still & (norm(paths.velocity) < STILL * SAFE)
         if np.ndim(platform.speed):
-            is_one &= np.asarray(platform.speed) != 0
-    is_one &= ~np.asarray(still)
+            is_safe &= np.asarray(platform.speed) != 0
+    is_safe &= ~np.asarray(still)
     turns, sine = spans_ground(geometries, mission.radar, 2 * half, cases)
-    is_one &= turns & (sine >= SAFE * MIN_SINE)
+    is_safe &= turns & (sine >= SAFE * MIN_SINE)
     if mission.propagation is not None:
         legs = dict(zip(PLATFORMS, geometries.both, strict=True))
         for _, _, degrees in least_elevations(mission.propagation, legs, mission.collection.aperture_time):
-            is_one &= degrees > LEAST_ELEVATION_DEG * SAFE
+            is_safe &= degrees > LEAST_ELEVATION_DEG * SAFE
     if mission.has_direct_path:
         halves = np.broadcast_to(half, (cases,))
         least = np.maximum(LEAST_BASELINE, geometries.apart.travelled(halves) / FARTHEST_BY)
-        is_one &= least_baseline(geometries.apart, halves) > SAFE * least
-    return is_one & (np.asarray(mission.radar.bandwidth) * SAFE < 2 * np.asarray(mission.radar.center_frequency))
+        is_safe &= least_baseline(geometries.apart, halves) > SAFE * least
+    return is_safe & (np.asarray(mission.radar.bandwidth) * SAFE < 2 * np.asarray(mission.radar.center_frequency))
 
 
 def _has_possible_figures(mission: Mission, cases: int) -> NDArray[np.bool_]:
-    """Whether numbers that a file holds to each other fit, with room to spare: shares, masks, correlations, ages."""
-    is_one = np.ones(cases, dtype=bool)
+    """Whether dependent numbers of a file certainly fit: shares, masks, correlations, ages."""
+    is_safe = np.ones(cases, dtype=bool)
     sync = mission.synchronization
     if sync is not None and sync.is_holdover:
-        is_one &= np.asarray(sync.age) > SAFE * least_age(sync.averaging, mission.collection.aperture_time)
+        is_safe &= np.asarray(sync.age) > SAFE * least_age(sync.averaging, mission.collection.aperture_time)
     split = mission.allocation.split
     for shares in split if isinstance(split, MetricSplits) else (split,):
         if isinstance(shares, Shares):
             total = sum(0.0 if share is None else share for share in shares)
-            is_one &= np.abs(np.asarray(total) - 1) * SAFE < WHOLE
+            is_safe &= np.abs(np.asarray(total) - 1) * SAFE < WHOLE
     for name in PLATFORMS:
         platform: Platform = getattr(mission.platforms, name)
         if platform.oscillator is not None:
             if platform.oscillator.bandwidth is not None:
                 least = least_bandwidth(np.asarray(mission.collection.aperture_time))
-                is_one &= np.asarray(platform.oscillator.bandwidth) > SAFE * least
+                is_safe &= np.asarray(platform.oscillator.bandwidth) > SAFE * least
             for (f, level), (g, next_level) in pairwise(platform.oscillator.phase_noise or ()):
                 slope = (np.asarray(next_level) - level) / math.log10(g / f)
-                is_one &= (slope * SAFE > -STEEPEST) & (slope * SAFE < RISE)
+                is_safe &= (slope * SAFE > -MAX_FALL_DB_PER_DECADE) & (slope * SAFE < MAX_RISE_DB_PER_DECADE)
         covariance = platform.motion_error.covariance
         if covariance is not None:
             rows = [[np.broadcast_to(rho, (cases,)) for rho in row] for row in covariance.correlation]
             least = np.linalg.eigvalsh(np.array(rows).transpose(2, 0, 1)).min(axis=1)
-            is_one &= least > -EIGENVALUE_TOLERANCE / 2
-    return is_one
+            is_safe &= least > -EIGENVALUE_TOLERANCE / 2
+    return is_safe
 
 
 # ---------------------------------------------------------------------- scaled errors
-# What a factor does not multiply: when and how fast an error changes, and settings.
-_KEPT = (units.FREQUENCY, units.TIME, units.RATIO, units.MEMORY)
-# By their keys: a time and a ratio that are errors, a length that is none.
+# Dimensions that a factor does not multiply: times and frequencies of errors, and settings.
+_UNSCALED_DIMENSIONS = (units.FREQUENCY, units.TIME, units.RATIO, units.MEMORY)
+# Exceptions by key: a time and a ratio that are errors, and a length that is no error.
 _OF_ERRORS, _MEASURES = ("time_tag", "accelerometer_scale_factor"), ("arm",)
 _ERRORS = ("motion_error", "common_motion_error", "timing_error", "propagation", "other_errors")
 _ACCEPTED = (
@@ -167,14 +169,14 @@ _ACCEPTED = (
 
 
 def scaled(mission: Mission, key: str, factor: Any) -> Mission:
-    """Multiply every error that stands below a key: amplitudes and sigmas, those of parts of the catalogue too.
+    """The mission with every error below a key multiplied: amplitudes and sigmas, also of parts of the catalogue.
 
     Frequencies, correlation times and correlations stay. The factor may be an array (cases,).
 
     Raises
     ------
     QuestionError
-        The key holds no errors, or the mission states none there.
+        The key has no errors, or the mission states none below it.
     """
     parts = parts_of(key)
     if not any(part in _ERRORS for part in parts[:3]):
@@ -186,27 +188,27 @@ def scaled(mission: Mission, key: str, factor: Any) -> Mission:
 
 
 def _below(value: Any, reader: Reader, parts: Sequence[str], factor: Any, key: str) -> tuple[Any, int]:
-    """Go down to the key, and put what is scaled in its place on the way back."""
+    """A value with the errors at a path below it scaled, and the number of errors that are not zero."""
     if not parts:
         name = parts_of(key)[-1]
         if name in _MEASURES:
             return value, 0
         is_clock = parts_of(key)[0] == "timing_error" or name in _OF_ERRORS
         return _scaled(value, reader, factor, is_clock=is_clock)
-    part, *rest = parts
+    child, *remaining = parts
     reader = _form(reader, value)
-    if isinstance(reader, Section) and part in reader.keys and value is not None:
-        inner, count = _below(getattr(value, part), reader.keys[part].reader, rest, factor, key)
-        return value._replace(**{part: inner}), count
-    if isinstance(reader, ListOf | Triple) and part.isdigit() and value and int(part) < len(value):
+    if isinstance(reader, Section) and child in reader.keys and value is not None:
+        inner, count = _below(getattr(value, child), reader.keys[child].reader, remaining, factor, key)
+        return value._replace(**{child: inner}), count
+    if isinstance(reader, ListOf | Triple) and child.isdigit() and value and int(child) < len(value):
         below = reader.section if isinstance(reader, ListOf) else reader.component
-        inner, count = _below(value[int(part)], below, rest, factor, key)
-        return (*value[: int(part)], inner, *value[int(part) + 1 :]), count
-    raise QuestionError(f"{key}: the mission has no {part}; {_ACCEPTED}")
+        inner, count = _below(value[int(child)], below, remaining, factor, key)
+        return (*value[: int(child)], inner, *value[int(child) + 1 :]), count
+    raise QuestionError(f"{key}: the mission has no {child}; {_ACCEPTED}")
 
 
 def _scaled(value: Any, reader: Reader, factor: Any, is_clock: bool) -> tuple[Any, int]:
-    """Multiply what is below a value; with it the number of numbers that are not zero."""
+    """A value with all errors below it scaled, and the number of errors that are not zero."""
     reader = _form(reader, value)
     if value is None:
         return value, 0
@@ -215,17 +217,17 @@ def _scaled(value: Any, reader: Reader, factor: Any, is_clock: bool) -> tuple[An
         for name, below in reader.keys.items():
             if name in _MEASURES or name == "spectrum_level":  # the spectrum is scaled
                 continue
-            inner, found = _scaled(getattr(value, name), below.reader, factor, is_clock or name in _OF_ERRORS)
-            value, count = value._replace(**{name: inner}), count + found
+            inner, inner_count = _scaled(getattr(value, name), below.reader, factor, is_clock or name in _OF_ERRORS)
+            value, count = value._replace(**{name: inner}), count + inner_count
         return value, count
     if isinstance(reader, ListOf | Triple):
         below_reader = reader.section if isinstance(reader, ListOf) else reader.component
         pairs = [_scaled(entry, below_reader, factor, is_clock) for entry in value]
-        return tuple(entry for entry, _ in pairs), sum(found for _, found in pairs)
+        return tuple(entry for entry, _ in pairs), sum(inner_count for _, inner_count in pairs)
     if isinstance(reader, Quantity):
         if reader.dimension in units.LEVELS:
             return value + 20 * np.log10(factor), 1
-        if reader.dimension in _KEPT and not is_clock:
+        if reader.dimension in _UNSCALED_DIMENSIONS and not is_clock:
             return value, 0
         return value * factor, int(np.any(value))
     if isinstance(value, Spectrum):
@@ -236,7 +238,7 @@ def _scaled(value: Any, reader: Reader, factor: Any, is_clock: bool) -> tuple[An
 
 
 def _form(reader: Reader, value: Any) -> Reader:
-    """The form of a reader that gave a value that was read."""
+    """The form of a reader that read a value."""
     if isinstance(reader, OneOf):
         kind = Triple if isinstance(value, tuple) and not hasattr(value, "_fields") else Quantity
         matching = [form for form in reader.forms if isinstance(form, Section) and type(value) is form.kind]

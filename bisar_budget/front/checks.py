@@ -1,4 +1,4 @@
-"""Checks of missions, and what their reports may show besides: draws, verdicts of images, studies, specifications."""
+"""Checks of missions, and additions to their reports: draws, verdicts of images, studies, specifications."""
 
 import datetime as dt
 import os
@@ -38,31 +38,31 @@ if TYPE_CHECKING:
     from bisar_budget.report.drawing.trades import Gathered
     from bisar_budget.sampling.draws import Drawing, DrawsPiece, Share, Tally
 
-MAX_CASES = 40_000  # of a study: a page has no room for more
-MAX_KEYS = 2  # of a study: a drawing has no more axes
-_MANY_DRAWS = 1_000_000  # from which on it is measured how long they will take
-_FEW_DRAWS = 1 << 12  # of the first trial
+MAX_CASES = 40_000  # of a study; a page has no room for more
+MAX_KEYS = 2  # of a study; a drawing has no more axes
+_MANY_DRAWS = 1_000_000  # from which the time is estimated
+_TRIAL_DRAWS = 1 << 12  # of the first trial for this estimate
 DAY_OF_RUN = "the day of the run"
 _CALLER = "the caller"
 _OPTION = "--sweep"
 
 
-# ---------------------------------------------------------------------- the day, and where it comes from
-def day_of(given: str | dt.date | None) -> dt.date:
-    """Day on which waivers are judged: one that is given, else of SOURCE_DATE_EPOCH, else today, UTC.
+# ---------------------------------------------------------------------- the day of waivers, and its origin
+def day_of(date: str | dt.date | None) -> dt.date:
+    """Day on which waivers are judged: `date`, or else the day of SOURCE_DATE_EPOCH, or else today, UTC.
 
     Raises
     ------
     ValueError
-        It is no day.
+        The argument or the variable is no day.
     """
-    if isinstance(given, dt.datetime):
-        return given.date()
-    if given is not None:
+    if isinstance(date, dt.datetime):
+        return date.date()
+    if date is not None:
         try:
-            return given if isinstance(given, dt.date) else dt.date.fromisoformat(given)
+            return date if isinstance(date, dt.date) else dt.date.fromisoformat(date)
         except (TypeError, ValueError):
-            raise ValueError(f"no day (got {printable(str(given))!r}); accepted: 2026-12-31") from None
+            raise ValueError(f"no day (got {printable(str(date))!r}); accepted: 2026-12-31") from None
     epoch = os.environ.get("SOURCE_DATE_EPOCH")
     if not epoch:
         return dt.datetime.now(dt.UTC).date()
@@ -75,7 +75,7 @@ def day_of(given: str | dt.date | None) -> dt.date:
 
 
 def day_origin(given: str | dt.date | None, giver: str) -> str:
-    """Where the day of waivers comes from: who gives one, else the environment, else the clock."""
+    """Origin of the day of waivers: the giver of `given`, or else the environment, or else the clock."""
     if given is not None:
         return giver
     return "environment, SOURCE_DATE_EPOCH" if os.environ.get("SOURCE_DATE_EPOCH") else DAY_OF_RUN
@@ -104,42 +104,42 @@ def check(
     Parameters
     ----------
     mission : Mission
-        Of `load`, `loads` or `Mission.replace`.
+        A result of `load`, `loads` or `Mission.replace`.
     model : str, optional
-        `published`, `full` or `strictest` in place of the mission's own.
+        `published`, `full` or `strictest` in place of the mission's model.
     date : str or date, optional
-        Day on which waivers are judged; omitted: that of SOURCE_DATE_EPOCH, else today, UTC.
+        Day on which waivers are judged; by default the day of SOURCE_DATE_EPOCH, or else today, UTC.
     monte_carlo : int, optional
-        Also draw the errors so often, and report how often each requirement holds; `seed` is as of `monte_carlo`.
+        Number of draws of the errors, to report how often each requirement holds; `seed` is as in `monte_carlo`.
     verify : bool
-        Also form images at the limits, and judge by them.
+        Whether to form images at the limits, and to judge by them too.
     sweep : mapping, optional
-        For the report: other values of one key or two, as of `sweep`.
+        For the report: further values of one key or two, as in `sweep`.
     outside : Outside, optional
-        Where model and day come from; omitted: the caller.
+        Origins of model and day; by default the caller.
 
     Raises
     ------
     MissionError
-        The model is none.
+        The model is unknown.
     QuestionError
-        The sweep cannot be asked of this mission.
+        The mission cannot answer the sweep.
     """
     from bisar_budget.front.results import CheckResult
 
-    today, given = day_of(date), outside or outside_of(model, date)
+    today, influences = day_of(date), outside or outside_of(model, date)
     if model is not None:
         mission = parse_mission(mission.data, mission.file, model, changes=mission.changes)
-    found = check_mission(mission, today, outside=given)
+    findings = check_mission(mission, today, outside=influences)
     if monte_carlo is not None:
         from bisar_budget.sampling.probability import monte_carlo as drawn
 
-        found = found._replace(monte_carlo=drawn(found.analysed(), *drawn_here(monte_carlo, seed)))
+        findings = findings._replace(monte_carlo=drawn(findings.analysed(), *drawn_here(monte_carlo, seed)))
     if verify:
-        found = cast("MissionFindings", with_images([found], today, is_illustrated=True)[0])
+        findings = cast("MissionFindings", with_images([findings], today, is_illustrated=True)[0])
     if sweep:
-        found = cast("MissionFindings", with_studies([found], sweep, model, today)[0])
-    return CheckResult(found, model, today)
+        findings = cast("MissionFindings", with_studies([findings], sweep, model, today)[0])
+    return CheckResult(findings, model, today)
 
 
 # ---------------------------------------------------------------------- many files
@@ -155,7 +155,7 @@ def checked(
     swept: Sequence[str] = (),
     is_illustrated: bool = False,
 ) -> list[CheckedMission]:
-    """Check files, with all that a report shows.
+    """Check files, with all content of a report.
 
     Parameters
     ----------
@@ -164,28 +164,28 @@ def checked(
     today : date
         Day on which waivers are judged, UTC.
     model, changes, outside
-        As of `check_files`.
+        As in `check_files`.
     drawn : Draws, optional
-        Of a Monte Carlo.
+        Draws of a Monte Carlo.
     is_verified : bool
         Whether images at the limits add their verdicts.
     swept : sequence of str
         Texts `KEY=VALUES` of a study.
     is_illustrated : bool
-        Whether the report has room for pictures: analyses and images are kept, sheets of specifications added.
+        Whether the report can show pictures: analyses and images are kept, sheets of specifications are added.
 
     Raises
     ------
     QuestionError
-        The study cannot be asked of a mission; the message begins with its file.
+        A mission cannot answer the study; the message begins with its file.
     """
     keep = whole if is_verified or is_illustrated else without_analysis
-    found = check_files(files, today, model, keep, drawn=drawn, changes=changes, outside=outside)
+    results = check_files(files, today, model, keep, drawn=drawn, changes=changes, outside=outside)
     if is_verified:
-        found = with_images(found, today, is_illustrated=is_illustrated)
+        results = with_images(results, today, is_illustrated=is_illustrated)
     if swept:
-        found = with_studies(found, swept, model, today)
-    return with_sheets(found, model, today) if is_illustrated else found
+        results = with_studies(results, swept, model, today)
+    return with_sheets(results, model, today) if is_illustrated else results
 
 
 def pieces(
@@ -198,14 +198,14 @@ def pieces(
     changes: Sequence[SetValue] = (),
     outside: Outside = NOTHING_OUTSIDE,
 ) -> list[Piece]:
-    """Check files for a report that is joined of a text for each mission: no findings are kept."""
+    """Check files for a report that is joined from one text per mission; no findings are kept."""
     keep = partial(piece, format_name=format_name, style=style)
     return check_files(files, today, model, keep, changes=changes, outside=outside)
 
 
 # ---------------------------------------------------------------------- draws
 def drawn_here(draws: int, seed: int | None) -> Draws:
-    """Draws that this process makes, seen by who waits."""
+    """Draws that this process makes, with a progress bar."""
     from bisar_budget.sampling.draws import in_turn
 
     return Draws(draws, seed, partial(_watched, in_turn, None))
@@ -215,7 +215,7 @@ def drawn_here(draws: int, seed: int | None) -> Draws:
 def drawn_by(
     scheduler: str | None, patience: int, draws: int | None, seed: int | None, files: int
 ) -> "Iterator[Draws | None]":
-    """Say who makes the draws of so many files, the workers of a scheduler at hand; None where none are asked for."""
+    """Yield the draws for a number of files, made here or by the workers of a scheduler; None without draws."""
     if draws is None:
         yield None
         return
@@ -224,12 +224,12 @@ def drawn_by(
     with workers_of(scheduler, patience) as workers:
         if workers is not None:
             yield Draws(draws, seed, partial(_watched, partial(shared_out, mapped=workers.mapped), workers))
-        else:  # files that processes share out draw for themselves
+        else:  # processes that share files make their own draws
             yield Draws(draws, seed) if files >= FILES_FOR_TWO_PROCESSES else drawn_here(draws, seed)
 
 
 def _watched(make: "Share", workers: "Workers | None", drawing: "Drawing") -> "Iterator[tuple[DrawsPiece, Tally]]":
-    """Pass on the pieces of draws that `make` gives; say how long they will take, and how far they are."""
+    """Pieces of draws from `make`, with an announcement of a long time, and with progress."""
     from bisar_budget.sampling.draws import Drawer, DrawsPiece
 
     if drawing.draws > _MANY_DRAWS and drawing.judged:
@@ -240,20 +240,20 @@ def _watched(make: "Share", workers: "Workers | None", drawing: "Drawing") -> "I
             drawer.tally(DrawsPiece(0, count))
             return perf_counter() - began
 
-        seconds = foreseen(drawing.draws, trial, _FEW_DRAWS, min(drawing.chunk, drawing.draws))
+        seconds = foreseen(drawing.draws, trial, _TRIAL_DRAWS, min(drawing.chunk, drawing.draws))
         threads = max(workers.threads, 1) if workers else 1
         foretell(seconds / threads, f"{drawing.draws:,} draws of {printable(drawing.name)}")
     done = 0
-    with watched("Drawing errors") as told:
+    with watched("Drawing errors") as report_progress:
         for piece, tally in make(drawing):
             yield piece, tally
             done += piece.stop - piece.start
-            told(done, drawing.draws)
+            report_progress(done, drawing.draws)
 
 
 # ---------------------------------------------------------------------- images
 def with_images(missions: Sequence[CheckedMission], today: dt.date, *, is_illustrated: bool) -> list[CheckedMission]:
-    """Add the verdicts of images, and where pictures are shown the images of the rows that decide most."""
+    """Missions with verdicts of images, and for illustrated reports with the images of the deciding rows."""
     from bisar_budget.budget.verdicts import with_verdicts
     from bisar_budget.front import imaging
     from bisar_budget.verifier.limits import form_image_evidence
@@ -276,12 +276,14 @@ def with_images(missions: Sequence[CheckedMission], today: dt.date, *, is_illust
 def with_studies(
     missions: Sequence[CheckedMission], asked: Sequence[str] | Mapping[str, Any], model: str | None, today: dt.date
 ) -> list[CheckedMission]:
-    """Add to each mission that can be used what a sweep of it finds; `asked` are texts `KEY=VALUES`, or a mapping.
+    """Missions with a study: the results of a sweep of each usable mission.
+
+    `asked` are texts `KEY=VALUES`, or a mapping.
 
     Raises
     ------
     QuestionError
-        One cannot be asked; the message begins with its file.
+        A mission cannot answer the sweep; the message begins with its file.
     """
     from bisar_budget.design.table import listed
     from bisar_budget.findings.trade import TradeStudy
@@ -299,9 +301,9 @@ def with_studies(
             progress(done, total)
 
         for mission, cases in zip(usable, all_cases, strict=True):
-            again = partial(gathered, mission, cases, model, today)
-            trade = _of(mission, again, (), advance).trade()
-            rows = _of(mission, uses_of_rows, trade, again)
+            check_again = partial(gathered, mission, cases, model, today)
+            trade = _of(mission, check_again, (), advance).trade()
+            rows = _of(mission, uses_of_rows, trade, check_again)
             counts = Counter(trade.values["status"].ravel().tolist())
             waivers = trade.values["waived_by"].ravel().tolist()
             study = TradeStudy(
@@ -318,12 +320,12 @@ def with_studies(
                 model=model,
             )
             studies.append(study)
-    left = iter(studies)
-    return [one._replace(study=next(left)) if isinstance(one, MissionFindings) else one for one in missions]
+    next_study = iter(studies)
+    return [each._replace(study=next(next_study)) if isinstance(each, MissionFindings) else each for each in missions]
 
 
 def _of(mission: Mission, ask: Callable[..., Any], *arguments: Any) -> Any:
-    """An answer about a mission; what cannot be asked names its file."""
+    """Answer of a function about a mission; the message of a `QuestionError` begins with the mission's file."""
     try:
         return ask(*arguments)
     except QuestionError as error:
@@ -331,16 +333,16 @@ def _of(mission: Mission, ask: Callable[..., Any], *arguments: Any) -> Any:
 
 
 def study_cases(mission: Mission, asked: Sequence[str] | Mapping[str, Any]) -> "Cases":
-    """Cases of a study: each key has several values, and a page can show them all."""
+    """Cases of a study: several values of each key, at most `MAX_CASES` cases."""
     from bisar_budget.design.cases import grid
     from bisar_budget.front.missions import grid_of
 
     if len(asked) > MAX_KEYS:
         raise QuestionError(f"{_OPTION} draws one key or two, and there are {len(asked)}.")
     cases = grid_of(mission, asked) if isinstance(asked, Mapping) else grid(tree_of(mission), asked, _OPTION)
-    for one, size in zip(cases.varied, cases.shape, strict=True):
+    for varied, size in zip(cases.varied, cases.shape, strict=True):
         if size < 2:
-            raise QuestionError(f"{_OPTION} {one.key}: has one value; accepted: several. --set puts in one")
+            raise QuestionError(f"{_OPTION} {varied.key}: has one value; accepted: several. --set puts in one")
     if cases.count > MAX_CASES:
         raise QuestionError(
             f"{_OPTION}: {cases.count} cases; accepted: up to {MAX_CASES}, for which a page has room. "
@@ -358,22 +360,24 @@ def gathered(
     advance: Callable[[int], None] = lambda _: None,
     jobs: int | None = None,
 ) -> "Gathered":
-    """Check all cases, and gather what a drawing needs, and some columns; `advance` is told how many are done."""
+    """Check all cases, and gather columns for a drawing; `advance` gets the number of cases of each finished part."""
     from bisar_budget.design.sweep import Asked
     from bisar_budget.report.drawing.trades import Gathered
     from bisar_budget.report.tables import Described
 
     swept = Asked(mission, cases, columns=columns, model=model, today=today).checked(jobs or cores())
-    found = Gathered(Described(swept, cases, mission, __version__), ("binding_requirement", "waived_by", *columns))
+    drawing_data = Gathered(
+        Described(swept, cases, mission, __version__), ("binding_requirement", "waived_by", *columns)
+    )
     for part in swept.parts:
-        found.add(part)
+        drawing_data.add(part)
         advance(part.stop - part.start)
-    return found
+    return drawing_data
 
 
 # ---------------------------------------------------------------------- specifications
 def with_sheets(missions: Sequence[CheckedMission], model: str | None, today: dt.date) -> list[CheckedMission]:
-    """Add the sheet of specifications to each mission whose file names what to specify, or say why there is none."""
+    """Missions with sheets of specifications, if their files have `allocation.specify`, or with a warning."""
     return [_with_sheet(found, model, today) if isinstance(found, MissionFindings) else found for found in missions]
 
 
@@ -386,5 +390,5 @@ def _with_sheet(found: MissionFindings, model: str | None, today: dt.date) -> Mi
     try:
         return found._replace(sheet=allocate(mission, model=model, today=today))
     except QuestionError as error:
-        said = FileWarning(mission.line(("allocation", "specify")), no_specifications(str(error)))
-        return found._replace(warnings=(*found.warnings, said))
+        warning = FileWarning(mission.line(("allocation", "specify")), no_specifications(str(error)))
+        return found._replace(warnings=(*found.warnings, warning))

@@ -27,12 +27,12 @@ if TYPE_CHECKING:
 
 
 def verify(mission: Mission, only: str = "*", *, jobs: int | None = None) -> VerifyResult:
-    """Form images at the limits of a mission, and measure whether they are true.
+    """Form images at the limits of a mission, and measure whether the limits are true.
 
     Parameters
     ----------
     mission : Mission
-        As of `check`.
+        As in `check`.
     only : str
         Glob of row ids.
     jobs : int, optional
@@ -43,8 +43,8 @@ def verify(mission: Mission, only: str = "*", *, jobs: int | None = None) -> Ver
     QuestionError
         No row with a limit has such an id.
     """
-    (found,) = verify_all([mission], only, jobs, outside=outside_of(None, None))
-    return VerifyResult(found)
+    (verified,) = verify_all([mission], only, jobs, outside=outside_of(None, None))
+    return VerifyResult(verified)
 
 
 def verify_all(
@@ -55,43 +55,45 @@ def verify_all(
     *,
     outside: Outside = NOTHING_OUTSIDE,
 ) -> list[VerifiedMission]:
-    """Verify missions in processes here, or on workers of a scheduler; arguments and faults are those of `verify`."""
+    """Verify missions in processes here, or on workers of a scheduler; arguments and errors are as in `verify`."""
     total = sum(len(rows_to_verify(mission, only)) for mission in missions)
     if not total and only != "*":
-        listed = where_ids_are(missions[0].file)
-        raise QuestionError(f"--only {printable(only)}: no row with a limit matches, nothing was verified; {listed}.")
+        where_listed = where_ids_are(missions[0].file)
+        raise QuestionError(
+            f"--only {printable(only)}: no row with a limit matches, nothing was verified; {where_listed}."
+        )
     jobs = workers.threads if workers else jobs or (1 if is_compiled() else cores())
     seconds = sum(seconds_to_verify(mission, only, jobs) for mission in missions)
     advice = "--only looks at some of them" + faster(None if workers else jobs)
     foretell(seconds, f"Forming the images of {total} rows", advice)
-    found: list[VerifiedMission] = []
+    verified_missions: list[VerifiedMission] = []
     with watched(FORMING) as progress:
         for mission in missions:
-            before = sum(len(one.rows) for one in found)
+            before = sum(len(verified.rows) for verified in verified_missions)
 
             def formed(done: int, _: int, before: int = before) -> None:
                 progress(before + done, total)
 
             images = verify_mission(mission, only, jobs, formed, workers.mapped if workers else None)
-            said = overrides(mission._replace(waivers=()), outside, date.min)  # images waive nothing
-            found.append(images._replace(overrides=said))
-    return found
+            options = overrides(mission._replace(waivers=()), outside, date.min)  # images waive nothing
+            verified_missions.append(images._replace(overrides=options))
+    return verified_missions
 
 
 def faster(jobs: int | None = None) -> str:
-    """Say what would make image formation faster here."""
+    """Advice for faster image formation on this machine; empty if there is none."""
     if not is_compiled():
         return f", and {install_command('fast')} makes it tens of times faster"
     return f", --jobs {cores()} uses all cores" if jobs is not None and 1 < jobs < cores() else ""
 
 
 def standing(targets: str | None) -> Targets:
-    """Targets that a text says; one point at the scene's centre without it.
+    """Targets of a text; without a text a point at the scene's centre.
 
     Raises
     ------
     QuestionError
-        It says none; the message begins with `--targets`.
+        The text has no valid targets; the message begins with `--targets`.
     """
     try:
         return Targets() if targets is None else parse_targets(targets)
@@ -107,18 +109,18 @@ def simulate(
     Parameters
     ----------
     mission : Mission
-        As of `check`.
+        As in `check`.
     targets : str, optional
-        What stands in the scene, as `simulate --targets` has it; omitted: one point at its centre.
+        Targets in the scene, as in `simulate --targets`; by default a point at the scene's centre.
     image_former : str
         `backprojection`, `polar_format`, `matched_filter` or `far_field`.
 
     Raises
     ------
     QuestionError
-        The targets are none.
+        The targets are invalid.
     SimulationError
-        The images cannot be formed as asked; says what to change.
+        The images cannot be formed with these arguments; the message says what to change.
     """
 
     def foreseen(seconds: float) -> None:

@@ -1,4 +1,4 @@
-"""Missions from files and texts, and the values that a sweep gives them."""
+"""Missions from files and texts, and the cases of sweeps."""
 
 import os
 from collections.abc import Mapping, Sequence
@@ -28,12 +28,12 @@ def load(path: str | os.PathLike[str]) -> Mission:
     Parameters
     ----------
     path : path
-        Of a YAML file; files that it names are looked for beside it.
+        Path of a YAML file; names of files in it are relative to its folder.
 
     Raises
     ------
     MissionError
-        The file cannot be used; `faults` has what is wrong, and where.
+        The file cannot be used; `faults` has every fault with its line.
     """
     return load_mission(os.fspath(path))
 
@@ -44,21 +44,21 @@ def loads(text: str | bytes, file: str = "mission.yaml") -> Mission:
     Parameters
     ----------
     text : str or bytes
-        What a mission file would have.
+        Content of a mission file.
     file : str
-        What messages call it; files that it names are looked for beside it.
+        Name for messages; names of files in the text are relative to its folder.
 
     Raises
     ------
     MissionError
-        The text cannot be used; `faults` has what is wrong, and where.
+        The text cannot be used; `faults` has every fault with its line.
     """
     return parse_mission(text, file)
 
 
 @dataclass(frozen=True)
 class Spaced:
-    """Values of a key from one to another, as `linspace` and `geomspace` give them, in the unit of the texts."""
+    """Evenly spaced values of a key, as `linspace` and `geomspace` return them, in the unit of the texts."""
 
     start: str
     stop: str
@@ -66,12 +66,12 @@ class Spaced:
     is_log: bool = False
 
     def of(self, key: str) -> str:
-        """The same as `sweep --vary` has it."""
+        """Text of the values for `sweep --vary`."""
         return f"{key}={self.start}:{self.stop}:{self.count}" + (":log" if self.is_log else "")
 
 
 def linspace(start: Any, stop: Any, count: int) -> Spaced:
-    """So many values from one to another at even distances, both included, for `sweep`.
+    """`count` values from `start` to `stop` at even distances, both included, for `sweep`.
 
     Parameters
     ----------
@@ -84,62 +84,62 @@ def linspace(start: Any, stop: Any, count: int) -> Spaced:
 
 
 def geomspace(start: Any, stop: Any, count: int) -> Spaced:
-    """So many values from one to another in equal ratios; arguments are those of `linspace`, above zero."""
+    """`count` values from `start` to `stop` in equal ratios; arguments are as in `linspace`, and above zero."""
     return Spaced(text_of("", start), text_of("", stop), count, is_log=True)
 
 
 def cases_of(mission: Mission, values: Mapping[str, Any] | str | os.PathLike[str], paired: bool = False) -> Cases:
-    """The cases of a sweep: every combination of the values of each key, the last key the fastest; or of a file.
+    """The cases of a sweep: every combination of the values of each key, the last key the fastest, or a file's cases.
 
     Parameters
     ----------
     mission : Mission
         As loaded.
     values : mapping or path
-        Of each key a range of `linspace`, an array of numbers in SI, a quantity that holds an array, or a list of
+        For each key a range of `linspace`, an array of numbers in SI, a quantity that holds an array, or a list of
         texts: values with units, or words. Or a CSV file, whose header has a `KEY [unit]` for each column.
     paired : bool
-        Each case takes one value of every key, instead of every combination.
+        Whether each case takes one value of every key, instead of every combination.
 
     Raises
     ------
     QuestionError
-        No such key, no number or word for it, no value, pairs of different length; of a file a `TableError`, which
-        has a line for each fault.
+        A key is unknown or has neither number nor word, a key has no values, or pairs differ in length. For a file it
+        is a `TableError`, which has a line for each fault.
     """
     if not isinstance(values, Mapping):
         return table_file(tree_of(mission), os.fspath(values))
     if not values:
         raise QuestionError("no key varies; accepted: values of one key or more")
-    found = grid_of(mission, values)
+    cases = grid_of(mission, values)
     if not paired:
-        return found
-    if len(set(found.shape)) > 1:
+        return cases
+    if len(set(cases.shape)) > 1:
         raise QuestionError(f"{', '.join(values)}: differ in length; accepted: one value of each for every case")
-    return replace(found, is_grid=False)
+    return replace(cases, is_grid=False)
 
 
 def grid_of(mission: Mission, values: Mapping[str, Any]) -> Cases:
-    """Every combination of values of keys, as `cases_of` takes them."""
+    """Every combination of values of keys; `values` is as in `cases_of`."""
     tree = tree_of(mission)
-    each = [_axis(tree, key, given) for key, given in values.items()]
-    return Cases(tuple(one.varied[0] for one in each), tuple(one.columns[0] for one in each), is_grid=True)
+    axes = [_axis(tree, key, axis_values) for key, axis_values in values.items()]
+    return Cases(tuple(axis.varied[0] for axis in axes), tuple(axis.columns[0] for axis in axes), is_grid=True)
 
 
 def cases_of_texts(mission: Mission, texts: Sequence[str], sample: str | None = None) -> Cases:
-    """The cases of texts such as `collection.aperture_time=1:5s:101`; every combination, or a sample of them."""
+    """Cases of texts such as `collection.aperture_time=1:5s:101`: every combination, or a sample of them."""
     tree = tree_of(mission)
     return grid(tree, texts) if sample is None else sample_of(tree, texts, sample)
 
 
-def _axis(tree: dict[str, Any], key: str, given: Any) -> Cases:
+def _axis(tree: dict[str, Any], key: str, values: Any) -> Cases:
     """The values of one key."""
-    if isinstance(given, Spaced):
-        return grid(tree, [given.of(key)], "sweep")
-    if isinstance(given, str):
-        return grid(tree, [f"{key}={given}"], "sweep")
-    if isinstance(given, Sequence) and any(isinstance(one, str) or is_quantity(one) for one in given):
-        return grid(tree, [f"{key}={','.join(text_of('', one) for one in given)}"], "sweep")
-    if is_quantity(given):
-        given = np.atleast_1d(magnitude(given, number_of(tree, key).dimension.si))
-    return grid_of_arrays(tree, {key: given})
+    if isinstance(values, Spaced):
+        return grid(tree, [values.of(key)], "sweep")
+    if isinstance(values, str):
+        return grid(tree, [f"{key}={values}"], "sweep")
+    if isinstance(values, Sequence) and any(isinstance(value, str) or is_quantity(value) for value in values):
+        return grid(tree, [f"{key}={','.join(text_of('', value) for value in values)}"], "sweep")
+    if is_quantity(values):
+        values = np.atleast_1d(magnitude(values, number_of(tree, key).dimension.si))
+    return grid_of_arrays(tree, {key: values})

@@ -1,4 +1,4 @@
-"""How long work will take, who shares it, and how far it is: a bar in a notebook or a terminal, nothing elsewhere."""
+"""Time, workers and progress of long work: a bar in a notebook or a terminal, no output elsewhere."""
 
 import sys
 from collections.abc import Callable, Iterator
@@ -17,19 +17,19 @@ if TYPE_CHECKING:
     from bisar_budget.cluster.scheduler import Workers
     from bisar_budget.workers import Progress
 
-LONG = 60.0  # s; what takes longer is announced
+LONG = 60.0  # [s]; work that takes longer is announced
 FORMING = "Forming images"  # label of a bar
-_MOMENT = 1.0  # s; what is done before has no bar
-_TRIAL = 0.3  # s; a shorter one is too short to measure
-_LARGER = 3  # times as much, the next trial
+_MOMENT = 1.0  # [s]; work that is done earlier has no bar
+_LEAST_TRIAL_S = 0.3  # a shorter trial is too short to measure
+_TRIAL_GROWTH_FACTOR = 3  # size of a trial over the size of the trial before
 
-# Takes what somebody who waits is to know; a caller from Python sees the bar alone.
+# Function that shows a message to the user who waits; a caller from Python sees only the bar.
 SAYING: ContextVar[Callable[[str], None]] = ContextVar("SAYING", default=lambda _: None)
 
 
 @contextmanager
 def watched(label: str) -> "Iterator[Progress]":
-    """Give what takes how far long work is; a bar with the time left shows it, where somebody watches."""
+    """Yield a function that takes the progress of long work, and shows a bar with the remaining time to a watcher."""
     began, bars = monotonic(), list[Any]()
 
     def progress(done: int, total: int) -> None:
@@ -50,28 +50,29 @@ def watched(label: str) -> "Iterator[Progress]":
 
 
 def _is_notebook() -> bool:
-    """Whether a kernel of Jupyter runs this; that its modules are there is not enough."""
+    """Whether a Jupyter kernel runs this process; imported modules of Jupyter alone are not enough."""
     shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
     return hasattr(shell, "kernel")
 
 
 def _bar(label: str, total: int, is_notebook: bool) -> Any:
+    """A bar of tqdm, for a notebook or a terminal."""
     has_widgets = is_notebook and find_spec("ipywidgets") is not None
     kind = import_module("tqdm.notebook").tqdm_notebook if has_widgets else import_module("tqdm").tqdm
-    # A thread that looks after bars, and a lock between processes, would outlive what forks here. Bars of the caller
-    # keep theirs.
-    own = type("Bar", (kind,), {"monitor_interval": 0, "_lock": RLock()})
-    return own(total=total, desc=label, leave=not is_notebook, **({} if has_widgets else {"file": sys.stderr}))
+    # The monitor thread of tqdm, and its lock between processes, would not survive a fork. The class is our own, so
+    # that bars of the caller keep theirs.
+    bar_class = type("Bar", (kind,), {"monitor_interval": 0, "_lock": RLock()})
+    return bar_class(total=total, desc=label, leave=not is_notebook, **({} if has_widgets else {"file": sys.stderr}))
 
 
 @contextmanager
 def watched_checks(name: str) -> "Iterator[Progress]":
-    """Give what takes how many checks of a mission are done, and how many there will be.
+    """Yield a function that takes the number of finished checks of a mission, and the expected number.
 
-    The second time it is told says how long all will take: the first imports what it needs.
+    The second call estimates the time of all checks, because the first check also imports modules.
     """
     since, calls, before = monotonic(), 0, 0
-    with watched("Checking values") as shown:
+    with watched("Checking values") as show_progress:
 
         def progress(done: int, total: int) -> None:
             nonlocal since, calls, before
@@ -81,13 +82,13 @@ def watched_checks(name: str) -> "Iterator[Progress]":
                 seconds = (now - since) / max(1, done - before) * total
                 foretell(seconds, doing, "fewer declared errors and --model published take less")
             since, before = now, done
-            shown(done, total)
+            show_progress(done, total)
 
         yield progress
 
 
 def lasting(seconds: float) -> str:
-    """Say how long something takes."""
+    """A time in words."""
     for unit, size in (("years", 365.25 * 86400), ("days", 86400), ("hours", 3600), ("minutes", 60)):
         if seconds >= 2 * size:
             return f"{seconds / size:.0f} {unit}"
@@ -95,27 +96,27 @@ def lasting(seconds: float) -> str:
 
 
 def foretell(seconds: float, doing: str, advice: str = "") -> None:
-    """Say to who waits that something will take long, and what to change."""
+    """Tell the user who waits that work will take long, and what to change."""
     if seconds > LONG:
         SAYING.get()(f"{doing} will take about {lasting(seconds)}{'; ' if advice else ''}{advice}.")
 
 
 def foreseen(count: int, trial: Callable[[int], float], few: int, most: int) -> float:
-    """How long so many of something will take, by trials of `few` to `most`, which say how long they took. [s]"""
-    trial(few)  # it imports and makes what the others find
+    """Estimated time of `count` items, by trials of `few` to `most` items that return their times. [s]"""
+    trial(few)  # imports modules and fills caches
     tried, seconds = few, trial(few)
     while True:
-        before, tried = seconds, _LARGER * tried
+        before, tried = seconds, _TRIAL_GROWTH_FACTOR * tried
         seconds = trial(tried)
-        if seconds > _TRIAL or _LARGER * tried > most:
+        if seconds > _LEAST_TRIAL_S or _TRIAL_GROWTH_FACTOR * tried > most:
             break
-    # Few take their time too, but not once more for each part of them all.
-    return count * max((seconds - before) / (tried - tried / _LARGER), seconds / tried / 10)
+    # The increment between trials leaves out the fixed time of a trial.
+    return count * max((seconds - before) / (tried - tried / _TRIAL_GROWTH_FACTOR), seconds / tried / 10)
 
 
-# ---------------------------------------------------------------------- who shares it
+# ---------------------------------------------------------------------- workers
 def workers_of(scheduler: str | None, patience: int) -> "AbstractContextManager[Workers | None]":
-    """Give the workers of a scheduler, None where none is named; `patience` is how long it may have no worker. [s]"""
+    """Workers of a scheduler, None without a scheduler; `patience` is the longest time without a worker. [s]"""
     if scheduler is None:
         return nullcontext()
     from bisar_budget.cluster.scheduler import connected
@@ -124,7 +125,7 @@ def workers_of(scheduler: str | None, patience: int) -> "AbstractContextManager[
 
 
 def hold_to_tables() -> None:
-    """Refuse to keep parts without the libraries that write them."""
+    """Raise an error if the libraries that write parts are not installed."""
     from bisar_budget.cluster.parts_folder import check_libraries
 
     check_libraries("--resume", OF_TABLES, "tables", "pyarrow")

@@ -1,4 +1,4 @@
-"""Questions of a mission that are answered by many checks: sweeps, solutions, specifications, passes, draws."""
+"""Questions about a mission that need many checks: sweeps, solutions, specifications, passes, draws."""
 
 import datetime as dt
 import math
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 def _judged(
     mission: Mission, model: str | None, date: str | dt.date | None, outside: Outside | None
 ) -> tuple[dt.date, tuple[Override, ...]]:
-    """Day on which waivers are judged, and what from outside the file bears on the verdict."""
+    """Day on which waivers are judged, and the influences on the verdict from outside the file."""
     if model not in (None, *GATING_MODELS):
         raise QuestionError(f"--model {printable(str(model))}: accepted: {', '.join(GATING_MODELS)}")
     today = day_of(date)
@@ -63,29 +63,29 @@ def sweep(
     Parameters
     ----------
     mission : Mission
-        As of `check`.
+        As in `check`.
     values : mapping, path or cases
         By the path of a key, such as `collection.aperture_time`: `linspace("1 s", "5 s", 101)`, an array of numbers
         in SI, a quantity that holds an array, a list of texts with units, or of words such as parts of the catalogue.
         Or the path of a CSV file, whose header has a `KEY [unit]` for each column.
     paired : bool
-        Each case takes one value of every key, instead of every combination.
+        Whether each case takes one value of every key, instead of every combination.
     columns : str or sequence of str
-        Columns more, `ROW.FIELD` such as `receiver.velocity.x.allowable`.
+        Further columns, `ROW.FIELD` such as `receiver.velocity.x.allowable`.
     model, date, outside
-        As of `check`.
+        As in `check`.
     jobs : int, optional
         Processes, for cases that are read one by one; omitted: the number of cores.
 
     Raises
     ------
     QuestionError
-        No such key, no value for it, no such column.
+        A key or a column is unknown, or a key has no value.
     """
-    today, said = _judged(mission, model, date, outside)
+    today, influences = _judged(mission, model, date, outside)
     cases = cases_of(mission, values, paired) if isinstance(values, Mapping | str | os.PathLike) else values
-    more = (columns,) if isinstance(columns, str) else tuple(columns)
-    return SweepResult(mission, cases, more, model, today, jobs or cores(), said)
+    further_columns = (columns,) if isinstance(columns, str) else tuple(columns)
+    return SweepResult(mission, cases, further_columns, model, today, jobs or cores(), influences)
 
 
 def solve(
@@ -106,47 +106,47 @@ def solve(
     Parameters
     ----------
     mission : Mission
-        As of `check`.
+        As in `check`.
     key : str
-        Path of the number, such as `collection.aperture_time`. Of `platforms.receiver.motion_error.sensor` and the
+        Path of the number, such as `collection.aperture_time`. For `platforms.receiver.motion_error.sensor` and the
         like every part of the catalogue is tried.
     between : pair, optional
-        Range to look at, `("0.2 s", "20 s")`; omitted: a tenth to ten times the file's value, of an azimuth the
-        circle.
+        Range of the search, `("0.2 s", "20 s")`; by default a tenth to ten times the file's value, and for an azimuth
+        the circle.
     scale : bool
-        The key is a section of errors: solve for the factor that multiplies all of them.
+        Whether to solve for a factor that multiplies all errors of a section; the key names the section.
     row : str, optional
         The row that has to comply, instead of the whole mission.
     target : str
         What must not happen: `fail`, or also `warn`.
     verify : bool
-        Form images of the row that binds at the solution.
+        Whether to form images of the binding row at the solution.
     model, date, outside
-        As of `check`.
+        As in `check`.
 
     Raises
     ------
     QuestionError
-        The question cannot be asked of this mission.
+        The mission cannot answer the question.
     """
     from bisar_budget.design.compare import compare_parts, is_of_parts
     from bisar_budget.design.solve import solve as solved
 
-    today, said = _judged(mission, model, date, outside)
+    today, influences = _judged(mission, model, date, outside)
     if target not in TARGETS:
         raise QuestionError(f"--target {printable(str(target))}: accepted: {' or '.join(TARGETS)}")
     if between is not None and not isinstance(between, str):
-        between = "..".join(text_of("", one) for one in between)
-    how: dict[str, Any] = {"row": row, "target": target, "model": model, "today": today}
+        between = "..".join(text_of("", end) for end in between)
+    arguments: dict[str, Any] = {"row": row, "target": target, "model": model, "today": today}
     hold_to_parts(key, between, scale)
-    found: Solution | Comparison
+    solution: Solution | Comparison
     with watched_checks(mission.name) as progress:
         if is_of_parts(key):
-            found = compare_parts(mission, key, **how, progress=progress)
+            solution = compare_parts(mission, key, **arguments, progress=progress)
         else:
-            found = solved(mission, key, between=between, is_scale=scale, **how, progress=progress)
-    found = found._replace(overrides=said)
-    return SolveResult(_imaged(mission, found, model) if verify else found)
+            solution = solved(mission, key, between=between, is_scale=scale, **arguments, progress=progress)
+    solution = solution._replace(overrides=influences)
+    return SolveResult(_imaged(mission, solution, model) if verify else solution)
 
 
 def hold_to_parts(key: str, between: object, scale: bool) -> None:
@@ -155,7 +155,7 @@ def hold_to_parts(key: str, between: object, scale: bool) -> None:
     Raises
     ------
     QuestionError
-        It is one.
+        The key names parts.
     """
     from bisar_budget.design.compare import is_of_parts
 
@@ -164,17 +164,17 @@ def hold_to_parts(key: str, between: object, scale: bool) -> None:
         raise QuestionError(f"{option}: {key} names parts of the catalogue, which are compared one by one.")
 
 
-def _imaged(mission: Mission, found: "Solution | Comparison", model: str | None) -> "Solution | Comparison":
-    """A solution with what images say of it."""
+def _imaged(mission: Mission, solution: "Solution | Comparison", model: str | None) -> "Solution | Comparison":
+    """A solution with the verdict of images."""
     from bisar_budget.design.imaged import imaged, to_image
     from bisar_budget.front.imaging import faster
 
-    asked = to_image(mission, found, model)
-    if asked is None:
-        return found
-    foretell(asked.seconds, f"Forming the images of {asked.row}", "without --verify none is formed" + faster())
+    case = to_image(mission, solution, model)
+    if case is None:
+        return solution
+    foretell(case.seconds, f"Forming the images of {case.row}", "without --verify none is formed" + faster())
     with watched(FORMING) as progress:
-        return found._replace(imaged=imaged(asked, progress))
+        return solution._replace(imaged=imaged(case, progress))
 
 
 def sensitivity(
@@ -185,13 +185,13 @@ def sensitivity(
     date: str | dt.date | None = None,
     outside: Outside | None = None,
 ) -> SensitivityResult:
-    """Rank the numbers of a mission by what they do to its worst utilization; arguments are those of `solve`."""
-    from bisar_budget.design.sensitivity import sensitivity as asked
+    """Rank the numbers of a mission by their effects on its worst utilization; arguments are as in `solve`."""
+    from bisar_budget.design.sensitivity import sensitivity as sensitivity_of
 
-    today, said = _judged(mission, model, date, outside)
+    today, influences = _judged(mission, model, date, outside)
     with watched_checks(mission.name) as progress:
-        found = asked(mission, row=row, model=model, today=today, progress=progress)
-    return SensitivityResult(found._replace(overrides=said))
+        effects = sensitivity_of(mission, row=row, model=model, today=today, progress=progress)
+    return SensitivityResult(effects._replace(overrides=influences))
 
 
 def allocate(
@@ -209,33 +209,33 @@ def allocate(
     Parameters
     ----------
     mission : Mission
-        As of `check`.
+        As in `check`.
     keys : str, sequence or mapping, optional
-        Keys of the errors to specify, or of each its weight, above 0; omitted: `allocation.specify` of the file, else
-        the usual.
+        Keys of the errors to specify, or positive weights by key; by default `allocation.specify` of the file, or
+        else the usual keys.
     reserve : float, optional
-        Part of every limit that is kept free, 0 to 1; omitted: what `allocation.warn_above` leaves.
+        Fraction of every limit that is kept free, 0 to 1; by default the fraction above `allocation.warn_above`.
     offer : Mission, optional
-        Whose figures are held to the specifications.
+        Mission whose figures are compared with the specifications.
     model, date, outside
-        As of `check`.
+        As in `check`.
 
     Raises
     ------
     QuestionError
-        The question cannot be asked of this mission.
+        The mission cannot answer the question.
     """
     from bisar_budget.design.allocate import allocate as allocated
     from bisar_budget.design.offers import offer as offered
 
-    today, said = _judged(mission, model, date, outside)
+    today, influences = _judged(mission, model, date, outside)
     if reserve is not None and not (isinstance(reserve, Real) and 0 <= reserve < 1):
         raise QuestionError(f"reserve {reserve!r}: accepted: a part from 0 to less than 1")
-    wanted = _weighted([keys] if isinstance(keys, str) else keys)
+    weights = _weighted([keys] if isinstance(keys, str) else keys)
     with watched_checks(mission.name) as progress:
-        found = allocated(mission, keys=wanted, reserve=reserve, model=model, today=today, progress=progress)
-    found = found._replace(overrides=said)
-    return AllocateResult(found, None if offer is None else offered(found, offer, today))
+        sheet = allocated(mission, keys=weights, reserve=reserve, model=model, today=today, progress=progress)
+    sheet = sheet._replace(overrides=influences)
+    return AllocateResult(sheet, None if offer is None else offered(sheet, offer, today))
 
 
 def _weighted(keys: Sequence[str] | Mapping[str, float] | None) -> Mapping[str, float] | None:
@@ -265,51 +265,51 @@ def passes(
     Parameters
     ----------
     mission : Mission or path
-        Of which a platform has an orbit. A file needs no `collection.center_time`.
+        A mission with an orbit. A file needs no `collection.center_time`.
     start : str or date, optional
-        Day of UTC to begin with, or an instant such as `2026-07-01T05:30:00Z`; omitted: the day of the check.
+        First day of UTC, or an instant such as `2026-07-01T05:30:00Z`; by default the day of the check.
     days : float
-        How many to look at.
+        Length of the span. [d]
     min_elevation, squint : str, float or quantity
         Least elevation seen from the scene, and the squint of the mid-time: texts with a unit, or radians.
     platform : str, optional
-        Whose passes: `transmitter` or `receiver`; omitted: the one that has an orbit, of two the transmitter.
+        Platform of the passes, `transmitter` or `receiver`; by default the first with an orbit.
     model, date, outside
-        As of `check`.
+        As in `check`.
 
     Raises
     ------
     QuestionError
-        The question cannot be asked of this mission.
+        The mission cannot answer the question.
     """
-    from bisar_budget.design.passes import passes as listed
+    from bisar_budget.design.passes import passes as find_passes
     from bisar_budget.design.passes import start_of
 
-    asked = mission if isinstance(mission, Mission) else load_mission(os.fspath(mission), is_placed=False)
-    today, said = _judged(asked, model, date, outside)
-    least, wanted = angle_of("--min-elevation", min_elevation, 0.0), angle_of("--squint", squint, -90.0)
+    loaded = mission if isinstance(mission, Mission) else load_mission(os.fspath(mission), is_placed=False)
+    today, influences = _judged(loaded, model, date, outside)
+    least, squint_rad = angle_of("--min-elevation", min_elevation, 0.0), angle_of("--squint", squint, -90.0)
     with watched("Checking passes") as progress:
-        found = listed(
-            asked,
+        found_passes = find_passes(
+            loaded,
             start_of(str(start) if start is not None else today.isoformat()),
             days=days,
             min_elevation=least,
-            squint=wanted,
+            squint=squint_rad,
             platform=platform,
             model=model,
             today=today,
             progress=progress,
         )
-    return PassesResult(found._replace(overrides=said), asked, model)
+    return PassesResult(found_passes._replace(overrides=influences), loaded, model)
 
 
 def angle_of(option: str, value: Any, least: float) -> float:
-    """An angle that an option asks for, from a least one [deg] to less than 90 deg. [rad]
+    """Angle of an option, from `least` [deg] to less than 90 deg. [rad]
 
     Raises
     ------
     QuestionError
-        It is none.
+        The value is no such angle.
     """
     bounds = {"ge": 0.0} if least == 0 else {"gt": math.radians(least)}
     text = text_of("rad", value)
@@ -325,15 +325,15 @@ def monte_carlo(mission: Mission, draws: int = 20_000, *, seed: int | None = Non
     Parameters
     ----------
     mission : Mission
-        As of `check`.
+        As in `check`.
     draws : int
-        How often.
+        Number of draws.
     seed : int, optional
-        Omitted: `simulation.seed` of the mission file, else 1. The same seed gives the same result.
+        By default `simulation.seed` of the mission file, or else 1. The same seed gives the same result.
 
     Raises
     ------
     ValueError
-        So many draws cannot be made.
+        The number of draws is too large or too small.
     """
     return MonteCarloResult(monte_carlo_of(Analysis(mission, is_complete=True), *drawn_here(draws, seed)))

@@ -1,4 +1,4 @@
-"""Answers of the front door: data, a line of `repr`, a table or a drawing in a notebook, rows as a data frame."""
+"""Answers of the Python interface: data, a line of `repr`, tables and drawings for notebooks, data frames of rows."""
 
 import json
 import os
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 _COMPLIES = ("fail", "pass")
 _HEADINGS = {"none": "fail", "waived": "waived"}  # of a solution, by its status
-_DECIDING = 12  # rows of a result that a notebook shows
+_MAX_SHOWN_ROWS = 12  # of a result in a notebook
 
 
 class MissingPackageError(ImportError):
@@ -57,34 +57,36 @@ def frame_of(columns: Mapping[str, Any], library: str | None = None) -> Any:
     Raises
     ------
     MissingPackageError
-        It is not installed, or neither is.
+        The library is not installed, or neither of the two is.
     """
-    wanted = (library,) if library else ("pandas", "polars")
-    for name in wanted:
+    libraries = (library,) if library else ("pandas", "polars")
+    for name in libraries:
         if find_spec(name) is not None:
             return import_module(name).DataFrame(dict(columns))
-    raise MissingPackageError(f"a data frame needs {' or '.join(wanted)}: pip install {wanted[0]}")
+    raise MissingPackageError(f"a data frame needs {' or '.join(libraries)}: pip install {libraries[0]}")
 
 
 def _frame_of_rows(rows: Sequence[Mapping[str, Any]], library: str | None) -> Any:
-    """A data frame of rows that are those of a document: its columns are the keys of the first."""
+    """A data frame of the rows of a document; the keys of the first row are the columns."""
     return frame_of({key: [row.get(key) for row in rows] for key in (rows[0] if rows else ())}, library)
 
 
 class Picture:
-    """A drawing: a notebook shows it, `save` writes a file, `of` gives the content of one.
+    """A drawing: a notebook shows it, `save` writes a file, `of` returns the content of a file.
 
     Parameters
     ----------
-    made : callable
-        From a kind of file, `svg`, `png` or `pdf`, to its bytes.
+    title : str
+        Title of the drawing.
+    draw : callable
+        Function of the kind of file, `svg`, `png` or `pdf`, that returns the content.
     """
 
-    def __init__(self, title: str, made: Callable[[str], bytes]) -> None:
-        self.title, self.of = title, made
+    def __init__(self, title: str, draw: Callable[[str], bytes]) -> None:
+        self.title, self.of = title, draw
 
     def __repr__(self) -> str:
-        """Its title, on one line."""
+        """Title of the drawing, on one line."""
         return f"Picture({self.title!r})"
 
     def _repr_html_(self) -> str:
@@ -110,7 +112,7 @@ def write_file(path: str, content: bytes) -> None:
     Raises
     ------
     ValueError
-        What is there is a named pipe, a socket or a device: it would wait, or never end.
+        The path is a named pipe, a socket or a device, which could wait or never end.
     """
     if kind := special_file(path):
         raise ValueError(f"cannot write {path}: {kind}; accepted: a regular file")
@@ -123,7 +125,7 @@ def write_file(path: str, content: bytes) -> None:
 class CheckResult(Mapping[str, Row]):
     """Findings of a check: its rows by their ids, in the order of the contract.
 
-    `findings` are all of them, as the reports have them; `model` and `day` are what they were asked with.
+    `findings` are those of the reports; `model` and `day` are the arguments of the check.
     """
 
     findings: MissionFindings
@@ -131,12 +133,12 @@ class CheckResult(Mapping[str, Row]):
     day: date
 
     def __repr__(self) -> str:
-        """Mission, status and how many rows have which, on one line."""
+        """Mission, status and number of rows of each status, on one line."""
         counts = ", ".join(f"{count} {status}" for status, count in self.findings.summary.items())
         return f"<check of {self.findings.name!r}: {self.status}; {counts}>"
 
     def __getitem__(self, row_id: str) -> Row:
-        """The row of an id, such as `receiver.velocity.y`."""
+        """The row with an id, such as `receiver.velocity.y`."""
         try:
             return self._rows[row_id]
         except KeyError:
@@ -171,13 +173,13 @@ class CheckResult(Mapping[str, Row]):
 
     @property
     def requirements(self) -> Mapping[str, JudgedRequirement]:
-        """Requirements of the file by their keys, each with its status and the row that decides it."""
-        return {one.key: one for one in self.findings.requirements}
+        """Requirements of the file by their keys, each with its status and the row that decides."""
+        return {requirement.key: requirement for requirement in self.findings.requirements}
 
     def to_dict(self) -> dict[str, Any]:
         """The document of `--format json`."""
-        found: dict[str, Any] = json.loads(render("json", self._report, Style()))
-        return found
+        document: dict[str, Any] = json.loads(render("json", self._report, Style()))
+        return document
 
     def to_dataframe(self, library: str | None = None) -> Any:
         """The rows as a data frame of pandas, or of polars; numbers in SI and radians.
@@ -197,19 +199,19 @@ class CheckResult(Mapping[str, Row]):
         Parameters
         ----------
         path : path
-            Of the file; pictures of .md go to a folder beside it.
+            Path of the file; pictures of .md go to a folder next to it.
         detail : str
             `summary`, or `full` with the annex.
 
         Raises
         ------
         ValueError
-            No format has the suffix.
+            The suffix belongs to no format.
         """
         name = os.fspath(path)
         form = format_of(name)
         if form is None:
-            suffixes = ", ".join(suffix for one in FORMATS.values() for suffix in one.suffixes)
+            suffixes = ", ".join(suffix for known_format in FORMATS.values() for suffix in known_format.suffixes)
             raise ValueError(f"{name}: the suffix must be one of {suffixes}")
         folder = f"{os.path.splitext(name)[0]}.assets" if FORMATS[form].has_pictures else ""
         style, shown = Style(detail=detail, assets=os.path.basename(folder)), self._report
@@ -228,51 +230,51 @@ class CheckResult(Mapping[str, Row]):
         return Report(version=__version__, missions=(self.findings,))
 
     def _repr_html_(self) -> str:
-        found = self.findings
+        findings = self.findings
         required = [
             (
-                one.name,
-                one.allowed,
-                one.reached,
-                one.use,
-                one.status,
-                ", ".join(filter(None, (one.decided_by, one.remark))),
+                line.name,
+                line.allowed,
+                line.reached,
+                line.use,
+                line.status,
+                ", ".join(filter(None, (line.decided_by, line.remark))),
             )
-            for one in requirement_lines(found)
+            for line in requirement_lines(findings)
         ]
-        rows = [row for row in worst_first(found.rows) if matters(row) or found.is_empty]
+        rows = [row for row in worst_first(findings.rows) if matters(row) or findings.is_empty]
         shown = [
             (
                 row.id,
-                row_size(row.declared, row, found),
-                allowable_words(row, found),
+                row_size(row.declared, row, findings),
+                allowable_words(row, findings),
                 use_words(shown_use(row)),
                 row.status,
             )
-            for row in rows[:_DECIDING]
+            for row in rows[:_MAX_SHOWN_ROWS]
         ]
-        more = len(found.rows) - len(shown)
+        hidden_count = len(findings.rows) - len(shown)
         return notebook.page(
-            notebook.heading(found.status, found.name, verdict(found)),
+            notebook.heading(findings.status, findings.name, verdict(findings)),
             notebook.table(("requirement", "allowed", "reached", "use", "status", "decided by"), required),
             notebook.table(("row", "declared", "allowable", "use", "status"), shown),
-            notebook.note(f"{declared_words(found.kinds)} {more} rows more: to_dataframe()."),
+            notebook.note(f"{declared_words(findings.kinds)} {hidden_count} rows more: to_dataframe()."),
         )
 
 
-_NESTED = ("displacement_m", "notes")  # of a row: no cells of a table
+_NESTED = ("displacement_m", "notes")  # fields of a row that fit in no cell of a table
 _SPECIFIED = ("key", "value", "ordered", "unit", "declared")
 
 
 # ---------------------------------------------------------------------- answers to other questions
 @dataclass(frozen=True, repr=False, eq=False)
 class _Answer:
-    """An answer that a command writes as JSON; its own attributes are those of what was found."""
+    """An answer that a command writes as JSON; the attributes of `found` are attributes of the answer too."""
 
     found: Any
 
     def __getattr__(self, name: str) -> Any:
-        """An attribute of what was found."""
+        """An attribute of `found`."""
         if name.startswith("_") or name == "found":
             raise AttributeError(name)
         return getattr(self.found, name)
@@ -287,53 +289,54 @@ class _Answer:
 
     def to_dict(self) -> dict[str, Any]:
         """The document of `--format json` of the command."""
-        found: dict[str, Any] = json.loads(self._document())
-        return found
+        document: dict[str, Any] = json.loads(self._document())
+        return document
 
 
 def _waived(waivers: Sequence[Sequence[str]]) -> str:
-    """How many are waived, and by which waivers, behind how many comply; empty where none is."""
-    ids = tuple(dict.fromkeys(waiver for of_one in waivers for waiver in of_one))
+    """Words for the number of waived cases and their waivers, empty without waived cases."""
+    ids = tuple(dict.fromkeys(waiver for case in waivers for waiver in case))
     return f", {waived_count(len(waivers), ids)}" if waivers else ""
 
 
 class SolveResult(_Answer):
     """Values at which compliance begins or ends: `value` in SI, `crossings`, `status`, `nearest`.
 
-    Where a key names parts of the catalogue: `parts`, those that comply first, `complying`, `status`.
+    For a key of parts of the catalogue: `parts`, complying parts first, `complying`, `status`.
     """
 
     found: "Solution | Comparison"
 
     def __repr__(self) -> str:
-        """Key and value, or that all or none of the range complies, and what is waived, on one line."""
-        return f"<solve of {self.found.key} for {self.found.name!r}: {self._said}>"
+        """Key and value, or whether all or none of the range complies, and waived values, on one line."""
+        return f"<solve of {self.found.key} for {self.found.name!r}: {self._summary}>"
 
     @property
-    def _said(self) -> str:
+    def _summary(self) -> str:
         if (parts := getattr(self.found, "parts", None)) is not None:
-            waived = [one.standing.waived_by for one in parts if one.standing.status == "waived"]
+            waived = [part.standing.waived_by for part in parts if part.standing.status == "waived"]
             return f"{len(self.complying)} of {len(parts)} parts comply{_waived(waived)}"
-        beside = f", {waived_count(self.waived, self.waived_by)}" if self.waived else ""
+        waived_words = f", {waived_count(self.waived, self.waived_by)}" if self.waived else ""
         if self.value is None:
-            return f"{'every' if self.status == 'all' else 'no'} value of the range complies{beside}"
-        return f"{self.value:.6g} {self.unit}{beside}"
+            return f"{'every' if self.status == 'all' else 'no'} value of the range complies{waived_words}"
+        return f"{self.value:.6g} {self.unit}{waived_words}"
 
     def _repr_html_(self) -> str:
         found, rows = self.found, list[tuple[object, ...]]()
         if (parts := getattr(found, "parts", None)) is not None:
             columns = ("part", "status", "worst row", "use")
             for part in parts:
-                at = part.standing
-                rows.append((part.id, at.status, at.row or part.reason, use_words(at.utilization)))
+                standing = part.standing
+                worst = standing.row or part.reason
+                rows.append((part.id, standing.status, worst, use_words(standing.utilization)))
         else:
             columns = (f"complies at [{self.unit}]", "worst row", "use", "breaks beyond by")
-            for one in self.crossings:
-                inside = one.inside
-                rows.append((inside.value, inside.row or "", use_words(inside.utilization), one.outside.row or ""))
+            for crossing in self.crossings:
+                inside, outside = crossing.inside, crossing.outside
+                rows.append((inside.value, inside.row or "", use_words(inside.utilization), outside.row or ""))
         title = f"{found.key} of {found.name}"
         return notebook.page(
-            notebook.heading(_HEADINGS.get(found.status, "pass"), title, f"{found.status}: {self._said}"),
+            notebook.heading(_HEADINGS.get(found.status, "pass"), title, f"{found.status}: {self._summary}"),
             notebook.table(columns, rows),
         )
 
@@ -363,16 +366,16 @@ class SensitivityResult(_Answer):
 class AllocateResult(_Answer):
     """Specifications that together meet every requirement: `specifications`, `complies`, `requirements`.
 
-    `offer` says how the figures of another mission stand to them, where one was given.
+    `offer` compares the figures of another mission with them, if one was given.
     """
 
     found: SpecificationSheet
     offer: "Offer | None" = None
 
     def __repr__(self) -> str:
-        """How many specifications, and whether the mission complies with them, on one line."""
-        said = "complies" if self.found.complies else "does not comply"
-        return f"<allocate of {self.found.name!r}: {len(self.found.specifications)} specifications, {said}>"
+        """Number of specifications, and whether the mission complies with them, on one line."""
+        verdict_words = "complies" if self.found.complies else "does not comply"
+        return f"<allocate of {self.found.name!r}: {len(self.found.specifications)} specifications, {verdict_words}>"
 
     def _document(self) -> str:
         from bisar_budget.report.formats.specification_sheet import as_json
@@ -380,12 +383,12 @@ class AllocateResult(_Answer):
         return as_json([(self.found, self.offer)], Style())
 
     def to_dataframe(self, library: str | None = None) -> Any:
-        """The specifications as a data frame; numbers in SI, lists of three where axes differ."""
+        """The specifications as a data frame; numbers in SI, lists of three if axes differ."""
         (mission,) = self.to_dict()["missions"]
         return _frame_of_rows([{key: row[key] for key in _SPECIFIED} for row in mission["specifications"]], library)
 
     def _repr_html_(self) -> str:
-        rows = [(one.key, one.text or "no limit") for one in self.found.specifications]
+        rows = [(each.key, each.text or "no limit") for each in self.found.specifications]
         return notebook.page(
             notebook.heading(_COMPLIES[self.found.complies], f"Specifications of {self.found.name}"),
             notebook.table(("key", "order at most"), rows),
@@ -398,10 +401,10 @@ class VerifyResult(_Answer):
     found: VerifiedMission
 
     def __repr__(self) -> str:
-        """How many limits have which verdict, on one line."""
+        """Number of limits of each verdict, on one line."""
         counts = Counter(row.verdict for row in self.found.rows)
-        said = ", ".join(f"{count} {verdict}" for verdict, count in counts.items())
-        return f"<verify of {self.found.name!r}: {said}>"
+        verdicts = ", ".join(f"{count} {verdict}" for verdict, count in counts.items())
+        return f"<verify of {self.found.name!r}: {verdicts}>"
 
     def _document(self) -> str:
         from bisar_budget.report.formats.verification import as_json
@@ -423,9 +426,9 @@ class VerifyResult(_Answer):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class PassesResult(_Answer):
-    """Passes of a satellite, each with the verdict of the mission then: a sequence of them.
+    """Passes of a satellite, each with the verdict of the mission in it: a sequence of passes.
 
-    `mission` and `model` are those that were asked about.
+    `mission` and `model` are the arguments of the question.
     """
 
     found: "Passes"
@@ -433,21 +436,21 @@ class PassesResult(_Answer):
     model: str | None = None
 
     def __repr__(self) -> str:
-        """How many passes comply, on one line."""
+        """Number of passes that comply, on one line."""
         found = self.found
-        waived = _waived([one.waived_by for one in found.found if one.status == "waived"])
+        waived = _waived([each.waived_by for each in found.found if each.status == "waived"])
         return f"<passes of {found.name!r}: {len(found.complying)} of {len(found.found)} comply{waived}>"
 
     def __len__(self) -> int:
         """Number of passes."""
         return len(self.found.found)
 
-    def __getitem__(self, place: int) -> "SatellitePass":
+    def __getitem__(self, index: int) -> "SatellitePass":
         """A pass, counted from 0."""
-        return self.found.found[place]
+        return self.found.found[index]
 
     def mission_text(self, one: "SatellitePass", folder: str | os.PathLike[str]) -> str:
-        """Text of a mission file that takes the aperture in a pass; files that it names are found from a folder."""
+        """Text of a mission file with the aperture in a pass; names of files are relative to a folder."""
         from bisar_budget.design.passes import center_time
         from bisar_budget.mission.edited import in_folder, with_values
 
@@ -492,15 +495,16 @@ class MonteCarloResult(_Answer):
         return f"<monte_carlo: {found.draws} draws, all hold in {found.probability:.4g} ({interval})>"
 
     def to_dict(self) -> dict[str, Any]:
-        """The same as `check --monte-carlo --format json` writes it."""
+        """The Monte Carlo part of the document of `check --monte-carlo --format json`."""
         from bisar_budget.report.formats.json_document import monte_carlo_item
 
-        found: dict[str, Any] = json.loads(json.dumps(monte_carlo_item(self.found)))
-        return found
+        document: dict[str, Any] = json.loads(json.dumps(monte_carlo_item(self.found)))
+        return document
 
     def _repr_html_(self) -> str:
         rows = [
-            (one.id, one.probability, one.probability_low, one.probability_high) for one in self.found.requirements
+            (each.id, each.probability, each.probability_low, each.probability_high)
+            for each in self.found.requirements
         ]
         return notebook.page(
             notebook.table(("requirement", "holds in", "from", "to"), rows),
@@ -509,7 +513,7 @@ class MonteCarloResult(_Answer):
 
 
 class SimulateResult:
-    """Images with the declared errors: `image` in the axes of the scene; `images` has all, and what explains them."""
+    """Images with the declared errors: `image` in the axes of the scene; `images` has all images with their data."""
 
     def __init__(self, images: "PointImages", mission: Mission) -> None:
         self.images, self._mission = images, mission

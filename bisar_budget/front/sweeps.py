@@ -1,4 +1,4 @@
-"""A mission checked in many cases: a table, a drawing, a line that says how many comply."""
+"""A mission checked in many cases: a table, a drawing, and a line with the number of cases that comply."""
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
@@ -31,19 +31,19 @@ from bisar_budget.resources import cores
 if TYPE_CHECKING:
     from bisar_budget.cluster.scheduler import Workers
 
-_MANY = 20_000  # cases from which on it is measured how long they will take
-_FEW = 100  # cases of the first trial
-_SHOWN = 10  # cases of a sweep without a drawing
+_MANY_CASES = 20_000  # from which the time is estimated
+_TRIAL_CASES = 100  # of the first trial for this estimate
+_MAX_SHOWN_CASES = 10  # of a sweep without a drawing, in a notebook
 
 
 @dataclass(repr=False, eq=False)
 class SweepResult:
     """A mission checked for many values: its table, by `to_dataframe`, `to_xarray`, or as columns.
 
-    Cases are those of `mission` with the values of `cases`; they are checked when they are first asked for.
-    `statuses` counts those that have been, `waived_by` has the ids of their waivers. `workers` of a scheduler check
-    them, where there are any; parts are kept beside the file `beside` where one is named, and gone on from if
-    `is_resumed`.
+    The cases are `mission` with the values of `cases`; they are checked when they are first needed. `statuses` counts
+    the statuses of the checked cases, and `waived_by` has the ids of their waivers. `workers` of a scheduler check
+    the cases, if there are any. If a file `beside` is named, parts are kept next to it, and `is_resumed` continues
+    from kept parts.
     """
 
     mission: Mission
@@ -60,53 +60,53 @@ class SweepResult:
     waived_by: dict[str, None] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Ask: what cannot be asked is said here."""
+        """Prepare the question; raises `QuestionError` if the mission cannot answer it."""
         self.asked = Asked(self.mission, self.cases, columns=self.more, model=self.model, today=self.day)
 
     def __repr__(self) -> str:
-        """Keys, number of cases and how many comply, on one line."""
+        """Keys, number of cases and number of cases that comply, on one line."""
         return f"<sweep of {self.mission.name!r} over {self._keys(', ')}: {self.summary}>"
 
     def _keys(self, between: str) -> str:
-        return between.join(one.key for one in self.cases.varied)
+        return between.join(each.key for each in self.cases.varied)
 
-    # ------------------------------------------------------------------ cases, as they are checked
+    # ------------------------------------------------------------------ checking cases
     def foreseen(self) -> float:
-        """About how long the cases take; 0 where there are few. [s]"""
-        if self.cases.count <= _MANY:
+        """Estimated time of all cases; 0 for few cases. [s]"""
+        if self.cases.count <= _MANY_CASES:
             return 0.0
 
-        def trial(some: int) -> float:
-            few = some_of(self.cases, some)
-            asked = Asked(self.mission, few, columns=self.more, model=self.model, today=self.day)
+        def trial(count: int) -> float:
+            sample = some_of(self.cases, count)
+            asked = Asked(self.mission, sample, columns=self.more, model=self.model, today=self.day)
             parts = asked.checked().parts
             began = perf_counter()
             for _ in parts:
                 pass
             return perf_counter() - began
 
-        seconds = progress.foreseen(self.cases.count, trial, _FEW, self.cases.count)
-        if self.asked.chunks.is_slow:  # else processes are no faster than arrays
+        seconds = progress.foreseen(self.cases.count, trial, _TRIAL_CASES, self.cases.count)
+        if self.asked.chunks.is_slow:  # otherwise processes are no faster than arrays
             seconds /= self.workers.threads if self.workers else min(self.jobs, cores())
         return seconds
 
     @contextmanager
     def checked(self) -> Iterator[tuple[Described, Iterator[Part]]]:
-        """Give the table and its parts, each checked as it is asked for; a bar shows it, where somebody watches."""
-        found: AbstractContextManager[Swept]
+        """Yield the table and its parts, each checked when it is needed, with a progress bar if somebody watches."""
+        sweep: AbstractContextManager[Swept]
         if self.beside is None:
-            found, label = nullcontext(self.asked.checked(self.jobs)), "Checking cases"
+            sweep, label = nullcontext(self.asked.checked(self.jobs)), "Checking cases"
         else:
-            found, label = self._kept(f"{self.beside}.parts"), "Writing"
-        with found as swept, progress.watched(label) as told:
-            yield self._described(swept), self._counted(swept.parts, told)
+            sweep, label = self._kept(f"{self.beside}.parts"), "Writing"
+        with sweep as swept, progress.watched(label) as report:
+            yield self._described(swept), self._counted(swept.parts, report)
 
     @contextmanager
     def _kept(self, path: str) -> Iterator[Swept]:
-        """Give the sweep when all its parts are kept in a folder, and take them away when the table is written.
+        """Yield the sweep when all its parts are kept in a folder, and remove them when the table is written.
 
-        Workers of a scheduler find them, or processes here. What ends it before leaves the parts, and says how to go
-        on.
+        Workers of a scheduler check the parts, or processes on this machine. An interruption leaves the parts in the
+        folder, with a message that tells how to continue.
         """
         from bisar_budget.cluster.parts_folder import parts_folder, question_of
 
@@ -114,73 +114,73 @@ class SweepResult:
         question = question_of(asked)
         with parts_folder(path, question, chunks, is_resumed=self.is_resumed) as folder:
 
-            def said() -> str:
+            def parts_done() -> str:
                 return f"{len(folder.done)} of {len(chunks.starts)} parts"
 
             try:
                 if folder.done:
-                    say(f"{folder.path} has {said()}.")
-                left = [start for start in chunks.starts if start not in folder.done]
+                    say(f"{folder.path} has {parts_done()}.")
+                missing = [start for start in chunks.starts if start not in folder.done]
                 done = sum(chunks.stop(start) - start for start in folder.done)
-                with progress.watched("Checking cases") as told:
-                    for part in asked.shared_out(left, self.jobs, self.workers.mapped if self.workers else None):
+                with progress.watched("Checking cases") as report:
+                    for part in asked.shared_out(missing, self.jobs, self.workers.mapped if self.workers else None):
                         folder.put(part)
                         done += part.stop - part.start
-                        told(done, self.cases.count)
+                        report(done, self.cases.count)
                 yield asked.swept(folder.parts(chunks.starts))
             except BaseException:
                 with suppress(ClusterError, OSError):
-                    folder.find(chunks, True)  # Ctrl-C may come between a part's rename and its note
+                    folder.find(chunks, True)  # Ctrl-C may come between the renaming of a part and its record
                 dated = f" --date {question['--date was']}" if question["--date was"] else ""
-                say(f"{folder.path} keeps {said()}; the same command with --resume{dated} goes on from there.")
+                say(f"{folder.path} keeps {parts_done()}; the same command with --resume{dated} goes on from there.")
                 raise
             folder.remove()
 
     def _described(self, swept: Swept) -> Described:
         return Described(swept, self.cases, self.mission, __version__, self.overrides)
 
-    def _counted(self, parts: Iterator[Part], told: Callable[[int, int], None]) -> Iterator[Part]:
+    def _counted(self, parts: Iterator[Part], report: Callable[[int, int], None]) -> Iterator[Part]:
         self.statuses.clear()
         self.waived_by.clear()
         for part in parts:
             self.statuses.update(part.values["status"].tolist())
-            of_part = (listed(waivers) for waivers in dict.fromkeys(part.values["waived_by"].tolist()))
-            self.waived_by |= dict.fromkeys(waiver for waivers in of_part for waiver in waivers)
+            waivers_of_cases = (listed(waivers) for waivers in dict.fromkeys(part.values["waived_by"].tolist()))
+            self.waived_by |= dict.fromkeys(waiver for waivers in waivers_of_cases for waiver in waivers)
             yield part
-            told(self.statuses.total(), self.cases.count)
+            report(self.statuses.total(), self.cases.count)
 
     @property
     def so_far(self) -> str:
-        """How many cases were checked until now, and how many comply."""
+        """Words for the number of checked cases, and of cases that comply."""
         done, comply = self.statuses.total(), complying(self.statuses)
         if not done:
             return "no case was checked"
-        said = [f"{done} case{'' if done == 1 else 's'}"]
+        words = [f"{done} case{'' if done == 1 else 's'}"]
         if done < self.cases.count:
-            said[0] += f" of {self.cases.count}"
-        said.append(f"{comply} comply ({percentage(comply, done)})")
+            words[0] += f" of {self.cases.count}"
+        words.append(f"{comply} comply ({percentage(comply, done)})")
         if self.statuses["waived"]:
-            said.append(waived_count(self.statuses["waived"], list(self.waived_by)))
+            words.append(waived_count(self.statuses["waived"], list(self.waived_by)))
         if self.statuses["not_evaluated"]:
-            said.append(f"{self.statuses['not_evaluated']} not evaluated")
+            words.append(f"{self.statuses['not_evaluated']} not evaluated")
         if self.statuses["error"]:
-            said.append(f"{self.statuses['error']} without a mission")
-        return ", ".join(said)
+            words.append(f"{self.statuses['error']} without a mission")
+        return ", ".join(words)
 
     @property
     def is_unjudged(self) -> bool:
-        """Whether no case that is a mission could be judged."""
+        """Whether no case with a mission could be judged."""
         return self.statuses.keys() - {"error"} == {"not_evaluated"}
 
-    def drawing(self, found: Gathered, *, is_polar: bool = False) -> str:
-        """SVG of what was gathered; over one key also the rows that are the worst somewhere."""
+    def drawing(self, trade_data: Gathered, *, is_polar: bool = False) -> str:
+        """SVG of gathered cases; over one key also the rows that are the worst in any case."""
         from bisar_budget.report.drawing.trade_drawing import head_of, trade_drawing
 
-        trade = found.trade(is_polar=is_polar)
-        again = partial(gathered, self.mission, self.cases, self.model, self.day, jobs=self.jobs)
+        trade = trade_data.trade(is_polar=is_polar)
+        check_again = partial(gathered, self.mission, self.cases, self.model, self.day, jobs=self.jobs)
         return trade_drawing(
             trade,
-            uses_of_rows(trade, again),
+            uses_of_rows(trade, check_again),
             self.mission.file,
             f"Trade study: {' and '.join(axis.key for axis in trade.axes)}, {self.mission.name}",
             f"{printable(self.mission.name)}: {self.so_far}",
@@ -188,7 +188,7 @@ class SweepResult:
             seen_from_above=self.mission.geometry if is_polar else None,
         )
 
-    # ------------------------------------------------------------------ all of them, for a notebook
+    # ------------------------------------------------------------------ all cases, for a notebook
     @cached_property
     def _parts(self) -> tuple[Swept, tuple[Part, ...]]:
         with self.checked() as (described, parts):
@@ -201,15 +201,15 @@ class SweepResult:
 
     @property
     def summary(self) -> str:
-        """How many cases there are, and how many comply."""
-        return self.so_far if self._parts else ""  # they are counted as they are checked
+        """Words for the number of cases, and of cases that comply."""
+        return self.so_far if self._parts else ""  # cases are counted when they are checked
 
     @cached_property
     def columns(self) -> Mapping[str, Any]:
-        """Values of each column by its name, (cases,); what varies stands in the unit that it was asked for in."""
+        """Values of each column by its name, (cases,); varied keys are in the unit of the question."""
         table = self._table
         parts = [table.values(part) for part in table.swept.parts]
-        return {one.name: np.concatenate([part[one.name] for part in parts]) for one in table.columns}
+        return {column.name: np.concatenate([part[column.name] for part in parts]) for column in table.columns}
 
     def __getitem__(self, name: str) -> Any:
         """Values of a column, (cases,)."""
@@ -218,10 +218,10 @@ class SweepResult:
         return self.columns[name]
 
     def to_dataframe(self, library: str | None = None) -> Any:
-        """The table as a data frame of pandas, or of polars: what `sweep` writes as CSV."""
+        """The table as a data frame of pandas or of polars, with the columns of the CSV file of `sweep`."""
         columns = self.columns.items()
-        plain = {name: values.tolist() if values.dtype == object else values for name, values in columns}
-        return frame_of(plain, library)
+        lists = {name: values.tolist() if values.dtype == object else values for name, values in columns}
+        return frame_of(lists, library)
 
     def to_xarray(self, chunks: Any = None) -> Any:
         """The table as `xarray.Dataset`, a dimension for each key, with units and long names (CF).
@@ -241,18 +241,20 @@ class SweepResult:
         """
         if chunks is None:
             return dataset(self._table, self.columns)
-        found = dataset(self._described(self.asked.swept(iter(()))), self._later())
+        lazy = dataset(self._described(self.asked.swept(iter(()))), self._later())
         sizes = (
-            {} if chunks == "auto" else chunks if isinstance(chunks, Mapping) else dict.fromkeys(found.dims, chunks)
+            {} if chunks == "auto" else chunks if isinstance(chunks, Mapping) else dict.fromkeys(lazy.dims, chunks)
         )
         # `Dataset.chunk` would compute the columns of texts.
-        return found.map(
-            lambda one: one.copy(data=one.data.rechunk({one.get_axis_num(key): size for key, size in sizes.items()})),
+        return lazy.map(
+            lambda array: array.copy(
+                data=array.data.rechunk({array.get_axis_num(key): size for key, size in sizes.items()})
+            ),
             keep_attrs=True,
         )
 
     def _later(self) -> dict[str, Any]:
-        """Columns as arrays of Dask: each chunk of the sweep is a task, which gives what it would give now."""
+        """Columns as arrays of Dask: each chunk of the sweep is a task, with the result that it would have now."""
         try:
             from dask import array
             from dask.delayed import delayed
@@ -271,7 +273,7 @@ class SweepResult:
         return {name: array.concatenate(parts) for name, parts in columns.items()}
 
     def plot(self, column: str | None = None) -> Picture:
-        """One key as curves of utilization, two as a map of what complies.
+        """Curves of utilization over one key, or a map over two keys of the cases that comply.
 
         Parameters
         ----------
@@ -287,30 +289,32 @@ class SweepResult:
 
         check_plot(self.cases, is_polar=False)
         table = self._table
-        found = Gathered(table, column=column)
+        gathered_cases = Gathered(table, column=column)
         for part in table.swept.parts:
-            found.add(part)
-        return Picture(f"{self._keys(' and ')}, {self.mission.name}", partial(drawing_file, self.drawing(found)))
+            gathered_cases.add(part)
+        return Picture(
+            f"{self._keys(' and ')}, {self.mission.name}", partial(drawing_file, self.drawing(gathered_cases))
+        )
 
     def _repr_html_(self) -> str:
         try:
             drawn = self.plot().of("svg").decode()
         except QuestionError:
             names = list(self.columns)
-            rows = zip(*(self.columns[name][:_SHOWN] for name in names), strict=True)
+            rows = zip(*(self.columns[name][:_MAX_SHOWN_CASES] for name in names), strict=True)
             drawn = notebook.table(names, rows)
         return notebook.page(drawn, notebook.note(f"{self.mission.name}: {self.summary}"))
 
 
 def _values(common: tuple[Question, Described, Any], block: Block) -> Mapping[str, Any]:
-    """Values of the columns in a block of cases; threads take turns, because a table keeps what it finds."""
+    """Values of the columns in a block of cases; threads take turns, because a table caches results."""
     question, table, lock = common
     with lock:
         return table.values(part_of(question, block))
 
 
-def percentage(some: int, of: int) -> str:
-    """Say a part of a whole; all and none are said only where it is so."""
-    if some in (0, of):
-        return "100 %" if some else "0 %"
-    return f"{min(max(100 * some / of, 0.1), 99.9):.3g} %"
+def percentage(count: int, total: int) -> str:
+    """Percentage of a count in a total; 0 % and 100 % only for none and all."""
+    if count in (0, total):
+        return "100 %" if count else "0 %"
+    return f"{min(max(100 * count / total, 0.1), 99.9):.3g} %"

@@ -1,8 +1,7 @@
-"""Paths of keys: the values that options put at them, and the key that somebody meant.
+"""Paths of keys: values that options put at them, and hints for unknown keys.
 
-`--set KEY=VALUE` is for a question that is asked once. The value is put into the tree that was read, before anybody
-asks what it means: every check works as for a file. `KEY=null` takes the key out. The keys of the file are those of
-the readers.
+`--set KEY=VALUE` is for a question that is asked once. The value goes into the tree of the file before the tree is
+interpreted, so every check works as for a file. `KEY=null` takes the key out. The readers define the known keys.
 """
 
 from collections.abc import Iterator, Sequence
@@ -18,8 +17,9 @@ from bisar_budget.mission.readers import INVALID, ListOf, OneOf, Reader, Section
 from bisar_budget.mission.tree import MAX_BYTES, NULLS, Tree
 
 _ACCEPTED = "accepted: KEY=VALUE, such as radar.bandwidth=150MHz"
-_MAX_KEY = 500  # characters; a path of the schema has a tenth
-_OF_DOTTED = (("requirement_ids",), ("specifications",), ("allocation", "specify"))  # by ids of rows, or whole paths
+_MAX_KEY_CHARACTERS = 500  # a path of the schema has a tenth
+# Sections whose keys have dots: ids of rows, or whole paths.
+_WITH_DOTTED_KEYS = (("requirement_ids",), ("specifications",), ("allocation", "specify"))
 
 
 def read_changes(texts: Sequence[str]) -> tuple[SetValue, ...]:
@@ -28,7 +28,7 @@ def read_changes(texts: Sequence[str]) -> tuple[SetValue, ...]:
     Raises
     ------
     InvalidValueError
-        One has no key or no `=`, or two have the same key.
+        An option has no key or no `=`, or two options have the same key.
     """
     changes: dict[tuple[str, ...], SetValue] = {}
     for text in texts:
@@ -36,7 +36,7 @@ def read_changes(texts: Sequence[str]) -> tuple[SetValue, ...]:
         key = key.strip()
         if not equals or not key:
             raise InvalidValueError(f"{shown(text)!r} is not KEY=VALUE", _ACCEPTED)
-        if len(key) > _MAX_KEY or len(value) > MAX_BYTES:
+        if len(key) > _MAX_KEY_CHARACTERS or len(value) > MAX_BYTES:
             raise InvalidValueError(f"{shown(text)!r} is too long", _ACCEPTED)
         parts = parts_of(key)
         if "" in parts:
@@ -48,17 +48,19 @@ def read_changes(texts: Sequence[str]) -> tuple[SetValue, ...]:
 
 
 def parts_of(key: str) -> tuple[str, ...]:
-    """Split a path of keys: `other_errors[0].name` and `other_errors.0.name` have the parts other_errors, 0, name."""
+    """Parts of a path of keys: other_errors, 0, name for `other_errors[0].name` and for `other_errors.0.name`."""
     return tuple(key.replace("[", ".").replace("]", "").split("."))
 
 
 def apply_changes(tree: Tree, changes: Sequence[SetValue]) -> None:
-    """Put each value into the tree, in place of what stands there or beside it; what is wrong is a fault of the tree.
+    """Put the value of each option into the tree; problems become faults of the tree.
+
+    A value replaces the value of the file, or is added.
 
     Raises
     ------
     UnusableError
-        Nothing after it is worth reading; the fault is in the tree.
+        The tree is not worth reading beyond this point; the fault is in the tree.
     """
     for change in changes:
         if takes_out(change):
@@ -68,31 +70,31 @@ def apply_changes(tree: Tree, changes: Sequence[SetValue]) -> None:
 
 
 def takes_out(change: SetValue) -> bool:
-    """Whether an option takes a key out: its value is the null of YAML, as `--set requirements.islr=null` has it."""
+    """Whether an option takes a key out: its value is a null of YAML, as in `--set requirements.islr=null`."""
     return not isinstance(change, SetNumber) and change.text in NULLS and change.text != ""
 
 
 def _take_out(tree: Tree, change: SetValue) -> None:
-    """Take a key out of the tree. One that the file does not have is left out already, if there is such a key."""
+    """Take a key out of the tree. A known key that the file does not have is no fault; an unknown key is."""
     parts = parts_of(change.key)
     container: Any = tree.root
     path: KeyPath = ()
     while True:
-        name, rest = next_name(container, parts, is_of_ids=path in _OF_DOTTED)
+        name, remaining = next_name(container, parts, has_dotted_keys=path in _WITH_DOTTED_KEYS)
         is_entry = isinstance(container, list)
-        if name is None or (is_entry and (not rest or int(name) >= len(container))) or container is INVALID:
+        if name is None or (is_entry and (not remaining or int(name) >= len(container))) or container is INVALID:
             break
         if not is_entry and name not in container:
             break
         path = (*path, name)
-        if not rest:
+        if not remaining:
             del container[name]
             _forget(tree, path)
             tree.changes[path] = change
             return
-        container, parts = container[name], rest
+        container, parts = container[name], remaining
     if container is INVALID:
-        return  # the file's own fault says what is wrong
+        return  # the tree has a fault for the invalid value
     here = tuple(parts_of(change.key))
     if isinstance(container, list):
         tree.changes[here] = change
@@ -104,33 +106,33 @@ def _take_out(tree: Tree, change: SetValue) -> None:
 
 
 def _apply(tree: Tree, change: SetValue) -> None:
-    """Go down to the value, making the sections that are not there."""
+    """Put a value at its path, and make the sections that are missing on the way."""
     parts = parts_of(change.key)
     container: Any = tree.root
     path: KeyPath = ()
     first_new: KeyPath | None = None
     while True:
-        name, rest = next_name(container, parts, is_of_ids=path in _OF_DOTTED)
+        name, remaining = next_name(container, parts, has_dotted_keys=path in _WITH_DOTTED_KEYS)
         if name is None:
             tree.changes[path] = change
             is_list = isinstance(container, list)
             entries = f"{len(container)} entr{'y' if len(container) == 1 else 'ies'}" if is_list else ""
             problem = f"has {entries}, and none has this number" if is_list else "has no keys"
             accepted = f"accepted: 0 to {len(container)}, where the last adds one" if is_list else ""
-            given = "" if is_list else shown(str(container))
-            tree.fault(None, path, problem, given=parts[0] if is_list else given, accepted=accepted)
+            shown_value = "" if is_list else shown(str(container))
+            tree.fault(None, path, problem, given=parts[0] if is_list else shown_value, accepted=accepted)
             return
         path = (*path, name)
         is_there = name in container if isinstance(container, dict) else int(name) < len(container)
         if not is_there and first_new is None:
             first_new = path
-        if not rest:
+        if not remaining:
             break
         if not is_there:
             _put(container, name, {})
-        container, parts = container[name], rest
+        container, parts = container[name], remaining
         if container is INVALID:
-            return  # the file's own fault says what is wrong
+            return  # the tree has a fault for the invalid value
     tree.changes[first_new or path] = change
     value = _value(tree, change, path)
     _forget(tree, path)
@@ -139,15 +141,18 @@ def _apply(tree: Tree, change: SetValue) -> None:
 
 
 def next_name(
-    container: Any, parts: tuple[str, ...], is_of_ids: bool = False
+    container: Any, parts: tuple[str, ...], has_dotted_keys: bool = False
 ) -> tuple[str | int | None, tuple[str, ...]]:
-    """Find the key or number that a path goes on with, and the parts behind it; None if there can be none."""
+    """The next key or index of a path within a container, and the parts behind it; None if there is none.
+
+    With `has_dotted_keys` all parts are one key, joined by dots.
+    """
     if isinstance(container, list):
         is_entry = is_place(parts[0]) and int(parts[0]) <= len(container)
         return (int(parts[0]) if is_entry else None), parts[1:]
     if not isinstance(container, dict):
         return None, ()
-    if is_of_ids:
+    if has_dotted_keys:
         return ".".join(parts), ()
     for length in range(len(parts), 1, -1):  # a key that has dots itself
         if (name := ".".join(parts[:length])) in container:
@@ -156,6 +161,7 @@ def next_name(
 
 
 def _put(container: Any, name: str | int, value: Any) -> None:
+    """Set a value in a mapping or a list; the index behind the last entry appends."""
     if isinstance(container, list) and name == len(container):
         container.append(value)
     else:
@@ -163,7 +169,7 @@ def _put(container: Any, name: str | int, value: Any) -> None:
 
 
 def _value(tree: Tree, change: SetValue, path: KeyPath) -> Any:
-    """Read the text of the value as the file's own would be; its faults name the option. A number is as it is."""
+    """The value of an option, read as a value of the file; faults name the option. A number stays as it is."""
     if isinstance(change, SetNumber):
         return change.value
     try:
@@ -173,8 +179,8 @@ def _value(tree: Tree, change: SetValue, path: KeyPath) -> Any:
             tree.fault(None, path, "has no value", hint="Give it one; null takes the key out")
         return value
     except yaml.MarkedYAMLError as error:
-        said = ", ".join(filter(None, (error.context, error.problem)))
-        tree.fault(None, path, f"is not valid YAML: {said}", given=shown(change.text))
+        reason = ", ".join(filter(None, (error.context, error.problem)))
+        tree.fault(None, path, f"is not valid YAML: {reason}", given=shown(change.text))
     except yaml.reader.ReaderError as error:
         tree.fault(None, path, f"is not text: {error.reason}")
     except UnicodeEncodeError:  # an argument of other bytes, which Python keeps as surrogates
@@ -183,16 +189,17 @@ def _value(tree: Tree, change: SetValue, path: KeyPath) -> Any:
 
 
 def _forget(tree: Tree, path: KeyPath) -> None:
-    """Forget where the file had what stood at a path: nothing may point there."""
-    for places in (tree.keys, tree.values):
-        for other in [other for other in places if other[: len(path)] == path]:
-            del places[other]
+    """Forget the positions in the file of a value and of all values below it: no fault may point there."""
+    for events in (tree.keys, tree.values):
+        for key_path in [key_path for key_path in events if key_path[: len(path)] == path]:
+            del events[key_path]
 
 
-# ---------------------------------------------------------------------- the key that somebody meant
-_FARTHEST = 200  # characters of what is looked for
-_MOST = 4  # paths that a hint names; of a key that stands in more sections it says nothing
-_NEAR = 0.8  # of a misspelt key and one of its section, where another section has the key as it is
+# ---------------------------------------------------------------------- hints for unknown keys
+_MAX_PATH_CHARACTERS = 200  # of a path that is compared with known paths
+_MAX_HINT_PATHS = 4  # in a hint; a key of more sections has no hint
+# Smallest similarity of a misspelt key to a key of its section: if another section has the key as it is, and if not.
+_SIMILARITY_RATIO, _SIMILARITY_RATIO_OF_UNKNOWN = 0.8, 0.6
 
 
 @cache
@@ -202,6 +209,7 @@ def all_keys() -> tuple[str, ...]:
 
 
 def _below(reader: Reader, path: str) -> Iterator[str]:
+    """Paths of all keys below a path."""
     if isinstance(reader, OneOf):
         for form in reader.forms:
             yield from _below(form, path)
@@ -215,23 +223,23 @@ def _below(reader: Reader, path: str) -> Iterator[str]:
 
 
 def nearest_keys(path: str) -> str:
-    """Hint at the path that somebody meant, or at where its key belongs; empty if there is neither.
+    """Hint at the known path nearest to an unknown path, or at the sections of its key; empty if there is neither.
 
-    A key that is misspelt is looked for among the keys of its own section alone, a path without its first sections
-    among those that end like it.
+    A misspelt key is compared with the keys of its own section only. A path without its first sections is compared
+    with the paths that end like it.
     """
-    path = path[:_FARTHEST]
+    path = path[:_MAX_PATH_CHARACTERS]
     parts = parts_of(path)
     meant = _spelt_right(parts)
-    if meant and meant != ".".join(parts):  # else one form of a section has the key, and the file another form
+    if meant and meant != ".".join(parts):  # equal if the key belongs to another form of the section
         return f"Did you mean {meant!r}?"
     section, missing = _split(_names(path))
-    begun = f"{section}." if section else ""
-    whole = [known for known in all_keys() if known.startswith(begun) and known.endswith(f".{missing}")]
-    if not (whole or section):  # a path that begins with no section says nothing of where its last key belongs
-        whole = [known for known in all_keys() if known.rpartition(".")[2] == missing.rpartition(".")[2]]
-    if 0 < len(whole) <= _MOST:
-        nearest_first = sorted(whole, key=lambda known: -SequenceMatcher(None, path, known).ratio())
+    prefix = f"{section}." if section else ""
+    candidates = [key for key in all_keys() if key.startswith(prefix) and key.endswith(f".{missing}")]
+    if not (candidates or section):  # without a known section, any section may have the last key
+        candidates = [key for key in all_keys() if key.rpartition(".")[2] == missing.rpartition(".")[2]]
+    if 0 < len(candidates) <= _MAX_HINT_PATHS:
+        nearest_first = sorted(candidates, key=lambda candidate: -SequenceMatcher(None, path, candidate).ratio())
         return f"Did you mean {' or '.join(map(repr, nearest_first))}?"
     if section or _is_known((_names(path) or [""])[-1]):
         return section_hint(path, "")
@@ -239,18 +247,18 @@ def nearest_keys(path: str) -> str:
 
 
 def section_hint(path: str, near: str) -> str:
-    """Hint at the sections that have the unknown key at the end of a path; `near` is the hint at one spelt alike.
+    """Hint at the sections that have the last key of a path; `near` is the hint at a key with a similar name.
 
-    A key that is nearly one of its own section, or stands nowhere, has the hint `near`. Of several sections those
-    that share most of the path are named, of too many none.
+    The hint is `near` if the key resembles a key of its own section, or if no section has it. The hint names the
+    sections that share most of the path, and is empty if they are more than `_MAX_HINT_PATHS`.
     """
-    *above, name = _names(path[:_FARTHEST]) or [""]
-    found = [known.split(".")[:-1] for known in all_keys() if known.rpartition(".")[2] == name]
-    if not found or above in found or get_close_matches(name, _keys_of(above), 1, _NEAR):
+    *above, name = _names(path[:_MAX_PATH_CHARACTERS]) or [""]
+    sections = [key.split(".")[:-1] for key in all_keys() if key.rpartition(".")[2] == name]
+    if not sections or above in sections or get_close_matches(name, _keys_of(above), 1, _SIMILARITY_RATIO):
         return near
-    shared = [_shared(section, above) for section in found]
-    nearest = [section for section, length in zip(found, shared, strict=True) if length == max(shared)]
-    if len(nearest) > _MOST:
+    shared = [_shared(section, above) for section in sections]
+    nearest = [section for section, length in zip(sections, shared, strict=True) if length == max(shared)]
+    if len(nearest) > _MAX_HINT_PATHS:
         return ""
     *first, last = [repr(".".join(section)) if section else "the file itself" for section in nearest]
     return f"{name!r} is a key of {', '.join(first)}{' and ' * bool(first)}{last}"
@@ -258,7 +266,7 @@ def section_hint(path: str, near: str) -> str:
 
 def _is_known(name: str) -> bool:
     """Whether any section has a key."""
-    return any(known.rpartition(".")[2] == name for known in all_keys())
+    return any(key.rpartition(".")[2] == name for key in all_keys())
 
 
 def _names(path: str) -> list[str]:
@@ -267,19 +275,20 @@ def _names(path: str) -> list[str]:
 
 
 def _keys_of(section: Sequence[str]) -> list[str]:
+    """Names of the keys of a section."""
     path = ".".join(section)
-    return [known.rpartition(".")[2] for known in all_keys() if known.rpartition(".")[0] == path]
+    return [key.rpartition(".")[2] for key in all_keys() if key.rpartition(".")[0] == path]
 
 
 def _split(names: list[str]) -> tuple[str, str]:
-    """The longest beginning of a path that there is, and the rest of the path."""
-    known = all_keys()
-    count = next((count for count in range(len(names), 0, -1) if ".".join(names[:count]) in known), 0)
+    """The longest known beginning of a path, and the remainder of the path."""
+    paths = all_keys()
+    count = next((count for count in range(len(names), 0, -1) if ".".join(names[:count]) in paths), 0)
     return ".".join(names[:count]), ".".join(names[count:])
 
 
 def _spelt_right(parts: Sequence[str]) -> str:
-    """The path with each unknown key as the nearest of its section; empty if there is none near."""
+    """The path with each unknown key replaced by the nearest key of its section; empty if no key is near."""
     meant: list[str] = []
     section: list[str] = []
     for part in parts:
@@ -287,7 +296,8 @@ def _spelt_right(parts: Sequence[str]) -> str:
             meant.append(part)
             continue
         keys = _keys_of(section)
-        near = [part] if part in keys else get_close_matches(part, keys, 1, _NEAR if _is_known(part) else 0.6)
+        smallest_ratio = _SIMILARITY_RATIO if _is_known(part) else _SIMILARITY_RATIO_OF_UNKNOWN
+        near = [part] if part in keys else get_close_matches(part, keys, 1, smallest_ratio)
         if not near:
             return ""
         meant += near
@@ -295,9 +305,12 @@ def _spelt_right(parts: Sequence[str]) -> str:
     return ".".join(meant)
 
 
-def _shared(one: list[str], other: list[str]) -> int:
+def _shared(names: list[str], other_names: list[str]) -> int:
     """Number of keys with which two paths begin alike."""
-    return next((at for at, (a, b) in enumerate(zip(one, other, strict=False)) if a != b), min(len(one), len(other)))
+    return next(
+        (at for at, (a, b) in enumerate(zip(names, other_names, strict=False)) if a != b),
+        min(len(names), len(other_names)),
+    )
 
 
 # ---------------------------------------------------------------------- keys of errors
@@ -313,21 +326,21 @@ ACCEPTED_ERRORS = (
 
 
 def is_error(key: str) -> bool:
-    """Whether a key stands where a mission file states errors, and is none of their other numbers."""
+    """Whether a key is the size of an error: in a section of errors, and no interval, frequency or the like."""
     parts = parts_of(key)
     return any(part in _ERRORS for part in parts[:3]) and parts[-1] not in _NO_SIZES
 
 
 def name_of_error(key: str) -> str:
-    """The key of an error as rows name it: `receiver.velocity` for `platforms.receiver.motion_error.velocity`."""
+    """The name of an error in rows: `receiver.velocity` for `platforms.receiver.motion_error.velocity`."""
     return ".".join(part for part in parts_of(key) if part not in ("platforms", "motion_error"))
 
 
 def report_specified(tree: Tree) -> None:
-    """Say of `allocation.specify` which of its keys are no errors."""
-    given = tree.root["allocation"]["specify"]
-    for place, key in enumerate(given):
-        path = ("allocation", "specify", key if isinstance(given, dict) else place)
+    """Report the keys of `allocation.specify` that name no errors."""
+    specify = tree.root["allocation"]["specify"]
+    for index, key in enumerate(specify):
+        path = ("allocation", "specify", key if isinstance(specify, dict) else index)
         if ".".join(_names(key)) not in all_keys():
             near = nearest_keys(key)
             tree.report(path, Problem("names no key of a mission file", ACCEPTED_ERRORS, near, is_of_key=True))

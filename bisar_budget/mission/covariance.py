@@ -1,7 +1,7 @@
-"""Position-velocity covariance of a platform's motion error: the two ways to write it, and what makes it one.
+"""Position-velocity covariance of a platform's motion error: readers of its two forms, and checks.
 
-Either the 6 x 6 matrix, or sigmas with their correlations. What is held is sigmas and a correlation matrix, which
-has no units: there a tolerance means the same for metres and for millimetres per second.
+A file has the 6 x 6 matrix, or sigmas with their correlations. A mission holds sigmas and a correlation matrix. The
+correlation matrix has no units, so a tolerance means the same for metres and for millimetres per second.
 """
 
 import math
@@ -61,7 +61,7 @@ class Covariance(NamedTuple):
         return [row[first : first + 3] for row in self.correlation[first : first + 3]]
 
     def path(self, kind: str, axis: int) -> KeyPath:
-        """Where the file says the sigma of an error, below `covariance`."""
+        """Path below `covariance` of the sigma of an error in the file."""
         index = 3 * KINDS.index(kind) + axis
         return (index, index) if self.is_matrix else (kind, axis)
 
@@ -71,6 +71,7 @@ class Covariance(NamedTuple):
 
 
 def _problems(correlation: _Matrix) -> Iterator[Problem]:
+    """Problem of a correlation matrix that is not positive semi-definite."""
     smallest = float(np.linalg.eigvalsh(correlation)[0])
     if smallest <= -EIGENVALUE_TOLERANCE:
         yield Problem(
@@ -81,7 +82,7 @@ def _problems(correlation: _Matrix) -> Iterator[Problem]:
 
 
 def _rows(value: Any, readers: Sequence[Sequence[Reader]], path: KeyPath, report: Report, otherwise: str) -> Any:
-    """Read six lists of six; `INVALID` after a report."""
+    """Read a 6 x 6 matrix as six lists; `INVALID` after a report."""
     if not isinstance(value, list) or len(value) != SIZE:
         given = f", {len(value)} given" if isinstance(value, list) else ""
         accepted = f"accepted: x, y, z of position, then of velocity, or {otherwise}"
@@ -103,14 +104,15 @@ def _rows(value: Any, readers: Sequence[Sequence[Reader]], path: KeyPath, report
     return INVALID if any(item is INVALID for row in rows for item in row) else rows
 
 
-def _found(faults: Sequence[Problem], path: KeyPath, report: Report) -> bool:
-    """Report faults; whether there is one."""
+def _report_all(faults: Sequence[Problem], path: KeyPath, report: Report) -> bool:
+    """Report faults; True if there are any."""
     for fault in faults:
         report(path, fault)
     return bool(faults)
 
 
 def _asymmetries(rows: Sequence[Sequence[float]], scales: Sequence[float]) -> Iterator[Problem]:
+    """Problems of elements that differ from their mirror element, in units of the scales of row and column."""
     for i in range(SIZE):
         for j in range(i):
             if abs(rows[i][j] - rows[j][i]) > _ELEMENT_TOLERANCE * scales[i] * scales[j]:
@@ -118,7 +120,7 @@ def _asymmetries(rows: Sequence[Sequence[float]], scales: Sequence[float]) -> It
 
 
 def _symmetric(rows: Sequence[Sequence[float]]) -> _Matrix:
-    """Mean of a matrix and its transpose, the diagonal 1, within ±1."""
+    """Mean of a matrix and its transpose, with a diagonal of 1, and elements within ±1."""
     return tuple(
         tuple(1.0 if i == j else max(-1.0, min(1.0, (rows[i][j] + rows[j][i]) / 2)) for j in range(SIZE))
         for i in range(SIZE)
@@ -136,7 +138,7 @@ class _MatrixReader(Reader):
     """The 6 x 6 matrix: m², m²/s and m²/s², position before velocity, each in the order of the frame's axes."""
 
     def read(self, value: Any, path: KeyPath, report: Report) -> Any:
-        """Read the elements and hold them to what a covariance is."""
+        """Read the elements, and check that they are a covariance."""
         rows = _rows(value, _ELEMENTS, path, report, "a mapping with position, velocity and correlation")
         if rows is INVALID:
             return INVALID
@@ -151,14 +153,17 @@ class _MatrixReader(Reader):
             ]
             correlation = _symmetric(ratios)
             faults = list(_problems(correlation))
-        return INVALID if _found(faults, path, report) else Covariance(tuple(sigmas), correlation, is_matrix=True)
+        return (
+            INVALID if _report_all(faults, path, report) else Covariance(tuple(sigmas), correlation, is_matrix=True)
+        )
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
-        """Array of six arrays of six."""
+        """JSON Schema: array of six arrays of six."""
         return _matrix_schema([[element.schema(definitions) for element in row] for row in _ELEMENTS])
 
 
 def _excesses(rows: Sequence[Sequence[float]], sigmas: Sequence[float]) -> Iterator[Problem]:
+    """Problems of elements that are larger than the product of their sigmas."""
     for i in range(SIZE):
         for j in range(i):
             most = sigmas[i] * sigmas[j]
@@ -185,17 +190,17 @@ class _Correlations(NamedTuple):
 
 
 class _CorrelationReader(Reader):
-    """Correlations: of named pairs of errors, all others zero, or the 6 x 6 matrix with a diagonal of 1."""
+    """Correlations of named pairs of errors, zero for other pairs; or the 6 x 6 matrix with a diagonal of 1."""
 
     _NUMBER = Quantity(units.RATIO, ge=-1, le=1)
 
     def read(self, value: Any, path: KeyPath, report: Report) -> Any:
-        """Read either form."""
+        """Read pairs or a matrix."""
         read = self._pairs(value, path, report) if isinstance(value, dict) else self._matrix(value, path, report)
         if read is INVALID:
             return INVALID
         faults = list(_problems(read.matrix))
-        return INVALID if _found(faults, path, report) else read
+        return INVALID if _report_all(faults, path, report) else read
 
     def _matrix(self, value: Any, path: KeyPath, report: Report) -> Any:
         readers = [[self._NUMBER] * SIZE] * SIZE
@@ -206,7 +211,7 @@ class _CorrelationReader(Reader):
             Problem("an error's correlation with itself is 1", at=(i, i)) for i in range(SIZE) if rows[i][i] != 1
         ]
         faults += _asymmetries(rows, [1.0] * SIZE)
-        return INVALID if _found(faults, path, report) else _Correlations(_symmetric(rows))
+        return INVALID if _report_all(faults, path, report) else _Correlations(_symmetric(rows))
 
     def _pairs(self, value: dict[str, Any], path: KeyPath, report: Report) -> Any:
         rows = [[float(i == j) for j in range(SIZE)] for i in range(SIZE)]
@@ -232,11 +237,11 @@ class _CorrelationReader(Reader):
         return _Correlations(tuple(map(tuple, rows)), tuple(named.values())) if is_valid else INVALID
 
     def below(self, part: str) -> Reader | None:
-        """Give the reader of the correlation of a pair."""
+        """Reader of the correlation of a pair."""
         return self._NUMBER if "-" in part else None
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
-        """Object of pairs, or array of six arrays of six."""
+        """JSON Schema: object of pairs, or array of six arrays of six."""
         number = self._NUMBER.schema(definitions)
         name = rf"(?:{'|'.join(KINDS)})\.(?:{'|'.join(_AXIS)})"
         pairs = {
@@ -248,7 +253,7 @@ class _CorrelationReader(Reader):
 
 
 def error_index(name: str) -> int | None:
-    """Place of `position.x`, `velocity.along` and the like among the six; None if it is none of them."""
+    """Index from 0 to 5 of `position.x`, `velocity.along` and the like; None for another name."""
     kind, _, axis = name.partition(".")
     return 3 * KINDS.index(kind) + _AXIS[axis] if kind in KINDS and axis in _AXIS else None
 
@@ -270,19 +275,21 @@ class Sigmas(NamedTuple):
 
 class _SigmasReader(Section):
     def read(self, value: Any, path: KeyPath, report: Report) -> Any:
-        """Read the section and put its parts together."""
-        stated = super().read(value, path, report)
-        if stated is INVALID:
+        """Read the section as a covariance."""
+        sigmas_section = super().read(value, path, report)
+        if sigmas_section is INVALID:
             return INVALID
-        sigmas = (*stated.position, *stated.velocity)
-        return Covariance(sigmas, stated.correlation.matrix, is_matrix=False, pairs=stated.correlation.pairs)
+        sigmas = (*sigmas_section.position, *sigmas_section.velocity)
+        return Covariance(
+            sigmas, sigmas_section.correlation.matrix, is_matrix=False, pairs=sigmas_section.correlation.pairs
+        )
 
 
 COVARIANCE = either(dict, _SigmasReader(Sigmas), _MatrixReader())
 
 
 def misplaced_axes(covariance: Covariance, frame: str) -> Iterator[Problem]:
-    """Say which pairs name an axis that the frame does not have; paths are below `motion_error`."""
+    """Problems of pairs that name an axis which the frame does not have; paths are below `motion_error`."""
     for pair in covariance.pairs:
         for name in pair.split("-"):
             axis = name.strip().partition(".")[2]

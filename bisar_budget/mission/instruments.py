@@ -45,10 +45,20 @@ AngleRandomWalk = Annotated[Vector | None, Key(_ANGLE_WALK, "Noise of the gyros.
 
 
 class Overridden(NamedTuple):
-    """A figure of a part, or of the accuracy of a log, that something in the file replaces.
+    """A figure of a part, or of the accuracy of a log, that a key of the file replaces.
 
-    `key` is what replaces it, below the platform, `text` the figure as its file has it. `frequency` is the part's, at
-    which a mask holds that the file states without one.
+    Attributes
+    ----------
+    figure : str
+        Key of the figure.
+    key : str
+        Key below the platform that replaces the figure.
+    part : str
+        Name of the part or log.
+    text : str
+        The figure as its file writes it.
+    frequency : str
+        Frequency of the part, if the file states a mask without a frequency and so uses this one.
     """
 
     figure: str
@@ -59,9 +69,16 @@ class Overridden(NamedTuple):
 
 
 class TakenFigure(NamedTuple):
-    """A figure that a mission takes from a part: the key that could state it, what the part says, the part's name.
+    """A figure that a mission takes from a part.
 
-    What the part says is text, or a mapping or a list of text, as its file has it.
+    Attributes
+    ----------
+    key : str
+        Path of the key under which the mission could state the figure.
+    value : str, list or mapping
+        The figure as the part's file writes it.
+    part : str
+        Name of the part.
     """
 
     key: str
@@ -82,11 +99,11 @@ class Imu(NamedTuple):
 
     @property
     def is_stated(self) -> bool:
-        """Whether the file states any of its figures; a zero does."""
+        """Whether the file states a figure. A zero is stated."""
         return any(getattr(self, kind) is not None for kind in IMU_KINDS)
 
 
-IMU_KINDS = Imu._fields[:-1]  # its figures, without their source
+IMU_KINDS = Imu._fields[:-1]  # keys of the figures, without the source
 
 
 class GaussMarkov(NamedTuple):
@@ -101,7 +118,7 @@ class GaussMarkov(NamedTuple):
 class LeverArm(NamedTuple):
     """From the navigation's reference to the antenna's phase centre, in the platform's own axes.
 
-    They are along, cross and up of its velocity, and turn with it; of one that stands still those of the scene.
+    The axes are along, cross and up of the velocity, and turn with it. A fixed platform has the axes of the scene.
     """
 
     arm: Annotated[
@@ -121,12 +138,12 @@ class LeverArm(NamedTuple):
 
     @staticmethod
     def any_of() -> tuple[str, ...]:
-        """Keys of which it has one at least."""
+        """Keys; a lever arm needs at least one."""
         return ("arm", "uncertainty")
 
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
-        """Hold it to saying something."""
+        """Reject an empty section."""
         if values.keys() >= {"arm", "uncertainty"} and values["arm"] is None and values["uncertainty"] is None:
             yield Problem("is empty", "accepted: arm, uncertainty or both")
 
@@ -141,45 +158,43 @@ class PowerLaw(NamedTuple):
     white_phase: float = 0.0
 
 
-POWERS = dict(zip(("h-2", "h-1", "h0", "h1", "h2"), PowerLaw._fields, strict=True))  # as the file has them
+POWERS = dict(zip(("h-2", "h-1", "h0", "h1", "h2"), PowerLaw._fields, strict=True))  # keys of the file to fields
 _COEFFICIENT = Quantity(units.RATIO, ge=0, le=1)
 
 
 class _PowerLawReader(Reader):
     """A mapping of h-2 … h2 to coefficients."""
 
-    what = "{h-2: 4e-23, h-1: 2e-21, h0: 8e-20} and the like"
-
     def read(self, value: Any, path: KeyPath, report: Report) -> Any:
-        """Read each coefficient at its own place."""
+        """Read each coefficient; a problem is reported at its own path."""
         accepted = f"accepted: {', '.join(POWERS)}"
         if not isinstance(value, dict) or not value:
             report(path, Problem("must be a mapping of coefficients", accepted))
             return INVALID
-        read = dict.fromkeys(POWERS, 0.0)
+        coefficients = dict.fromkeys(POWERS, 0.0)
         is_valid = True
         for key, item in value.items():
-            if key not in read:
+            if key not in coefficients:
                 report((*path, key), Problem("is not a known key", accepted, is_of_key=True))
                 is_valid = False
                 continue
-            read[key] = read_part(_COEFFICIENT, item, (*path, key), report)
-        return PowerLaw(*read.values()) if is_valid and INVALID not in read.values() else INVALID
+            coefficients[key] = read_part(_COEFFICIENT, item, (*path, key), report)
+        return PowerLaw(*coefficients.values()) if is_valid and INVALID not in coefficients.values() else INVALID
 
     def below(self, part: str) -> Reader | None:
-        """Give the reader of a coefficient."""
+        """Reader of a coefficient."""
         return _COEFFICIENT if part in POWERS else None
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
-        """Object of coefficients."""
-        one = _COEFFICIENT.schema(definitions)
-        properties = dict.fromkeys(POWERS, one)
+        """JSON Schema: object of coefficients."""
+        coefficient = _COEFFICIENT.schema(definitions)
+        properties = dict.fromkeys(POWERS, coefficient)
         return {"type": "object", "properties": properties, "additionalProperties": False, "minProperties": 1}
 
 
 FORMS = ("phase_noise", "allan_deviation", "power_law")
-STEEPEST = 60.0  # dB a decade; noise of an oscillator falls by 40 at most
-RISE = 20.0  # dB a decade; a mask that rises by more is a tone, or a slip
+MAX_FALL_DB_PER_DECADE = 60.0  # of a mask; noise of an oscillator falls by 40 at most
+MAX_RISE_DB_PER_DECADE = 20.0  # of a mask; a steeper rise is a tone or a mistake
 _OR_SENSOR = ", or sensor: a part of the catalogue"
 NOT_SENSITIVE = Problem(
     "does nothing to an oscillator without acceleration_sensitivity",
@@ -232,8 +247,8 @@ AccelerationSensitivity = Annotated[
 class Oscillator(NamedTuple):
     """An oscillator and its noise, in one of three forms or as a part of the catalogue.
 
-    `overridden` are the figures of the part that keys beside it replace, `of_parts` says where its acceleration
-    sensitivity comes from, where that is the part's.
+    `overridden` lists figures of the part that keys of the file replace. `of_parts` has the sources of aging and
+    acceleration sensitivity if these are figures of the part.
     """
 
     frequency: Frequency = None
@@ -279,29 +294,29 @@ class Oscillator(NamedTuple):
 
     @property
     def needs_frequency(self) -> bool:
-        """Whether what it says is stated at its own frequency: a power law is of fractional frequency."""
+        """Whether the mask or the tones hold at a frequency; a power law describes the fractional frequency."""
         return self.phase_noise is not None or bool(self.spurs)
 
     @property
     def mask_at_frequency_of_part(self) -> Overridden | None:
-        """Noise of a part that a mask without a frequency replaces; it is taken at the frequency of that part."""
-        return next((one for one in self.overridden if one.frequency), None)
+        """Noise of a part that a mask without a frequency replaces; the mask holds at the frequency of the part."""
+        return next((figure for figure in self.overridden if figure.frequency), None)
 
     @property
     def noise_alone(self) -> "Oscillator":
-        """The same without its level, without aging and without what it feels."""
+        """The oscillator without level, aging and vibration."""
         return self._replace(level=0.0, aging=None, acceleration_sensitivity=None, vibration=None)
 
     @staticmethod
     def problems(values: Mapping[str, Any], or_else: str = _OR_SENSOR) -> Iterator[Problem]:
-        """Hold it to one form, and a mask to slopes that an oscillator can have; `or_else` is accepted instead."""
+        """Require one form, and possible slopes of a mask; `or_else` names what else is accepted."""
         forms = [form for form in FORMS if values.get(form) is not None]
-        ways = f"accepted: one of {', '.join(FORMS)}"
+        accepted = f"accepted: one of {', '.join(FORMS)}"
         for form in forms[1:]:
-            yield Problem(f"stands beside {forms[0]}", ways, at=(form,))
+            yield Problem(f"stands beside {forms[0]}", accepted, at=(form,))
         if values.get("sensor") is None and values.keys() >= set(FORMS):
             if not forms:
-                yield Problem("says nothing of its noise", f"{ways}{or_else}")
+                yield Problem("says nothing of its noise", f"{accepted}{or_else}")
             if values["phase_noise"] is not None and values.get("frequency", 0.0) is None:
                 yield Problem("is missing", "accepted: the frequency at which the mask is stated", at=("frequency",))
         if values.get("spurs") and values.get("sensor") is None and values.get("frequency", 0.0) is None:
@@ -311,16 +326,17 @@ class Oscillator(NamedTuple):
             yield NOT_SENSITIVE
         for (f, level), (g, next_level) in pairwise(values.get("phase_noise") or ()):
             slope = (next_level - level) / math.log10(g / f)
-            if slope < -STEEPEST or slope > RISE:
-                does = "rises" if slope > 0 else "falls"
+            if slope < -MAX_FALL_DB_PER_DECADE or slope > MAX_RISE_DB_PER_DECADE:
+                verb = "rises" if slope > 0 else "falls"
                 yield Problem(
-                    f"{does} by {abs(slope):.3g} dB a decade between {f:g} Hz and {g:g} Hz",
-                    f"accepted: a rise of at most {RISE:g} and a fall of at most {STEEPEST:g} dB a decade",
+                    f"{verb} by {abs(slope):.3g} dB a decade between {f:g} Hz and {g:g} Hz",
+                    f"accepted: a rise of at most {MAX_RISE_DB_PER_DECADE:g} and a fall of at most "
+                    f"{MAX_FALL_DB_PER_DECADE:g} dB a decade",
                     at=("phase_noise",),
                 )
 
 
-# Methods with the keys that each needs, and those that it may have beside.
+# Keys that each method needs.
 METHODS: Mapping[str, tuple[str, ...]] = {
     "linear": ("interval", "error"),
     "direct_path": ("error",),
@@ -376,17 +392,17 @@ class Synchronization(NamedTuple):
 
     @property
     def is_direct_path(self) -> bool:
-        """Whether the receiver hears the transmitter, and no pulses are exchanged."""
+        """Whether the receiver receives the transmitter directly, and no pulses are exchanged."""
         return self.method == "direct_path"
 
     @property
     def is_holdover(self) -> bool:
-        """Whether the clocks were set before the aperture, and run free over it."""
+        """Whether the clocks were set before the aperture, and run free during it."""
         return self.method == "holdover"
 
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
-        """Hold each method to its own keys."""
+        """Require the keys of the method, and refuse keys of other methods."""
         method = values.get("method")
         if method is None:
             return
@@ -395,8 +411,8 @@ class Synchronization(NamedTuple):
             if key in values and values[key] is None and key in needed:
                 yield Problem("is missing", f"accepted: {_MEANS[key]}", at=(key,))
             elif values.get(key) is not None and key not in needed:
-                said = _REFUSED.get((method, key), f"has no part in {method}")
-                yield Problem(said, f"accepted: {', '.join(needed)}; no {key}", at=(key,))
+                problem = _REFUSED.get((method, key), f"has no part in {method}")
+                yield Problem(problem, f"accepted: {', '.join(needed)}; no {key}", at=(key,))
 
 
 _MEANS = {

@@ -1,6 +1,6 @@
-"""Read a mission file: a plain tree with positions (`tree`), the tree to a `Mission`, faults to their lines.
+"""Reading of a mission file: a plain tree with positions (`tree`), a `Mission` of the tree, faults with their lines.
 
-A text gives a `Mission` or a `MissionError`, nothing else.
+Every text gives a `Mission` or a `MissionError`.
 """
 
 import os
@@ -15,8 +15,8 @@ from bisar_budget.mission.readers import INVALID
 from bisar_budget.mission.tree import MAX_BYTES, Tree, UnusableError, read_tree
 from bisar_budget.resources import UnreadableError, held, special_file, standard_input
 
-# Imported where a file needs them: `changes`, `parts` and `paths`, which most missions do without. Compiled, as in an
-# environment without bytecode, they take 40 ms, a fifth of the start of a check.
+# `changes`, `parts` and `paths` are imported by the functions that need them, because most missions do without. In an
+# environment without bytecode their compilation takes 40 ms, a fifth of the start of a check.
 _Find = Callable[[str], tuple[str, bytes]]
 
 
@@ -25,7 +25,7 @@ def load_mission(
 ) -> Mission:
     """Read the mission file at `path`; `-` is standard input.
 
-    `model` stands in for the file's own, `changes` for values. Without `is_placed` as `parse_mission`.
+    `model` replaces the model of the file, and `changes` its values. `is_placed` is as in `parse_mission`.
 
     Raises
     ------
@@ -47,6 +47,7 @@ def load_mission(
 
 
 def _content(path: str) -> bytes:
+    """Content of a regular file or of standard input; raises `UnreadableError` for another kind of file."""
     if path == "-":
         return _bounded(standard_input())
     if kind := special_file(path):
@@ -56,7 +57,7 @@ def _content(path: str) -> bytes:
 
 
 def _bounded(file: BinaryIO) -> bytes:
-    """Read at most one byte more than a mission file may have, in two steps: a large buffer costs page faults."""
+    """At most `MAX_BYTES + 1` bytes of a file, read in two steps: a large buffer would cost page faults."""
     data = file.read(1 << 14)
     return data + file.read(MAX_BYTES + 1 - len(data)) if len(data) == 1 << 14 else data
 
@@ -78,18 +79,20 @@ def parse_mission(
     data : bytes or str
         The file's content; bytes are UTF-8.
     file : str
-        Name to say in messages.
+        Name of the file for messages.
     model : str, optional
         Gating model in place of `allocation.model`.
     beside : callable, optional
-        Gives the content of a file that the mission names, and raises `PathFileError`; omitted: files beside it.
+        Returns the content of a file that the mission names, or raises `PathFileError`. By default files are read
+        relative to the folder of the mission file.
     changes : sequence of SetValue
-        Values in place of the file's, and beside them, in this order.
+        Values that replace values of the file or are added to them, in this order.
     find : callable, optional
-        Gives file and content of a part that the mission names, and raises `PartError`; omitted: where parts are.
+        Returns file and content of a part that the mission names, or raises `PartError`. By default parts are
+        searched for in the folders of `parts.folders`.
     is_placed : bool
-        Whether platforms on the Earth get their paths. Without them the mission may be asked at any
-        `collection.center_time`, and has no geometry.
+        Whether platforms on the Earth get their paths. Without paths the mission has no geometry, and can be used for
+        any `collection.center_time`.
 
     Raises
     ------
@@ -110,7 +113,7 @@ def mission_of(
     *,
     is_placed: bool = True,
 ) -> Mission:
-    """Turn the tree of a mission file into a `Mission`, and change the tree; all else as `parse_mission`."""
+    """Turn the tree of a mission file into a `Mission`, and change the tree; other arguments as `parse_mission`."""
     if changes:
         from bisar_budget.mission.changes import apply_changes
 
@@ -146,36 +149,36 @@ def mission_of(
         elif mission is not INVALID and names_parts(mission):
             from bisar_budget.mission.parts import finder_of, with_parts
 
-            mission = with_parts(mission, _noted(find or finder_of(folder), parts), tree.report)
+            mission = with_parts(mission, _recording(find or finder_of(folder), parts), tree.report)
     if tree.faults:
         ordered = tuple([_with_hint(fault) for fault in tree.in_order()])
         if changes:
             ordered = tuple([_with_changes(fault, changes) for fault in ordered])
         raise MissionError(file, ordered)
     as_bytes = data.encode("utf-8", "surrogatepass") if isinstance(data, str) else data
-    read = cast(Mission, mission._replace(file=file, places=tree.values, data=as_bytes, changes=tuple(changes)))
-    read = read._replace(parts=tuple(parts.values()))
-    return read if model is None else read._replace(allocation=read.allocation._replace(model=model))
+    finished = cast(Mission, mission._replace(file=file, places=tree.values, data=as_bytes, changes=tuple(changes)))
+    finished = finished._replace(parts=tuple(parts.values()))
+    return finished if model is None else finished._replace(allocation=finished.allocation._replace(model=model))
 
 
-def _noted(find: _Find, parts: dict[str, PartFile]) -> _Find:
-    """The same, and the file of each part is noted by its name."""
+def _recording(find: _Find, parts: dict[str, PartFile]) -> _Find:
+    """A function that finds parts like `find`, and puts the file of each part into `parts`."""
 
-    def found(name: str) -> tuple[str, bytes]:
+    def find_and_record(name: str) -> tuple[str, bytes]:
         file, content = find(name)
         parts[name] = PartFile(name, file, content)
         return file, content
 
-    return found
+    return find_and_record
 
 
 def folder_of(file: str) -> str:
-    """Folder from which the names in a mission file start; that of standard input is the current one."""
+    """Folder to which names in a mission file are relative; for standard input the current folder."""
     return os.path.dirname(file) if file != "-" else ""
 
 
 def _with_hint(fault: Fault) -> Fault:
-    """Say of an unknown key which was meant, or which section has it."""
+    """A fault with a hint, for an unknown key: at the nearest known key, or at the sections that have the key."""
     is_unknown = fault.problem.endswith("is not a known key")
     if not is_unknown or (fault.hint and not fault.hint.startswith("Did you mean")):
         return fault
@@ -183,13 +186,13 @@ def _with_hint(fault: Fault) -> Fault:
 
     if not fault.option:
         return fault._replace(hint=section_hint(fault.key, fault.hint))
-    asked = fault.option.removeprefix("--set ")
-    is_above = ".".join(parts_of(asked)).startswith(".".join(parts_of(fault.key)))
-    return fault._replace(hint=nearest_keys(asked if is_above else fault.key))
+    option_key = fault.option.removeprefix("--set ")
+    is_above = ".".join(parts_of(option_key)).startswith(".".join(parts_of(fault.key)))
+    return fault._replace(hint=nearest_keys(option_key if is_above else fault.key))
 
 
 def _with_changes(fault: Fault, changes: Sequence[SetValue]) -> Fault:
-    """Say with what options a fault of the file was found: without them there may be none."""
+    """A fault of the file with a hint that names the options: without them there may be no fault."""
     return (
         fault if fault.option else fault._replace(hint=sentences(fault.hint, f"Read with {changes_words(changes)}"))
     )
@@ -198,7 +201,7 @@ def _with_changes(fault: Fault, changes: Sequence[SetValue]) -> Fault:
 # ---------------------------------------------------------------------- files that a mission names
 @dataclass(frozen=True)
 class Named:
-    """Files that a mission names, to take along to machines that do not have them: orbits and logs by name, parts."""
+    """Content of the files that a mission names, for machines without them: orbits and logs by name, and parts."""
 
     paths: tuple[tuple[str, bytes], ...] = ()
     parts: tuple[PartFile, ...] = ()
@@ -206,27 +209,27 @@ class Named:
     def parse(
         self, tree: Tree, data: bytes, file: str, model: str | None = None, *, changes: Sequence[SetValue] = ()
     ) -> Mission:
-        """Read a mission that names nothing else; arguments and faults are those of `mission_of`."""
-        parts = {one.name: (one.file, one.data) for one in self.parts}
+        """Read a mission that names only these files; arguments and faults are as in `mission_of`."""
+        parts = {part.name: (part.file, part.data) for part in self.parts}
         return mission_of(tree, data, file, model, dict(self.paths).__getitem__, changes, parts.__getitem__)
 
     @property
     def sha256(self) -> str:
-        """Hash of all names and contents; empty where nothing is named."""
-        from hashlib import sha256  # a check does without
+        """Hash of all names and contents; empty if the mission names no files."""
+        from hashlib import sha256  # a check does not need it
 
-        named = (*self.paths, *((one.name, one.data) for one in self.parts))
-        each = [(name, sha256(content).hexdigest()) for name, content in named]
-        return sha256(ascii(each).encode()).hexdigest() if each else ""
+        files = (*self.paths, *((part.name, part.data) for part in self.parts))
+        digests = [(name, sha256(content).hexdigest()) for name, content in files]
+        return sha256(ascii(digests).encode()).hexdigest() if digests else ""
 
 
 def named_by(mission: Mission, also: Sequence[SetValue] = ()) -> Named:
-    """Read all that a mission names, and what it names with each of some values that it may get.
+    """Read all files that a mission names, also with each value of `also` in turn.
 
     Raises
     ------
     MissionError
-        A file has changed since the mission was loaded, and is none that can be used.
+        A file has changed since the mission was loaded, and can no longer be used.
     """
     from bisar_budget.mission.parts import finder_of
     from bisar_budget.mission.paths import reader_of
@@ -235,15 +238,15 @@ def named_by(mission: Mission, also: Sequence[SetValue] = ()) -> Named:
     read = reader_of(folder)
     paths: dict[str, bytes] = {}
     parts: dict[str, PartFile] = {}
-    find = _noted(finder_of(folder), parts)
+    find = _recording(finder_of(folder), parts)
 
-    def beside(name: str) -> bytes:
+    def read_and_record(name: str) -> bytes:
         paths[name] = read(name)
         return paths[name]
 
-    model = mission.allocation.model  # --model may stand in for one of the file that is none
-    parse_mission(mission.data, mission.file, model, beside, mission.changes, find)
+    model = mission.allocation.model  # --model may replace an invalid model of the file
+    parse_mission(mission.data, mission.file, model, read_and_record, mission.changes, find)
     for change in also:
-        with suppress(MissionError):  # there is none with it, which is said where it is asked for
-            parse_mission(mission.data, mission.file, model, beside, (*mission.changes, change), find)
+        with suppress(MissionError):  # no mission with this value; reported when the value is used
+            parse_mission(mission.data, mission.file, model, read_and_record, (*mission.changes, change), find)
     return Named(tuple(sorted(paths.items())), tuple(sorted(parts.values())))

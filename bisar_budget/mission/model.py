@@ -1,4 +1,4 @@
-"""Mission file, schema_version 1: every key, its type and its meaning. Values are SI and radians."""
+"""The mission file, schema_version 1: every key with its type and meaning. Values are in SI and radians."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -69,7 +69,7 @@ class Radar(NamedTuple):
 
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
-        """Hold the band above 0 Hz."""
+        """Require a band above 0 Hz."""
         if (
             values.keys() >= {"bandwidth", "center_frequency"}
             and values["bandwidth"] >= 2 * values["center_frequency"]
@@ -78,7 +78,7 @@ class Radar(NamedTuple):
 
     @property
     def wavelength(self) -> float:
-        """At the centre frequency. [m]"""
+        """Wavelength at the centre frequency. [m]"""
         return SPEED_OF_LIGHT / self.center_frequency
 
 
@@ -106,7 +106,7 @@ class Scene(NamedTuple):
 
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
-        """Hold its place to all three coordinates."""
+        """Require all three coordinates of the scene, or none."""
         if values.keys() >= set(PLACE_KEYS):
             missing = [key for key in PLACE_KEYS if values[key] is None]
             if 0 < len(missing) < len(PLACE_KEYS):
@@ -114,12 +114,12 @@ class Scene(NamedTuple):
 
     @property
     def is_on_earth(self) -> bool:
-        """Whether the file says where on the Earth it is."""
+        """Whether the file states the position of the scene on the Earth."""
         return self.latitude is not None
 
     @property
     def axes(self) -> SceneAxes | None:
-        """East, north and up there, in Earth-fixed axes; None where the file does not say where it is."""
+        """East, north and up of the scene in Earth-fixed axes; None if the file states no position."""
         if self.latitude is None or self.longitude is None or self.height is None:
             return None
         return axes_at(Geodetic(self.latitude, self.longitude, self.height))
@@ -143,7 +143,7 @@ class EarthOrientation(NamedTuple):
 
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
-        """Hold it to figures that go together, or to a table."""
+        """Require figures that go together, or a table."""
         figures = [key for key in values if key != "file" and values[key] is not None]
         if values.get("file") is not None:
             if figures:
@@ -155,7 +155,7 @@ class EarthOrientation(NamedTuple):
 
     @property
     def orientation(self) -> Orientation:
-        """Orientation by the figures; where the pole is not stated, its doubt stays."""
+        """Orientation by the figures; an unstated pole is unknown, with its doubt."""
         x, y = self.polar_motion_x, self.polar_motion_y
         pole, doubt = UNKNOWN.pole, UNKNOWN.pole_doubt
         if x is not None and y is not None:
@@ -184,21 +184,21 @@ class OtherError(NamedTuple):
 
     @staticmethod
     def any_of() -> tuple[str, ...]:
-        """Keys of its effects."""
+        """Keys of the effects."""
         return OTHER_EFFECTS
 
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
-        """Hold it to an effect."""
-        if values.keys() >= set(OTHER_EFFECTS) and all(values[one] is None for one in OTHER_EFFECTS):
+        """Require at least one effect."""
+        if values.keys() >= set(OTHER_EFFECTS) and all(values[effect] is None for effect in OTHER_EFFECTS):
             yield Problem("states no effect", f"accepted: any of {', '.join(OTHER_EFFECTS)}")
 
     @property
     def stated(self) -> dict[str, float]:
         """Size of each effect that the file states, by row id."""
-        first, *others = OTHER_EFFECTS
+        first, *further = OTHER_EFFECTS
         sizes = {f"other.{self.name}": getattr(self, first)}
-        sizes |= {f"other.{self.name}.{one}": getattr(self, one) for one in others}
+        sizes |= {f"other.{self.name}.{effect}": getattr(self, effect) for effect in further}
         return {row_id: size for row_id, size in sizes.items() if size is not None}
 
 
@@ -212,7 +212,7 @@ OF_PLATFORMS = (
 )
 OF_MISSION = ("timing", "synchronization", "propagation", "common", "other")
 DECLARABLE = (*OF_PLATFORMS, *OF_MISSION)
-_OF_ONE = tuple(f"{name}.{kind}" for name in Platforms._fields for kind in OF_PLATFORMS)
+_OF_ONE_PLATFORM = tuple(f"{name}.{kind}" for name in Platforms._fields for kind in OF_PLATFORMS)
 
 
 class Requirements(NamedTuple):
@@ -232,7 +232,7 @@ class Requirements(NamedTuple):
         Key(
             Words(
                 *DECLARABLE,
-                *_OF_ONE,
+                *_OF_ONE_PLATFORM,
                 accepted=f"{', '.join(DECLARABLE)}; of one platform receiver.imu and the like",
             ),
             "Errors that the file must declare, for both platforms or for one (receiver.imu); what is missing is "
@@ -244,12 +244,12 @@ class Requirements(NamedTuple):
 
 
 def least_age(averaging: Any, aperture_time: Any) -> Any:
-    """Least age of a setting, with whose averaging the aperture does not overlap. [s]"""
+    """Least age of a clock setting whose averaging does not overlap with the aperture. [s]"""
     return (averaging + aperture_time) / 2
 
 
 def _unset_clocks(values: Mapping[str, Any]) -> Iterator[Problem]:
-    """Hold clocks that were set to a time before the aperture, and to one way to say what they are wrong by."""
+    """Problems of clocks that were set: too late, or with their errors stated twice."""
     sync, collection, timing = (values.get(key) for key in ("synchronization", "collection", "timing_error"))
     if sync is None or sync.is_direct_path:
         return
@@ -261,30 +261,30 @@ def _unset_clocks(values: Mapping[str, Any]) -> Iterator[Problem]:
                 f"accepted: at least {least:g} s, half of both",
                 at=("synchronization", "age"),
             )
-    for term, stands in (("constant", "time_error"), ("linear", "frequency_error")):
+    for term, sync_key in (("constant", "time_error"), ("linear", "frequency_error")):
         if timing is None or getattr(timing, term) is None:
             continue
         if sync.is_holdover:
             yield Problem(
                 "stands beside synchronization.method holdover, which says what the clocks are wrong by",
-                f"accepted: synchronization.{stands}, or no holdover",
+                f"accepted: synchronization.{sync_key}, or no holdover",
                 at=("timing_error", term),
             )
-        elif getattr(sync, stands) is not None:
+        elif getattr(sync, sync_key) is not None:
             yield Problem(
-                f"stands beside synchronization.{stands}: the same error would count twice",
+                f"stands beside synchronization.{sync_key}: the same error would count twice",
                 "accepted: one of the two",
                 at=("timing_error", term),
             )
 
 
 def least_bandwidth(aperture_time: Any) -> Any:
-    """Least bandwidth of an oscillator's noise: below one cycle per aperture, none would be counted. [Hz]"""
+    """Least bandwidth of an oscillator's noise, a cycle per aperture; with a smaller one no noise counts. [Hz]"""
     return 1 / aperture_time
 
 
 def _noise_cut_off(values: Mapping[str, Any]) -> Iterator[Problem]:
-    """Hold bandwidths of oscillators to the aperture, so that their noise is looked at."""
+    """Problems of oscillators whose bandwidth excludes all noise of the aperture."""
     platforms, collection = values.get("platforms"), values.get("collection")
     if platforms is None or collection is None:
         return
@@ -299,7 +299,7 @@ def _noise_cut_off(values: Mapping[str, Any]) -> Iterator[Problem]:
             )
 
 
-WHOLE = 1e-6  # by so much the sum of shares may differ from 1
+WHOLE = 1e-6  # largest difference of a sum of shares from 1
 
 
 class Shares(NamedTuple):
@@ -311,7 +311,7 @@ class Shares(NamedTuple):
     reserve: Annotated[float, Key(Quantity(units.RATIO, ge=0, lt=1))] = 0.0
 
     def of(self, owner: str) -> float:
-        """Share of an owner; what belongs to nobody is held to the whole budget."""
+        """Share of an owner; 1 for errors of the mission, which have no owner."""
         if owner == "clock":
             return self.receiver if self.clock is None else self.clock
         if owner == "mission":
@@ -319,12 +319,12 @@ class Shares(NamedTuple):
         return self.transmitter if owner == "transmitter" else self.receiver
 
     def includes(self, owner: str, of: str) -> bool:
-        """Whether an owner's errors count against the share of `of`; against the mission's all do."""
+        """Whether an owner's errors count against the share of `of`; all errors count against the mission's."""
         return of in ("mission", owner) or (owner == "clock" and of == "receiver" and self.clock is None)
 
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
-        """Hold the sum to 1."""
+        """Require shares that sum to 1."""
         if not values.keys() >= set(Shares._fields):
             return
         total = sum(values[name] or 0.0 for name in Shares._fields)
@@ -349,6 +349,7 @@ METRIC_SPLITS = Section(MetricSplits)
 
 
 def _form_of_split(value: Any) -> Reader:
+    """Reader of a split: a rule, shares, or splits by metric."""
     if not isinstance(value, dict):
         return RULE
     return SHARES if value.keys().isdisjoint(METRIC_SPLITS.keys) else METRIC_SPLITS
@@ -428,7 +429,7 @@ class Waiver(NamedTuple):
 
 
 class PartFile(NamedTuple):
-    """The file of a part that a mission takes figures from: the name that the mission says, and the file as read."""
+    """The file of a part whose figures a mission takes: the name in the mission, the path and the content."""
 
     name: str
     file: str
@@ -438,9 +439,22 @@ class PartFile(NamedTuple):
 class Mission(NamedTuple):
     """A mission file that can be used.
 
-    `file` and `places` say where it stands: the path of each value to the parser's event. `data` is the file as
-    read, byte for byte. `changes` are the values that options put in place of the file's, `parts` the files of
-    parts that it names, `taken` the figures that it takes from them: it is the same mission if its file states them.
+    Fields that are no keys of the file:
+
+    Attributes
+    ----------
+    file : str
+        Path of the file.
+    places : mapping of KeyPath to event
+        The parser's event of each value, with its position in the file.
+    data : bytes
+        Content of the file, byte for byte.
+    changes : tuple of SetValue
+        Values that options put in place of the file's values.
+    parts : tuple of PartFile
+        Files of the parts that the mission names.
+    taken : tuple of TakenFigure
+        Figures that the mission takes from parts. A file that states these figures gives the same mission.
     """
 
     schema_version: Annotated[int, Key(Version())]
@@ -491,8 +505,8 @@ class Mission(NamedTuple):
         return f"Mission({self.file!r}, {shown(self.name)!r})"
 
     def _repr_html_(self) -> str:
-        """Radar, aperture, where the platforms are and how they move, as a notebook shows them."""
-        from html import escape  # a check does without
+        """Table for a notebook: radar, aperture, positions and motion of the platforms."""
+        from html import escape  # a check does not need it
 
         from bisar_budget import notebook
 
@@ -511,22 +525,22 @@ class Mission(NamedTuple):
         return notebook.page(title, notebook.table(("", ""), rows), file)
 
     def __eq__(self, other: object) -> bool:
-        """Whether it says the same, in the same file; `places` are where the bytes of `data` stand."""
+        """Whether two missions have equal values from the same file; `places` follow from `data`."""
         return isinstance(other, Mission) and tuple(self._replace(places={})) == tuple(other._replace(places={}))
 
     def __ne__(self, other: object) -> bool:
-        """Whether it does not; a tuple has its own answer."""
+        """Whether two missions differ; defined because a tuple has an answer of its own."""
         return not self == other
 
     def replace(self, values: Mapping[str, Any]) -> "Mission":
-        """A mission with other values in place of the file's; see `quantities.changed`."""
-        from bisar_budget.mission.quantities import changed  # which reads a mission
+        """A mission with some values changed; see `quantities.changed`."""
+        from bisar_budget.mission.quantities import changed  # that module imports this one
 
         return changed(self, values)
 
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
-        """Hold it to a collection that forms an image, and to names that can be told apart."""
+        """Require a collection that forms an image, and distinct names."""
         platforms: Platforms | None = values.get("platforms")
         if platforms is not None and not any(platform.is_of_the_earth for platform in platforms):
             collection, synchronization = values.get("collection"), values.get("synchronization")
@@ -559,37 +573,38 @@ class Mission(NamedTuple):
 
     @property
     def has_direct_path(self) -> bool:
-        """Whether the receiver hears the transmitter and takes it as its clock."""
+        """Whether the receiver receives the transmitter directly and uses it as its clock."""
         return self.synchronization is not None and self.synchronization.is_direct_path
 
     @property
     def gating_model(self) -> str:
-        """The model that gates: with a direct path the full one, since the published one does not know it."""
+        """The model that gates: with a direct path the full model, because the published model has no direct path."""
         return "full" if self.has_direct_path else self.allocation.model
 
     def line(self, path: KeyPath) -> Place | None:
-        """Line of a value in the mission file, from 1, else of the nearest key above it that exists.
+        """Line of a value in the mission file, from 1, or else of the nearest key above it that exists.
 
-        At last that is the file's first key; None for a mission that came from no file, and for a value that an
+        The last resort is the first key of the file. None for a mission without a file, and for a value that an
         option set.
         """
         event = next(filter(None, map(self.places.get, (*upwards(path), ()))), None)
         return None if event is None or isinstance(event, Changed) else Place.of(event)
 
     def is_changed(self, path: KeyPath) -> bool:
-        """Whether a value, or what holds it, comes from an option."""
+        """Whether a value, or a section or list around it, comes from an option."""
         event = next(filter(None, map(self.places.get, upwards(path))), None)
         return bool(self.changes) and isinstance(event, Changed)
 
 
 def _at_a_glance(state: PlatformState) -> str:
+    """Position and motion of a platform in a line."""
     speed = math.hypot(*state.velocity)
     moves = "stands still" if state.is_still else f"moves at {format_quantity(speed, 'm/s', 4)}"
     return f"{format_quantity(state.slant_range, 'm', 4)} away, {math.degrees(state.elevation):.1f}° high, {moves}"
 
 
 def has_instruments(mission: Mission) -> bool:
-    """Whether a mission says anything of sensors, lever arms, clocks or spectra: what is random over an aperture."""
+    """Whether a mission has sensors, lever arms, clocks or spectra, whose errors are random over an aperture."""
     return (
         mission.synchronization is not None
         or any(
@@ -606,7 +621,7 @@ def has_instruments(mission: Mission) -> bool:
 
 
 def has_random_errors(mission: Mission) -> bool:
-    """Whether a mission says anything of sensors, clocks or the air, or of others what is no quadratic phase."""
+    """Whether a mission has sensors, clocks, delays in the air, or other errors that are no quadratic phase."""
     return (
         has_instruments(mission)
         or mission.propagation is not None
@@ -615,7 +630,7 @@ def has_random_errors(mission: Mission) -> bool:
 
 
 def flies_on_earth(mission: Mission) -> bool:
-    """Whether paths of a mission depend on where on the Earth its scene is, or stand in files."""
+    """Whether paths of a mission depend on the position of the scene on the Earth, or on files."""
     common = mission.common_motion_error
     return (
         mission.scene.is_on_earth
@@ -633,7 +648,7 @@ def names_parts(mission: Mission) -> bool:
 
 
 def names_files(root: Mapping[str, Any]) -> bool:
-    """Whether what a file says, mission or not, names a part, an orbit or a log."""
+    """Whether the content of a file, mission or not, names a part, an orbit or a log."""
     platforms = root.get("platforms")
     sections = platforms.values() if isinstance(platforms, dict) else ()
     return any(
@@ -645,12 +660,12 @@ def names_files(root: Mapping[str, Any]) -> bool:
 
 
 MISSION = Section(Mission)
-# Of the JSON Schemas of the mission file and of a part's: keywords that every editor's YAML support reads.
+# Draft of the JSON Schemas of missions and parts: the YAML support of every editor knows its keywords.
 DRAFT = "http://json-schema.org/draft-07/schema#"
 
 
 def mission_schema() -> dict[str, Any]:
-    """Return the schema; quantities are text with a unit or a bare number, whose unit the tool itself checks."""
+    """JSON Schema of a mission; quantities are text with a unit, which only the tool checks, or a bare number."""
     definitions: dict[str, Any] = {}
     return {
         "$schema": DRAFT,

@@ -1,7 +1,7 @@
-"""Parts of the catalogue: inertial sensors, GNSS receivers and oscillators, with their figures and where these stand.
+"""Parts of the catalogue: inertial sensors, GNSS receivers and oscillators, their figures and the sources of these.
 
-One YAML file for each part, in `specs/sensors/`, in the folders that a project names, or anywhere by its path. A
-mission names parts, and what the mission says itself overrides single figures.
+Each part has one YAML file: in `specs/sensors/`, in a folder that a project names, or anywhere by its path. A mission
+names parts. A figure that the mission states itself overrides the figure of the part.
 """
 
 import os
@@ -68,7 +68,7 @@ from bisar_budget.mission.tree import MAX_BYTES, Tree, UnusableError, read_tree
 from bisar_budget.resources import DISK, Files, UnreadableError, resource, standard_input
 from bisar_budget.settings import SettingsError, project_settings
 
-Find = Callable[[str], tuple[str, bytes]]  # file and content of a part by its name
+Find = Callable[[str], tuple[str, bytes]]  # name of a part to the path and the content of its file
 
 MOTION_ERROR = Section(MotionError)
 _TEXT = Text()
@@ -82,7 +82,7 @@ _POSITION = "1 sigma east, north, up; a single value stands for each."
 _NOISE = "Position errors that change within an aperture: what is left of its noise."
 _GNSS_KINDS = ("position", "velocity", "random")
 _SUFFIXES = (".yaml", ".yml")
-_MOST = 1000  # parts of a folder
+_MAX_FOLDER_FILES = 1000  # parts that are read of one folder
 
 
 class ImuPart(NamedTuple):
@@ -102,7 +102,7 @@ class ImuPart(NamedTuple):
 
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
-        """Hold it to a figure that is not zero."""
+        """Require a figure that is not zero."""
         yield from _without_figure(values, IMU_KINDS)
 
 
@@ -120,7 +120,7 @@ class GnssPart(NamedTuple):
 
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
-        """Hold it to a figure that is not zero, and its noise to what that of a mission is held to."""
+        """Require a figure that is not zero, and check the noise as in a mission."""
         yield from MotionError.problems({"random": values.get("random", ())})
         yield from _without_figure(values, _GNSS_KINDS)
 
@@ -141,7 +141,7 @@ class OscillatorPart(NamedTuple):
 
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
-        """Hold it to what an oscillator of a mission is held to, and to noise that is not zero."""
+        """Check the part as an oscillator of a mission, and require noise that is not zero."""
         yield from Oscillator.problems({**values, "sensor": None}, or_else="")
         if any(values.get(form) is not None for form in FORMS):
             yield from _without_figure(values, FORMS)
@@ -153,39 +153,44 @@ SECTIONS: dict[str, Section] = {
     "gnss": Section(GnssPart),
     "oscillator": Section(OscillatorPart),
 }
-BESIDE_NOISE = ("aging", "acceleration_sensitivity")  # figures of an oscillator that stand for themselves
+BESIDE_NOISE = ("aging", "acceleration_sensitivity")  # figures of an oscillator in addition to a form of noise
 FIGURES = {"imu": IMU_KINDS, "gnss": _GNSS_KINDS, "oscillator": ("frequency", *FORMS, *BESIDE_NOISE)}
 
 
 class PartError(Exception):
-    """A part that cannot be used; each of its arguments says what is wrong.
+    """A part that cannot be used; each argument of the error is one reason.
 
-    `faults` are those of its file, with their places; empty where there is none to read. `hint` is what may help.
+    Attributes
+    ----------
+    faults : tuple of Fault
+        Faults of the part's file with their lines and columns; empty if no file was read.
+    hint : str
+        Advice for the user, or empty.
     """
 
-    def __init__(self, *said: str, faults: Sequence[Fault] = (), hint: str = "") -> None:
-        super().__init__(*said)
+    def __init__(self, *reasons: str, faults: Sequence[Fault] = (), hint: str = "") -> None:
+        super().__init__(*reasons)
         self.faults, self.hint = tuple(faults), hint
 
     @classmethod
     def of(cls, file: str, faults: Sequence[Fault]) -> "PartError":
-        """Lines for the faults of a file, one each."""
+        """An error with one line for each fault of a file."""
         return cls(*MissionError(file, tuple(faults)).lines(), faults=faults)
 
     def __str__(self) -> str:
-        """Say all of it."""
+        """All reasons, joined by semicolons."""
         return "; ".join(map(str, self.args))
 
 
 def evidence(part: Part, figure: str) -> str:
-    """Where a figure of a part stands."""
+    """Evidence for a figure of a part: the name of the part and the source of the figure."""
     source = part.source if isinstance(part.source, str) else part.source.get(figure, "")
     return f"{part.name}: {source}"
 
 
 @dataclass(frozen=True)
 class Entry:
-    """A part as its file has it; `written` is what the file says, as text, in lists and mappings."""
+    """A part with its file; `written` is the content of the file: text, lists and mappings."""
 
     file: str
     part: Part
@@ -193,29 +198,29 @@ class Entry:
 
     @property
     def id(self) -> str:
-        """The name that a mission asks for."""
+        """The name by which a mission names the part."""
         return os.path.splitext(os.path.basename(self.file))[0]
 
     @property
     def figures(self) -> Mapping[str, str]:
-        """Its figures as written there."""
+        """Figures of the part by their keys, as the file writes them."""
         return {key: figure_text(self.written[key]) for key in FIGURES[self.part.kind] if key in self.written}
 
 
 def entries(places: Sequence[str]) -> Iterator[Entry]:
-    """Read every part of the catalogue, by kind and name.
+    """Read every part of the catalogue, ordered by kind and name.
 
     Raises
     ------
     PartError
-        One of them is no part.
+        One of the files is no part.
     """
-    found = [_entry(file, _content(file, DISK)) for file in catalogue(places).values()]
-    yield from sorted(found, key=lambda one: (list(SECTIONS).index(one.part.kind), one.id))
+    read = [_entry(file, _content(file, DISK)) for file in catalogue(places).values()]
+    yield from sorted(read, key=lambda entry: (list(SECTIONS).index(entry.part.kind), entry.id))
 
 
 def figure_text(value: Any) -> str:
-    """A figure as the file of its part has it, in one line."""
+    """A figure as the file of its part writes it, in one line."""
     if isinstance(value, dict):
         return ", ".join(f"{key}: {figure_text(item)}" for key, item in value.items())
     if isinstance(value, list):
@@ -224,25 +229,26 @@ def figure_text(value: Any) -> str:
 
 
 def read_entry(file: str) -> Entry:
-    """Read a file, `-` for standard input, as a mission does that names it; hold its name to what one can name.
+    """Read the file of a part, `-` for standard input, as for a mission that names it; the file name is checked too.
 
     Raises
     ------
     PartError
-        No mission can use it; carries every fault.
+        No mission can use the part; carries every fault.
     """
     data = _standard_input() if file == "-" else _content(file, DISK)
     faults = () if file == "-" else tuple(_name_faults(file))
     try:
-        read = _entry(file, data)
+        entry = _entry(file, data)
     except PartError as error:
         raise PartError.of(file, (*faults, *error.faults)) from None
     if faults:
         raise PartError.of(file, faults)
-    return read
+    return entry
 
 
 def _name_faults(file: str) -> Iterator[Fault]:
+    """Faults of a file name by which no mission can name the part."""
     name = os.path.basename(file)
     if not name.endswith(_SUFFIXES):
         accepted = f"accepted: one that ends in {' or '.join(_SUFFIXES)}"
@@ -254,14 +260,16 @@ def _name_faults(file: str) -> Iterator[Fault]:
 
 
 def _content(file: str, files: Files) -> bytes:
+    """Content of the file of a part; raises `PartError`."""
     try:
         return files.content(file, MAX_BYTES)
     except UnreadableError as error:
-        said = str(error)
-        raise PartError(said, faults=[file_fault(said.removeprefix(f"{file} "))]) from None
+        problem = str(error)
+        raise PartError(problem, faults=[file_fault(problem.removeprefix(f"{file} "))]) from None
 
 
 def _standard_input() -> bytes:
+    """Content of standard input, at most one byte more than `MAX_BYTES`; raises `PartError`."""
     try:
         return standard_input().read(MAX_BYTES + 1)
     except (OSError, ValueError) as error:
@@ -271,7 +279,7 @@ def _standard_input() -> bytes:
 
 @lru_cache(maxsize=64)  # a thousand missions name the same parts
 def _entry(file: str, data: bytes) -> Entry:
-    """Read a part, whoever asks for it."""
+    """Read a part; parts that were read before come from the cache."""
     part: Any = INVALID
     try:
         tree = read_tree(data, file, "part")
@@ -285,16 +293,16 @@ def _entry(file: str, data: bytes) -> Entry:
 
 
 def _part_of(tree: Tree) -> Any:
-    """The part that a file states; `INVALID` after a report.
+    """The part of a file; `INVALID` after a report.
 
-    A file that does not say its kind is read as what its figures are, so that all that is wrong is said at once.
+    A file without a valid kind is read as the kind with most of its figures, so that all faults are reported at once.
     """
     root = tree.root
     kind = root.get("kind")
     if not (isinstance(kind, str) and kind in SECTIONS):
-        kind = max(SECTIONS, key=lambda one: len(root.keys() & set(FIGURES[one])))
+        kind = max(SECTIONS, key=lambda name: len(root.keys() & set(FIGURES[name])))
         is_likely = not root.keys().isdisjoint(FIGURES[kind])
-        if root.get("kind") is not INVALID:  # that was reported
+        if root.get("kind") is not INVALID:  # an invalid value was reported by the tree
             tree.report(("kind",), _no_kind(root, kind if is_likely else ""))
         if not is_likely:
             return INVALID
@@ -305,7 +313,7 @@ def _part_of(tree: Tree) -> Any:
 
 
 def _no_kind(root: Mapping[str, Any], likely: str) -> Problem:
-    """The problem with the kind that a file states, or lacks; `likely` is the kind of its figures."""
+    """The problem with a missing or unknown kind; `likely` is the kind that the figures belong to, or empty."""
     hint = did_you_mean(root.get("kind", ""), tuple(SECTIONS))
     if likely:
         hint = f"Its figures are those of kind: {likely}"
@@ -316,34 +324,36 @@ def _no_kind(root: Mapping[str, Any], likely: str) -> Problem:
 
 
 def _without_figure(values: Mapping[str, Any], figures: Sequence[str]) -> Iterator[Problem]:
-    """Say so if no figure is there, or zeros alone; a figure that is wrong in itself is no key of `values`."""
-    if values.keys() >= set(figures) and not any(_says(values[figure]) for figure in figures):
+    """A problem if all figures are missing or zero; none if `values` lacks a figure because it was reported."""
+    if values.keys() >= set(figures) and not any(_is_not_zero(values[figure]) for figure in figures):
         yield Problem("states no figure", f"accepted: one of {', '.join(figures)} that is not zero")
 
 
 def _without_source(root: Mapping[str, Any], figures: Sequence[str]) -> Iterator[Problem]:
-    """Say which figures that a file states, right or wrong, have no source, where each has its own."""
+    """A problem if sources are given by figure and a figure of the file, valid or not, has none."""
     source = root.get("source")
     if not isinstance(source, dict):
         return
-    silent = tuple([figure for figure in figures if root.get(figure) and figure not in source])
-    if silent:
-        others = [did_you_mean(key, silent) for key in source if key not in figures]
-        hint = next(filter(None, others), "")
-        yield Problem(f"says nothing of {', '.join(silent)}", "accepted: one for every figure", hint, at=("source",))
+    unsourced = tuple([figure for figure in figures if root.get(figure) and figure not in source])
+    if unsourced:
+        near = [did_you_mean(key, unsourced) for key in source if key not in figures]
+        hint = next(filter(None, near), "")
+        yield Problem(
+            f"says nothing of {', '.join(unsourced)}", "accepted: one for every figure", hint, at=("source",)
+        )
 
 
-def _says(figure: Any) -> bool:
-    """Whether a figure is there, and is not zero: no sensor is without error."""
+def _is_not_zero(figure: Any) -> bool:
+    """Whether a figure is stated and not zero: no sensor is without error."""
     if isinstance(figure, GaussMarkov):
-        return _says(figure.sigma)
+        return _is_not_zero(figure.sigma)
     if isinstance(figure, tuple | list):
-        return any(_says(item) for item in figure)
+        return any(_is_not_zero(item) for item in figure)
     return isinstance(figure, float) and figure != 0
 
 
 def folders(beside: str, files: Files = DISK) -> list[str]:
-    """Where parts are looked for: the project's own folders, then the catalogue of this package.
+    """Folders that are searched for parts: the folders of the project's settings, then the catalogue of this package.
 
     Raises
     ------
@@ -356,21 +366,21 @@ def folders(beside: str, files: Files = DISK) -> list[str]:
         raise PartError(str(error)) from None
     except OSError:  # somebody removed the current folder
         settings = None
-    own = list(settings.values.get("sensors", ())) if settings else []
-    return [*own, str(resource("specs", "sensors"))]
+    project_folders = list(settings.values.get("sensors", ())) if settings else []
+    return [*project_folders, str(resource("specs", "sensors"))]
 
 
 def catalogue(places: Sequence[str], files: Files = DISK) -> dict[str, str]:
-    """File of each part by its name; a project's own stand before the catalogue's."""
-    found: dict[str, str] = {}
+    """File of each part by its name; parts of a folder hide parts of the same name in later folders."""
+    part_file_by_name: dict[str, str] = {}
     for folder in places:
-        for file in part_files(folder, files)[:_MOST]:
-            found.setdefault(os.path.splitext(os.path.basename(file))[0], file)
-    return found
+        for file in part_files(folder, files)[:_MAX_FOLDER_FILES]:
+            part_file_by_name.setdefault(os.path.splitext(os.path.basename(file))[0], file)
+    return part_file_by_name
 
 
 def part_files(folder: str, files: Files = DISK) -> list[str]:
-    """Files of a folder that are parts by their names; raises `PartError` where it cannot be listed."""
+    """Files of a folder that are parts by their suffixes; raises `PartError` if the folder cannot be listed."""
     try:
         names = files.names(folder)
     except OSError as error:
@@ -382,7 +392,7 @@ def part_files(folder: str, files: Files = DISK) -> list[str]:
 def finder_of(folder: str, files: Files = DISK) -> Find:
     """Return a function that finds the parts that a mission file in a folder names.
 
-    It raises `PartError` where there is none of a name, or its file cannot be read.
+    The function raises `PartError` if no part has the name, or if its file cannot be read.
     """
 
     def find(name: str) -> tuple[str, bytes]:
@@ -393,37 +403,38 @@ def finder_of(folder: str, files: Files = DISK) -> Find:
 
 
 def find_part(name: str, beside: str) -> Part:
-    """Read the part that a mission names: one of the catalogue, or a file beside the mission's folder.
+    """Read the part that a mission names: a part of the catalogue, or a file relative to the mission's folder.
 
     Raises
     ------
     PartError
-        There is none, or it is no part.
+        No part has the name, or the file is no part.
     """
     return _entry(*finder_of(beside)(name)).part
 
 
 def is_file(name: str) -> bool:
-    """Whether what a mission names as a part is a file beside it, and none of a catalogue."""
+    """Whether the name of a part is the path of a file, and not a name of the catalogue."""
     return name.endswith(_SUFFIXES)
 
 
 def _file_of(name: str, beside: str, files: Files) -> str:
+    """Path of the file of a part; raises `PartError` if no folder has the part."""
     if is_file(name):
         return os.path.join(beside, name)
-    places = folders(beside, files)
-    for folder in places:
-        with suppress(OSError):  # said where the part is in no other folder
-            there = files.names(folder)
+    searched_folders = folders(beside, files)
+    for folder in searched_folders:
+        with suppress(OSError):  # `catalogue` reports the folder below if no other folder has the part
+            names = files.names(folder)
             for file in (name + suffix for suffix in _SUFFIXES):
-                if file in there:
+                if file in names:
                     return os.path.join(folder, file)
-    near = did_you_mean(name.lower(), tuple(catalogue(places, files)))
+    near = did_you_mean(name.lower(), tuple(catalogue(searched_folders, files)))
     raise PartError("is no part of the catalogue", hint=sentences("`bisar-budget sensors` lists them", near))
 
 
 def with_parts(mission: Mission, find: Find, report: Report) -> Any:
-    """Put in the figures of the parts that a mission names; `INVALID` after a report. `find` raises `PartError`."""
+    """The mission with the figures of its parts; `INVALID` after a report. `find` raises `PartError`."""
     is_valid, taken = True, list[TakenFigure]()
     platforms = mission.platforms
     for name, platform in platforms._asdict().items():
@@ -440,10 +451,10 @@ def with_parts(mission: Mission, find: Find, report: Report) -> Any:
 
 
 def report_parts(root: Any, find: Find, report: Report) -> None:
-    """Say what is wrong with the parts that a file names, which is no mission for other reasons.
+    """Report problems with the parts of a file that is no mission for other reasons.
 
-    A section whose values are right is held to its parts as that of a mission is; of another one the names are looked
-    at. `root` is what the file says.
+    A valid section is checked together with its parts as in a mission. For an invalid section only the names of its
+    parts are checked. `root` is the content of the file.
     """
     platforms = root.get("platforms")
     for name in Platforms._fields:
@@ -458,11 +469,11 @@ def report_parts(root: Any, find: Find, report: Report) -> None:
 
 
 def _stand_in(section: Section, value: Any) -> dict[str, Any]:
-    """Values of a section, if all of them are right; else the names of its parts."""
+    """Values of a section if all of them are valid, else only the names of its parts."""
     values = section.each(value)
     if INVALID not in values.values():
         return values
-    return {key: found for key, found in values.items() if key == "sensor" and found is not INVALID}
+    return {key: item for key, item in values.items() if key == "sensor" and item is not INVALID}
 
 
 def _parts_of(
@@ -470,7 +481,7 @@ def _parts_of(
 ) -> Any:
     """Entries of parts by their names; `INVALID` after a report."""
     is_list = isinstance(names, tuple)
-    found: dict[str, Entry] = {}
+    entry_by_name: dict[str, Entry] = {}
     is_valid = True
     for index, name in enumerate(names if isinstance(names, tuple) else [names] if names else []):
         here = (*path, index) if is_list else path
@@ -480,37 +491,38 @@ def _parts_of(
             if kind not in kinds:
                 raise PartError(f"is an {kind}" if kind != "gnss" else "is a GNSS receiver")
         except PartError as error:
-            # What is wrong with its file says what is accepted there, and names the file.
+            # Faults of the part's file name the file and what it accepts.
             accepted = "" if error.faults else f"accepted: parts of the kind {' or '.join(kinds)}"
-            for said in map(str, error.args):
-                report(here, Problem(said, accepted, error.hint, names_value=bool(error.faults)))
+            for problem in map(str, error.args):
+                report(here, Problem(problem, accepted, error.hint, names_value=bool(error.faults)))
             is_valid = False
             continue
-        if any(kind == other.part.kind for other in found.values()):
+        if any(kind == earlier.part.kind for earlier in entry_by_name.values()):
             report(here, Problem(f"is a second {kind}", "accepted: one part of each kind"))
             is_valid = False
-        found[name] = entry
-    return found if is_valid else INVALID
+        entry_by_name[name] = entry
+    return entry_by_name if is_valid else INVALID
 
 
 def _with_sensors(error: MotionError, path: KeyPath, find: Find, report: Report, taken: list[TakenFigure]) -> Any:
-    """A motion error with the figures of parts where the file has none, which are noted; `INVALID` after a report.
+    """A motion error with figures of parts in place of missing figures; `INVALID` after a report.
 
-    What the file has overrides exactly that figure, and says so.
+    Figures taken from parts are appended to `taken`. A figure of the file overrides the same figure of a part, and
+    the motion error lists it as overridden.
     """
     path = (*path, "sensor")
-    parts = _parts_of(error.sensor, path, ("imu", "gnss"), find, report)
-    if parts is INVALID:
+    entries = _parts_of(error.sensor, path, ("imu", "gnss"), find, report)
+    if entries is INVALID:
         return INVALID
-    of_parts = dict(error.of_parts)  # an accuracy file may have been before
+    of_parts = dict(error.of_parts)  # figures of an accuracy file may be there already
     overridden = list(error.overridden)
-    for name, entry in parts.items():
+    for name, entry in entries.items():
         part = entry.part
         imu = error.imu or Imu()
-        own = imu if isinstance(part, ImuPart) else error
+        stating = imu if isinstance(part, ImuPart) else error
         figures = {}
         for figure, text in entry.figures.items():
-            key = _own_key(error, own, figure)
+            key = _own_key(error, stating, figure)
             if key:
                 overridden.append(Overridden(figure, key, part.name, text))
             else:
@@ -532,52 +544,55 @@ def _with_sensors(error: MotionError, path: KeyPath, find: Find, report: Report,
 
 
 def _taken(name: str, entry: Entry, section: KeyPath, figures: Collection[str]) -> Iterator[TakenFigure]:
-    """Figures that a section takes from a part, in the order of the part's file."""
+    """Notes on the figures that a section takes from a part, in the order of the part's file."""
     for figure in entry.figures:
         if figure in figures:
             yield TakenFigure(".".join(map(str, (*section, figure))), entry.written[figure], name)
 
 
-def _own_key(error: MotionError, own: MotionError | Imu, figure: str) -> str:
-    """Key below the platform that states a figure beside a part; empty where nothing does."""
+def _own_key(error: MotionError, stating: MotionError | Imu, figure: str) -> str:
+    """Key below the platform that states a figure in addition to a part; empty if the part alone states it."""
     if figure in ("position", "velocity"):
         if error.covariance is not None:
             return "motion_error.covariance"
         if figure in dict(error.of_parts):
             return "trajectory.accuracy"
-    if getattr(own, figure) in (None, ()):
+    if getattr(stating, figure) in (None, ()):
         return ""
-    return f"motion_error.imu.{figure}" if isinstance(own, Imu) else f"motion_error.{figure}"
+    return f"motion_error.imu.{figure}" if isinstance(stating, Imu) else f"motion_error.{figure}"
 
 
 def _with_sensor(oscillator: Oscillator, path: KeyPath, find: Find, report: Report, taken: list[TakenFigure]) -> Any:
-    """An oscillator with the figures of its part, which are noted; `INVALID` after a report.
+    """An oscillator with the figures of its part; `INVALID` after a report.
 
-    What the file states overrides exactly that figure, and says so. A mask holds at the frequency it was measured
-    at: with another one beside it, the same decibels would be those of a better or a worse oscillator. The file has
-    to state both, or neither.
+    Figures taken from the part are appended to `taken`. A figure of the file overrides the same figure of the part,
+    and the oscillator lists it as overridden. A mask holds at the frequency at which it was measured: with another
+    frequency, the same decibels would describe a better or a worse oscillator. So the file has to state both, or
+    neither.
     """
     if oscillator.sensor is None:
         return oscillator
-    parts = _parts_of(oscillator.sensor, (*path, "sensor"), ("oscillator",), find, report)
-    if parts is INVALID:
+    entries = _parts_of(oscillator.sensor, (*path, "sensor"), ("oscillator",), find, report)
+    if entries is INVALID:
         return INVALID
-    entry = parts[oscillator.sensor]
+    entry = entries[oscillator.sensor]
     part, written, overridden, of_parts = entry.part, entry.figures, [], []
-    own = next((form for form in FORMS if getattr(oscillator, form) is not None), None)
+    own_form = next((form for form in FORMS if getattr(oscillator, form) is not None), None)
     (form,) = [form for form in FORMS if getattr(part, form) is not None]
     figures: dict[str, Any] = {}
-    if own is None:
+    if own_form is None:
         figures = {form: getattr(part, form), "source": evidence(part, form)}
     else:
-        # A power law is of fractional frequency, the same at any.
-        holds_at = "" if own != "phase_noise" or oscillator.frequency else written.get("frequency", "")
-        overridden.append(Overridden(own, f"oscillator.{own}", part.name, f"{form} {written[form]}", holds_at))
+        # A power law describes the fractional frequency, which does not depend on the frequency.
+        holds_at = "" if own_form != "phase_noise" or oscillator.frequency else written.get("frequency", "")
+        overridden.append(
+            Overridden(own_form, f"oscillator.{own_form}", part.name, f"{form} {written[form]}", holds_at)
+        )
     if oscillator.frequency is None:
         figures["frequency"] = part.frequency
     elif part.frequency is not None and oscillator.frequency != part.frequency:
         at = written["frequency"]
-        if own is None and form == "phase_noise":
+        if own_form is None and form == "phase_noise":
             problem = f"the phase noise of {shown(part.name)} is stated at its own frequency, {at}"
             report(path, Problem(problem, "accepted: no frequency, or phase_noise beside it", at=("frequency",)))
             return INVALID
@@ -590,24 +605,24 @@ def _with_sensor(oscillator: Oscillator, path: KeyPath, find: Find, report: Repo
             of_parts.append((figure, evidence(part, figure)))
         elif value is not None:
             overridden.append(Overridden(figure, f"oscillator.{figure}", part.name, written[figure]))
-    found = oscillator._replace(**figures, of_parts=tuple(of_parts), overridden=tuple(overridden))
-    if found.needs_frequency and found.frequency is None:
+    completed = oscillator._replace(**figures, of_parts=tuple(of_parts), overridden=tuple(overridden))
+    if completed.needs_frequency and completed.frequency is None:
         problem = f"{shown(part.name)} states no frequency, at which the mask or the tones are stated"
         report(path, Problem(problem, "accepted: oscillator.frequency", at=("frequency",)))
         return INVALID
-    if found.vibration is not None and found.acceleration_sensitivity is None:
+    if completed.vibration is not None and completed.acceleration_sensitivity is None:
         report(path, NOT_SENSITIVE)
         return INVALID
     taken += _taken(oscillator.sensor, entry, path, figures)
-    return found
+    return completed
 
 
 # ---------------------------------------------------------------------- JSON Schema of a part
-_SOME: dict[str, Any] = {"not": {"const": []}}  # an empty list states nothing
+_NOT_EMPTY: dict[str, Any] = {"not": {"const": []}}  # an empty list states no figure
 
 
 def part_schema() -> dict[str, Any]:
-    """Return the schema of the file of a part, one alternative for each kind; quantities as in `mission_schema`."""
+    """JSON Schema of the file of a part, with one alternative for each kind; quantities as in `mission_schema`."""
     definitions: dict[str, Any] = {}
     kinds = []
     for kind, section in SECTIONS.items():
@@ -626,20 +641,21 @@ def part_schema() -> dict[str, Any]:
 
 
 def _rules(figures: Sequence[str]) -> dict[str, Any]:
-    """Schema rules for a part's figures together: one of them is there, and each has a source.
+    """Schema rules between the figures of a part: at least one is stated, and each has a source.
 
-    Of an oscillator exactly one form is there, and a mask has its frequency. Zeros are for the tool to see.
+    An oscillator has exactly one form of noise, and a mask has its frequency. The rules do not see figures that are
+    zero; the reader does.
     """
     by_itself = [figure for figure in figures if figure not in ("frequency", *BESIDE_NOISE)]
-    ways = [{"required": [figure], "properties": {figure: _SOME}} for figure in by_itself]
-    of_each = {"required": ["source"], "properties": {"source": {"type": "object"}}}
+    alternatives = [{"required": [figure], "properties": {figure: _NOT_EMPTY}} for figure in by_itself]
+    has_sources = {"required": ["source"], "properties": {"source": {"type": "object"}}}
     sourced = [
         {
-            "if": {"allOf": [of_each, {"required": [figure], "properties": {figure: _SOME}}]},
+            "if": {"allOf": [has_sources, {"required": [figure], "properties": {figure: _NOT_EMPTY}}]},
             "then": {"properties": {"source": {"required": [figure]}}},
         }
         for figure in figures
     ]
     if set(FORMS) <= set(figures):
-        return {"oneOf": ways, "dependencies": {"phase_noise": ["frequency"]}, "allOf": sourced}
-    return {"anyOf": ways, "allOf": sourced}
+        return {"oneOf": alternatives, "dependencies": {"phase_noise": ["frequency"]}, "allOf": sourced}
+    return {"anyOf": alternatives, "allOf": sourced}

@@ -1,4 +1,4 @@
-"""Put the path of each platform into a mission: from its orbit, the log of its flight or its geodetic place."""
+"""Paths of the platforms of a mission: from an orbit, the log of a flight or a geodetic position."""
 
 import hashlib
 import math
@@ -67,23 +67,23 @@ from bisar_budget.units import format_quantity
 
 _T = TypeVar("_T")
 Floats = earth.Floats
-Beside = Callable[[str], bytes]  # content of a file that a mission names
+Beside = Callable[[str], bytes]  # name of a file in a mission to the content of the file
 
-_FILES = (*ORBIT_FORMATS, "file", "accuracy")  # keys of a path that name one
-_MOST_BYTES = 500_000_000
-_LOGS_KEPT = 2  # of a mission that is read again and again, such as by `solve`
-_logs: dict[tuple[object, ...], Log] = {}  # by what they were read from; the bytes themselves are let go
-_PATHS_KEPT = 256  # of cases that a sweep reads: where nothing that a path follows from changes
-_paths: dict[tuple[object, ...], FlownPath] = {}  # by what they follow from
-_FARTHEST_M = 4.1e8  # of a satellite from the Earth's centre
-_UNCORRELATED = 1e-6  # of a correlation: what turning axes leaves by rounding
-_LOST = 0.1  # of the slant range: a satellite that may be farther off leaves nothing of the geometry
-_NOISE_M = 1.0  # residual of a log that is doubted where the file declares no position error; as of an ephemeris
-_PLACE = "accepted: scene.latitude, scene.longitude and scene.height"
+_FILE_KEYS = (*ORBIT_FORMATS, "file", "accuracy")  # keys of orbits and trajectories that name files
+_MAX_FILE_BYTES = 500_000_000
+_MAX_KEPT_LOGS = 2  # the logs of a mission that is read again and again, such as by `solve`
+_logs: dict[tuple[object, ...], Log] = {}  # by the hash of the file and the keys that decide how it is read
+_MAX_KEPT_PATHS = 256  # cases of a sweep have the same path where nothing that decides it changes
+_paths: dict[tuple[object, ...], FlownPath] = {}  # by all values that decide them
+_MAX_ORBIT_RADIUS_M = 4.1e8  # beyond the Moon
+_ROUNDED_CORRELATION_FRACTION = 1e-6  # a correlation this small is a rounding error of turned axes
+_MAX_DOUBT_FRACTION = 0.1  # of the slant range; with a larger doubt of the orbit the geometry is unknown
+_DOUBTED_RESIDUAL_M = 1.0  # a log with a larger residual is doubted, like an ephemeris
+_ACCEPTED_SCENE = "accepted: scene.latitude, scene.longitude and scene.height"
 
 
 class _UnusablePathError(Exception):
-    """A path that cannot be found: below which key of the platform, and why."""
+    """A path that cannot be used: the key below the platform, and the problem."""
 
     def __init__(self, key: tuple[str, ...], problem: Problem) -> None:
         super().__init__(problem)
@@ -91,28 +91,28 @@ class _UnusablePathError(Exception):
 
 
 def reader_of(folder: str, files: Files = DISK) -> Beside:
-    """Return a function that reads files beside a mission file in a folder.
+    """Return a function that reads files relative to a folder.
 
-    It raises `PathFileError` where a file cannot be read, is no regular file, or is larger than 500 MB.
+    The function raises `PathFileError` if a file cannot be read, is no regular file, or is larger than 500 MB.
     """
 
     def read(name: str) -> bytes:
         try:
-            data = files.content(os.path.join(folder, name), _MOST_BYTES, name)
+            data = files.content(os.path.join(folder, name), _MAX_FILE_BYTES, name)
         except UnreadableError as error:
             raise PathFileError(printable(str(error))) from None
-        if len(data) > _MOST_BYTES:
-            raise PathFileError(f"{printable(name)} is larger than {_MOST_BYTES // 10**6} MB")
+        if len(data) > _MAX_FILE_BYTES:
+            raise PathFileError(f"{printable(name)} is larger than {_MAX_FILE_BYTES // 10**6} MB")
         return data
 
     return read
 
 
 def path_files(mission: Mission) -> Iterator[tuple[str, str]]:
-    """Keys under which a mission names an orbit or a log, and the names."""
+    """Keys under which a mission names the file of a path or of the Earth's orientation, with the names."""
     for name, platform in mission.platforms._asdict().items():
         for key, section in (("orbit", platform.orbit), ("trajectory", platform.trajectory)):
-            for form in _FILES:
+            for form in _FILE_KEYS:
                 if isinstance(file := getattr(section, form, None), str):
                     yield f"platforms.{name}.{key}.{form}", file
     if mission.earth_orientation is not None and mission.earth_orientation.file is not None:
@@ -120,44 +120,44 @@ def path_files(mission: Mission) -> Iterator[tuple[str, str]]:
 
 
 def report_files(root: Any, read: Beside, report: Report) -> None:
-    """Say which orbits and logs cannot be read, of a file that is no mission for other reasons.
+    """Report orbits and logs that cannot be read, for a file that is no mission for other reasons.
 
-    What they say is looked at where the rest of the mission is there: a path depends on its scene, time and aperture.
-    `root` is what the file says.
+    Their content is not checked here, because a path depends on the scene, time and aperture of a valid mission.
+    `root` is the content of the mission file.
     """
-    platforms, stated = root.get("platforms"), root.get("earth_orientation")
-    named: dict[KeyPath, Any] = {}
+    platforms, orientation = root.get("platforms"), root.get("earth_orientation")
+    files: dict[KeyPath, Any] = {}
     for name in Platforms._fields:
         platform = platforms.get(name) if isinstance(platforms, dict) else None
         for key, section in (("orbit", ORBIT), ("trajectory", TRAJECTORY)):
             values = section.each(platform.get(key)) if isinstance(platform, dict) else {}
-            named |= {("platforms", name, key, form): values.get(form) for form in _FILES}
-    named["earth_orientation", "file"] = stated.get("file") if isinstance(stated, dict) else None
-    for path, file in named.items():
+            files |= {("platforms", name, key, form): values.get(form) for form in _FILE_KEYS}
+    files["earth_orientation", "file"] = orientation.get("file") if isinstance(orientation, dict) else None
+    for path, file in files.items():
         if isinstance(file, str):
             try:
                 read(file)
             except PathFileError as error:
-                report(path, _of_file(file, error))
+                report(path, _file_problem(file, error))
 
 
 def with_paths(mission: Mission, read: Beside, report: Report) -> Any:
-    """Put in the paths; `INVALID` after a report. `read` gives the content of a file, and raises `PathFileError`."""
+    """The mission with the paths of its platforms; `INVALID` after a report. `read` may raise `PathFileError`."""
     axes, platforms, is_valid = mission.scene.axes, mission.platforms, True
-    if (wrong := _unusable_orientation(mission, read)) is not None:
-        report(("earth_orientation", "file"), wrong)
+    if (orientation_problem := _unusable_orientation(mission, read)) is not None:
+        report(("earth_orientation", "file"), orientation_problem)
         return INVALID
     for name, platform in platforms._asdict().items():
         try:
-            found = _with_path(mission, platform, axes, read)
+            placed = _with_path(mission, platform, axes, read)
         except _UnusablePathError as unusable:
             report(("platforms", name, *unusable.key), unusable.problem)
             is_valid = False
             continue
-        for problem in found.without_image(found.motion_error):
+        for problem in placed.without_image(placed.motion_error):
             report(("platforms", name), problem)
             is_valid = False
-        platforms = platforms._replace(**{name: found})
+        platforms = platforms._replace(**{name: placed})
     if not is_valid:
         return INVALID
     aperture_time, common = mission.collection.aperture_time, mission.common_motion_error
@@ -172,26 +172,27 @@ def with_paths(mission: Mission, read: Beside, report: Report) -> Any:
 
 
 def _unusable_orientation(mission: Mission, read: Beside) -> Problem | None:
-    """Say what keeps the table of the Earth's orientation from being used, whether a path needs it or not."""
-    stated, center = mission.earth_orientation, mission.collection.center_time
-    if stated is None or stated.file is None:
+    """Problem of the table of the Earth's orientation, whether a path needs it or not; None if it can be used."""
+    section, center = mission.earth_orientation, mission.collection.center_time
+    if section is None or section.file is None:
         return None
     if center is None:
         return Problem("needs an instant", "accepted: collection.center_time")
     try:
         _orientation(mission, center, read)
     except PathFileError as error:
-        return _of_file(stated.file, error)
+        return _file_problem(section.file, error)
     return None
 
 
 def _with_path(mission: Mission, platform: Platform, axes: earth.SceneAxes | None, read: Beside) -> Platform:
+    """A platform with its path, and with the errors that the source of the path states."""
     if platform.orbit is not None:
-        path = _of_orbit(mission, platform.orbit, _known(axes, "orbit"), read)
+        path = _of_orbit(mission, platform.orbit, _required_axes(axes, "orbit"), read)
     elif platform.trajectory is not None:
         path = _of_log(mission, platform.trajectory, axes, read)
     elif platform.latitude is not None:
-        path = _of_place(platform, _known(axes, "latitude"), mission.collection.aperture_time)
+        path = _of_position(platform, _required_axes(axes, "latitude"), mission.collection.aperture_time)
     else:
         path = FlownPath(platform.state)
     if path.state.position[2] < 0:
@@ -203,21 +204,22 @@ def _with_path(mission: Mission, platform: Platform, axes: earth.SceneAxes | Non
     if trajectory is not None and trajectory.accuracy is not None:
         accuracy, digest = _by_accuracy(mission, trajectory, error, read)
         path = path._replace(accuracy=(trajectory.accuracy, digest), stated=(accuracy,))
-    for one in path.stated:
-        error = _filled(error, one, path.state)
+    for accuracy_stated in path.stated:
+        error = _filled(error, accuracy_stated, path.state)
     return platform._replace(path=path, motion_error=error)
 
 
-def _of_file(file: str | None, error: PathFileError) -> Problem:
-    """The problem with a file, which is the value of a key and is named once."""
-    said = str(error)
-    said = f"{file} {said}" if file is not None and said.startswith("has ") else said
-    return Problem(said, error.accepted, error.hint, names_value=file is not None and said.startswith(file))
+def _file_problem(file: str | None, error: PathFileError) -> Problem:
+    """The problem with a file that a key names; the name of the file is in the problem once."""
+    words = str(error)
+    words = f"{file} {words}" if file is not None and words.startswith("has ") else words
+    return Problem(words, error.accepted, error.hint, names_value=file is not None and words.startswith(file))
 
 
-def _known(axes: earth.SceneAxes | None, key: str) -> earth.SceneAxes:
+def _required_axes(axes: earth.SceneAxes | None, key: str) -> earth.SceneAxes:
+    """The axes of a scene on the Earth; raises `_UnusablePathError` if the scene has none."""
     if axes is None:
-        raise _UnusablePathError((key,), Problem("needs the scene's place on the Earth", _PLACE))
+        raise _UnusablePathError((key,), Problem("needs the scene's place on the Earth", _ACCEPTED_SCENE))
     return axes
 
 
@@ -230,9 +232,20 @@ def with_radial(state: PlatformState, axes: earth.SceneAxes) -> PlatformState:
 
 
 class _OrbitFile(NamedTuple):
-    """The file of an orbit: the form it has, its name, its content, and which object of it is wanted.
+    """The file of an orbit.
 
-    One that `is_planned` is flown as it stands. The name is None where an element set stands in the mission file.
+    Attributes
+    ----------
+    form : str
+        Key of the format, one of `ORBIT_FORMATS`.
+    name : str, optional
+        Name of the file; None for an element set in the mission file.
+    data : bytes
+        Content.
+    object : str, optional
+        Name or number of the object, if the file has several.
+    is_planned : bool
+        Whether the orbit is a plan, without doubts.
     """
 
     form: str
@@ -245,13 +258,13 @@ class _OrbitFile(NamedTuple):
     def of(cls, route: OrbitSource, read: Beside) -> "_OrbitFile":
         """Read the file of an orbit; raises `PathFileError`."""
         form = _form_of(route)
-        named = getattr(route, form)
-        if isinstance(named, str):
-            return cls(form, named, read(named), route.object, bool(route.planned))
-        return cls(form, None, "\n".join(named).encode(), route.object, bool(route.planned))
+        source = getattr(route, form)
+        if isinstance(source, str):
+            return cls(form, source, read(source), route.object, bool(route.planned))
+        return cls(form, None, "\n".join(source).encode(), route.object, bool(route.planned))
 
     def orbit(self, center: Instant, orientation: Orientation) -> Orbit:
-        """The orbit that is flown at an instant; raises `PathFileError` where there is none."""
+        """The orbit at an instant; raises `PathFileError` if the file has none."""
         name = self.name or "the element set"
         hold_to_format(self.data, name, self.form)
         orbit = ORBIT_FORMATS[self.form].read(self.data, name, self.object, center, orientation)
@@ -259,72 +272,75 @@ class _OrbitFile(NamedTuple):
 
 
 def _form_of(route: OrbitSource) -> str:
-    """Key under which the mission file has an orbit."""
+    """Key under which the mission file has the orbit."""
     return next(form for form in ORBIT_FORMATS if getattr(route, form) is not None)
 
 
 def orbits_of(mission: Mission, route: OrbitSource, read: Beside) -> Callable[[Instant], Orbit]:
-    """Return a function that gives the orbit which a mission flies in an aperture around an instant.
+    """Return a function that takes the instant of an aperture's midpoint and returns the orbit of a mission.
 
-    Of several element sets, or segments of an ephemeris, that is the nearest one. Both raise `PathFileError`. The
-    Earth is turned as at noon of the day: UT1 - UTC changes by a millisecond a day.
+    The orbit is the nearest of several element sets or segments of an ephemeris. Both functions raise
+    `PathFileError`. The orientation of the Earth is that at noon of the day: UT1 - UTC changes by a millisecond per
+    day.
     """
-    given = _OrbitFile.of(route, read)
+    orbit_file = _OrbitFile.of(route, read)
 
     @lru_cache(maxsize=64)
     def orientation(day: int) -> Orientation:
         return _orientation(mission, Instant(day, DAY / 2), read)[0]
 
-    return lambda center: given.orbit(center, orientation(center.day))
+    return lambda center: orbit_file.orbit(center, orientation(center.day))
 
 
 def _of_orbit(mission: Mission, route: OrbitSource, axes: earth.SceneAxes, read: Beside) -> FlownPath:
+    """Path of a platform with an orbit."""
     center = mission.collection.center_time
     if center is None:
         raise _UnusablePathError(("orbit",), Problem("needs an instant", "accepted: collection.center_time"))
     orientation, table = _orientation(mission, center, read)
     try:
-        given = _OrbitFile.of(route, read)
-        digest, T = hashlib.sha256(given.data).hexdigest(), mission.collection.aperture_time
+        orbit_file = _OrbitFile.of(route, read)
+        digest, T = hashlib.sha256(orbit_file.data).hexdigest(), mission.collection.aperture_time
 
-        def found() -> FlownPath:
-            orbit = given.orbit(center, orientation)
-            path = _orbit_path(orbit, given.name, center, axes, T)
+        def orbit_path() -> FlownPath:
+            orbit = orbit_file.orbit(center, orientation)
+            path = _orbit_path(orbit, orbit_file.name, center, axes, T)
             return path._replace(orientation=table) if orbit.is_turned else path
 
-        key = (*given._replace(data=digest.encode()), center, axes, T, orientation, table)
-        path = _kept(_paths, _PATHS_KEPT, key, found)
+        key = (*orbit_file._replace(data=digest.encode()), center, axes, T, orientation, table)
+        path = _kept(_paths, _MAX_KEPT_PATHS, key, orbit_path)
     except PathFileError as error:
-        named = getattr(route, _form_of(route))
-        file = named if isinstance(named, str) else None
-        raise _UnusablePathError(("orbit", _form_of(route)), _of_file(file, error)) from None
-    return path._replace(sha256=digest, is_planned=given.is_planned)
+        source = getattr(route, _form_of(route))
+        file = source if isinstance(source, str) else None
+        raise _UnusablePathError(("orbit", _form_of(route)), _file_problem(file, error)) from None
+    return path._replace(sha256=digest, is_planned=orbit_file.is_planned)
 
 
 def _orientation(mission: Mission, center: Instant, read: Beside) -> tuple[Orientation, tuple[str, str] | None]:
-    """How the Earth is turned in the middle of the aperture, and the table that says it with its SHA-256."""
-    stated = mission.earth_orientation
-    if stated is None:
+    """Orientation of the Earth in the middle of the aperture, and its table with the SHA-256."""
+    section = mission.earth_orientation
+    if section is None:
         return UNKNOWN._replace(day=center.day), None
-    if stated.file is None:
-        return stated.orientation._replace(day=center.day), None
-    data = read(stated.file)  # that it can be read is known, see `with_paths`
-    turned = read_earth_rotation(data, stated.file, center)._replace(day=center.day)
-    return turned, (stated.file, hashlib.sha256(data).hexdigest())
+    if section.file is None:
+        return section.orientation._replace(day=center.day), None
+    data = read(section.file)  # `with_paths` has checked that it can be read
+    turned = read_earth_rotation(data, section.file, center)._replace(day=center.day)
+    return turned, (section.file, hashlib.sha256(data).hexdigest())
 
 
-def _kept(kept: dict[tuple[object, ...], _T], most: int, key: tuple[object, ...], made: Callable[[], _T]) -> _T:
-    """The value of a key, as it was made before or made now; so many are kept, the last that were asked for."""
-    found = kept.pop(key, None) or made()
-    kept[key] = found
-    for old in list(kept)[:-most]:
-        kept.pop(old, None)
-    return found
+def _kept(cache: dict[tuple[object, ...], _T], most: int, key: tuple[object, ...], make: Callable[[], _T]) -> _T:
+    """The value of a key, from the cache or made now; the cache keeps the `most` values that were used last."""
+    value = cache.pop(key, None) or make()
+    cache[key] = value
+    for old in list(cache)[:-most]:
+        cache.pop(old, None)
+    return value
 
 
 def _orbit_path(
     orbit: Orbit, file: str | None, center: Instant, axes: earth.SceneAxes, aperture_time_s: float
 ) -> FlownPath:
+    """Path that interpolates an orbit in an aperture."""
     name, half, widest = file or "the element set", aperture_time_s / 2, math.inf
     if orbit.span is not None:
         before, after = center.since(orbit.span[0]), orbit.span[1].since(center)
@@ -335,7 +351,7 @@ def _orbit_path(
             )
         widest = 2 * min(before, after)
     far = math.hypot(*orbit.place(center))
-    if far > _FARTHEST_M:
+    if far > _MAX_ORBIT_RADIUS_M:
         words = f"{far:.4g} m from the Earth's centre, farther than the Moon; are its units km?"
         raise PathFileError(f"{name}: is {words}")
 
@@ -343,13 +359,13 @@ def _orbit_path(
         return axes.places(np.array([orbit.place(later(center, time)) for time in times.tolist()]))
 
     fitted = interpolated(places, aperture_time_s, widest)
-    # An interpolation is worst between the places of a file.
-    instants = [later(center, part * half) for part in (0.0, -0.5, 0.5, -1.0, 1.0)]
-    of_orbit = max((orbit.doubts(instant) for instant in instants), key=len)
+    # An interpolation is worst between the positions of a file.
+    instants = [later(center, fraction * half) for fraction in (0.0, -0.5, 0.5, -1.0, 1.0)]
+    orbit_doubts = max((orbit.doubts(instant) for instant in instants), key=len)
     doubt = max(orbit.doubt(instant) for instant in instants)
-    _hold_to_range(doubt, fitted.state.slant_range, of_orbit, orbit.remedy, name)
+    _hold_to_range(doubt, fitted.state.slant_range, orbit_doubts, orbit.remedy, name)
     age = None if orbit.epoch is None else center.since(orbit.epoch)
-    doubts = (*of_orbit, *fitted.doubts)
+    doubts = (*orbit_doubts, *fitted.doubts)
     return _flown(fitted, orbit.words, file)._replace(
         age=age,
         doubts=doubts,
@@ -362,46 +378,49 @@ def _orbit_path(
 
 def _stated_of_orbit(orbit: Orbit, center: Instant, axes: earth.SceneAxes, name: str) -> Iterator[StatedAccuracy]:
     """Accuracy that the file of an orbit states in the middle of the aperture, along the scene's axes."""
-    stated = orbit.stated(center)
-    if stated is not None:
-        own = stated.covariance
-        turned = None if own is None else as_matrix(block_turned(np.array(own), np.array(axes.axes)))
-        yield stated._replace(covariance=turned, words=f"{name}, {stated.words}")
+    accuracy = orbit.stated(center)
+    if accuracy is not None:
+        covariance = accuracy.covariance
+        turned = None if covariance is None else as_matrix(block_turned(np.array(covariance), np.array(axes.axes)))
+        yield accuracy._replace(covariance=turned, words=f"{name}, {accuracy.words}")
 
 
-def _hold_to_range(doubt: PathDoubt, slant_range: float, said: Sequence[str], remedy: str, name: str) -> None:
-    """Refuse an orbit that may be elsewhere by more than a tenth of the slant range: the geometry is not known."""
-    if not doubt.size <= _LOST * slant_range:
-        away, known, size = (format_quantity(one, "m", 4) for one in (slant_range, _LOST * slant_range, doubt.size))
-        words = said[0] if said else f"{name}: {doubt.words}"
+def _hold_to_range(doubt: PathDoubt, slant_range: float, doubts: Sequence[str], remedy: str, name: str) -> None:
+    """Refuse an orbit with a doubt of more than a tenth of the slant range, because the geometry is then unknown."""
+    if not doubt.size <= _MAX_DOUBT_FRACTION * slant_range:
+        lengths = (slant_range, _MAX_DOUBT_FRACTION * slant_range, doubt.size)
+        slant_range_text, largest, size = (format_quantity(length, "m", 4) for length in lengths)
+        words = doubts[0] if doubts else f"{name}: {doubt.words}"
         raise PathFileError(
-            f"{words}; a doubt of {size} is more than a tenth of the slant range, {away}",
-            f"accepted: an orbit that is known to {known}",
+            f"{words}; a doubt of {size} is more than a tenth of the slant range, {slant_range_text}",
+            f"accepted: an orbit that is known to {largest}",
             remedy,
         )
 
 
 def _of_log(mission: Mission, route: TrajectorySource, axes: earth.SceneAxes | None, read: Beside) -> FlownPath:
+    """Path of a platform with a log of its flight."""
     aperture_time = mission.collection.aperture_time
     try:
         data = read(route.file)
         digest = hashlib.sha256(data).hexdigest()
         key = (route, digest, mission.collection.center_time, axes, aperture_time)
-        return _kept(_paths, _PATHS_KEPT, key, lambda: _log_path(mission, route, axes, data, digest))
+        return _kept(_paths, _MAX_KEPT_PATHS, key, lambda: _log_path(mission, route, axes, data, digest))
     except PathFileError as error:
-        problem = _of_file(None if error.key else route.file, error)
+        problem = _file_problem(None if error.key else route.file, error)
         raise _UnusablePathError(("trajectory", error.key or "file"), problem) from None
 
 
 def _log_path(
     mission: Mission, route: TrajectorySource, axes: earth.SceneAxes | None, data: bytes, digest: str
 ) -> FlownPath:
+    """Path that smooths a log in an aperture."""
     center, aperture_time = mission.collection.center_time, mission.collection.aperture_time
     log = dated(track_around(_log(route, data, digest), center, route.center, aperture_time, route.file), center)
     if log.is_earth_fixed:
-        known = _known(axes, "trajectory")
-        grid = as_rows(np.array(log.grid) @ np.array(known.axes).T)
-        log = replace(log, places=known.places(log.places), is_earth_fixed=False, grid=grid)
+        scene_axes = _required_axes(axes, "trajectory")
+        grid = as_rows(np.array(log.grid) @ np.array(scene_axes.axes).T)
+        log = replace(log, places=scene_axes.places(log.places), is_earth_fixed=False, grid=grid)
     times = slow_times(log, center, route.center, aperture_time, route.file)
     needed = stretch_around(times, aperture_time)
     hold_to_usable_records(log, times, needed)
@@ -410,7 +429,7 @@ def _log_path(
     if fitted.stretch > needed:
         try:
             hold_to_motion(times, log.places, fitted.stretch, route.file)
-        except PathFileError:  # beside what is needed, a place that cannot be flown does not refuse the log
+        except PathFileError:  # outside of the needed stretch, an impossible fix does not refuse the log
             fitted = smoothed(times, log.places, aperture_time)
     words = log.words + {SMOOTHED: ", flown smooth by the processor", RAW: ", flown as it is by the processor"}.get(
         route.processed or "", ""
@@ -419,12 +438,12 @@ def _log_path(
         words += f", {route.center or 0.0:.12g} s of it at mid-aperture"
     path = _flown(fitted, words, route.file, digest)
     path = path._replace(stated=tuple(_stated_of_log(log, around_aperture(times, aperture_time), route.file)))
-    # The root mean square is what a sigma is compared with: the largest of thousands of places is four of them.
+    # A sigma is compared with the root mean square; the largest residual of thousands of fixes is four times that.
     words = "residual of the smoothed log at places left out, root mean square"
     return path._replace(
         doubt_m=fitted.missed,
         doubt_of=words,
-        is_doubted=fitted.missed > _NOISE_M,
+        is_doubted=fitted.missed > _DOUBTED_RESIDUAL_M,
         log_noise=LogNoise(fitted.residual, fitted.correlation_time, log.grid, route.processed),
         acceleration_noise=fitted.acceleration_noise,
         path_noise=fitted.path_noise,
@@ -432,15 +451,15 @@ def _log_path(
 
 
 def _log(route: TrajectorySource, data: bytes, digest: str) -> Log:
-    """Read a log, or take it as it was read before."""
+    """A log, from the cache or read now."""
     keys = LogKeys(route.week, route.time_scale, route.geoid_separation, route.talker, route.track, route.instance)
     key = (route.file, route.format, keys, digest)
 
-    def made() -> Log:
+    def read_file() -> Log:
         hold_to_log(data, route.file)
         return read_log(data, route.file, route.format, keys)
 
-    return _kept(_logs, _LOGS_KEPT, key, made)
+    return _kept(_logs, _MAX_KEPT_LOGS, key, read_file)
 
 
 def _by_accuracy(
@@ -454,17 +473,19 @@ def _by_accuracy(
     try:
         data = read(file)
         collection = mission.collection
-        stated = read_accuracy(data, file, route.week, collection.center_time, route.center, collection.aperture_time)
+        accuracy = read_accuracy(
+            data, file, route.week, collection.center_time, route.center, collection.aperture_time
+        )
     except PathFileError as unusable:
-        raise _UnusablePathError(key, _of_file(file, unusable)) from None
+        raise _UnusablePathError(key, _file_problem(file, unusable)) from None
     if error.distribution != "normal" and error.covariance is None and None in (error.position, error.velocity):
         raise _UnusablePathError(key, Problem("states one sigma", "accepted: motion_error.distribution: normal"))
-    variances = [sigma**2 for sigma in (*stated.position, *stated.velocity)]
+    variances = [sigma**2 for sigma in (*accuracy.position, *accuracy.velocity)]
     return StatedAccuracy(f"accuracy file {file}", diagonal(variances)), hashlib.sha256(data).hexdigest()
 
 
 def _stated_of_log(log: Log, near: slice, file: str) -> Iterator[StatedAccuracy]:
-    """Accuracy that a log states of its fixes around the aperture: the largest sigmas, or what is usual of them.
+    """Accuracy that a log states of its fixes around the aperture: the largest sigmas, and the largest usual sigma.
 
     Along an axis of which the log states none, the largest of the others counts. The usual one counts for fixes of
     which the log does not state all sigmas.
@@ -486,28 +507,28 @@ def _stated_of_log(log: Log, near: slice, file: str) -> Iterator[StatedAccuracy]
 
 
 def _filled(error: MotionError, stated: StatedAccuracy, state: PlatformState) -> MotionError:
-    """Errors with those that the source of a path states, where the mission file states none.
+    """Motion errors with figures of the source of a path in place of missing figures of the mission file.
 
-    Along the axes of the motion error. The figure of a source that states no direction is taken on each axis: the
-    error may have any. Figures that the mission file has itself are noted beside those of the source.
+    The figures are along the axes of the motion error. A figure without a direction is taken on each axis, because
+    the error may have any direction. A figure of the mission file overrides the source; `overridden` lists it.
     """
     if stated.is_typical:
         return error
     try:
         axes = np.array(state.frame(error.frame), dtype=float)
-    except UndefinedFrameError:  # which is said of the mission
+    except UndefinedFrameError:  # reported for the mission
         return error
-    own = diagonal([stated.total**2] * 3) if stated.covariance is None else stated.covariance
-    along = block_turned(np.array(own), axes)
+    covariance_of_source = diagonal([stated.total**2] * 3) if stated.covariance is None else stated.covariance
+    along = block_turned(np.array(covariance_of_source), axes)
     kinds = KINDS[: len(along) // 3]
     sigmas = np.sqrt(np.diag(along))
     is_complete = error.covariance is None and error.position is None and error.velocity is None
     if is_complete and len(kinds) == 2 and error.distribution == "normal" and _is_correlated(along):
         covariance = Covariance(tuple(sigmas.tolist()), correlations(along), is_matrix=False)
-        parts = tuple((figure, stated.words) for figure in ("covariance", *kinds))
-        return error._replace(covariance=covariance, of_parts=(*error.of_parts, *parts))
-    for place, kind in enumerate(kinds):
-        block = along[3 * place : 3 * place + 3, 3 * place : 3 * place + 3]
+        of_source = tuple((figure, stated.words) for figure in ("covariance", *kinds))
+        return error._replace(covariance=covariance, of_parts=(*error.of_parts, *of_source))
+    for index, kind in enumerate(kinds):
+        block = along[3 * index : 3 * index + 3, 3 * index : 3 * index + 3]
         if not np.trace(block) > 0:
             continue
         unit = {"position": "m", "velocity": "m/s"}[kind]
@@ -524,31 +545,32 @@ def _filled(error: MotionError, stated: StatedAccuracy, state: PlatformState) ->
 
 
 def _is_correlated(covariance: Floats) -> bool:
-    """Whether errors of a covariance are correlated, beyond rounding."""
-    apart = np.array(correlations(covariance)) - np.eye(len(covariance))
-    return bool(np.abs(apart).max() > _UNCORRELATED)
+    """Whether the errors of a covariance are correlated, beyond rounding."""
+    off_diagonal = np.array(correlations(covariance)) - np.eye(len(covariance))
+    return bool(np.abs(off_diagonal).max() > _ROUNDED_CORRELATION_FRACTION)
 
 
-def _of_place(platform: Platform, axes: earth.SceneAxes, aperture_time_s: float) -> FlownPath:
-    """Flight along the geodesic, `speed` over ground at its height, which `climb` changes."""
-    place = earth.Geodetic(platform.latitude or 0.0, platform.longitude or 0.0, platform.altitude or 0.0)
+def _of_position(platform: Platform, axes: earth.SceneAxes, aperture_time_s: float) -> FlownPath:
+    """Path along the geodesic from a geodetic position, with `speed` over ground at a height that `climb` changes."""
+    position = earth.Geodetic(platform.latitude or 0.0, platform.longitude or 0.0, platform.altitude or 0.0)
     speed, heading, climb = platform.speed or 0.0, platform.heading or 0.0, platform.climb or 0.0
     if not speed and not climb:
         return FlownPath(
-            PlatformState(position=axes.place(earth.earth_fixed(place)), velocity=STRAIGHT), "geodetic place"
+            PlatformState(position=axes.place(earth.earth_fixed(position)), velocity=STRAIGHT), "geodetic place"
         )
 
     def path() -> FlownPath:
         fitted = interpolated(
-            lambda times: axes.places(earth.flown(place, heading, speed, climb, times)), aperture_time_s
+            lambda times: axes.places(earth.flown(position, heading, speed, climb, times)), aperture_time_s
         )
         return _flown(fitted, "geodetic place, flight along the geodesic")
 
-    key = (place, heading, speed, climb, axes, aperture_time_s)
-    return _kept(_paths, _PATHS_KEPT, key, path)
+    key = (position, heading, speed, climb, axes, aperture_time_s)
+    return _kept(_paths, _MAX_KEPT_PATHS, key, path)
 
 
 def _flown(fitted: Fitted, words: str, file: str | None = None, digest: str | None = None) -> FlownPath:
+    """The path of a fit, with its residuals and doubts; `words` name the source."""
     return FlownPath(
         fitted.state,
         source=words,

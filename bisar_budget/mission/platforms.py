@@ -1,4 +1,4 @@
-"""Platforms of a mission file: where they fly, in one of five ways, and how wrong their motion is measured."""
+"""Platforms of a mission file: their paths, stated in one of five ways, and the errors of their measured motion."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -70,17 +70,18 @@ from bisar_budget.paths.instant import SCALES, parse_instant
 if TYPE_CHECKING:
     from bisar_budget.mission.model import Radar
 
-LEAST_BASELINE = 1.0  # m, between platforms of which one hears the other
-FARTHEST_BY = 3  # times the least baseline, that they move by in half an aperture: so far a fit of 16 nodes is true
+LEAST_BASELINE = 1.0  # between platforms with a direct path [m]
+# Largest relative motion in half an aperture over the least baseline; up to it a fit through 16 nodes is accurate.
+FARTHEST_BY = 3
 
-_UPRIGHT = 1e-3  # of the speed: of less than that over the ground a velocity has no direction there
-# A 32nd of the way from one place to the next, the distance between is not smaller by as much as matters.
-_PLACES = np.linspace(-1, 1, 65)[:, None]
+_LEVEL_FRACTION = 1e-3  # of the speed; a smaller speed over the ground has no direction
+# In halves of the aperture time. Between neighbours, a 32nd apart, a distance is hardly smaller than at them.
+_APERTURE_TIMES = np.linspace(-1, 1, 65)[:, None]
 
 FRAMES = Choice("scene", "track", "look", "ric")
 TIME_TAG = Quantity(units.TIME, ge=-1e3, le=1e3)
-# As of `paths.path_formats`, which every check would wait for: it loads the readers of them all.
-SMOOTHED, RAW = "smoothed", "raw"  # what a processor flies of a log
+# Copies of `paths.path_formats`, whose import would load all readers in every check.
+SMOOTHED, RAW = "smoothed", "raw"  # path that a processor flies with a log
 _LOG_FORMATS = ("csv", "sbet", "pos", "nmea", "gpx", "ulog")
 PARTS = either(list, TextList(), Reference())
 
@@ -88,8 +89,8 @@ PARTS = either(list, TextList(), Reference())
 class MotionError(NamedTuple):
     """How wrong the measured motion of one platform may be. A scalar means each axis.
 
-    `of_parts` names the figures that come from parts of the catalogue, and the source of each. `overridden` are the
-    figures of parts that something else in the file replaces.
+    `of_parts` names the figures that come from parts of the catalogue, and the source of each. `overridden` lists the
+    figures of parts that another key of the file replaces.
     """
 
     frame: Annotated[
@@ -134,48 +135,49 @@ class MotionError(NamedTuple):
 
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
-        """Hold a covariance to standing alone, to its frame and to a normal distribution; names to one each."""
+        """Check that a covariance is alone, fits its frame and is normal, and that names of errors are distinct."""
         yield from _names_twice(values.get("random", ()))
         covariance: Covariance | None = values.get("covariance")
         if covariance is None:
             return
-        both = [kind for kind in ("position", "velocity") if values.get(kind) is not None]
-        if both:
-            yield Problem(f"replaces position and velocity, but there is also a {both[0]}", at=("covariance",))
+        replaced = [kind for kind in ("position", "velocity") if values.get(kind) is not None]
+        if replaced:
+            yield Problem(f"replaces position and velocity, but there is also a {replaced[0]}", at=("covariance",))
         if values.get("distribution", "normal") != "normal":
             yield Problem("a covariance is that of a normal distribution", "accepted: normal", at=("distribution",))
         if "frame" in values:
             yield from misplaced_axes(covariance, values["frame"])
 
     def stated(self, kind: str) -> Vector | None:
-        """Position, velocity or acceleration error along the frame's axes; of a covariance the marginal sigmas."""
+        """Position, velocity or acceleration error along the frame's axes; marginal sigmas of a covariance."""
         if self.covariance is not None and kind != "acceleration":
             return self.covariance.of(kind)
-        stated: Vector | None = getattr(self, kind)
-        return stated
+        error: Vector | None = getattr(self, kind)
+        return error
 
     def evidence(self, figure: str) -> str | None:
-        """Where a figure comes from: a part of the catalogue, else what the file says of all."""
+        """Source of a figure: its part of the catalogue, or else the source that the file states for all figures."""
         return dict(self.of_parts).get(figure, self.source)
 
     def key_of(self, figure: str) -> str:
-        """Key under which the file states a figure, or the part that it is taken from."""
+        """Key under which the file states a figure, or names the part of the figure."""
         return "sensor" if figure in dict(self.of_parts) else figure
 
 
 def _names_twice(random: Sequence[GaussMarkov]) -> Iterator[Problem]:
+    """Problems of errors with the name of an earlier error."""
     seen: set[str] = set()
-    for index, one in enumerate(random):
-        if one.name in seen:
+    for index, error in enumerate(random):
+        if error.name in seen:
             yield Problem("is the name of an earlier error", at=("random", index, "name"))
-        seen.add(one.name)
+        seen.add(error.name)
 
 
 class CommonMotionError(NamedTuple):
     """The same error on both platforms, such as the bias of one GNSS service. A scalar means each axis.
 
-    Along the scene's axes both are moved by one vector. Along those of another frame each is moved by the same
-    components in its own axes: both too far along their tracks, or from the scene.
+    Along the scene's axes both platforms are displaced by one vector. In another frame each platform is displaced by
+    the same components along its own axes: both too far along their tracks, or too far from the scene.
     """
 
     frame: Annotated[
@@ -203,17 +205,17 @@ class CommonMotionError(NamedTuple):
 
     @property
     def is_stated(self) -> bool:
-        """Whether the file states any error of it; a zero does, axes or a source alone do not."""
+        """Whether the file states an error. A zero is an error; axes or a source alone are not."""
         figures = (self.position, self.velocity, self.acceleration, self.time_tag)
         return bool(self.random) or any(figure is not None for figure in figures)
 
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
-        """Hold names to one each."""
+        """Check that names of errors are distinct."""
         yield from _names_twice(values.get("random", ()))
 
 
-# ---------------------------------------------------------------------- where a platform flies
+# ---------------------------------------------------------------------- paths of platforms
 _FILE = Reference()
 _TALKER = "[A-Z]{2}"
 
@@ -222,17 +224,16 @@ class _Lines(Reader):
     """The two lines of an element set."""
 
     is_word = True
-    what = "[line 1, line 2]"
 
     def read(self, value: Any, path: tuple[Any, ...], report: Report) -> Any:
-        """Read both."""
+        """Read both lines."""
         if not isinstance(value, list) or len(value) != 2 or not all(isinstance(line, str) for line in value):
             report(path, Problem("must be the name of a file, or the two lines of an element set"))
             return INVALID
         return tuple(value)
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
-        """Array of two lines."""
+        """JSON Schema: array of two lines."""
         return {"type": "array", "items": Reference().schema(definitions), "minItems": 2, "maxItems": 2}
 
 
@@ -258,37 +259,37 @@ class OrbitSource(NamedTuple):
 
     @staticmethod
     def any_of() -> tuple[str, ...]:
-        """Keys of its sources."""
+        """Keys of the formats of orbits."""
         return tuple(key for key in OrbitSource._fields if key not in ("object", "planned"))
 
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
-        """Hold it to one source."""
-        ways = OrbitSource.any_of()
-        given = [way for way in ways if values.get(way) is not None]
-        if len(given) != 1 and values.keys() >= set(ways):
-            said = f"mixes {' with '.join(given)}" if given else "is empty"
-            yield Problem(said, f"accepted: one of {', '.join(ways)}")
+        """Require exactly one format."""
+        formats = OrbitSource.any_of()
+        stated = [key for key in formats if values.get(key) is not None]
+        if len(stated) != 1 and values.keys() >= set(formats):
+            problem = f"mixes {' with '.join(stated)}" if stated else "is empty"
+            yield Problem(problem, f"accepted: one of {', '.join(formats)}")
 
 
 class _Instant(Reader):
     """An instant of UTC."""
 
     is_word = True
-    what = "2026-06-01T05:20:31.250Z and the like"
+    accepted = "accepted: 2026-06-01T05:20:31.250Z and the like"
 
     def leaf(self, value: Any) -> Any:
         """Read 2026-06-01T05:20:31.250Z, or with an offset from UTC."""
-        found = parse_instant(value) if isinstance(value, str) else None
-        if found is None:
+        instant = parse_instant(value) if isinstance(value, str) else None
+        if instant is None:
             is_zoneless = isinstance(value, str) and parse_instant(value, needs_zone=False) is not None
             problem = "has no zone" if is_zoneless else "must be an instant of UTC"
             hint = "Write Z behind it where it is UTC, or the offset from UTC, such as +01:00" if is_zoneless else ""
-            raise InvalidValueError(problem, f"accepted: {self.what}", hint)
-        return found
+            raise InvalidValueError(problem, self.accepted, hint)
+        return instant
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
-        """Date and time."""
+        """JSON Schema: date and time."""
         return date_schema(r"^\s*\d{4}-\d\d-\d\d[T ]")
 
 
@@ -298,13 +299,13 @@ class _Talker(Text):
     is_word = True
 
     def leaf(self, value: Any) -> str:
-        """Refuse what is no talker."""
+        """Refuse a text that is no talker."""
         if not isinstance(value, str) or not re.fullmatch(_TALKER, value, re.ASCII):
             raise InvalidValueError("must be two capital letters", "accepted: GN, GP and the like")
         return value
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
-        """Two capital letters."""
+        """JSON Schema: two capital letters."""
         return {"type": "string", "pattern": f"^{_TALKER}$"}
 
 
@@ -364,9 +365,9 @@ ORBIT, TRAJECTORY, INSTANT = Section(OrbitSource), Section(TrajectorySource), _I
 
 @dataclass(frozen=True)
 class Way:
-    """A way to state the path of a platform: keys that it needs, and others that it may have.
+    """A way to state the path of a platform: required keys, optional keys, and the key of the direction of motion.
 
-    `direction` is the key that a platform which does not move has no use for.
+    A fixed platform has no direction.
     """
 
     keys: tuple[str, ...]
@@ -375,7 +376,7 @@ class Way:
 
     @property
     def own(self) -> tuple[str, ...]:
-        """Keys that it needs and no other way has."""
+        """Required keys that no other way has."""
         return tuple(key for key in self.keys if key != "speed")
 
 
@@ -396,11 +397,18 @@ ACCEPTED_WAYS = (
 
 
 class LogNoise(NamedTuple):
-    """Noise of a log beside its smooth path, along the scene's axes, and which of both the processor flies.
+    """Noise of a log around its smooth path, along the scene's axes, and the path that the processor flies.
 
-    `residual` is the covariance of what is left of the fixes in the aperture [m²], `correlation_time` that of a
-    Gauss-Markov process which is correlated as they are [s]. `grid` is one step of each coordinate that the log
-    writes [m]. `processed` is a value of `trajectory.processed`, None where the file does not say it.
+    Attributes
+    ----------
+    residual : Matrix
+        Covariance of the residuals of the fixes in the aperture. [m²]
+    correlation_time : float
+        Correlation time of a Gauss-Markov process with the correlation of the residuals. [s]
+    grid : Matrix
+        One step of each coordinate that the log writes. [m]
+    processed : str, optional
+        Value of `trajectory.processed`; None if the file does not state it.
     """
 
     residual: Matrix
@@ -410,16 +418,45 @@ class LogNoise(NamedTuple):
 
 
 class FlownPath(NamedTuple):
-    """The path of a platform that the scene's place on the Earth, an orbit or a log of a flight decide.
+    """The path of a platform from an orbit, a log of a flight, or a geodetic position.
 
-    `source` says where it comes from, empty where the file states it; `file` and `sha256` are those of the file it
-    was read from, `age` that of its elements [s]. Of a fit the order, the number of pieces, the residual at most and
-    root mean square [m], the number of places of a log and the stretch of time that they are from [s]. `doubts` are
-    warnings, for reports.
-
-    `doubt_m` is how far the truth may be from it by what its own source says: the age of elements, the interpolation
-    of an ephemeris, the residual of a smoothed log; `doubt_of` says which. Where the file declares no position error,
-    it counts if it `is_doubted`. An orbit that `is_planned` is the plan: what its source cannot know does not count.
+    Attributes
+    ----------
+    state : PlatformState
+        The path in the frame of the scene.
+    source : str
+        Words for the source of the path; empty if the mission file states the path itself.
+    file, sha256 : str, optional
+        File that the path was read from, and its SHA-256.
+    age : float, optional
+        Age of orbital elements. [s]
+    order, pieces : int, optional
+        Order of the fitted polynomial, and number of its pieces.
+    farthest, rms : float, optional
+        Largest and root-mean-square residual of the fit. [m]
+    samples, stretch : int, float, optional
+        Number of fixes of a log, and the time that they cover. [s]
+    doubts : tuple of str
+        Warnings for reports.
+    doubt_m, doubt_of : float, str
+        Distance of the true path that the source allows for [m], and its cause: the age of elements, the
+        interpolation of an ephemeris, or the residual of a smoothed log.
+    is_doubted : bool
+        Whether the doubt counts as an error where the mission file declares no position error.
+    is_planned : bool
+        Whether an orbit is the plan. Errors that its source cannot know do not count then.
+    accuracy : tuple of str, optional
+        File that states errors of the path, and its SHA-256.
+    orientation : tuple of str, optional
+        Table of the Earth's orientation that was used, and its SHA-256.
+    stated : tuple of StatedAccuracy
+        Accuracy that the source of the path states, along the scene's axes.
+    log_noise : LogNoise, optional
+        Noise of a log.
+    acceleration_noise : Matrix, optional
+        Covariance of the acceleration error of a fit. [m²/s⁴]
+    path_noise : PathNoise, optional
+        Noise of a smoothed path.
     """
 
     state: PlatformState
@@ -438,26 +475,26 @@ class FlownPath(NamedTuple):
     doubt_of: str = ""
     is_doubted: bool = False
     is_planned: bool = False
-    accuracy: tuple[str, str] | None = None  # file that states its errors, and its SHA-256
-    orientation: tuple[str, str] | None = None  # table by which it is turned to the Earth, and its SHA-256
-    stated: tuple[StatedAccuracy, ...] = ()  # by its own source, along the scene's axes
+    accuracy: tuple[str, str] | None = None
+    orientation: tuple[str, str] | None = None
+    stated: tuple[StatedAccuracy, ...] = ()
     log_noise: LogNoise | None = None
-    acceleration_noise: Matrix | None = None  # covariance of the error of a fit [m²/s⁴]
+    acceleration_noise: Matrix | None = None
     path_noise: PathNoise | None = None
 
     @property
     def is_raw(self) -> bool:
-        """Whether it is that of a log whose processor flies the fixes as they are."""
+        """Whether the path is that of a log whose fixes the processor flies without smoothing."""
         return self.log_noise is not None and self.log_noise.processed == RAW
 
     @property
     def largest_doubt_m(self) -> float:
-        """How far the truth may be from it, by what its source says of itself or by anything else. [m]"""
-        return max([self.doubt_m, *(one.position_m for one in self.stated)])
+        """Largest distance of the true path, by the doubt of the source or by its stated accuracy. [m]"""
+        return max([self.doubt_m, *(accuracy.position_m for accuracy in self.stated)])
 
     @property
     def beside(self) -> Mapping[str, tuple[str, str] | None]:
-        """Files that say more of it, each with its SHA-256, by what they say."""
+        """Further files that the path depends on, with their SHA-256, by their content."""
         return {"accuracy": self.accuracy, "earth_orientation": self.orientation}
 
 
@@ -491,8 +528,8 @@ class Platform(NamedTuple):
 
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
-        """Hold it to one complete geometry, above the ground, off the scene centre."""
-        wrong = [key for key in _PATH_KEYS if key not in values]  # by themselves, and given all the same
+        """Require one complete geometry, above the ground and away from the scene centre."""
+        wrong = [key for key in _PATH_KEYS if key not in values]  # stated with an invalid value
         given = [key for key in _PATH_KEYS if key in wrong or values[key] is not None]
         unclear = _unclear_geometry(given, is_fixed=values.get("speed") == 0, may_be_fixed="speed" in wrong)
         if unclear is not None:
@@ -506,11 +543,11 @@ class Platform(NamedTuple):
                 yield from platform.without_image(values.get("motion_error"))
 
     def without_image(self, error: MotionError | None) -> Iterator[Problem]:
-        """Say what keeps its path from forming an image, and its errors from their frame."""
+        """Problems that keep the path from forming an image, or the errors from having a frame."""
         state = self.state
         if state.slant_range < 1:
-            where: KeyPath = ("slant_range",) if self.slant_range is not None else (self.way,)
-            yield Problem("puts the platform within 1 m of the scene centre", at=where)
+            at_key: KeyPath = ("slant_range",) if self.slant_range is not None else (self.way,)
+            yield Problem("puts the platform within 1 m of the scene centre", at=at_key)
         elif error is not None and (error.frame != "ric" or self.path is not None):
             try:
                 state.frame(error.frame)
@@ -519,18 +556,18 @@ class Platform(NamedTuple):
 
     @property
     def way(self) -> str:
-        """First key of the way in which its path is stated."""
+        """First key of the way in which the path is stated."""
         firsts = [way.keys[0] for way in WAYS]
         return next((key for key in firsts if getattr(self, key) is not None), firsts[-1])
 
     @property
     def is_of_the_earth(self) -> bool:
-        """Whether its path needs to be found: by a file, or where the scene is on the Earth."""
+        """Whether the path follows from a file, or from the position of the scene on the Earth."""
         return self.way in ("orbit", "trajectory", "latitude")
 
     @property
     def state(self) -> PlatformState:
-        """Its path in the frame of the scene; of a way that needs to be found once it is, see `is_of_the_earth`.
+        """The path in the frame of the scene; if it `is_of_the_earth`, only once `path` is set.
 
         Numbers may be arrays (cases,).
         """
@@ -546,7 +583,7 @@ class Platform(NamedTuple):
             azimuth=self.azimuth,
             elevation=self.elevation,
             speed=self.speed,
-            motion_azimuth=0.0 if self.motion_azimuth is None else self.motion_azimuth,  # of a fixed platform
+            motion_azimuth=0.0 if self.motion_azimuth is None else self.motion_azimuth,  # a fixed platform has none
             climb=0.0 if self.climb is None else self.climb,
             acceleration=acceleration,
             bends=bends,
@@ -554,14 +591,14 @@ class Platform(NamedTuple):
 
 
 def _unclear_geometry(given: Sequence[str], *, is_fixed: bool, may_be_fixed: bool) -> Problem | None:
-    """Say what keeps the keys that a file gives from being one complete way."""
+    """Problem that keeps the stated keys from being one complete way; None if they are one."""
     ways = [way for way in WAYS if any(key in way.own for key in given)] or WAYS[-1:]
-    known = (*ways[0].keys, *ways[0].optional)
-    strange = [key for key in given if key not in known]
-    if strange:
-        own = next(key for key in given if key in ways[0].own)
-        other = next((key for key in strange if any(key in way.own for way in ways[1:])), strange[0])
-        return Problem(f"mixes {own} with {other}", ACCEPTED_WAYS, at=(other,))
+    known_keys = (*ways[0].keys, *ways[0].optional)
+    foreign = [key for key in given if key not in known_keys]
+    if foreign:
+        own_key = next(key for key in given if key in ways[0].own)
+        foreign_key = next((key for key in foreign if any(key in way.own for way in ways[1:])), foreign[0])
+        return Problem(f"mixes {own_key} with {foreign_key}", ACCEPTED_WAYS, at=(foreign_key,))
     direction = ways[0].direction
     if is_fixed and direction in given:
         return Problem("a platform with speed 0 has none", ACCEPTED_WAYS, at=(direction,))
@@ -571,7 +608,7 @@ def _unclear_geometry(given: Sequence[str], *, is_fixed: bool, may_be_fixed: boo
 
 
 def _bends(jerk: Vector | None, snap: Vector | None) -> tuple[Vector, ...]:
-    """Coefficients of τ³ and τ⁴."""
+    """Coefficients of τ³ and τ⁴ of a path. [m/s³], [m/s⁴]"""
     if jerk is None and snap is None:
         return ()
     (a, b, c), (x, y, z) = jerk or STRAIGHT, snap or STRAIGHT
@@ -598,7 +635,7 @@ def without_image(
     *,
     has_direct_path: bool,
 ) -> Iterator[Problem]:
-    """Say what keeps paths from forming an image, and errors from having axes; no aperture is wrong by itself."""
+    """Problems that keep paths from forming an image, or errors from having axes; an invalid aperture is None."""
     geometry = platforms.geometry
     yield from _no_image(geometry, radar, aperture_time_s)
     if common is not None:
@@ -611,6 +648,7 @@ def without_image(
 
 
 def _no_image(geometry: BistaticGeometry, radar: "Radar | None", aperture_time_s: float | None) -> Iterator[Problem]:
+    """Problem of a geometry that forms no image."""
     if all(norm(platform.velocity) < STILL for platform in geometry.both):
         yield Problem("both platforms are still: no aperture", at=("platforms",))
     elif radar and aperture_time_s and (reason := degeneracy(geometry, radar, aperture_time_s)):
@@ -618,8 +656,9 @@ def _no_image(geometry: BistaticGeometry, radar: "Radar | None", aperture_time_s
 
 
 def _no_common_frame(platforms: Platforms, frame: str) -> Iterator[Problem]:
+    """Problems of platforms on which the frame of the common motion error is undefined."""
     for name, platform in platforms._asdict().items():
-        if frame == "ric" and platform.path is None:  # yet
+        if frame == "ric" and platform.path is None:  # its radial direction follows with the path
             continue
         try:
             platform.state.frame(frame)
@@ -628,20 +667,22 @@ def _no_common_frame(platforms: Platforms, frame: str) -> Iterator[Problem]:
 
 
 def has_body_axes(state: PlatformState, half: Any, margin: float = 1.0) -> Any:
-    """Whether a velocity keeps a direction on the ground within apertures, half of which last so long (cases,) [s].
+    """Whether a velocity keeps a direction on the ground within apertures of half-length `half` (cases,) [s].
 
-    That of a platform that stands still does not matter.
+    True for a platform that does not move, whose direction does not matter.
     """
-    times = half * _PLACES
-    u, v, w = (np.broadcast_to(one, times.shape) for one in state.at(times)[1])
+    times = half * _APERTURE_TIMES
+    u, v, w = (np.broadcast_to(component, times.shape) for component in state.at(times)[1])
     fastest = np.sqrt(u * u + v * v + w * w).max(axis=0)
-    is_level = np.hypot(u, v).min(axis=0) > margin * _UPRIGHT * fastest
-    goes_on = (u[1:] * u[:-1] + v[1:] * v[:-1] > 0).all(axis=0)  # else it stops and turns back between two places
+    is_level = np.hypot(u, v).min(axis=0) > margin * _LEVEL_FRACTION * fastest
+    goes_on = (u[1:] * u[:-1] + v[1:] * v[:-1] > 0).all(
+        axis=0
+    )  # else the platform stops and turns back between two times
     return np.asarray((is_level & goes_on) | state.is_still)
 
 
 def _no_body_axes(platforms: Platforms, half: float) -> Iterator[Problem]:
-    """Lever arms of platforms whose velocity has no direction on the ground, at some time of the aperture."""
+    """Problems of lever arms on platforms whose velocity has no direction on the ground during the aperture."""
     for name, platform in platforms._asdict().items():
         if platform.motion_error.lever_arm is None or platform.state.is_still:
             continue
@@ -654,6 +695,7 @@ def _no_body_axes(platforms: Platforms, half: float) -> Iterator[Problem]:
 
 
 def _dives(platforms: Platforms, geometry: BistaticGeometry, aperture_time: float) -> Iterator[Problem]:
+    """Problems of platforms that go below the ground during the aperture."""
     for (name, platform), state in zip(platforms._asdict().items(), geometry.both, strict=True):
         lowest = min(state.place(tau)[2] for tau in _turning_points(state, aperture_time / 2))
         if lowest < 0 <= state.position[2]:
@@ -669,28 +711,29 @@ def _dives(platforms: Platforms, geometry: BistaticGeometry, aperture_time: floa
 
 
 def least_baseline(apart: PlatformState, half: Any) -> Any:
-    """Least distance of the platforms over an aperture, half of which lasts so long [s]. [m]"""
-    return norm(apart.place(half * _PLACES)).min(axis=0)
+    """Least distance of the platforms over an aperture of half-length `half` [s]. [m]"""
+    return norm(apart.place(half * _APERTURE_TIMES)).min(axis=0)
 
 
 def _no_baseline(apart: PlatformState, half: float) -> Iterator[Problem]:
-    least, way = float(least_baseline(apart, half)[0]), apart.travelled(half)
-    if least < max(LEAST_BASELINE, way / FARTHEST_BY):
+    """Problem of platforms that come too near each other for a direct path."""
+    least, travelled = float(least_baseline(apart, half)[0]), apart.travelled(half)
+    if least < max(LEAST_BASELINE, travelled / FARTHEST_BY):
         yield Problem(
             f"there is no direct path to follow: the platforms come within {least:.3g} m of each other, and move "
-            f"{way:.3g} m against each other in half an aperture",
+            f"{travelled:.3g} m against each other in half an aperture",
             f"accepted: at least {LEAST_BASELINE:g} m and a {FARTHEST_BY}rd of that way, or linear",
             at=("synchronization", "method"),
         )
 
 
 def _turning_points(state: PlatformState, half: float) -> Iterator[float]:
-    """Slow times within the aperture where a platform can be lowest: its ends, and where it stops sinking.
+    """Slow times at which a platform can be lowest: the ends of the aperture, and where the platform stops sinking.
 
-    Of a path that bends more than once, places a 64th of the aperture apart.
+    For a path that bends more than once, times a 64th of the aperture apart.
     """
     yield from (-half, half)
     if not state.is_quadratic:
-        yield from (half * part / 32 for part in range(-31, 32))
+        yield from (half * step / 32 for step in range(-31, 32))
     elif state.acceleration[2] > 0:
         yield max(-half, min(half, -state.velocity[2] / state.acceleration[2]))

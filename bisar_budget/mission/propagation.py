@@ -1,4 +1,4 @@
-"""Delays in the air: what correction leaves above the scene, on the leg of each platform. Values are SI, 1 sigma."""
+"""Delays in the air that remain after correction, on the leg of each platform. Values are SI, 1 sigma."""
 
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, NamedTuple
@@ -14,13 +14,13 @@ from bisar_budget.mission.readers import Key, Quantity, Section, Source
 
 DELAYS = ("zenith_delay", "zenith_electron_content")
 _TIME = "correlation_time"
-LEAST_ELEVATION_DEG = 3.0  # below, a delay does not follow from that of the zenith
-ABOVE_THE_AIR = 80e3  # m; below, there are no free electrons to speak of, and hardly any air above
+LEAST_ELEVATION_DEG = 3.0  # at a lower elevation, a delay does not follow from the delay at the zenith
+ABOVE_THE_AIR = 80e3  # height [m]; few free electrons are lower, and little air is higher
 
 _ZENITH_DELAY = Quantity(units.LENGTH, ge=0, le=1e3)
 _ELECTRON_CONTENT = Quantity(units.ELECTRON_CONTENT, ge=0, le=1e20)
 _CORRELATION_TIME = Quantity(units.TIME, gt=0, ge=1e-6, le=1e9)  # as of any Gauss-Markov error
-_PLACES = np.linspace(-1.0, 1.0, 9)[:, None]  # of an aperture, in halves of it
+_APERTURE_TIMES = np.linspace(-1.0, 1.0, 9)[:, None]  # in halves of the aperture time
 
 
 class LegDelay(NamedTuple):
@@ -76,7 +76,7 @@ class Propagation(NamedTuple):
 
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
-        """Reject a mixture of figures of both legs and of one, none at all, and a time in which nothing changes."""
+        """Reject delays of both legs together with delays of one leg, no delay, and a time without a delay."""
         if not values.keys() >= {*DELAYS, _TIME, *Platforms._fields}:
             return
         of_both = [delay for delay in DELAYS if values[delay] is not None]
@@ -85,8 +85,10 @@ class Propagation(NamedTuple):
         if of_both and of_one:
             yield Problem(f"mixes {of_both[0]} of both legs with {of_one[0]}", accepted, at=(of_one[0],))
         elif not (of_both or of_one):
-            what = "states no delay" if values[_TIME] is None else f"states a {_TIME} and no delay that changes in it"
-            yield Problem(what, accepted)
+            problem = (
+                "states no delay" if values[_TIME] is None else f"states a {_TIME} and no delay that changes in it"
+            )
+            yield Problem(problem, accepted)
         elif (
             not of_both
             and values[_TIME] is not None
@@ -101,31 +103,31 @@ class Propagation(NamedTuple):
 
     @property
     def is_one_air(self) -> bool:
-        """Whether the delays are stated once: both legs have the same air over them."""
+        """Whether the delays are stated once, for the same air over both legs."""
         return self.transmitter is None and self.receiver is None
 
     def content(self, platform: str) -> Any:
-        """Electron content at the zenith of the leg of a platform; None where the file states none. [1/m²]"""
+        """Electron content at the zenith for the leg of a platform; None if the file states none. [1/m²]"""
         leg = self.leg(platform)
         return None if leg is None else leg.zenith_electron_content
 
     def source_of(self, platform: str) -> str | None:
-        """Where the delays of the leg of a platform come from."""
+        """Source of the delays of the leg of a platform."""
         leg = self.leg(platform)
         return None if leg is None else leg.source
 
     def leg(self, platform: str) -> LegDelay | None:
-        """The leg of a platform as stated; None where that of the other alone is."""
+        """Delays on the leg of a platform; None if the file states only the leg of the other platform."""
         if self.is_one_air:
             return LegDelay(self.zenith_delay, self.zenith_electron_content, self.correlation_time, self.source)
-        own: LegDelay | None = getattr(self, platform)
-        if own is None:
+        platform_leg: LegDelay | None = getattr(self, platform)
+        if platform_leg is None:
             return None
-        time = self.correlation_time if own.correlation_time is None else own.correlation_time
-        return own._replace(correlation_time=time, source=own.source or self.source)
+        time = self.correlation_time if platform_leg.correlation_time is None else platform_leg.correlation_time
+        return platform_leg._replace(correlation_time=time, source=platform_leg.source or self.source)
 
     def path(self, platform: str, delay: str) -> KeyPath:
-        """Where a figure of a leg stands in the file."""
+        """Path in the file of a figure of a leg."""
         return ("propagation", *(() if self.is_one_air else (platform,)), delay)
 
 
@@ -133,27 +135,27 @@ PROPAGATION = Section(Propagation)
 
 
 def height_of(position: Vectors) -> Any:
-    """Height of places (…) above the sphere of the Earth's mean radius that touches the scene. [m]"""
+    """Height of positions (…) above the sphere of the Earth's mean radius that touches the scene. [m]"""
     x, y, z = position
     return np.sqrt(x * x + y * y + (z + EARTH_RADIUS) ** 2) - EARTH_RADIUS
 
 
 def elevation_deg(position: Vectors) -> Any:
-    """Elevation of places (…) as the scene centre sees them. [deg]"""
+    """Elevation of positions (…) seen from the scene centre. [deg]"""
     x, y, z = position
     return np.degrees(np.arctan2(z, np.hypot(x, y)))
 
 
 def least_elevation_deg(path: PlatformState, aperture_time_s: Any) -> Any:
-    """Least elevation of a platform over the aperture, as the scene centre sees it. [deg]"""
+    """Least elevation of a platform over the aperture, seen from the scene centre. [deg]"""
     half = np.asarray(aperture_time_s, dtype=float) / 2
-    return elevation_deg(path.place(_PLACES * half)).min(axis=0)
+    return elevation_deg(path.place(_APERTURE_TIMES * half)).min(axis=0)
 
 
 def least_elevations(
     propagation: Propagation, paths: Mapping[str, PlatformState], aperture_time_s: Any
 ) -> Iterator[tuple[str, str, Any]]:
-    """Least elevation of the legs of which a delay is stated: platform, figure, and its degrees in the aperture."""
+    """Platform, figure and least elevation over the aperture [deg], for each stated delay of a leg."""
     for name, path in paths.items():
         leg = propagation.leg(name)
         if leg is None:
@@ -163,11 +165,11 @@ def least_elevations(
             yield name, DELAYS[0], least
         if leg.zenith_electron_content is not None:
             is_below = np.asarray(height_of(path.position)) < ABOVE_THE_AIR
-            yield name, DELAYS[1], np.where(is_below, 90.0, least)  # it has no leg there
+            yield name, DELAYS[1], np.where(is_below, 90.0, least)  # the leg does not reach the ionosphere
 
 
 def too_low(propagation: Propagation, platforms: Platforms, aperture_time_s: float) -> Iterator[Problem]:
-    """Refuse delays of legs that run along the ground."""
+    """Problems of delays on legs that run along the ground."""
     paths = dict(zip(Platforms._fields, platforms.geometry.both, strict=True))
     for name, delay, least in least_elevations(propagation, paths, aperture_time_s):
         (degrees,) = least.tolist()

@@ -1,6 +1,6 @@
-"""Numbers of a mission by their keys: reader, value and unit of one in the file, and its place in a mission.
+"""Numbers of a mission by their keys: reader, value and unit of a number in the file, and its field in a mission.
 
-A caller gives values as a file has them: texts, numbers in SI, quantities of other packages.
+Callers give values as a file would have them: texts, numbers in SI, or quantities of other packages.
 """
 
 import functools
@@ -44,17 +44,17 @@ from bisar_budget.mission.tree import Tree, read_tree
 from bisar_budget.mission.vibrations import Spectrum
 from bisar_budget.units import Dimension, parse_quantity
 
-DIGITS = 8  # of values that are said: both sides of a crossing stay within 1e-6
-_DECADE = 10.0
+DIGITS = 8  # of values in answers: both sides of a crossing stay within 1e-6
+_DECADE_RATIO = 10.0
 FACTOR = Quantity(units.RATIO, gt=0, ge=1e-12, le=1e12)
 
 
 class QuestionError(Exception):
-    """A question that cannot be asked of a mission; the message says why, and what can."""
+    """A question that a mission cannot answer; the message says why, and what is accepted."""
 
 
 class TableError(QuestionError):
-    """A table of cases that cannot be read; `lines` says each fault, `file:line:column: fault`."""
+    """A table of cases that cannot be read; `lines` has a line for each fault, `file:line:column: fault`."""
 
     def __init__(self, lines: Sequence[str]) -> None:
         self.lines = list(lines)
@@ -62,17 +62,17 @@ class TableError(QuestionError):
 
     @classmethod
     def of_faults(cls, file: str, faults: Sequence[Fault]) -> "TableError":
-        """An error of places in a file."""
+        """An error for faults at positions in a file."""
         return cls([f"{printable(file)}:{fault.line}:{fault.column}: {fault}" for fault in faults])
 
     @classmethod
     def of_file(cls, file: str, problem: str) -> "TableError":
-        """An error of the whole file."""
+        """An error for a problem of the file as a whole."""
         return cls([f"Error: {printable(file)}: {printable(problem)}"])
 
 
 class Number(NamedTuple):
-    """A number of the file: its reader, its value in SI (None: the file has none) and the unit that it is said in."""
+    """A number of the file: its reader, its value in SI (None if the file has none) and the unit of its texts."""
 
     key: str
     reader: Quantity
@@ -81,21 +81,21 @@ class Number(NamedTuple):
 
     @property
     def dimension(self) -> Dimension:
-        """Kind of quantity that it is."""
+        """Kind of quantity."""
         return self.reader.dimension
 
     @property
     def is_level(self) -> bool:
-        """Whether it is a level in decibel."""
+        """Whether the number is a level in decibels."""
         return self.dimension in units.LEVELS
 
     @property
     def scale(self) -> tuple[float, float]:
-        """Factor and divisor that make SI of a value in its unit."""
+        """Factor and divisor that convert a value in the number's unit to SI."""
         return self.dimension.scales.get(self.unit) or (1.0, 1.0)
 
     def text(self, value: float, *, is_up: bool | None = None) -> str:
-        """Write a value as the file would have it, with `DIGITS` digits, rounded up or down; None: to the nearest."""
+        """Text of a value in the number's unit with `DIGITS` digits, rounded up, down, or (None) to the nearest."""
         factor, divisor = self.scale
         number = value / factor * divisor
         if is_up is not None:
@@ -104,20 +104,20 @@ class Number(NamedTuple):
         return f"{number:.{DIGITS}g}{' ' if self.unit else ''}{self.unit}"
 
     def said_like(self, between: str | None) -> "Number":
-        """The number said in the unit of the range's end, where the file has no value to say it like."""
+        """The number in the unit of a range's upper end, if the file has no value whose unit could be used."""
         unit = units.unit_behind((between or "").rpartition("..")[2])
         unit = unit if unit in self.dimension.scales else units.normal_unit(unit)
         return self._replace(unit=unit) if self.value is None and unit in self.dimension.scales and unit else self
 
     def read(self, text: str) -> float:
-        """Read what `text` wrote; within a rounding of what the file's reader makes of it, which is the same."""
+        """Value in SI of a text that `text` wrote, equal to the value of the file's reader within rounding."""
         return parse_quantity(text, self.dimension)
 
 
 class Choices(NamedTuple):
-    """A key that has a word instead of a number: a choice, a part of the catalogue, a file, a whole number.
+    """A key with a word instead of a number: a choice, a part of the catalogue, a file, a whole number.
 
-    `value` is what the file says; None if nothing, or a list or a section.
+    `value` is the word of the file; None if the file has no value, a list or a section.
     """
 
     key: str
@@ -131,7 +131,7 @@ Varied = Number | Choices
 
 
 def tree_of(mission: Mission) -> dict[str, Any]:
-    """Content of a mission's file with the options that changed it, as text."""
+    """Content of a mission's file, changed by the mission's options: texts, lists and mappings."""
     tree = read_tree(mission.data or b"", mission.file)
     apply_changes(tree, mission.changes)
     root: dict[str, Any] = tree.root
@@ -139,18 +139,30 @@ def tree_of(mission: Mission) -> dict[str, Any]:
 
 
 def number_of(tree: dict[str, Any], key: str, of_all: str = "", *, is_for_each: bool = False) -> Number:
-    """Find the number that a key names; a scalar that stands for each axis is one.
+    """The number that a key names; a scalar that holds for each of three axes counts as a number.
 
-    `tree` is what the file says, as text, `of_all` what else is accepted where a key has three numbers. Where one is
-    looked for that is to stand for each axis, the largest of three in the file is its value. A `QuestionError` says
-    that there is no such key, or no number.
+    Parameters
+    ----------
+    tree : dict
+        Content of the file as text.
+    key : str
+        Path of the key.
+    of_all : str
+        Words of the message for a key with three numbers: what else is accepted.
+    is_for_each : bool
+        Whether the number is to hold for each axis. The value is then the largest of the three in the file.
+
+    Raises
+    ------
+    QuestionError
+        The key does not exist or has no number.
     """
-    reader, value = _found(tree, key)
+    reader, value = _reader_and_value(tree, key)
     reader = form_of(reader, value)
     if isinstance(reader, Triple):
         if is_for_each and reader.or_scalar and isinstance(value, list):
-            of_each = [as_number(key, reader.component, one) for one in value]
-            return max(of_each, key=lambda one: abs(one.value or 0.0))
+            components = [as_number(key, reader.component, text) for text in value]
+            return max(components, key=lambda component: abs(component.value or 0.0))
         if isinstance(value, list) or not reader.or_scalar:
             more = of_all if reader.or_scalar else ""
             raise QuestionError(f"{key}: has three components; accepted: {key}.0, .1 or .2{more}")
@@ -165,12 +177,12 @@ def number_of(tree: dict[str, Any], key: str, of_all: str = "", *, is_for_each: 
 
 
 def choices_of(tree: dict[str, Any], key: str, text: str) -> Choices | None:
-    """Find the key that a word can be given for; None where it has a number, or anything else.
+    """The key if a word can be its value; None for a key with a number, or with anything else.
 
-    `text` is what is to be given: of shares of a budget the rule, of parts a list. A `QuestionError` says that there
-    is no such key.
+    `text` is the new value: for shares of a budget the rule, for parts a list. Raises `QuestionError` if the key does
+    not exist.
     """
-    reader, value = _found(tree, key)
+    reader, value = _reader_and_value(tree, key)
     reader = form_of(reader, [] if text.startswith("[") else text)
     if not reader.is_word:
         return None
@@ -184,7 +196,7 @@ def choices_of(tree: dict[str, Any], key: str, text: str) -> Choices | None:
 
 
 def as_number(key: str, reader: Quantity, value: Any) -> Number:
-    """Put together a number and the unit that it is said in; `value` is what the file says, None if nothing."""
+    """A number with the unit of its texts; `value` is the file's value, None if it has none."""
     dimension = reader.dimension
     number = parse_quantity(value, dimension) if isinstance(value, str) else value if type(value) is float else None
     unit = units.unit_behind(value) if isinstance(value, str) else ""
@@ -194,43 +206,43 @@ def as_number(key: str, reader: Quantity, value: Any) -> Number:
     return Number(key, reader, number, unit if unit in dimension.scales else "")
 
 
-def _found(tree: dict[str, Any], key: str) -> tuple[Reader, Any]:
-    """Go down to a key: its reader, of whatever form, and what the file says there, None if nothing."""
+def _reader_and_value(tree: dict[str, Any], key: str) -> tuple[Reader, Any]:
+    """Reader of a key, which may be one of several forms, and the file's value, None if it has none."""
     reader: Reader = MISSION
     value: Any = tree
     parts = parts_of(key)
     while parts:
         reader = form_of(reader, value)
-        name, rest = next_name(value, parts)
-        part, parts = (parts[0], parts[1:]) if name is None else (str(name), rest)
-        inner = reader.below(part)
+        name, remaining = next_name(value, parts)
+        child, parts = (parts[0], parts[1:]) if name is None else (str(name), remaining)
+        inner = reader.below(child)
         if inner is None and isinstance(value, str):
-            raise QuestionError(f"{shown(key)}: the file has {shown(value)!r} there, which has no {shown(part)!r}")
+            raise QuestionError(f"{shown(key)}: the file has {shown(value)!r} there, which has no {shown(child)!r}")
         if inner is None:
-            known = f"accepted: {', '.join(reader.keys)}" if isinstance(reader, Section) else ""
-            problem = fault_words(f"{shown(part)!r} is not a known key", "", known, nearest_keys(key))
+            accepted = f"accepted: {', '.join(reader.keys)}" if isinstance(reader, Section) else ""
+            problem = fault_words(f"{shown(child)!r} is not a known key", "", accepted, nearest_keys(key))
             raise QuestionError(f"{shown(key)}: {problem}")
         if isinstance(reader, ListOf | TextList | Triple):
-            listed = value if isinstance(value, list) else []
-            if int(part) >= len(listed):
-                entries = f"{len(listed)} entr{'y' if len(listed) == 1 else 'ies'}"
-                raise QuestionError(f"{key}: the list has {entries}, and none has the number {part}")
-            value = listed[int(part)]
+            entries_read = value if isinstance(value, list) else []
+            if int(child) >= len(entries_read):
+                entries = f"{len(entries_read)} entr{'y' if len(entries_read) == 1 else 'ies'}"
+                raise QuestionError(f"{key}: the list has {entries}, and none has the number {child}")
+            value = entries_read[int(child)]
         else:
-            value = value.get(part) if isinstance(value, dict) else None
+            value = value.get(child) if isinstance(value, dict) else None
         reader, value = inner, None if value is INVALID else value
     return reader, value
 
 
 def form_of(reader: Reader, value: Any) -> Reader:
-    """Find the form of a reader that reads a value."""
+    """The form of a reader that reads a value."""
     while isinstance(reader, OneOf):
         reader = reader.pick(value)
     return reader
 
 
 class Range(NamedTuple):
-    """Where a question looks: from `low` to `high` in SI, `is_log` in steps of a ratio, `is_circle` once around."""
+    """Range of a search: from `low` to `high` in SI; `is_log` with steps of equal ratio, `is_circle` once around."""
 
     low: float
     high: float
@@ -238,22 +250,23 @@ class Range(NamedTuple):
     is_circle: bool = False
 
     def places(self, count: int) -> list[float]:
-        """Spread `count` values over the range, its ends among them."""
-        parts = [index / (count - 1) for index in range(1, count - 1)]
+        """`count` values over the range, with both ends."""
+        fractions = [index / (count - 1) for index in range(1, count - 1)]
         if self.is_log:
-            between = [self.low * (self.high / self.low) ** part for part in parts]
+            between = [self.low * (self.high / self.low) ** fraction for fraction in fractions]
         else:
-            between = [self.low + (self.high - self.low) * part for part in parts]
+            between = [self.low + (self.high - self.low) * fraction for fraction in fractions]
         return [self.low, *between, self.high]
 
 
 def range_of(number: Number, between: str | None) -> Range:
-    """Read `A..B`; without it two decades around the file's value, angles from end to end.
+    """Read `A..B`; None gives two decades around the file's value, and for angles all that the key accepts.
 
     Raises
     ------
     QuestionError
-        No range, an empty one, values that the key cannot have, or no value to look around.
+        `between` is no range, is empty, or has values that the key cannot have; or the file has no value around which
+        a range could be chosen.
     """
     gt, ge, lt, le = number.reader.bounds
     if between is None:
@@ -263,11 +276,11 @@ def range_of(number: Number, between: str | None) -> Range:
             return Range(ge, le, is_log=False)
         is_level = number.dimension in (units.POWER_RATIO, units.TONE, units.PHASE_NOISE)
         if number.value is None or (number.value == 0 and not is_level):
-            said = "is 0" if number.value == 0 else "has no value"
-            raise QuestionError(f"{number.key}: {said} in the file; say where to look, --between A..B")
-        ends = sorted((number.value / _DECADE, number.value * _DECADE))
+            problem = "is 0" if number.value == 0 else "has no value"
+            raise QuestionError(f"{number.key}: {problem} in the file; say where to look, --between A..B")
+        ends = sorted((number.value / _DECADE_RATIO, number.value * _DECADE_RATIO))
         if is_level:  # its decades are 20 dB
-            ends = [number.value - 20.0, number.value + 20.0]
+            ends = [number.value - 20.0, number.value + 20.0]  # [dB]
         low, high = max(ends[0], ge, gt), min(ends[1], le, lt)
         low, high = (low * (1 + 1e-9) if low == gt else low), (high * (1 - 1e-9) if high == lt else high)
     else:
@@ -275,17 +288,17 @@ def range_of(number: Number, between: str | None) -> Range:
         first, dots, last = (part.strip() for part in between.partition(".."))
         if not dots:
             example = (1.0, 10.0) if number.value is None else (number.value / 2, number.value * 2)
-            said = "..".join(map(number.text, example)).replace(" ", "")
-            raise QuestionError(f"{option}: is no range; accepted: A..B, such as {said}")
+            example_range = "..".join(map(number.text, example)).replace(" ", "")
+            raise QuestionError(f"{option}: is no range; accepted: A..B, such as {example_range}")
         if first and not units.unit_behind(first):  # 1..10 km starts at 1 km
             first += f" {units.unit_behind(last)}".rstrip()
-        found = []
+        ends_read = []
         for text in (first, last):
             try:
-                found.append(number.reader.leaf(text))
+                ends_read.append(number.reader.leaf(text))
             except InvalidValueError as error:
                 raise QuestionError(f"{option}: {shown(text)!r} {error.problem.words}") from None
-        low, high = found
+        low, high = ends_read
     if not low < high:
         raise QuestionError(
             f"--between {shown(between or '')}: is {'empty' if low == high else 'reversed'}; accepted: A < B"
@@ -293,8 +306,8 @@ def range_of(number: Number, between: str | None) -> Range:
     return Range(low, high, is_log=low > 0 and high / low >= 4)
 
 
-# ---------------------------------------------------------------- a number in its place
-# Sections that a file may leave out, and keys whose scalar stands for each of three axes.
+# ---------------------------------------------------------------- numbers of a mission
+# Sections that a file may omit, and keys whose scalar holds for each of three axes.
 _SECTIONS: Mapping[str, Callable[[], Any]] = {
     "imu": Imu,
     "lever_arm": LeverArm,
@@ -302,7 +315,7 @@ _SECTIONS: Mapping[str, Callable[[], Any]] = {
     "simulation": Simulation,
 }
 _TRIPLES = ("position", "velocity", "acceleration", *IMU_KINDS, "uncertainty")
-# Curves of an oscillator, with the dimension of what their points are named by.
+# Curves of an oscillator, with the dimension of their abscissas, which name the points.
 _CURVES: Mapping[str, Dimension] = {
     "phase_noise": units.FREQUENCY,
     "spurs": units.FREQUENCY,
@@ -312,34 +325,34 @@ _CURVES: Mapping[str, Dimension] = {
 
 
 def with_number(mission: Mission, key: str, number: Any) -> Mission:
-    """Put a number, or an array of numbers, into a mission in the place of a key."""
-    found: Mission = _with_value(mission, parts_of(key), number)
-    return found
+    """The mission with a number, or an array over cases, as the value of a key."""
+    changed_mission: Mission = _with_value(mission, parts_of(key), number)
+    return changed_mission
 
 
 def _with_value(value: Any, parts: Sequence[str], number: Any) -> Any:
-    """The same below a value; a scalar for each axis goes into all."""
+    """A value with a number at a path below it; at a triple the number goes into all three axes."""
     if not parts:
         return (number, number, number) if isinstance(value, tuple) else number
     if isinstance(value, Covariance):
         return _with_element(value, parts, number)
-    part, *rest = parts
-    if part.isdigit():
-        place = int(part)
-        return (*value[:place], _with_value(value[place], rest, number), *value[place + 1 :])
-    if part in _CURVES:
-        return value._replace(**{part: _with_point(getattr(value, part), part, ".".join(rest), number)})
-    part = POWERS.get(part, part)
-    below = getattr(value, part)
-    if below is None and rest:
-        below = _SECTIONS[part]()
-    if below is None and part in _TRIPLES:
+    name, *remaining = parts
+    if name.isdigit():
+        index = int(name)
+        return (*value[:index], _with_value(value[index], remaining, number), *value[index + 1 :])
+    if name in _CURVES:
+        return value._replace(**{name: _with_point(getattr(value, name), name, ".".join(remaining), number)})
+    name = POWERS.get(name, name)
+    below = getattr(value, name)
+    if below is None and remaining:
+        below = _SECTIONS[name]()
+    if below is None and name in _TRIPLES:
         below = ()
-    return value._replace(**{part: _with_value(below, rest, number)})
+    return value._replace(**{name: _with_value(below, remaining, number)})
 
 
 def _with_point(curve: Any, name: str, point: str, number: Any) -> Any:
-    """A curve with another ordinate at one of its points."""
+    """A curve with another ordinate at the point that a text names."""
     if isinstance(curve, Spectrum):
         return curve._replace(points=_with_point(curve.points, name, point, number))
     here = parse_quantity(point, _CURVES[name])
@@ -347,14 +360,14 @@ def _with_point(curve: Any, name: str, point: str, number: Any) -> Any:
 
 
 def _with_element(covariance: Covariance, parts: Sequence[str], number: Any) -> Covariance:
-    """A covariance with another sigma, a sigma of each axis, or the correlation of a pair."""
-    kind, *rest = parts
+    """A covariance with another sigma of one axis or of all axes, or with another correlation of a pair."""
+    kind, *remaining = parts
     if kind in KINDS:
         first = 3 * KINDS.index(kind)
-        places = [first + int(axis) for axis in rest] or range(first, first + 3)
-        sigmas = tuple(number if place in places else one for place, one in enumerate(covariance.sigmas))
+        changed_indices = [first + int(axis) for axis in remaining] or range(first, first + 3)
+        sigmas = tuple(number if index in changed_indices else sigma for index, sigma in enumerate(covariance.sigmas))
         return covariance._replace(sigmas=sigmas)
-    pair = {error_index(name.strip()) for name in ".".join(rest).split("-")}
+    pair = {error_index(name.strip()) for name in ".".join(remaining).split("-")}
     rows = [
         tuple(number if i != j and {i, j} == pair else rho for j, rho in enumerate(row))
         for i, row in enumerate(covariance.correlation)
@@ -363,44 +376,47 @@ def _with_element(covariance: Covariance, parts: Sequence[str], number: Any) -> 
 
 
 def value_at(mission: Mission, key: str) -> Any:
-    """Find what a mission has in the place of a key, in SI: a number, a tuple of one for each axis, or None.
+    """The value of a key in a mission, in SI: a number, a tuple of three numbers, or None.
 
-    Of a covariance it is the sigma, of a figure of a part that figure.
+    The value of a covariance is the sigma. A figure that comes from a part is the part's figure.
     """
     return _value_below(mission, parts_of(key))
 
 
 def _value_below(value: Any, parts: Sequence[str]) -> Any:
+    """The value at a path below a value; None if there is none."""
     if not parts or value is None:
         return value
     if isinstance(value, Covariance):
         return _element(value, parts)
-    part, *rest = parts
-    if part.isdigit():
-        return _value_below(value[int(part)], rest) if int(part) < len(value) else None
-    if part in _CURVES:
-        return _point(getattr(value, part), part, ".".join(rest))
-    if isinstance(value, MotionError) and part in ("position", "velocity", "acceleration"):
-        return _value_below(value.stated(part), rest)
-    return _value_below(getattr(value, POWERS.get(part, part)), rest)
+    name, *remaining = parts
+    if name.isdigit():
+        return _value_below(value[int(name)], remaining) if int(name) < len(value) else None
+    if name in _CURVES:
+        return _point(getattr(value, name), name, ".".join(remaining))
+    if isinstance(value, MotionError) and name in ("position", "velocity", "acceleration"):
+        return _value_below(value.stated(name), remaining)
+    return _value_below(getattr(value, POWERS.get(name, name)), remaining)
 
 
 def _point(curve: Any, name: str, point: str) -> Any:
+    """Ordinate of a curve at the point that a text names; None if the curve has no such point."""
     points = curve.points if isinstance(curve, Spectrum) else curve or ()
     here = parse_quantity(point, _CURVES[name])
     return next((ordinate for at, ordinate in points if at == here), None)
 
 
 def _element(covariance: Covariance, parts: Sequence[str]) -> Any:
+    """Sigma of an axis, or the three sigmas, of a covariance; None for a correlation."""
     kind, *axis = parts
     if kind not in KINDS:
         return None  # a correlation is no size
     return covariance.of(kind)[int(axis[0])] if axis else covariance.of(kind)
 
 
-# ---------------------------------------------------------------- sizes that errors are held to
+# ---------------------------------------------------------------- specified sizes of errors
 def with_specifications(mission: Mission, tree: Tree) -> Mission:
-    """Read the sizes of `specifications`, each as the number of its key; what is wrong is a fault of the tree."""
+    """The mission with its `specifications` as numbers of their keys; problems become faults of the tree."""
     read = {}
     for key, text in mission.specifications.items():
         path = ("specifications", key)
@@ -423,9 +439,9 @@ def with_specifications(mission: Mission, tree: Tree) -> Mission:
 
 
 def largest_at(mission: Mission, number: Number) -> Any:
-    """Find the size that a mission states for an error: of three axes the largest; None where it states none.
+    """The size that a mission states for an error, the largest of three axes; None if it states none.
 
-    A spectrum without a level has 0 dB.
+    The level of a spectrum that states none is 0 dB.
     """
     value = value_at(mission, number.key)
     if value is None and parts_of(number.key)[-1] in ("level", "spectrum_level"):
@@ -435,13 +451,13 @@ def largest_at(mission: Mission, number: Number) -> Any:
         return 0.0 if has_curve else None
     if number.is_level or value is None:
         return value
-    each = [np.abs(one) for one in (value if isinstance(value, tuple) else (value,))]
-    return functools.reduce(np.maximum, each)
+    sizes = [np.abs(size) for size in (value if isinstance(value, tuple) else (value,))]
+    return functools.reduce(np.maximum, sizes)
 
 
 # ---------------------------------------------------------------- values that a caller gives
 def changed(mission: Mission, values: Mapping[str, Any]) -> Mission:
-    """A mission with other values in place of the file's, and beside them, as `--set` puts them.
+    """A mission with values that replace values of the file or are added to them, as with `--set`.
 
     Parameters
     ----------
@@ -454,7 +470,7 @@ def changed(mission: Mission, values: Mapping[str, Any]) -> Mission:
     Raises
     ------
     MissionError
-        The mission cannot be used with them; a key is unknown.
+        The mission cannot be used with the values, or a key is unknown.
     """
     tree = tree_of(mission)
     changes = [SetValue(key, text_of(_si_of(tree, key), value)) for key, value in values.items()]
@@ -462,22 +478,22 @@ def changed(mission: Mission, values: Mapping[str, Any]) -> Mission:
 
 
 def _si_of(tree: dict[str, Any], key: str) -> str:
-    """SI unit of a key's numbers; empty where it has none, or where three numbers stand for one."""
-    for one in (key, f"{key}.0"):
+    """SI unit of a key's numbers; empty if the key has no number with a unit."""
+    for number_key in (key, f"{key}.0"):
         try:
-            return number_of(tree, one).dimension.si
+            return number_of(tree, number_key).dimension.si
         except QuestionError:
             continue
     return ""
 
 
 def text_of(si: str, value: Any) -> str:
-    """A text, number, quantity, list of them, or None as a mission file has it; numbers are in the SI unit.
+    """Text in a mission file for a text, number, quantity, list of them, or None; numbers are in the SI unit.
 
     Raises
     ------
     TypeError
-        It is none of them.
+        The value is of another type.
     """
     if isinstance(value, str):
         return value
@@ -491,26 +507,26 @@ def text_of(si: str, value: Any) -> str:
     if isinstance(value, numbers.Real):
         return f"{float(value)!r} {si}".rstrip() if not isinstance(value, numbers.Integral) or si else str(int(value))
     if isinstance(value, Sequence | np.ndarray):
-        return f"[{', '.join(text_of(si, one) for one in value)}]"
+        return f"[{', '.join(text_of(si, item) for item in value)}]"
     raise TypeError(
         f"{type(value).__name__} is no value of a mission; accepted: text with its unit, number, list, None"
     )
 
 
-# Quantities of other packages are known by what they do: no such package has to be there.
+# Quantities of other packages are recognised by their attributes, so that no such package has to be installed.
 def is_quantity(value: Any) -> bool:
     """Whether a value is a quantity of astropy, which has `to_value`, or of pint, which has a magnitude."""
     return hasattr(value, "to_value") or (hasattr(value, "magnitude") and hasattr(value, "units"))
 
 
 def magnitude(value: Any, unit: str) -> Any:
-    """The number, or the array, of a quantity in a unit."""
+    """The number or array of a quantity in a unit."""
     if hasattr(value, "to_value"):
         return value.to_value(unit)
     return value.to(unit.replace("^", "**") or "dimensionless").magnitude
 
 
 def _unit_of(value: Any) -> str:
-    """The unit that a quantity is said in, as a mission file writes it."""
-    said = str(value.unit) if hasattr(value, "to_value") else f"{value.units:~}"
-    return said.replace("**", "^").replace(" ", "")
+    """The unit of a quantity, as a mission file writes it."""
+    unit = str(value.unit) if hasattr(value, "to_value") else f"{value.units:~}"
+    return unit.replace("**", "^").replace(" ", "")

@@ -1,9 +1,9 @@
 """How a value of a mission file is read: one reader per kind of value, which also writes its JSON Schema.
 
-A section of the file is a `NamedTuple` whose keys are annotated with `Key(reader, description)`; see `model`.
-Readers are given what stands in the file (text, list or mapping; of a case a number in SI), say what is wrong with it
-through `report`, and return `INVALID` when they said something. This does for a mission file what a validation
-library would, in a fifth of the import time: `check` starts in every commit of somebody's repository.
+A section of the file is a `NamedTuple` whose keys are annotated with `Key(reader, description)`; see `model`. A
+reader takes the content of the file: a text, list or mapping, or for a case of a sweep a number in SI. It reports
+problems through `report`, and returns `INVALID` after a report. Readers do for a mission file what a validation
+library would do, in a fifth of the import time: `check` starts in every commit of somebody's repository.
 """
 
 import math
@@ -16,36 +16,36 @@ from bisar_budget.faults import InvalidValueError, KeyPath, Problem
 from bisar_budget.resources import docstring
 from bisar_budget.units import Dimension, format_quantity, parse_quantity
 
-MISSING = "is missing"  # of a key that a section does not go without
-INVALID: Any = object()  # in place of a value that was reported
+MISSING = "is missing"  # problem of a required key
+INVALID: Any = object()  # replaces a value that was reported
 Report = Callable[[KeyPath, Problem], None]
 
 _POINT = "A decimal is written with a point, a comma separates"
-_MAX_TEXT = 500  # characters
-_MAX_ENTRIES = 1000  # of a list
+_MAX_TEXT_CHARACTERS = 500
+_MAX_ENTRIES = 1000  # of a list of sections
 _MAX_POINTS = 100  # of a curve
-_FEW = 8  # parts that one platform is made of
-_MAX_IDS = 4000  # more rows than all lists together make
-_MAX_WILDCARDS = 20  # an id has four parts; patterns of hundreds take a second for each fifty
+_MAX_NAMES = 8  # of a list of names; a platform has no more parts
+_MAX_IDS = 4000  # of a mapping by row ids; the longest lists make fewer rows
+_MAX_WILDCARDS = 20  # of a pattern; an id has four parts, and fifty wildcards take a second
 # Controls, line separators, lone surrogates, byte order mark, and the marks that turn the reading direction.
 _UNPRINTABLE = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff\ufeff\u202a-\u202e\u2066-\u2069]")
 
 
-_MANY = {"type": ["array", "object", "null"]}  # JSON Schema: what is no single value
+_NOT_SINGLE = {"type": ["array", "object", "null"]}  # JSON Schema: lists, mappings and null are no single values
 
 
 def date_schema(pattern: str) -> dict[str, Any]:
-    """JSON Schema of a date or an instant: as text, or as what a reader of YAML makes of it, which JSON has not."""
+    """JSON Schema of a date or an instant: a text, or a type of dates that YAML readers have and JSON has not."""
     return {"not": {"type": ["array", "object", "null", "boolean", "number"]}, "pattern": pattern}
 
 
 class Reader:
-    """Reads one kind of value; `is_word` where that is a word or a whole number, of which several can be compared."""
+    """Reads one kind of value; `is_word` for words and whole numbers, several of which a sweep can compare."""
 
     is_word = False
 
     def read(self, value: Any, path: KeyPath, report: Report) -> Any:
-        """Return the value, or `INVALID` after a report. Leaves say what is wrong by `InvalidValueError`."""
+        """Return the value, or `INVALID` after a report. `leaf` raises the problem as `InvalidValueError`."""
         try:
             return self.leaf(value)
         except InvalidValueError as error:
@@ -57,11 +57,11 @@ class Reader:
         raise NotImplementedError
 
     def below(self, part: str) -> "Reader | None":
-        """Reader of the value at a key or a number within this one; None if it has no such part, or no parts."""
+        """Reader of the value at a key or an index within this value; None if there is no such key or index."""
         return None
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
-        """JSON Schema of what is accepted; sections add theirs to `definitions`."""
+        """JSON Schema of accepted values; sections add their own schema to `definitions`."""
         raise NotImplementedError
 
 
@@ -73,7 +73,7 @@ class Key(NamedTuple):
 
 
 class Quantity(Reader):
-    """A number with a unit, within bounds; read as a float in SI (decibels stay decibels).
+    """A number with a unit, within bounds; read as a float in SI. Decibels stay decibels.
 
     The outer bounds keep every later square and quotient finite; nothing real comes near them.
     """
@@ -91,7 +91,7 @@ class Quantity(Reader):
         self.bounds = (gt, ge, lt, le)
 
     def leaf(self, value: Any) -> float:
-        """Parse and hold to the bounds; a float is a number in SI already."""
+        """Parse the text of a number, or take a float in SI, and check the bounds."""
         if type(value) is float and math.isfinite(value):
             number = value
         else:
@@ -109,28 +109,28 @@ class Quantity(Reader):
             )
             if not holds
         )
-        said = format_quantity(bound, self.dimension.si)
+        bound_text = format_quantity(bound, self.dimension.si)
         if self.dimension is units.ANGLE:  # three digits of a radian are not 90 deg
-            said = f"{math.degrees(bound):.6g} deg"
-        raise InvalidValueError(f"must be {words} {said}", hint=self._meant(self._text(value)))
+            bound_text = f"{math.degrees(bound):.6g} deg"
+        raise InvalidValueError(f"must be {words} {bound_text}", hint=self._unit_hint(self._text(value)))
 
     def _text(self, value: Any) -> Any:
-        """A number as a file would have it."""
+        """A float as a file would write it; other values unchanged."""
         return f"{value!r} {self.dimension.si}".rstrip() if type(value) is float else value
 
-    def _meant(self, value: Any) -> str:
+    def _unit_hint(self, value: Any) -> str:
         """Hint at the unit that a bare number may lack."""
         text = str(value).strip()
         if not text or not text[-1].isdigit():
             return ""
         if self.dimension.usual:
-            return ""  # only a zero comes so far without its unit
+            return ""  # of such dimensions only a zero is read without a unit
         if "%" in self.dimension.units:
             return f"A bare number is a ratio: {text} is {100 * float(text):.6g} %"
         return f"A bare number is in {self.dimension.si}" if self.dimension.si not in ("", "dB") else ""
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
-        """Text with a unit, or a bare number within the bounds; of an angle only zero is bare."""
+        """JSON Schema: text with a unit, or a bare number within the bounds; an angle without a unit is zero."""
         name = re.sub(r"\W", "", self.dimension.name.partition(" ")[2].title()) + "Quantity"
         if name not in definitions:
             definitions[name] = _quantity_schema(self.dimension)
@@ -143,9 +143,9 @@ class Quantity(Reader):
         return {"allOf": [accepted], **bounds} if bounds else accepted
 
     def _sides_of_zero(self) -> dict[str, Any]:
-        """JSON Schema of the sign that a number has with any unit, where bounds leave one sign alone or no zero."""
+        """JSON Schema of the sign of a number in any unit, if the bounds exclude a sign or zero."""
         gt, ge, lt, le = self.bounds
-        if self.dimension.offsets:  # of which a unit moves the zero
+        if self.dimension.offsets:  # a unit shifts the zero
             return {}
         refused = [*(["-"] if max(gt, ge) >= 0 else []), *([r"\+?"] if min(lt, le) <= 0 else [])]
         patterns = [rf"(?!{sign}{_NOT_ZERO})" for sign in refused]
@@ -156,19 +156,23 @@ class Quantity(Reader):
         return {"pattern": rf"^\s*{''.join(patterns)}", **bare} if patterns else {}
 
 
-# Mantissas behind a sign, and what of a number ends them. A power of a hundred or more may come to zero.
+# Mantissa behind a sign, with the end of the number. A power of ten with three digits may underflow to zero.
 _NOT_ZERO = r"[0.]*[1-9][\d.]*(?:[eE][+-]?\d{1,2})?(?![\d.eE])"
 _ZERO = r"[0.]+(?:[eE][+-]?\d+)?(?![\d.eE])"
-_SHORT = ("dps", "mdps", "dph", "micro-g", "milli-g")  # spellings of units that are read
+_UNIT_ALIASES = ("dps", "mdps", "dph", "micro-g", "milli-g")  # further spellings of units that are read
 
 
 def _quantity_schema(dimension: Dimension) -> dict[str, Any]:
     """JSON Schema of a kind of quantity: text that begins with a number and has no unit of another kind behind it."""
     number = r"[+-]?(?!0\d)(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
-    known = {unit for other in units.DIMENSIONS for unit in other.units if unit}.union(_SHORT)
-    foreign = sorted(unit for unit in known if dimension.scales.keys().isdisjoint((unit, units.normal_unit(unit))))
-    of_others = "|".join(re.sub(r"([\^$.*+?()|/])", r"\\\1", unit) for unit in foreign)
-    text: dict[str, Any] = {"type": "string", "pattern": rf"^\s*(?!{number}\s*(?:{of_others})\s*$){number}"}
+    all_units = {unit for dimension_of_unit in units.DIMENSIONS for unit in dimension_of_unit.units if unit}.union(
+        _UNIT_ALIASES
+    )
+    foreign = sorted(
+        unit for unit in all_units if dimension.scales.keys().isdisjoint((unit, units.normal_unit(unit)))
+    )
+    foreign_pattern = "|".join(re.sub(r"([\^$.*+?()|/])", r"\\\1", unit) for unit in foreign)
+    text: dict[str, Any] = {"type": "string", "pattern": rf"^\s*(?!{number}\s*(?:{foreign_pattern})\s*$){number}"}
     words = dimension.accepted.removeprefix("accepted: ")
     return {"description": words, "anyOf": [text, {"const": 0} if dimension.usual else {"type": "number"}]}
 
@@ -181,73 +185,77 @@ class Triple(Reader):
         self.or_scalar = or_scalar
 
     def read(self, value: Any, path: KeyPath, report: Report) -> Any:
-        """Read each component at its own place."""
+        """Read each component; a problem is reported at its own path."""
         bracketed = "" if isinstance(value, list) else self._bracketed(value)
         if self.or_scalar and not isinstance(value, list) and not bracketed:
-            one = self.component.read(value, path, report)
-            return one if one is INVALID else (one, one, one)
+            scalar = self.component.read(value, path, report)
+            return scalar if scalar is INVALID else (scalar, scalar, scalar)
         if not isinstance(value, list) or len(value) != 3:
             given = f", {len(value)} given" if isinstance(value, list) else ""
             hint = _POINT if isinstance(value, list) and len(value) > 3 else bracketed
             report(path, Problem(f"must be three components{given}", "accepted: [a, b, c]", hint))
             return INVALID
-        parts = tuple([read_part(self.component, part, (*path, index), report) for index, part in enumerate(value)])
-        return INVALID if INVALID in parts else parts
+        components = tuple(
+            [read_part(self.component, item, (*path, index), report) for index, item in enumerate(value)]
+        )
+        return INVALID if INVALID in components else components
 
     def _bracketed(self, value: Any) -> str:
-        """Hint at brackets around three values that are written without; empty where it is not three values.
+        """Hint to put brackets around three values; empty if the value is not three values.
 
-        Each has its own unit, or is 0: `1,234,567 m` may be one number, and `1, 2, 3 km` are not three of km.
+        Each of the three has a unit or is 0: `1,234,567 m` may be one number, and `1, 2, 3 km` are not three lengths.
         """
         texts = value.strip(" ()").split(",") if isinstance(value, str) else ()
         if len(texts) != 3 or not any(map(units.unit_behind, texts)):
             return ""
         try:
-            bare = [self.component.leaf(text.strip()) for text in texts if not units.unit_behind(text)]
+            bare_numbers = [self.component.leaf(text.strip()) for text in texts if not units.unit_behind(text)]
             for text in texts:
                 self.component.leaf(text.strip())
         except InvalidValueError:
-            bare = [math.nan]
-        if any(bare):
+            bare_numbers = [math.nan]
+        if any(bare_numbers):
             return "Write brackets, and the unit of each" if value.count(", ") == 2 else ""
         return f"Did you mean [{', '.join(text.strip() for text in texts)}]?"
 
     def below(self, part: str) -> Reader | None:
-        """Give the reader of one component."""
+        """Reader of one component."""
         return self.component if is_place(part) else None
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
-        """Array of three, or also a single value."""
-        one = self.component.schema(definitions)
-        three = {"type": "array", "items": one, "minItems": 3, "maxItems": 3}
-        return {"anyOf": [one, three]} if self.or_scalar else three
+        """JSON Schema: array of three, or also a single value."""
+        single = self.component.schema(definitions)
+        triple = {"type": "array", "items": single, "minItems": 3, "maxItems": 3}
+        return {"anyOf": [single, triple]} if self.or_scalar else triple
 
 
 class Text(Reader):
     """One line of printable text."""
 
     def leaf(self, value: Any) -> str:
-        """Refuse what could do something to a terminal or a report."""
+        """Refuse empty, long and unprintable texts: control characters could change a terminal or a report."""
         if not isinstance(value, str):
             raise InvalidValueError("must be text")
         if not value.strip():
             raise InvalidValueError("must not be empty")
-        if len(value) > _MAX_TEXT:
-            raise InvalidValueError(f"must be at most {_MAX_TEXT} characters, has {len(value)}")
+        if len(value) > _MAX_TEXT_CHARACTERS:
+            raise InvalidValueError(f"must be at most {_MAX_TEXT_CHARACTERS} characters, has {len(value)}")
         if _UNPRINTABLE.search(value):
             raise InvalidValueError("must be one line of printable text, without control characters")
         return value
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
-        """Any single value: readers of YAML make a number of 007, true of `yes` and a date of 2026-06-01."""
+        """JSON Schema of any single value: YAML readers make a number of 007, true of `yes`, a date of 2026-06-01."""
         pattern = r"^(?=.*\S)[^\u0000-\u001f\u007f-\u009f\u2028\u2029\ufeff\u202a-\u202e\u2066-\u2069]*$"
         words = {"description": "One line of text."}
-        definitions.setdefault("Text", {**words, "not": _MANY, "maxLength": _MAX_TEXT, "pattern": pattern})
+        definitions.setdefault(
+            "Text", {**words, "not": _NOT_SINGLE, "maxLength": _MAX_TEXT_CHARACTERS, "pattern": pattern}
+        )
         return {"$ref": "#/definitions/Text"}
 
 
 class Reference(Text):
-    """Name of a part or of a file, from which values come."""
+    """Name of a part or of a file that values are taken from."""
 
     is_word = True
 
@@ -256,7 +264,7 @@ class Glob(Text):
     """An id, or a pattern of ids with `*`, `?` and `[...]`."""
 
     def leaf(self, value: Any) -> str:
-        """Refuse a pattern that takes long to match."""
+        """Refuse a pattern with more than `_MAX_WILDCARDS` wildcards, which takes long to match."""
         pattern = super().leaf(value)
         if sum(map(pattern.count, "*?[")) > _MAX_WILDCARDS:
             raise InvalidValueError(f"must have at most {_MAX_WILDCARDS} wildcards")
@@ -264,7 +272,7 @@ class Glob(Text):
 
 
 class Choice(Reader):
-    """One of a few words; `accepted` says which there are, omitted: all of them."""
+    """One of a few words; `accepted` lists words for messages, by default all."""
 
     is_word = True
 
@@ -272,14 +280,14 @@ class Choice(Reader):
         self.names, self.accepted = names, accepted or ", ".join(names)
 
     def leaf(self, value: Any) -> str:
-        """Refuse other words, with the nearest."""
+        """Refuse unknown words, with a hint at the nearest known word."""
         if isinstance(value, str) and value in self.names:
             return value
         near = did_you_mean(value, self.names)
         raise InvalidValueError("is not a known choice", f"accepted: {self.accepted}", near)
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
-        """Enumeration."""
+        """JSON Schema: enumeration."""
         return {"enum": list(self.names)}
 
 
@@ -293,19 +301,19 @@ class YesNo(Reader):
     what = "true or false"
 
     def leaf(self, value: Any) -> bool:
-        """Read true or false, in the spellings of YAML 1.2; of an option also as a word."""
-        found = value if isinstance(value, bool) else _YES_NO.get(value) if isinstance(value, str) else None
-        if found is None:
+        """Read true or false, in the spellings of YAML 1.2; options may have a boolean already."""
+        boolean = value if isinstance(value, bool) else _YES_NO.get(value) if isinstance(value, str) else None
+        if boolean is None:
             raise InvalidValueError("must be true or false", "accepted: true, false")
-        return found
+        return boolean
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
-        """Boolean, or its word."""
+        """JSON Schema: boolean, or its word."""
         return {"enum": [True, False, *_YES_NO]}
 
 
 class Words(Reader):
-    """A list of some of a few words, each once."""
+    """A list of known words, each at most once."""
 
     def __init__(self, *names: str, accepted: str) -> None:
         self.word: Reader = Choice(*names, accepted=accepted)
@@ -313,7 +321,7 @@ class Words(Reader):
         self.fewest, self.most = 0.0, math.inf
 
     def read(self, value: Any, path: KeyPath, report: Report) -> Any:
-        """Read each word at its own place."""
+        """Read each word; a problem is reported at its own path."""
         if not isinstance(value, list) or not self.fewest <= len(value) <= self.most:
             report(path, self.problem)
             return INVALID
@@ -325,26 +333,26 @@ class Words(Reader):
         return INVALID if INVALID in words else words
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
-        """Array of the words."""
+        """JSON Schema: array of the words."""
         return {"type": "array", "items": self.word.schema(definitions), "uniqueItems": True}
 
 
 class TextList(Words):
-    """A list of the names of a few parts, each once."""
+    """A list of 1 to `_MAX_NAMES` names of parts, each at most once."""
 
     is_word = True
 
     def __init__(self) -> None:
         self.word = Reference()
-        self.problem = Problem(f"must be a list of 1 to {_FEW} names")
-        self.fewest, self.most = 1, _FEW
+        self.problem = Problem(f"must be a list of 1 to {_MAX_NAMES} names")
+        self.fewest, self.most = 1, _MAX_NAMES
 
     def below(self, part: str) -> Reader | None:
-        """Give the reader of one name."""
+        """Reader of one name."""
         return self.word if is_place(part) else None
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
-        """Array of text."""
+        """JSON Schema: array of text."""
         return {"type": "array", "items": self.word.schema(definitions), "minItems": 1, "maxItems": self.most}
 
 
@@ -357,7 +365,7 @@ class Whole(Reader):
         self.low, self.high = low, high
 
     def leaf(self, value: Any) -> int:
-        """Read decimal digits; a leading zero could be octal to somebody else."""
+        """Read decimal digits; a leading zero is refused, because YAML 1.1 reads it as octal."""
         if isinstance(value, str) and re.fullmatch(r"0|-?[1-9]\d{0,17}", value.strip(), re.ASCII):
             number = int(value)
             if self.low <= number <= self.high:
@@ -365,7 +373,7 @@ class Whole(Reader):
         raise InvalidValueError(f"must be a whole number from {self.low} to {self.high}")
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
-        """Integer, or its digits in quotes."""
+        """JSON Schema: integer, or its digits in quotes."""
         number = {"type": "integer", "minimum": self.low, "maximum": self.high}
         return {"anyOf": [number, {"type": "string", "pattern": r"^\s*(?:0|-?[1-9]\d{0,17})\s*$"}]}
 
@@ -380,7 +388,7 @@ class Version(Reader):
         return 1
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
-        """Constant, in quotes or not."""
+        """JSON Schema: constant, in quotes or not."""
         return {"enum": [1, "1"]}
 
 
@@ -399,16 +407,16 @@ class Day(Reader):
             raise InvalidValueError("must be a calendar date", "accepted: 2027-03-31 and the like") from None
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
-        """Date, which readers of YAML may have made of its text."""
+        """JSON Schema: date as text, or as the type that YAML readers make of it."""
         return date_schema(r"^\d{4}-\d\d-\d\d$")
 
 
 def _is_few(
-    value: Any, kind: type[Sized] | tuple[type[Sized], ...], else_said: str, path: KeyPath, report: Report
+    value: Any, kind: type[Sized] | tuple[type[Sized], ...], kind_problem: str, path: KeyPath, report: Report
 ) -> bool:
-    """Whether a value is of a kind, and has no more entries than there can be ids; says what is wrong if not."""
+    """Whether a value is of a kind and has at most `_MAX_IDS` entries; reports the problem if not."""
     if not isinstance(value, kind):
-        report(path, Problem(else_said))
+        report(path, Problem(kind_problem))
         return False
     if len(value) > _MAX_IDS:
         report(path, Problem(f"must have at most {_MAX_IDS} entries, has {len(value)}"))
@@ -417,37 +425,37 @@ def _is_few(
 
 
 class TextMap(Reader):
-    """A mapping of any key to text; `of` says what the keys are."""
+    """A mapping of any key to text; `of` names the kind of the keys."""
 
     def __init__(self, of: str = "row id") -> None:
         self.of = of
 
     def read(self, value: Any, path: KeyPath, report: Report) -> Any:
-        """Read each value at its own place."""
+        """Read each value; a problem is reported at its own path."""
         if not _is_few(value, dict, "must be a mapping of keys to values", path, report):
             return INVALID
         result = {key: read_part(Text(), text, (*path, key), report) for key, text in value.items()}
         return INVALID if any(text is INVALID for text in result.values()) else result
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
-        """Object."""
+        """JSON Schema: object."""
         return {"type": "object", "additionalProperties": Text().schema(definitions), "maxProperties": _MAX_IDS}
 
 
 class SizeMap(Reader):
-    """A mapping of keys of the file to sizes; what each size may be depends on its key, and is read later."""
+    """A mapping of keys of the file to sizes, which are read later: a size has the reader of its key."""
 
     def read(self, value: Any, path: KeyPath, report: Report) -> Any:
-        """Hold each size to be one value."""
+        """Refuse sizes that are lists or mappings."""
         if not _is_few(value, dict, "must be a mapping of keys of errors to sizes", path, report):
             return INVALID
-        many = [key for key, size in value.items() if isinstance(size, dict | list)]
-        for key in many:
+        nested = [key for key, size in value.items() if isinstance(size, dict | list)]
+        for key in nested:
             report((*path, key), Problem("must be one size, which holds for each axis", "accepted: such as 2 mm/s"))
-        return INVALID if many or INVALID in value.values() else value
+        return INVALID if nested or INVALID in value.values() else value
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
-        """Object of quantities."""
+        """JSON Schema: object of quantities."""
         size = {"type": ["string", "number"]}
         return {"type": "object", "additionalProperties": size, "maxProperties": _MAX_IDS}
 
@@ -456,23 +464,23 @@ _WEIGHT = Quantity(units.RATIO, gt=0, ge=1e-6, le=1e6)
 
 
 class Weights(Reader):
-    """Keys of the file with a weight above 0 each, or a list of keys, whose weights are 1."""
+    """Keys of the file with positive weights, or a list of keys with weights of 1."""
 
     def read(self, value: Any, path: KeyPath, report: Report) -> Any:
-        """Read each key and weight at its own place."""
+        """Read each key and weight; a problem is reported at its own path."""
         if not _is_few(value, (dict, list), "must be keys with their weights, or a list of keys", path, report):
             return INVALID
         if isinstance(value, list):
-            names = [read_part(Text(), name, (*path, place), report) for place, name in enumerate(value)]
-            twice = [place for place, name in enumerate(names) if name in names[:place]]
-            for place in twice:
-                report((*path, place), Problem("stands twice", "accepted: each key once"))
-            return INVALID if twice or any(name is INVALID for name in names) else dict.fromkeys(names, 1.0)
+            names = [read_part(Text(), name, (*path, index), report) for index, name in enumerate(value)]
+            repeated = [index for index, name in enumerate(names) if name in names[:index]]
+            for index in repeated:
+                report((*path, index), Problem("stands twice", "accepted: each key once"))
+            return INVALID if repeated or any(name is INVALID for name in names) else dict.fromkeys(names, 1.0)
         weights = {key: read_part(_WEIGHT, weight, (*path, key), report) for key, weight in value.items()}
         return INVALID if any(weight is INVALID for weight in weights.values()) else weights
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
-        """Object of numbers, or array of text."""
+        """JSON Schema: object of numbers, or array of text."""
         label, weight = Text().schema(definitions), _WEIGHT.schema(definitions)
         return {
             "anyOf": [
@@ -485,10 +493,10 @@ class Weights(Reader):
 class Section(Reader):
     """A mapping with known keys, read into a `NamedTuple`; an unknown key is an error.
 
-    A section's own `problems(values)` says what is wrong between its values. It is given those that are right,
-    defaults included, so that a fault in one place does not hide one between two others. A key with an empty section
-    or list, where that is no fault, is read as if the file did not have it: it declares nothing and hides nothing.
-    Of the keys that its `any_of()` lists a section needs one; `problems` says so, and the schema.
+    The method `problems(values)` of a section yields problems between its values. It gets the valid values with
+    defaults, so that a fault in one value does not hide a problem between two valid values. An empty section or list
+    that is no fault counts as absent: it declares nothing and hides nothing. A section needs at least one of the keys
+    that its `any_of()` lists; `problems` and the schema check it.
     """
 
     def __init__(self, kind: type[Any]) -> None:
@@ -513,9 +521,9 @@ class Section(Reader):
         for name, item in value.items():
             key = self.keys.get(name)
             if key is None:
-                known = f"accepted: {', '.join(self.keys)}"
+                accepted = f"accepted: {', '.join(self.keys)}"
                 hint = _POINT if name[:1].isdigit() else did_you_mean(name, tuple(self.keys))
-                report((*path, name), Problem("is not a known key", known, hint, is_of_key=True))
+                report((*path, name), Problem("is not a known key", accepted, hint, is_of_key=True))
                 is_valid = False
                 continue
             value_read = item if item is INVALID else key.reader.read(item, (*path, name), report)
@@ -528,40 +536,42 @@ class Section(Reader):
                 report((*path, name), Problem(MISSING))
                 is_valid = False
         if self.problems is not None:
-            right = self.defaults | values
+            valid_values = self.defaults | values
             if not is_valid:
-                right = {name: item for name, item in right.items() if item is not INVALID}
-            for problem in self.problems(right):
+                valid_values = {name: item for name, item in valid_values.items() if item is not INVALID}
+            for problem in self.problems(valid_values):
                 report(path, problem)
                 is_valid = False
         return self.kind(**values) if is_valid else INVALID
 
     def each(self, value: Any) -> dict[str, Any]:
-        """Read each known key by itself, and say nothing: `INVALID` stands for what is wrong."""
-        given = value.items() if isinstance(value, dict) else ()
+        """Value of each known key, read by itself without a report; `INVALID` for an invalid value."""
+        items = value.items() if isinstance(value, dict) else ()
         return {
-            name: read_part(self.keys[name].reader, item, (), _unsaid) for name, item in given if name in self.keys
+            name: read_part(self.keys[name].reader, item, (), _ignore_problem)
+            for name, item in items
+            if name in self.keys
         }
 
     def below(self, part: str) -> Reader | None:
-        """Give the reader of a key."""
+        """Reader of a key."""
         return self.keys[part].reader if part in self.keys else None
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
-        """Reference to a definition, made on first use."""
+        """JSON Schema: reference to a definition, which is made on first use."""
         name = self.kind.__name__
         if name not in definitions:
-            definitions[name] = {}  # holds the place in the order of first use
+            definitions[name] = {}  # keeps the order of first use
             definitions[name] = self.definition(definitions)
         return {"$ref": f"#/definitions/{name}"}
 
     def definition(self, definitions: dict[str, Any]) -> dict[str, Any]:
-        """The section itself."""
+        """JSON Schema of the section itself."""
         properties = {}
         for name, key in self.keys.items():
             accepted = key.reader.schema(definitions)
             if key.description:
-                # draft-07 ignores what stands beside a $ref.
+                # draft-07 ignores the siblings of a $ref.
                 accepted = {"allOf": [accepted]} if "$ref" in accepted else accepted
                 accepted = {"description": key.description, **accepted}
             default = self.defaults.get(name)
@@ -585,7 +595,7 @@ class ListOf(Reader):
         self.section: Reader = kind if isinstance(kind, Reader) else Section(kind)
 
     def read(self, value: Any, path: KeyPath, report: Report) -> Any:
-        """Read each entry at its own place."""
+        """Read each entry; a problem is reported at its own path."""
         if not isinstance(value, list):
             report(path, Problem("must be a list"))
             return INVALID
@@ -596,26 +606,26 @@ class ListOf(Reader):
         return INVALID if INVALID in entries else entries
 
     def below(self, part: str) -> Reader | None:
-        """Give the reader of one entry."""
+        """Reader of one entry."""
         return self.section if is_place(part) else None
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
-        """Array of the section."""
+        """JSON Schema: array of the section."""
         return {"type": "array", "items": self.section.schema(definitions), "maxItems": _MAX_ENTRIES}
 
 
 class OneOf(Reader):
-    """One of several forms, told apart by `pick`, which sees the value and names the reader to use."""
+    """One of several forms of a value; `pick` takes the value and returns the reader of its form."""
 
     def __init__(self, pick: Callable[[Any], Reader], forms: tuple[Reader, ...]) -> None:
         self.pick, self.forms = pick, forms
 
     def read(self, value: Any, path: KeyPath, report: Report) -> Any:
-        """Hand over to the form."""
+        """Read the value by the reader of its form."""
         return self.pick(value).read(value, path, report)
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
-        """Any of the forms."""
+        """JSON Schema: any of the forms."""
         return {"anyOf": [form.schema(definitions) for form in self.forms]}
 
 
@@ -623,46 +633,48 @@ Points = tuple[tuple[float, float], ...]
 
 
 class SortedPoints(tuple[tuple[float, float], ...]):
-    """Points of a curve in rising order, which the file has in another: the rows that rest on them say so."""
+    """Points of a curve in rising order that the file has in another order; rows that use them carry a note."""
 
 
 class CurveReader(Reader):
-    """A mapping of abscissas to ordinates, read in rising order: `SortedPoints` if the file has another."""
+    """A mapping of abscissas to ordinates, read in rising order; `SortedPoints` if the file has another order."""
 
-    def __init__(self, abscissa: Quantity, ordinate: Quantity, what: str, fewest: int) -> None:
-        self.abscissa, self.ordinate, self.what, self.fewest = abscissa, ordinate, what, fewest
+    def __init__(self, abscissa: Quantity, ordinate: Quantity, accepted: str, fewest: int) -> None:
+        self.abscissa, self.ordinate, self.accepted, self.fewest = abscissa, ordinate, accepted, fewest
 
     def read(self, value: Any, path: KeyPath, report: Report) -> Any:
-        """Read each point at its own place."""
+        """Read each point; a problem is reported at its own path."""
         if not isinstance(value, dict) or not self.fewest <= len(value) <= _MAX_POINTS:
             given = f", {len(value)} given" if isinstance(value, dict) else ""
-            report(path, Problem(f"must be {self.fewest} to {_MAX_POINTS} points{given}", f"accepted: {self.what}"))
+            report(
+                path, Problem(f"must be {self.fewest} to {_MAX_POINTS} points{given}", f"accepted: {self.accepted}")
+            )
             return INVALID
         points = {}
         is_valid = True
         for key, item in value.items():
             here = (*path, key)
             try:
-                at = self.abscissa.leaf(key)
+                abscissa = self.abscissa.leaf(key)
             except InvalidValueError as error:
                 report(here, error.problem._replace(is_of_key=True))
                 is_valid = False
                 continue
-            if at in points:
+            if abscissa in points:
                 report(here, Problem("is in the list twice"))
                 is_valid = False
-            points[at] = read_part(self.ordinate, item, here, report)
+            points[abscissa] = read_part(self.ordinate, item, here, report)
         if INVALID in points.values() or not is_valid:
             return INVALID
-        found = sorted(points.items())
-        return tuple(found) if found == list(points.items()) else SortedPoints(found)
+        sorted_points = sorted(points.items())
+        return tuple(sorted_points) if sorted_points == list(points.items()) else SortedPoints(sorted_points)
 
     def below(self, part: str) -> Reader | None:
-        """Give the reader of an ordinate."""
+        """Reader of an ordinate."""
         return self.ordinate
 
     def schema(self, definitions: dict[str, Any]) -> dict[str, Any]:
-        """Object of points."""
+        """JSON Schema: object of points."""
         return {
             "type": "object",
             "additionalProperties": self.ordinate.schema(definitions),
@@ -672,41 +684,41 @@ class CurveReader(Reader):
 
 
 def either(kind: type, form: Reader, other: Reader) -> OneOf:
-    """One form for a list or a mapping, which is the `kind`, and another for all else."""
+    """Reader of two forms: `form` for values of type `kind`, a list or a mapping, and `other` for other values."""
     return OneOf(lambda value: form if isinstance(value, kind) else other, (other, form))
 
 
 def is_empty(item: Any) -> bool:
-    """Whether an item of a file is a section or a list in which nothing stands but empty ones."""
+    """Whether an item of a file is a section or a list that is empty, or has only empty sections and lists."""
     if isinstance(item, dict):
         return all(map(is_empty, item.values()))
     return isinstance(item, list) and all(map(is_empty, item))
 
 
 def is_place(part: str) -> bool:
-    """Whether a part of a key is the number of an entry, from 0."""
+    """Whether a part of a key is the index of an entry."""
     return part.isascii() and part.isdigit() and len(part) < 9
 
 
 def read_part(reader: Reader, value: Any, path: KeyPath, report: Report) -> Any:
-    """Read a part of a list or a mapping; one that was reported stays `INVALID`."""
+    """Read an item of a list or a mapping; an item that was reported stays `INVALID`."""
     return INVALID if value is INVALID else reader.read(value, path, report)
 
 
-def _unsaid(path: KeyPath, problem: Problem) -> None:
-    """Take what is said elsewhere."""
+def _ignore_problem(path: KeyPath, problem: Problem) -> None:
+    """Ignore a problem that is reported elsewhere."""
 
 
-def did_you_mean(given: object, known: tuple[str, ...]) -> str:
-    """Hint at the nearest known word; empty if none is near."""
+def did_you_mean(word: object, known_words: tuple[str, ...]) -> str:
+    """Hint at the nearest of the known words; empty if no word is near."""
     from difflib import get_close_matches
 
-    near = get_close_matches(str(given)[:_MAX_TEXT], known, 1)
+    near = get_close_matches(str(word)[:_MAX_TEXT_CHARACTERS], known_words, 1)
     return f"Did you mean {near[0]!r}?" if near else ""
 
 
 # ---------------------------------------------------------------------- bounds
-# Nothing real comes near them, and squares stay finite.
+# Real values stay far inside these bounds, and squares stay finite.
 FREQUENCY = Quantity(units.FREQUENCY, gt=0, ge=1e3, le=1e13)
 VIBRATION_FREQUENCY = Quantity(units.FREQUENCY, gt=0, le=1e9)
 DURATION = Quantity(units.TIME, gt=0, ge=1e-6, le=1e6)
@@ -723,7 +735,7 @@ LATITUDE = Quantity(units.ANGLE, ge=-math.pi / 2, le=math.pi / 2)
 HEIGHT = Quantity(units.LENGTH, ge=-1e4, le=1e9)
 ELEVATION = Quantity(units.ANGLE, ge=0, le=math.pi / 2)
 PHASE = Quantity(units.ANGLE, ge=-1e6, le=1e6)
-# With a turn at the aperture edge a response has no mainlobe; 45 without a unit would be seven.
+# A response with a turn of phase at the aperture edge has no mainlobe. 45 without a unit would be seven turns.
 PHASE_REQUIREMENT = Quantity(units.ANGLE, gt=0, ge=1e-6, le=2 * math.pi)
 SIDELOBE_REQUIREMENT = Quantity(units.POWER_RATIO, lt=0, ge=-200)
 SHARE = Quantity(units.RATIO, gt=0, ge=1e-6, le=1)

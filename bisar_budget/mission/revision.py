@@ -1,4 +1,4 @@
-"""A mission file as it stood in a git revision, with all that it names: parts, settings, orbits, logs."""
+"""A mission file of a git revision, with the files that it names: parts, settings, orbits, logs."""
 
 import os
 from collections.abc import Sequence
@@ -16,8 +16,8 @@ from bisar_budget.resources import DISK, UnreadableError
 
 # Modes of an entry that is a commit of another repository, and of a link.
 _SUBMODULE, _LINK = b"160000", b"120000"
-# Left by a hook, they would put another repository, or another top, in the place of that of the missions.
-_OF_ANOTHER = ("GIT_DIR", "GIT_WORK_TREE", "GIT_COMMON_DIR", "GIT_NAMESPACE", "GIT_PREFIX")
+# Variables that a hook leaves behind. With them git would read another repository, or from another top.
+_VARIABLES_OF_HOOKS = ("GIT_DIR", "GIT_WORK_TREE", "GIT_COMMON_DIR", "GIT_NAMESPACE", "GIT_PREFIX")
 
 
 class RevisionError(Exception):
@@ -27,10 +27,10 @@ class RevisionError(Exception):
 class Revision:
     """The files of a git repository as committed in a branch, tag or commit.
 
-    The repository is that of the current folder where the path is in it, else its own: a folder that became a
-    submodule since does not answer for itself. Links are followed within the revision, submodules are read at the
-    commit that it names. A file outside of the repository has one version, that on the disk; `outside` lists those
-    that were read.
+    The repository of the current folder is read if the path is in it, else the repository of the path. So a folder
+    that has become a submodule since the revision is read from the repository around it. Links are followed within
+    the revision. Submodules are read at the commit that the revision names. A file outside of the repository has one
+    version, which is on the disk; `outside` lists the files outside that were read.
 
     Parameters
     ----------
@@ -42,17 +42,17 @@ class Revision:
     Raises
     ------
     RevisionError
-        Git is not there, the path is in no repository, or the revision is unknown.
+        Git is not installed, the path is in no repository, or the revision is unknown.
     """
 
     def __init__(self, near: str, name: str) -> None:
         self.name = name
         self.outside: list[str] = []
-        self.top, said = _top(os.curdir)
+        self.top, refusal = _top(os.curdir)
         if not self.top or self._inside(near) is None:
-            self.top, said = _top(_existing(near)[0])
+            self.top, refusal = _top(_existing(near)[0])
         if not self.top:
-            raise RevisionError(f"{near} {said or 'is not in a git repository'}")
+            raise RevisionError(f"{near} {refusal or 'is not in a git repository'}")
         # What starts with a dash would be an option to git.
         is_known, commit, _ = (
             (False, b"", "")
@@ -62,81 +62,85 @@ class Revision:
         if not is_known:
             raise RevisionError(f"the repository of {near} has no revision {printable(name)}")
         self._commit = commit.decode().strip()
-        self._known: dict[str, _Object] = {}
-        self._listed: dict[str, list[str]] = {}
+        self._objects: dict[str, _Object] = {}
+        self._names_by_tree: dict[str, list[str]] = {}
 
     def content(self, file: str, most: int, called: str | None = None) -> bytes:
-        """Content of a file then; arguments and `UnreadableError` are those of `resources.Files`."""
+        """Content of a file in the revision; arguments and `UnreadableError` are as in `resources.Files`."""
         called = file if called is None else called
         inside = self._inside(file)
         if inside is None:
             data = DISK.content(file, most, called)
             self.outside.append(file)
             return data
-        found = self._object(inside)
-        if found.kind == b"blob":
-            return found.content[: most + 1]
-        raise UnreadableError(f"{called} {_why_not(found)} revision {printable(self.name)}", is_missing=True)
+        git_object = self._object(inside)
+        if git_object.kind == b"blob":
+            return git_object.content[: most + 1]
+        raise UnreadableError(f"{called} {_why_not(git_object)} revision {printable(self.name)}", is_missing=True)
 
     def names(self, folder: str) -> list[str]:
-        """Names of the files in a folder then, sorted; `OSError` where there was none."""
+        """Names of the files of a folder in the revision, sorted; raises `OSError` if it has no such folder."""
         inside = self._inside(folder)
         if inside is None:
             return DISK.names(folder)
-        found = self._object(inside)
-        if found.kind != b"tree":
+        git_object = self._object(inside)
+        if git_object.kind != b"tree":
             raise FileNotFoundError(folder)
-        if found.hash not in self._listed:
-            _, names, _ = _git(found.top, "ls-tree", "-z", "--name-only", found.hash)
-            self._listed[found.hash] = sorted(os.fsdecode(name) for name in names.split(b"\0") if name)
-        return self._listed[found.hash]
+        if git_object.hash not in self._names_by_tree:
+            _, names, _ = _git(git_object.top, "ls-tree", "-z", "--name-only", git_object.hash)
+            self._names_by_tree[git_object.hash] = sorted(os.fsdecode(name) for name in names.split(b"\0") if name)
+        return self._names_by_tree[git_object.hash]
 
     def has(self, file: str) -> bool:
-        """Whether there was such a file; raises `RevisionError` where the revision alone does not tell."""
+        """Whether the revision has a file; raises `RevisionError` for a link out of it or an absent submodule."""
         inside = self._inside(file)
-        found = _Object(b"missing") if inside is None else self._object(inside)
-        if found.kind in (b"symlink", b"submodule"):
-            raise RevisionError(f"{file} {_why_not(found)} revision {printable(self.name)}")
-        return found.kind == b"blob"
+        git_object = _Object(b"missing") if inside is None else self._object(inside)
+        if git_object.kind in (b"symlink", b"submodule"):
+            raise RevisionError(f"{file} {_why_not(git_object)} revision {printable(self.name)}")
+        return git_object.kind == b"blob"
 
     def matching(self, pattern: str) -> list[str]:
-        """Files of the revision that a name or a glob pattern names from the current folder, sorted."""
+        """Files of the revision that match a name or a glob pattern relative to the current folder, sorted."""
         inside = self._inside(pattern)
         if inside is None:
             return []
-        wanted = inside.split("/")
+        pattern_parts = inside.split("/")
         write = str if os.path.isabs(pattern) else os.path.relpath
-        files = self._files(wanted, _Object(b"tree", hash=self._commit, top=self.top))
-        return sorted(write(os.path.join(self.top, file)) for file in files if _matches(file.split("/"), wanted))
+        files = self._files(pattern_parts, _Object(b"tree", hash=self._commit, top=self.top))
+        return sorted(
+            write(os.path.join(self.top, file)) for file in files if _matches(file.split("/"), pattern_parts)
+        )
 
-    def _files(self, wanted: Sequence[str], tree: "_Object", above: str = "", way: tuple[str, ...] = ()) -> list[str]:
-        """Paths of the files below a tree, in submodules and linked folders that a pattern may look into too."""
+    def _files(
+        self, pattern: Sequence[str], tree: "_Object", above: str = "", way: tuple[str, ...] = ()
+    ) -> list[str]:
+        """Paths of the files below a tree, also in submodules and linked folders that a pattern may match."""
         _, entries, _ = _git(tree.top, "ls-tree", "-r", "-z", tree.hash)
         files = []
         for entry in filter(None, entries.split(b"\0")):
             head, _, name = entry.partition(b"\t")
             file = above + os.fsdecode(name)
-            if head.startswith((_SUBMODULE, _LINK)) and _leads_to(file.split("/"), wanted):
-                found = self._object(file)
-                if found.kind == b"tree" and found.hash not in way:  # a link to a folder above itself
-                    files += self._files(wanted, found, f"{file}/", (*way, tree.hash, found.hash))
+            if head.startswith((_SUBMODULE, _LINK)) and _leads_to(file.split("/"), pattern):
+                git_object = self._object(file)
+                if git_object.kind == b"tree" and git_object.hash not in way:  # a link to a folder above itself
+                    files += self._files(pattern, git_object, f"{file}/", (*way, tree.hash, git_object.hash))
                     continue
             files.append(file)
         return files
 
     def path_of(self, file: str) -> str:
-        """Path of a file from the top of the repository, with forward slashes; of one outside as given."""
+        """Path of a file from the top of the repository, with forward slashes; unchanged for a file outside."""
         return self._inside(file) or file
 
     def _inside(self, path: str) -> str | None:
-        """Path from the top of the repository, with forward slashes; None for what is outside.
+        """Path from the top of the repository, with forward slashes; None outside of the repository.
 
-        Links below the top are left to the revision, which may have others.
+        Links below the top are not resolved here, because the revision may have other links.
         """
-        folder, rest = _existing(path)
-        real = os.path.join(os.path.realpath(folder), rest)
-        for whole in (os.path.abspath(path), real):
-            above, below = whole, os.curdir
+        folder, remainder = _existing(path)
+        real = os.path.join(os.path.realpath(folder), remainder)
+        for full_path in (os.path.abspath(path), real):
+            above, below = full_path, os.curdir
             while True:
                 if os.path.isdir(above) and os.path.samefile(above, self.top):
                     return below.replace(os.sep, "/")
@@ -147,17 +151,17 @@ class Revision:
         return None
 
     def _object(self, inside: str) -> "_Object":
-        """Find what stands at a path; of nothing what git says instead. Settings and parts are asked for again."""
-        found = self._known.get(inside)
-        if found is None:
-            found = _object(self.top, self._commit, inside)
-            if len(found.content) <= MAX_BYTES:  # a log may be large, and is read once
-                self._known[inside] = found
-        return found
+        """The object at a path, or the reason of git why there is none. Small objects are kept for the next call."""
+        git_object = self._objects.get(inside)
+        if git_object is None:
+            git_object = _object(self.top, self._commit, inside)
+            if len(git_object.content) <= MAX_BYTES:  # a log may be large, and is read once
+                self._objects[inside] = git_object
+        return git_object
 
 
 def _matches(parts: Sequence[str], pattern: Sequence[str]) -> bool:
-    """Whether the parts of a path are those of a pattern, as `glob.glob` has it: `**` is any folders."""
+    """Whether a path matches a pattern, both split at slashes, as in `glob.glob`: `**` is any number of folders."""
     if not pattern:
         return not parts
     is_open = bool(parts) and (not parts[0].startswith(".") or pattern[0].startswith("."))
@@ -174,14 +178,14 @@ def _leads_to(folder: Sequence[str], pattern: Sequence[str]) -> bool:
 
 
 def _top(folder: str) -> tuple[str, str]:
-    """Top of the repository of a folder, empty where there is none, and what git says of it."""
-    is_found, top, said = _git(folder, "rev-parse", "--show-toplevel")
-    return (os.fsdecode(top).rstrip("\r\n") if is_found else ""), said
+    """Top folder of the repository around a folder, empty if there is none, and the refusal of git."""
+    is_found, top, refusal = _git(folder, "rev-parse", "--show-toplevel")
+    return (os.fsdecode(top).rstrip("\r\n") if is_found else ""), refusal
 
 
 @dataclass(frozen=True)
 class _Object:
-    """An object of git: its kind, its content, its hash, and the folder of its repository."""
+    """A git object: its kind, its content, its hash, and the folder of its repository."""
 
     kind: bytes
     content: bytes = b""
@@ -193,17 +197,17 @@ _MISSING = _Object(b"missing")
 
 
 def _object(top: str, commit: str, inside: str) -> _Object:
-    """Find what stands at a path of a commit, in submodules too."""
+    """The object at a path of a commit, also in submodules."""
     if "\n" in inside:
         return _object_of_lines(top, commit, inside)
-    asked = os.fsencode(f"{commit}:{'' if inside == os.curdir else inside}")
-    is_read, answer, _ = _git(top, "cat-file", "--batch", "--follow-symlinks", given=asked + b"\n")
-    head, _, rest = answer.partition(b"\n")
+    request = os.fsencode(f"{commit}:{'' if inside == os.curdir else inside}")
+    is_read, answer, _ = _git(top, "cat-file", "--batch", "--follow-symlinks", stdin=request + b"\n")
+    head, _, content = answer.partition(b"\n")
     words = head.split()
     if is_read and words[1:2] in ([b"blob"], [b"tree"]):
-        return _Object(words[1], rest[: int(words[2])], words[0].decode(), top)
+        return _Object(words[1], content[: int(words[2])], words[0].decode(), top)
     if words[:1] == [b"symlink"]:
-        return _Object(words[0], rest.removesuffix(b"\n"))
+        return _Object(words[0], content.removesuffix(b"\n"))
     parts = inside.split("/")
     for length in range(1, len(parts) + 1):
         module = "/".join(parts[:length])
@@ -217,9 +221,9 @@ def _object(top: str, commit: str, inside: str) -> _Object:
 
 
 def _object_of_lines(top: str, commit: str, inside: str) -> _Object:
-    """Find what stands at a path with a line end, which `cat-file` cannot be asked for, by its hash.
+    """The object at a path with a line end in it, found by its hash: `cat-file --batch` takes no such path.
 
-    Neither links nor submodules are followed: what is one, or below one, is said to be.
+    Links and submodules are not followed. A path that is one, or is below one, has the kind of the link or submodule.
     """
     parts = inside.split("/")
     for length in range(1, len(parts) + 1):
@@ -240,53 +244,53 @@ def _object_of_lines(top: str, commit: str, inside: str) -> _Object:
 
 
 def _existing(path: str) -> tuple[str, str]:
-    """The nearest folder of a path that exists, and the rest of it."""
-    folder, rest = os.path.split(os.path.abspath(path))
+    """The nearest existing folder above a path, and the remainder of the path."""
+    folder, remainder = os.path.split(os.path.abspath(path))
     while not os.path.isdir(folder) and folder != os.path.dirname(folder):
         folder, name = os.path.split(folder)
-        rest = os.path.join(name, rest)
-    return folder, rest
+        remainder = os.path.join(name, remainder)
+    return folder, remainder
 
 
-def _why_not(found: _Object) -> str:
-    """Return why git gives no file: `symlink` with the way out of the tree, or why a link has no end."""
-    if found.kind == b"symlink":
-        return f"is a link out of the repository, to {printable(os.fsdecode(found.content))}, in"
-    if found.kind == b"submodule":
+def _why_not(git_object: _Object) -> str:
+    """Return the words between the name of a file and the revision that say why git gives no content of it."""
+    if git_object.kind == b"symlink":
+        return f"is a link out of the repository, to {printable(os.fsdecode(git_object.content))}, in"
+    if git_object.kind == b"submodule":
         return "is in a submodule whose commit is not here (`git submodule update --init`), in"
-    if found.kind in (b"dangling", b"loop", b"notdir"):
+    if git_object.kind in (b"dangling", b"loop", b"notdir"):
         return "is a link that leads nowhere in"
-    return "is a folder in" if found.kind == b"tree" else "is not in"
+    return "is a folder in" if git_object.kind == b"tree" else "is not in"
 
 
 def mission_at(path: str, revision: Revision, model: str | None = None) -> Mission:
-    """Read a mission file as committed in `revision`, with the parts, settings, orbits and logs of then.
+    """Read a mission file as committed in `revision`, with the parts, settings, orbits and logs of that revision.
 
-    `model` stands in for the file's own.
+    `model` replaces the model that the file names.
 
     Raises
     ------
     RevisionError
-        It is not there.
+        The revision has no such file.
     MissionError
-        Not a usable mission then.
+        The file of the revision is no usable mission.
     """
     try:
         data = revision.content(path, MAX_BYTES)
     except UnreadableError as error:
         raise RevisionError(str(error)) from None
     folder = folder_of(path)
-    beside, find = reader_of(folder, revision), finder_of(folder, revision)
-    return parse_mission(data, f"{revision.name}:{path}", model, beside, find=find)
+    path_reader, find = reader_of(folder, revision), finder_of(folder, revision)
+    return parse_mission(data, f"{revision.name}:{path}", model, path_reader, find=find)
 
 
-def _git(folder: str, *arguments: str, given: bytes = b"") -> tuple[bool, bytes, str]:
-    """Whether git did it, what it wrote, and what it refuses that has nothing to do with what was asked."""
-    # A folder can have the files of a bare repository among those that are committed: its revisions, its settings.
+def _git(folder: str, *arguments: str, stdin: bytes = b"") -> tuple[bool, bytes, str]:
+    """Run git in a folder: whether it succeeded, its output, and why it refuses the repository, if it does."""
+    # Committed files can look like a bare repository, with revisions and settings; git must not use them.
     command = ["git", "-c", "safe.bareRepository=explicit", "-C", folder, *arguments]
-    variables = {name: value for name, value in os.environ.items() if name not in _OF_ANOTHER}
+    variables = {name: value for name, value in os.environ.items() if name not in _VARIABLES_OF_HOOKS}
     try:
-        done = run(command, input=given, capture_output=True, check=False, env=variables)
+        done = run(command, input=stdin, capture_output=True, check=False, env=variables)
     except OSError:
         raise RevisionError("git cannot be run; --base needs it") from None
     except ValueError:  # a NUL in the name

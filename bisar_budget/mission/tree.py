@@ -1,8 +1,7 @@
-"""YAML as a plain tree with positions: what stands in a file, before anybody asks what it means.
+"""YAML as a plain tree with positions: the content of a file before its keys and values are interpreted.
 
-The tree is built from the parser's events, so that depth is bounded before anything recurses further, and
-every scalar stays the text that stands in the file: YAML 1.1 would read `9.6e9` as text,
-`on` as true and `010` as eight.
+The tree is built from the parser's events, so that depth is bounded before anything recurses further. Every scalar
+stays the text of the file: YAML 1.1 would read `9.6e9` as text, `on` as true and `010` as eight.
 """
 
 import re
@@ -17,20 +16,21 @@ from bisar_budget.faults import Fault, KeyPath, MissionError, Problem, SetValue,
 from bisar_budget.mission.readers import INVALID, MISSING
 from bisar_budget.units import unit_behind
 
-MAX_BYTES = 1 << 20  # a mission file has a few kilobytes
+MAX_BYTES = 1 << 20  # of a file; a mission file has a few kilobytes
 MAX_DEPTH = 20  # containers inside each other; the schema needs 9
 TOO_DEEP = f"is nested more than {MAX_DEPTH} deep"
-MAX_VALUES = 100_000  # the longest lists that the schema takes come to a third
-MAX_FAULTS = 200  # nobody mends more at once, and each costs a line of every report
+MAX_VALUES = 100_000  # of a file; the longest lists that the schema accepts have a third of it
+MAX_FAULTS = 200  # of a file; nobody mends more at once, and each fault costs a line of every report
 
 _PARSER = yaml.CSafeLoader if yaml.__with_libyaml__ else yaml.SafeLoader
 _NUMERAL = re.compile(r"[+-]?\.?\d", re.ASCII)  # begins a number
 NULLS = ("", "~", "null", "Null", "NULL")
 
 
-def _decoded(data: bytes | str, file: str, what: str) -> str:
+def _decoded(data: bytes | str, file: str, file_kind: str) -> str:
+    """Text of a file; raises `MissionError` if it is too large or not UTF-8."""
     if len(data) > MAX_BYTES:
-        raise MissionError(file, (file_fault(f"is larger than {MAX_BYTES // 1024} KiB, so no {what} file"),))
+        raise MissionError(file, (file_fault(f"is larger than {MAX_BYTES // 1024} KiB, so no {file_kind} file"),))
     if isinstance(data, str):
         return data
     try:
@@ -44,49 +44,61 @@ def _decoded(data: bytes | str, file: str, what: str) -> str:
 
 
 class UnusableError(Exception):
-    """Nothing after this point is worth reading; the fault is in the tree."""
+    """The file is not worth reading beyond this point; the fault is in the tree."""
 
 
 class Tree:
     """Content of the file: nested dict, list and str, with the parser's event of every key and value.
 
-    What cannot be read is reported and stands in the tree as `INVALID`. `changes` are the options that put values
-    into it, each at the highest path that it changed; of a case of a sweep those are floats. `what` the file is to be
-    is said of one that is too much.
+    Attributes
+    ----------
+    file_kind : str
+        "mission" or "part"; faults of the whole file name it.
+    root : dict
+        The content. An unreadable value is reported and becomes `INVALID`.
+    keys, values : dict of KeyPath to event
+        The parser's events, which hold the marks of start and end.
+    faults : list of Fault
+        Faults in the order in which they were met.
+    changes : dict of KeyPath to SetValue
+        The options that put values into the tree, each at the highest path that it changed. Cases of a sweep put
+        floats.
     """
 
-    def __init__(self, what: str = "mission") -> None:
-        self.what = what
+    def __init__(self, file_kind: str = "mission") -> None:
+        self.file_kind = file_kind
         self.root: Any = INVALID
         self.keys: dict[KeyPath, Any] = {}
-        self.values: dict[KeyPath, Any] = {}  # events, which hold the marks of start and end
+        self.values: dict[KeyPath, Any] = {}
         self.faults: list[Fault] = []
         self.changes: dict[KeyPath, SetValue] = {}
 
     def copied(self) -> "Tree":
-        """The same, into which other values can be put."""
-        tree = Tree(self.what)
+        """A copy of the tree, for changes that leave this tree as it is."""
+        tree = Tree(self.file_kind)
         tree.root, tree.faults = _copied(self.root), list(self.faults)
         tree.keys, tree.values, tree.changes = dict(self.keys), dict(self.values), dict(self.changes)
         return tree
 
-    def fault(self, mark: Any, path: KeyPath, problem: str, **more: str) -> None:
-        """Note a fault at a place of the file; without a mark, at its start. Of too many only the first are said."""
+    def fault(self, mark: Any, path: KeyPath, problem: str, **details: str) -> None:
+        """Note a fault at a mark of the file, or at the start of the file without a mark.
+        Raises `UnusableError` when the file has `MAX_FAULTS` faults.
+        """
         change = self._change_at(path)
         if change is not None:
-            more["option"] = change.option
+            details["option"] = change.option
             if problem == MISSING and change.text in NULLS:
                 problem = "must not be taken out: it is required"
-            self.faults.append(Fault(line=None, column=None, key=_dotted(path), problem=problem, **more))
+            self.faults.append(Fault(line=None, column=None, key=_dotted(path), problem=problem, **details))
         else:
             line, column = (mark.line + 1, mark.column + 1) if mark else (1, 1)
-            self.faults.append(Fault(line=line, column=column, key=_dotted(path), problem=problem, **more))
+            self.faults.append(Fault(line=line, column=column, key=_dotted(path), problem=problem, **details))
         if len(self.faults) >= MAX_FAULTS:
             self.faults.append(file_fault(f"has {MAX_FAULTS} faults or more; what follows them was not read"))
             raise UnusableError
 
     def _change_at(self, path: KeyPath) -> SetValue | None:
-        """The option that a value, or what holds it, comes from."""
+        """The option that put a value, or a section or list around it, into the tree."""
         return next(filter(None, map(self.changes.get, upwards(path))), None)
 
     def in_order(self) -> tuple[Fault, ...]:
@@ -94,26 +106,26 @@ class Tree:
         return tuple(sorted(dict.fromkeys(self.faults), key=lambda fault: (fault.line or 0, fault.column or 0)))
 
     def report(self, path: KeyPath, problem: Problem) -> None:
-        """Note what a reader found wrong, at the value's place, else at the nearest key's above it."""
+        """Note a problem that a reader reports: at the value, or else at the nearest key above it."""
         path = (*path, *problem.at)
         value: Any = self.root
-        for part in path:
+        for name in path:
             try:
-                value = value[part]
+                value = value[name]
             except (KeyError, IndexError, TypeError):
                 value = None
                 break
         is_key = value is None or problem.is_of_key
-        above = (self.keys.get(one) or self.values.get(one) for one in upwards(path[:-1]))
-        place = (self.keys if is_key else self.values).get(path) or next(filter(None, above), None)
-        mark = None if place is None else place.start_mark
+        above = (self.keys.get(key_path) or self.values.get(key_path) for key_path in upwards(path[:-1]))
+        event = (self.keys if is_key else self.values).get(path) or next(filter(None, above), None)
+        mark = None if event is None else event.start_mark
         given = shown(value) if isinstance(value, str) and not is_key and not problem.names_value else ""
         self.fault(mark, path, problem.problem, given=given, accepted=problem.accepted, hint=problem.hint)
 
-    def document(self, text: str, path: KeyPath, one: str) -> Any:
-        """Read the one document of a text, which stands at a path; `INVALID` where there is none.
+    def document(self, text: str, path: KeyPath, accepted: str) -> Any:
+        """Read the only document of a text into the tree at a path; `INVALID` for an empty text.
 
-        `one` says what is accepted. Raises `yaml.YAMLError` too.
+        `accepted` completes the sentence for a second document. Raises `yaml.YAMLError` too.
         """
         next_event: Callable[[], Any] = _PARSER(text).get_event
         while type(event := next_event()) is not yaml.DocumentStartEvent:
@@ -122,7 +134,7 @@ class Tree:
         value = self.node(next_event, next_event(), path)
         while type(event := next_event()) is not yaml.StreamEndEvent:
             if type(event) is yaml.DocumentStartEvent:
-                self.fault(event.start_mark, path, "has a second YAML document", accepted=f"accepted: {one}")
+                self.fault(event.start_mark, path, "has a second YAML document", accepted=f"accepted: {accepted}")
                 raise UnusableError
         return value
 
@@ -130,7 +142,7 @@ class Tree:
         """Read one value; the depth of the recursion is bounded by `MAX_DEPTH`."""
         self.values[path] = event
         if len(self.values) > MAX_VALUES:
-            self.faults.append(file_fault(f"has more than {MAX_VALUES} values, so no {self.what} file"))
+            self.faults.append(file_fault(f"has more than {MAX_VALUES} values, so no {self.file_kind} file"))
             raise UnusableError
         mark = event.start_mark
         kind = type(event)
@@ -164,11 +176,11 @@ class Tree:
     def _decimal_commas(self, items: list[Any], path: KeyPath) -> None:
         """Refuse `[0,5 m, 1 m, 2 m]` and `[0,5 m, 1 m]`, which YAML reads as four values and as three.
 
-        Told by the blank that other commas of the list have behind them.
+        A decimal comma shows by the blank that follows the other commas of the list and not this one.
         """
         commas = []
         for index, (before, item) in enumerate(pairwise(items), start=1):
-            if all(type(one) is ScalarEvent for one in (before, item)):
+            if all(type(scalar) is ScalarEvent for scalar in (before, item)):
                 is_tight = item.start_mark.column - before.end_mark.column == 1
                 commas.append((index, is_tight, before, item))
         if all(is_tight for _, is_tight, _, _ in commas):
@@ -184,8 +196,9 @@ class Tree:
                 self.fault(item.start_mark, (*path, index), problem, given=given, accepted=accepted)
 
     def _mapping(self, next_event: Callable[[], Any], path: KeyPath, *, is_flow: bool) -> dict[str, Any]:
+        """Read the keys and values of a mapping; its first event has been read."""
         mapping: dict[str, Any] = {}
-        split: dict[str, list[str]] = {}  # by key: texts that commas of a flow mapping part from its value
+        split: dict[str, list[str]] = {}  # by key: texts that commas of a flow mapping separate from its value
         name = ""
         while type(event := next_event()) is not MappingEndEvent:
             mark = event.start_mark
@@ -207,7 +220,7 @@ class Tree:
             self.keys[here] = event
             name = "" if _NUMERAL.match(key) else key
             if type(item) is ScalarEvent and item.tag is None and item.value not in NULLS:
-                self.values[here] = item  # as `node` would: most values are such
+                self.values[here] = item  # as `node` would; a short cut for most values
                 mapping[key] = item.value
             else:
                 mapping[key] = self.node(next_event, item, here)
@@ -217,7 +230,7 @@ class Tree:
         return mapping
 
     def _without_brackets(self, path: KeyPath, texts: list[str]) -> None:
-        """Refuse `{position: 1 m, 2 m, 3 m}`, of which YAML makes three keys."""
+        """Refuse `{position: 1 m, 2 m, 3 m}`, which YAML reads as three keys."""
         is_sure = len(texts) == 3 and all(unit_behind(text) or text == "0" for text in texts)
         hint = f"Did you mean [{', '.join(texts)}]?" if is_sure else "A decimal is written with a point"
         accepted = "accepted: one value, or [a, b, c]"
@@ -237,27 +250,29 @@ _STARTS = {
 }
 
 
-def read_tree(data: bytes | str, file: str, what: str = "mission") -> Tree:
-    """Read the one document of a file; bytes are UTF-8, `what` is "mission" or "part".
+def read_tree(data: bytes | str, file: str, file_kind: str = "mission") -> Tree:
+    """Read the only document of a file; bytes are UTF-8, `file_kind` is "mission" or "part".
 
     Raises
     ------
     MissionError
-        It is no mapping in YAML, or too large; carries every fault.
+        The file is no mapping in YAML, or too large; carries every fault.
     """
-    text = _decoded(data, file, what)
-    tree = Tree(what)
+    text = _decoded(data, file, file_kind)
+    tree = Tree(file_kind)
     try:
-        tree.root = tree.document(text, (), f"one {what} in a file")
+        tree.root = tree.document(text, (), f"one {file_kind} in a file")
         if not isinstance(tree.root, dict) and not tree.faults:
             problem = "is empty" if tree.root is INVALID else "is not a mapping of keys to values"
-            tree.faults.append(file_fault(problem, _STARTS[what]))
+            tree.faults.append(file_fault(problem, _STARTS[file_kind]))
     except yaml.MarkedYAMLError as error:
-        place = error.problem_mark or error.context_mark
+        mark = error.problem_mark or error.context_mark
         problem = f"is not valid YAML: {', '.join(filter(None, (error.context, error.problem)))}"
-        if "maximum nesting depth" in (error.problem or ""):  # of libyaml, which scans ahead of what is read
+        if "maximum nesting depth" in (
+            error.problem or ""
+        ):  # of libyaml, which scans ahead of the events that are read
             problem = TOO_DEEP
-        tree.fault(place, (), problem)
+        tree.fault(mark, (), problem)
         raise MissionError(file, tuple(tree.faults)) from None
     except yaml.reader.ReaderError as error:
         line = text.count("\n", 0, max(0, error.position)) + 1
@@ -271,13 +286,15 @@ def read_tree(data: bytes | str, file: str, what: str = "mission") -> Tree:
 
 
 def _copied(value: Any) -> Any:
+    """A copy of nested mappings and lists."""
     if isinstance(value, dict):
         return {key: _copied(item) for key, item in value.items()}
     return [_copied(item) for item in value] if isinstance(value, list) else value
 
 
 def _dotted(path: KeyPath) -> str:
+    """A path as `other_errors[0].name`, shortened beyond 200 characters."""
     text = ""
-    for part in path:
-        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else str(part)
+    for name in path:
+        text += f"[{name}]" if isinstance(name, int) else f".{name}" if text else str(name)
     return printable(text) if len(text) <= 200 else shown(text)

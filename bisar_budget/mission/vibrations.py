@@ -28,14 +28,14 @@ _OF_SPEED = "A velocity divided by 2πf is a displacement"
 
 
 class _Displacement(Quantity):
-    """A displacement, whose faults say how a vibration known by its velocity or acceleration is written."""
+    """A displacement; its faults tell how to write a vibration that is known by its velocity or acceleration."""
 
     def __init__(self, of_acceleration: str, also: str = "") -> None:
         super().__init__(units.LENGTH, ge=0, le=1e9)
         self.of_acceleration, self.also = of_acceleration, also
 
     def leaf(self, value: Any) -> float:
-        """Parse and hold to the bounds; a velocity or an acceleration gets a hint of its own."""
+        """Parse and check the bounds; a velocity or an acceleration gets a hint."""
         try:
             return super().leaf(value)
         except InvalidValueError as error:
@@ -59,8 +59,8 @@ _ALONG = "along the line of sight; a vector: along each axis"
 
 
 def _of_all(value: Any, number: Any) -> Any:
-    """A single number, or each of three, with a factor of an amplitude."""
-    return tuple(part * number for part in value) if isinstance(value, tuple) else value * number
+    """An amplitude, single or of three axes, multiplied by a number."""
+    return tuple(component * number for component in value) if isinstance(value, tuple) else value * number
 
 
 class Sinusoid(NamedTuple):
@@ -77,17 +77,17 @@ class Sinusoid(NamedTuple):
 
     @property
     def scale(self) -> Any:
-        """Displacement by a unit of the amplitude. [m/m]"""
+        """Displacement per unit of the amplitude. [m/m]"""
         return 1.0
 
     @property
     def displacement(self) -> Any:
-        """Amplitude of the displacement, or along each axis. [m]"""
+        """Amplitude of the displacement, single or along each axis. [m]"""
         return self.amplitude
 
     @property
     def acceleration(self) -> Any:
-        """Amplitude of the acceleration, or along each axis. [m/s²]"""
+        """Amplitude of the acceleration, single or along each axis. [m/s²]"""
         return _of_all(self.amplitude, (2 * math.pi * self.frequency) ** 2)
 
 
@@ -99,17 +99,17 @@ class AcceleratedSinusoid(NamedTuple):
 
     @property
     def scale(self) -> Any:
-        """Displacement by a unit of the amplitude: 1/(2πf)². [s²]"""
+        """Displacement per unit of the amplitude: 1/(2πf)². [s²]"""
         return 1 / (2 * math.pi * self.frequency) ** 2
 
     @property
     def displacement(self) -> Any:
-        """Amplitude of the displacement, or along each axis. [m]"""
+        """Amplitude of the displacement, single or along each axis. [m]"""
         return _of_all(self.amplitude, self.scale)
 
     @property
     def acceleration(self) -> Any:
-        """Amplitude of the acceleration, or along each axis. [m/s²]"""
+        """Amplitude of the acceleration, single or along each axis. [m/s²]"""
         return self.amplitude
 
 
@@ -117,10 +117,10 @@ _SINUSOID, _ACCELERATED = Section(Sinusoid), Section(AcceleratedSinusoid)
 
 
 def _form_of_sinusoid(value: Any) -> Reader:
-    """A sinusoid in g, or in metres, by the first unit of its amplitude."""
+    """Reader of a sinusoid in g, or else in metres, by the unit of its amplitude."""
     amplitude = value.get("amplitude") if isinstance(value, dict) else None
-    parts = amplitude if isinstance(amplitude, list) else [amplitude]
-    is_accelerated = any(isinstance(part, str) and given_unit(part, units.ACCELERATION.si) for part in parts)
+    components = amplitude if isinstance(amplitude, list) else [amplitude]
+    is_accelerated = any(isinstance(text, str) and given_unit(text, units.ACCELERATION.si) for text in components)
     return _ACCELERATED if is_accelerated else _SINUSOID
 
 
@@ -134,7 +134,7 @@ class Wideband(NamedTuple):
 
 
 class Spectrum(NamedTuple):
-    """One-sided spectral density of a vibration, straight over logarithms between its points, nothing beside them.
+    """One-sided spectral density of a vibration: straight over logarithms between its points, zero outside of them.
 
     `points` are frequencies [Hz] with densities of acceleration [(m/s²)²/Hz], or of displacement [m²/Hz].
     """
@@ -143,12 +143,12 @@ class Spectrum(NamedTuple):
     is_accelerated: bool
 
     def times(self, power: Any) -> "Spectrum":
-        """The same with each density times a factor of power."""
+        """The spectrum with each density multiplied by a factor of power."""
         return self._replace(points=tuple((f, density * power) for f, density in self.points))
 
 
 class _SpectrumReader(CurveReader):
-    """A mapping of frequencies to densities that all are of acceleration, or all of displacement."""
+    """A mapping of frequencies to densities, all of acceleration or all of displacement."""
 
     def __init__(self, dimension: Dimension, example: str) -> None:
         frequency = Quantity(units.FREQUENCY, gt=0, ge=1e-6, le=1e9)
@@ -156,7 +156,7 @@ class _SpectrumReader(CurveReader):
         self.is_accelerated = dimension is units.ACCELERATION_DENSITY
 
     def read(self, value: Any, path: KeyPath, report: Report) -> Any:
-        """Read the points, and say which they are."""
+        """Read the points as a spectrum of acceleration or displacement."""
         points = super().read(value, path, report)
         return INVALID if points is INVALID else Spectrum(points, self.is_accelerated)
 
@@ -168,10 +168,10 @@ _SPECTRA = (
 
 
 def _form_of_spectrum(value: Any) -> Reader:
-    """The reader of the dimension that most points have; acceleration where it is not clear."""
+    """Reader of the dimension that most points have; of acceleration if both have equally many."""
     texts = [item for item in value.values() if isinstance(item, str)] if isinstance(value, dict) else []
     accelerations, displacements = (
-        sum(bool(given_unit(text, one.ordinate.dimension.si)) for text in texts) for one in _SPECTRA
+        sum(bool(given_unit(text, reader.ordinate.dimension.si)) for text in texts) for reader in _SPECTRA
     )
     return _SPECTRA[accelerations < displacements]
 
@@ -197,14 +197,14 @@ class Vibration(NamedTuple):
 
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
-        """Hold a level to a spectrum."""
+        """Refuse a level without a spectrum."""
         if values.get("spectrum_level") is not None and "spectrum" in values and values["spectrum"] is None:
-            said = "shifts a spectrum, and there is none"
-            yield Problem(said, "accepted: spectrum beside it", at=("spectrum_level",))
+            problem = "shifts a spectrum, and there is none"
+            yield Problem(problem, "accepted: spectrum beside it", at=("spectrum_level",))
 
     @property
     def is_stated(self) -> bool:
-        """Whether the file says anything of it; a zero does."""
+        """Whether the file states a vibration. A zero is stated."""
         return bool(self.sinusoidal) or self.wideband is not None or self.spectrum is not None
 
 
@@ -219,12 +219,12 @@ class FeltVibration(NamedTuple):
 
     @staticmethod
     def problems(values: Mapping[str, Any]) -> Iterator[Problem]:
-        """Hold a level to a spectrum."""
+        """Refuse a level without a spectrum."""
         yield from Vibration.problems(values)
 
     @property
     def is_stated(self) -> bool:
-        """Whether the file says anything of it; a zero does."""
+        """Whether the file states a vibration. A zero is stated."""
         return bool(self.sinusoidal) or self.spectrum is not None
 
 

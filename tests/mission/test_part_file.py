@@ -356,7 +356,7 @@ class TestCheck:
     def test_a_folder_of_more_parts_than_are_listed_is_checked_whole(
         self, tmp_path: Path, run: Run, monkeypatch: Any
     ) -> None:
-        monkeypatch.setattr("bisar_budget.mission.parts._MOST", 1)
+        monkeypatch.setattr("bisar_budget.mission.parts._MAX_FOLDER_FILES", 1)
         for name, text in {"a.yaml": IMU, "b.yaml": "kind: imu\n"}.items():
             (tmp_path / name).write_text(text, encoding="utf-8")
         assert catalogue([str(tmp_path)]).keys() == {"a"}
