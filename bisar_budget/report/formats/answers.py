@@ -3,7 +3,6 @@
 import math
 import re
 from collections.abc import Iterator, Sequence
-from typing import Any
 
 from bisar_budget.design.compare import Comparison, PartState
 from bisar_budget.design.sensitivity import LITTLE, Relaxed, Sensitivity, Slope
@@ -40,7 +39,7 @@ def as_json(answers: Sequence[Answer], style: Style) -> str:
     return document_text(f"bisar-budget/{command}/1", {"missions": missions})
 
 
-def _document(answer: Answer) -> dict[str, Any]:
+def _document(answer: Answer) -> dict[str, object]:
     if isinstance(answer, Sensitivity):
         return _ranked(answer)
     return _solved(answer) if isinstance(answer, Solution) else _compared(answer)
@@ -57,7 +56,7 @@ def _lines(answer: Answer, style: Style) -> Iterator[str]:
     return _lines_of_crossings(answer, style) if isinstance(answer, Solution) else _lines_of_parts(answer, style)
 
 
-def _solved(solution: Solution) -> dict[str, Any]:
+def _solved(solution: Solution) -> dict[str, object]:
     best = solution.best
     return {
         "key": solution.key,
@@ -85,7 +84,7 @@ def _solved(solution: Solution) -> dict[str, Any]:
     }
 
 
-def _imaged(imaged: Imaged | None) -> dict[str, Any] | None:
+def _imaged(imaged: Imaged | None) -> dict[str, object] | None:
     """Item of the verified row. The verdict has the form of `verify --format json`."""
     if imaged is None:
         return None
@@ -99,7 +98,7 @@ def _imaged(imaged: Imaged | None) -> dict[str, Any] | None:
     }
 
 
-def _compared(comparison: Comparison) -> dict[str, Any]:
+def _compared(comparison: Comparison) -> dict[str, object]:
     """Item of a comparison of catalogue parts, with the keys of `_solved`. Keys of values and borders are null."""
     best = next(iter(comparison.complying), None)
     return {
@@ -128,7 +127,7 @@ def _compared(comparison: Comparison) -> dict[str, Any]:
     }
 
 
-def _part(part: PartState) -> dict[str, Any]:
+def _part(part: PartState) -> dict[str, object]:
     return {
         "id": part.id,
         "name": part.name,
@@ -145,7 +144,7 @@ def _part(part: PartState) -> dict[str, Any]:
     }
 
 
-def _crossing(crossing: Crossing) -> dict[str, Any]:
+def _crossing(crossing: Crossing) -> dict[str, object]:
     return {
         "value": crossing.inside.value,
         "complies": "below" if crossing.is_upper else "above",
@@ -155,7 +154,7 @@ def _crossing(crossing: Crossing) -> dict[str, Any]:
     }
 
 
-def _state(state: State) -> dict[str, Any]:
+def _state(state: State) -> dict[str, object]:
     return {**state._asdict(), "reason": state.reason or None, "waived_by": list(state.waived_by)}
 
 
@@ -325,7 +324,7 @@ def _resolution(crossing: Crossing) -> str:
     return "; resolution {} range, {} cross range".format(*sizes)
 
 
-def _ranked(sensitivity: Sensitivity) -> dict[str, Any]:
+def _ranked(sensitivity: Sensitivity) -> dict[str, object]:
     return {
         "model": sensitivity.model,
         "status": sensitivity.status,
@@ -341,7 +340,7 @@ def _ranked(sensitivity: Sensitivity) -> dict[str, Any]:
     }
 
 
-def _slope(slope: Slope) -> dict[str, Any]:
+def _slope(slope: Slope) -> dict[str, object]:
     return {
         "key": slope.key,
         "text": slope.text,
@@ -360,8 +359,8 @@ def _slope(slope: Slope) -> dict[str, Any]:
     }
 
 
-def _relaxed(relaxed: Relaxed) -> dict[str, Any]:
-    def platform(change: tuple[str, float, float] | None) -> dict[str, Any] | None:
+def _relaxed(relaxed: Relaxed) -> dict[str, object]:
+    def platform(change: tuple[str, float, float] | None) -> dict[str, object] | None:
         return None if change is None else dict(zip(("row", "before", "after"), change, strict=True))
 
     return {

@@ -3,9 +3,8 @@
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from datetime import UTC, date, datetime
-from typing import Any
 
 from bisar_budget import __version__
 from bisar_budget.design.passes import Passes, SatellitePass
@@ -70,10 +69,10 @@ def _summarized(passes: Passes) -> dict[str, int]:
     }
 
 
-def _item(overpass: SatellitePass) -> dict[str, Any]:
+def _item(overpass: SatellitePass) -> dict[str, object]:
     """Values of a pass, by the keys of JSON and CSV."""
     state = overpass.state
-    values: dict[str, Any] = {
+    values: dict[str, object] = {
         "number": overpass.number,
         "status": overpass.status,
         "center_time": None if overpass.center is None else overpass.center.as_text(),
@@ -312,7 +311,7 @@ def _grouped(
         yield text, _numbers(numbers)
 
 
-def _numbers(numbers: Any) -> str:
+def _numbers(numbers: Iterable[int]) -> str:
     """Numbers as "1, 3 to 5". Empty without numbers."""
     runs: list[list[int]] = []
     for number in numbers:
