@@ -40,7 +40,7 @@ from bisar_budget.report.drawing.trades import per_word, stretches
 from bisar_budget.report.explain.explanation import chain, collection_chain
 from bisar_budget.report.formats import verification
 from bisar_budget.report.formats.specification_sheet import specified
-from bisar_budget.report.words.requirements import held
+from bisar_budget.report.words.requirements import probability_words
 from bisar_budget.report.words.sentences import BINDING_WORDS, counted, percent, sentence, waived_count
 from bisar_budget.units import format_quantity
 
@@ -307,11 +307,11 @@ def _draws(page: Page, drawn: MonteCarlo) -> Iterator[doc.Block]:
     lines: list[doc.Line] = []
     for one in drawn.requirements:
         sizes = ("–" if size is None else format_quantity(size, one.unit) for size in (one.sum, one.rss, one.sigma))
-        in_draws = held(one.probability, one.probability_low, one.probability_high)
+        in_draws = probability_words(one.probability, one.probability_low, one.probability_high)
         lines.append((doc.Name(one.id), limit_words(one.limit, one.unit), *sizes, in_draws))
     if drawn.probability is not None and len(drawn.requirements) > 1:
         ends = (drawn.probability_low or 0.0, drawn.probability_high or 1.0)
-        lines.append((doc.Name("all at once"), *("–",) * 4, held(drawn.probability, *ends)))
+        lines.append((doc.Name("all at once"), *("–",) * 4, probability_words(drawn.probability, *ends)))
     if lines:
         yield doc.TextTable(
             f"Monte Carlo of {page.name}",

@@ -25,7 +25,7 @@ from bisar_budget.report.words.identity import Identity, distinct, identities
 from bisar_budget.report.words.requirements import RequirementLine, requirement_lines
 from bisar_budget.report.words.sentences import counted, need_text, percent, rst_text, share_percent, table, wrapped
 
-_MAX_LISTED_COUNT = 3  # parts of the catalogue that a table names
+_LISTED_COUNT = 3  # parts of the catalogue that a table names
 _COLUMNS = ("file", "key", "value", "ordered", "unit", "text", "declared", "weight", "parts")
 
 
@@ -176,8 +176,8 @@ def _offered(offer: Offer) -> str:
 
 def _parts_words(spec: Specification) -> str:
     """First parts of the catalogue that meet a specification, and the number of further parts."""
-    more = f" and {len(spec.parts) - _MAX_LISTED_COUNT} more" if len(spec.parts) > _MAX_LISTED_COUNT else ""
-    return f"{', '.join(spec.parts[:_MAX_LISTED_COUNT])}{more}"
+    more = f" and {len(spec.parts) - _LISTED_COUNT} more" if len(spec.parts) > _LISTED_COUNT else ""
+    return f"{', '.join(spec.parts[:_LISTED_COUNT])}{more}"
 
 
 def _broken_words(row: Broken) -> list[str]:

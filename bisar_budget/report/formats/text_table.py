@@ -26,14 +26,14 @@ from bisar_budget.report.words.requirements import (
     COLUMNS,
     RequirementLine,
     declared_words,
-    is_said_with_the_table,
+    is_explained_in_table,
     probabilities,
     requirement_lines,
     unjudged_effects,
     verdict,
 )
 from bisar_budget.report.words.sentences import (
-    WIDTH,
+    TEXT_WIDTH,
     aligned,
     allowable_words,
     binding_words,
@@ -142,7 +142,7 @@ def _requirement(line: RequirementLine, widths: Sequence[int], style: Style) -> 
     """One line of the table of requirements. A long deciding row goes on a line of its own below."""
     start = spaced((line.name, line.allowed, line.reached, line.use), widths, "<>>>")
     decided = ", ".join(filter(None, (line.decided_by, line.remark)))
-    if len(start) + 10 + len(decided) <= WIDTH:
+    if len(start) + 10 + len(decided) <= TEXT_WIDTH:
         yield f"{start} {_word(line.status, style, _STATUS_WIDTH)} {decided}"
     else:
         yield f"{start} {_word(line.status, style)}"
@@ -268,7 +268,7 @@ def _details(mission: MissionFindings, style: Style) -> Iterator[str]:
     for row in worst_first(mission.rows):
         if style.verbosity > 0:
             yield from _detail([row], [*filter(None, [row.reason]), *row.notes, *_more(row)], mission, style)
-        elif STATUS[row.status].is_explained and not is_said_with_the_table(row):
+        elif STATUS[row.status].is_explained and not is_explained_in_table(row):
             groups.setdefault((row.status, row.decisive), []).append(row)
     for (_, texts), rows in groups.items():
         yield from _detail(rows, texts, mission, style)
