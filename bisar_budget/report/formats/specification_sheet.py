@@ -226,9 +226,9 @@ def _side(figure: OfferedFigure) -> str:
 # ---------------------------------------------------------------- for a board, and a supplier
 def as_markdown(answers: Sequence[Answer], style: Style) -> str:
     """Write the sheets as Markdown, without drawings."""
-    from bisar_budget.report.compliance.markdown import written
+    from bisar_budget.report.compliance.markdown import markdown_document
 
-    return written(_sheets(answers), "")
+    return markdown_document(_sheets(answers), "")
 
 
 def as_html(answers: Sequence[Answer], style: Style) -> str:
