@@ -15,7 +15,7 @@ from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.changes import parts_of
 from bisar_budget.report import Style
 from bisar_budget.report.compliance import document as doc
-from bisar_budget.report.drawing.share_bars import LIMITS, limiting, share_bars
+from bisar_budget.report.drawing.share_bars import LEAST_WEIGHT_FRACTION, limiting, share_bars
 from bisar_budget.report.formats.csv_table import csv_text
 from bisar_budget.report.formats.json_document import document_text, outside_item
 from bisar_budget.report.formats.text_table import requirement_table
@@ -308,7 +308,10 @@ def _table(sheet: SpecificationSheet) -> Iterator[doc.Block]:
     heads = doc.heads(*doc.numbers("No."), "Specification", *size_heads, "Parts")
     rows: list[doc.Line] = []
     for number, spec in enumerate(sheet.specifications, 1):
-        shares = [share_percent(spec.shares[key]) if spec.shares.get(key, 0.0) > LIMITS else "–" for key in keys]
+        shares = [
+            share_percent(spec.shares[key]) if spec.shares.get(key, 0.0) > LEAST_WEIGHT_FRACTION else "–"
+            for key in keys
+        ]
         sizes = (spec.text or "free", spec.found_text or "–", spec.declared_text or "–")
         rows.append([str(number), doc.Name(spec.key), *sizes, *shares, _parts_words(spec) or "–"])
     caption = "Specifications, rounded down to two digits; shares are those of what a limit may use."
