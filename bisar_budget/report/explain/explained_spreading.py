@@ -36,7 +36,7 @@ from bisar_budget.faults import printable
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import GroundVector
 from bisar_budget.mission.model import Mission
-from bisar_budget.report.explain.explained_error import combined, limit_steps, no_limit, place, stated
+from bisar_budget.report.explain.explained_error import combined, limit_steps, location, no_limit, stated
 from bisar_budget.report.explain.notation import Step, Sum, WorkedEquation, number, step, with_unit
 
 
@@ -145,7 +145,7 @@ def explained_pslr(mission: Mission, row: Row) -> Iterator[Step]:
     if row.allowable is None:
         return
     worked = WorkedEquation("allowable", "required", {"required": row.allowable}, row.allowable, "dB")
-    yield step(f"requirements.pslr, all of it, {place(mission, ('requirements', 'pslr'))}", worked)
+    yield step(f"requirements.pslr, all of it, {location(mission, ('requirements', 'pslr'))}", worked)
     yield from use_of_amplitudes(row)
 
 
@@ -216,7 +216,7 @@ def explained_spur(mission: Mission, allocation: Allocation, row: Row) -> Iterat
     path = ("platforms", row.owner, "oscillator", "spurs")
     entry = row.subject.entry or 0
     frequency, level = oscillator.spurs[entry]
-    yield step(f"Declared in {place(mission, path)}", f"{frequency:.6g} Hz: {level:.6g} dBc")
+    yield step(f"Declared in {location(mission, path)}", f"{frequency:.6g} Hz: {level:.6g} dBc")
     f_0 = mission.radar.center_frequency
     values, formula = {"L": level, "f_0": f_0, "f_osc": oscillator.frequency or f_0}, "L + 20*log(f_0/f_osc)/log(10)"
     spur = next(one for one in spurs_of(mission) if (one.name, one.entry) == (row.owner, entry))
@@ -260,10 +260,12 @@ def explained_tone(mission: Mission, allocation: Allocation, row: Row) -> Iterat
     path = ("platforms", name, *section, "vibration", "sinusoidal", entry, "amplitude")
     a = float(one.acceleration)
     gamma = ("platforms", name, "oscillator", "acceleration_sensitivity")
-    yield step(f"Γ, declared in {place(mission, gamma)}", f"Γ = {with_unit(one.sensitivity, 's^2/m')}")
+    yield step(f"Γ, declared in {location(mission, gamma)}", f"Γ = {with_unit(one.sensitivity, 's^2/m')}")
     if row.evidence:
         yield step("Evidence", printable(row.evidence))
-    yield step(f"Acceleration of the vibration, declared in {place(mission, path)}", f"a = {with_unit(a, 'm/s^2')}")
+    yield step(
+        f"Acceleration of the vibration, declared in {location(mission, path)}", f"a = {with_unit(a, 'm/s^2')}"
+    )
     values, formula = {"f_0": f_0, "Γ": one.sensitivity, "a": a, "f": one.frequency}, "f_0*Γ*a/f"
     title = "Derived: peak phase of the tone, a quarter of a turn from the motion itself"
     if one.echo != 1:
