@@ -78,7 +78,7 @@ class Gathered:
     def add(self, part: Part) -> None:
         """Keep the needed columns of a part."""
         for name, column_pieces in self.pieces.items():
-            column_pieces.append(self.described.said(name, part.values[name]))
+            column_pieces.append(self.described.converted(name, part.values[name]))
 
     def passing(self, parts: Iterable[Part]) -> Iterator[Part]:
         """Parts of a sweep, unchanged. The needed columns of each part are kept."""
@@ -117,7 +117,7 @@ class Gathered:
             words = tuple(values.tolist())
             own_value = float(words.index(varied.value)) if varied.value in words else None
             return Axis(varied.key, "", np.arange(float(values.size)), words=words, own=own_value)
-        shown = np.asarray(self.described.said(varied.key, values), float)
+        shown = np.asarray(self.described.converted(varied.key, values), float)
         factor, divisor = varied.dimension.scales.get(varied.unit) or (1.0, 1.0)
         own_value = None if varied.value is None else varied.value / factor * divisor
         return Axis(varied.key, varied.unit, shown, scale=factor / divisor, own=own_value)
