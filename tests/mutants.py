@@ -343,7 +343,7 @@ MUTANTS = (
         "bisar_budget/report/formats/annotations.py",
         """    if status != "waived" or not waivers:
         return {}
-    waiver = next(one for one in waivers if not one.is_expired)""",
+    waiver = next(waiver for waiver in waivers if not waiver.is_expired)""",
         """    if not waivers:
         return {}
     waiver = waivers[0]""",
@@ -387,15 +387,15 @@ MUTANTS = (
     Mutant(
         "seam: text of verify, the nearest displacement",
         "bisar_budget/report/formats/verification.py",
-        "distance, row_id = max(apart)",
-        "distance, row_id = min(apart)",
+        "distance, row_id = max(distances)",
+        "distance, row_id = min(distances)",
         (f"{_SEAMS}test_verify_names_the_image_that_is_farthest_off",),
     ),
     Mutant(
         "seam: text of verify, the smallest turn",
         "bisar_budget/report/formats/verification.py",
-        "angle, row_id = max(turned)",
-        "angle, row_id = min(turned)",
+        "angle, row_id = max(angles)",
+        "angle, row_id = min(angles)",
         (f"{_SEAMS}test_verify_names_the_image_that_is_farthest_off",),
     ),
     Mutant(

@@ -1,9 +1,9 @@
-"""Findings as text: each format has a module, found here by name, with a pure function of the format's name.
+"""Findings as text: the table of formats gives the module of each format, whose functions are pure.
 
-That of SARIF is `as_sarif(report, style) -> str`. A format that says one mission after the other has two in its
-stead, `piece(mission, style) -> str` and `joined(pieces, version, style) -> str`: a thousand missions can be written
-where each is checked, and their findings forgotten. One that has pictures beside its text has a function
-`pictures(report, style)` too.
+The function of SARIF is `as_sarif(report, style) -> str`. A piecewise format, which writes one mission after another,
+has two functions instead, `piece(mission, style) -> str` and `joined(pieces, version, style) -> str`: a process that
+checks a mission writes its piece and need not keep its findings. A format with pictures also has a function
+`pictures(report, style)`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,10 +15,10 @@ if TYPE_CHECKING:
 
 
 class Format(NamedTuple):
-    """One format: its module here, and how the names of its files end, the usual ending first.
+    """A format: its module in this package, and the endings of its files, the usual ending first.
 
-    `about` is what `--help` says of it. `is_piecewise`, `has_pictures`: see above. `is_illustrated` is whether it
-    shows the mission itself, and images of verified limits; for the others neither is kept.
+    `about` is its description in `--help`. `is_piecewise` and `has_pictures` are explained above. An illustrated
+    format shows the mission itself and images of verified limits; other formats do not keep them in memory.
     """
 
     name: str
@@ -46,24 +46,26 @@ _FORMATS = (
         is_illustrated=True, has_pictures=True,
     ),
 )  # fmt: skip
-FORMATS = {one.name: one for one in _FORMATS}
+FORMATS = {entry.name: entry for entry in _FORMATS}
 
 
 def format_of(name: str) -> str | None:
-    """Format that the name of a report asks for: `budget.sarif`, `x.needs.json` or `needs.json` itself."""
-    # The dot before the name lets `needs.json` end like `x.needs.json`.
+    """Format of a report by the name of its file, such as `budget.sarif`, `x.needs.json` or `needs.json` itself."""
+    # With the dot before it, the name `needs.json` ends like `x.needs.json`.
     ending = "." + name.replace("\\", "/").rpartition("/")[2].lower()
     if ending.count(".") == 1:
         return None
-    fitting = [(len(suffix), one.name) for one in _FORMATS for suffix in one.suffixes if ending.endswith(suffix)]
-    return max(fitting)[1] if fitting else None
+    matches = [
+        (len(suffix), entry.name) for entry in _FORMATS for suffix in entry.suffixes if ending.endswith(suffix)
+    ]
+    return max(matches)[1] if matches else None
 
 
 class Style(NamedTuple):
-    """How much to say, and whether in colour; formats for machines ignore both.
+    """Verbosity, colour and folders of a report. Formats for machines ignore verbosity and colour.
 
-    They name files from the root of the repository that each lies in (`report.words.identity`), else from `root`.
-    Pictures lie in the folder `assets` beside the report; empty: nowhere, and the text has none.
+    They name a file from the root of its repository (`report.words.identity`), else from `root`. Pictures are in the
+    folder `assets` beside the report; without a folder the report has no pictures.
     """
 
     color: bool = False
@@ -71,16 +73,16 @@ class Style(NamedTuple):
     root: str = ""  # absolute path of the current folder, or GitHub's checkout; empty: files are named as given
     is_checkout: bool = False  # whether `root` is GitHub's checkout, which needs no `.git` to be a repository
     assets: str = ""
-    all_rows: bool = False  # of the text: what is neither declared nor limits anything too
-    detail: str = "summary"  # of a compliance report; full: formulas and undeclared rows too
+    all_rows: bool = False  # whether the text shows rows that are neither declared nor limit anything
+    detail: str = "summary"  # of a compliance report: summary, or full with formulas and undeclared rows
 
     def coloured(self, text: str, sgr: str) -> str:
-        """Text for a terminal with parameters of SGR (ECMA-48), where there is colour."""
+        """Text for a terminal, with parameters of SGR (ECMA-48) if the style has colour."""
         return f"\x1b[{sgr}m{text}\x1b[0m" if self.color else text
 
 
 def _module(format_name: str) -> Any:
-    """Imported when it is asked for, so that none costs the others anything."""
+    """Module of a format, imported at its first use, so that other formats need not wait for it."""
     return import_module(f"bisar_budget.report.{FORMATS[format_name].module}")
 
 
@@ -94,9 +96,10 @@ def render(format_name: str, report: "Report", style: Style) -> str:
 
 
 class Piece(NamedTuple):
-    """The text of a format for one mission; `unusable` is the file if it cannot be used.
+    """Text of a piecewise format for one mission.
 
-    `statuses` are all of its rows and requirements, of which `status` is the worst.
+    `unusable` holds the faults of an unusable file, else None. `statuses` are those of all rows and requirements,
+    `status` is the worst of them.
     """
 
     status: str
@@ -106,7 +109,7 @@ class Piece(NamedTuple):
 
 
 def piece(mission: "MissionFindings | UnusableMission", format_name: str, style: Style) -> Piece:
-    """Write the part of one mission, in a piecewise format."""
+    """Write one mission in a piecewise format."""
     from bisar_budget.findings.mission import UnusableMission
 
     text: str = _module(format_name).piece(mission, style)
@@ -114,7 +117,7 @@ def piece(mission: "MissionFindings | UnusableMission", format_name: str, style:
 
 
 def joined(format_name: str, pieces: Sequence[Piece], version: str, style: Style) -> str:
-    """Write a report from its pieces: what `render` would."""
+    """Write a report from its pieces, the same text as `render`."""
     text: str = _module(format_name).joined(pieces, version, style)
     return text
 

@@ -1,4 +1,4 @@
-"""The cases of a sweep as files (CSV, Parquet, NetCDF) and as a dataset, with what each says of itself."""
+"""The cases of a sweep as files (CSV, Parquet, NetCDF) and as a dataset, with metadata."""
 
 import csv
 import io
@@ -30,27 +30,27 @@ FORMAT = "bisar-budget/sweep/1"
 
 
 class Described:
-    """A sweep as a table: keys that vary stand in the unit that they were asked for in, all else in SI."""
+    """A sweep as a table. Keys that vary have the unit of the question, other columns have SI units."""
 
     def __init__(
         self, swept: Swept, cases: Cases, mission: Mission, version: str, overrides: Sequence[Override] = ()
     ) -> None:
         self.swept, self.cases = swept, cases
-        self.numbers = {one.key: one for one in cases.varied if isinstance(one, Number)}
+        self.numbers = {key.key: key for key in cases.varied if isinstance(key, Number)}
         changed = changes_words(mission.changes)
         self.facts = {
             "format": FORMAT,
             "mission": printable(swept.mission_name),
             "mission_sha256": swept.mission_sha256,
             **({"set": changed} if changed else {}),
-            **({"overrides": _said(overrides)} if overrides else {}),
+            **({"overrides": _overrides_text(overrides)} if overrides else {}),
             "model": "varies" if "allocation.model" in swept.varied else mission.gating_model,
             "source": f"bisar-budget {version}",
         }
 
     @cached_property
     def columns(self) -> tuple[Column, ...]:
-        """Columns in their order."""
+        """Columns in their order, with their units."""
         return tuple(
             column._replace(unit=self.numbers[column.name].unit) if column.name in self.numbers else column
             for column in self.swept.columns
@@ -58,31 +58,31 @@ class Described:
 
     def values(self, part: Part) -> Mapping[str, Values]:
         """Values of a part by the name of their column."""
-        return {name: self.said(name, values) for name, values in part.values.items()}
+        return {name: self.converted(name, values) for name, values in part.values.items()}
 
-    def said(self, name: str, values: Values) -> Values:
-        """Values of a column, of one that varies in its unit."""
+    def converted(self, name: str, values: Values) -> Values:
+        """Values of a column in the unit of the column."""
         if name not in self.numbers:
             return values
         return in_unit(self.numbers[name], np.asarray(values, float))
 
 
-def _said(overrides: Sequence[Override]) -> str:
-    """The overrides from outside the file that bear on statuses, in a line."""
-    return "; ".join(printable(f"{one.name} {one.value} ({one.origin})") for one in overrides)
+def _overrides_text(overrides: Sequence[Override]) -> str:
+    """Overrides from outside the file that affect statuses, in one line."""
+    return "; ".join(printable(f"{override.name} {override.value} ({override.origin})") for override in overrides)
 
 
 def write_csv(described: Described, parts: Iterable[Part], path: str) -> None:
-    """Write lines `# name: value` about the whole, a header `KEY [unit]`, one line for each case.
+    """Write metadata as lines `# name: value`, a header `KEY [unit]`, and one line for each case.
 
-    Numbers have all digits that they need to be read back; what has no value is empty.
+    Numbers have all digits that reproduce them. A missing value is an empty cell.
     """
     with open(path, "w", encoding="utf-8", errors="backslashreplace", newline="") as file:
         file.writelines(texts(described, parts))
 
 
 def texts(described: Described, parts: Iterable[Part]) -> Iterator[str]:
-    """Write what stands above the cases, then each part."""
+    """Texts of a CSV file: metadata and header, then the lines of each part."""
     yield "".join(f"# {name}: {value}\n" for name, value in described.facts.items())
     yield ",".join(_quoted(spreadsheet_text(column.heading)) for column in described.columns) + "\n"
     for part in parts:
@@ -98,31 +98,31 @@ def _quoted(text: str | None) -> str:
 
 
 def _cells(column: Column, values: Values) -> list[str]:
-    """Cells of a column; a value that many cases share is written once."""
+    """Cells of a column. A value that many cases share is converted once."""
     if column.is_text:
         texts: list[str] = values.tolist()
-        said = {text: _quoted(spreadsheet_text(text)) for text in set(texts)}
-        return [said[text] for text in texts]
+        quoted = {text: _quoted(spreadsheet_text(text)) for text in set(texts)}
+        return [quoted[text] for text in texts]
     numbers = np.asarray(values, float)
-    few, places = np.unique(numbers, return_inverse=True)
-    if few.size > numbers.size / 2:
+    distinct, indices = np.unique(numbers, return_inverse=True)
+    if distinct.size > numbers.size / 2:
         return [_number(number) for number in numbers.tolist()]
-    words = [_number(number) for number in few.tolist()]
-    return [words[place] for place in places.tolist()]
+    words = [_number(number) for number in distinct.tolist()]
+    return [words[index] for index in indices.tolist()]
 
 
 def _number(number: float) -> str:
-    """All digits that a number needs to be read back; nothing for none."""
+    """All digits that reproduce a number; empty for NaN."""
     return repr(number) if number == number else ""
 
 
-_ROWS = 1 << 17  # of a group, at least: readers take one at a time
+_MIN_GROUP_ROWS = 1 << 17  # of a row group, which readers load at once
 
 
 def write_parquet(described: Described, parts: Iterable[Part], path: str) -> None:
-    """Write one row for each case, units and descriptions as metadata of the fields.
+    """Write one row for each case, with units and descriptions as metadata of the fields.
 
-    Texts are dictionaries; what has no value is null. The metadata of the file is what a CSV has above its header.
+    Texts are dictionaries, missing values are null. The metadata of the file is the same as in a CSV.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -154,30 +154,30 @@ def _array(pa: Any, column: Column, values: Values) -> Any:
 
 
 def _groups(parts: Iterable[Part]) -> Iterator[list[Part]]:
-    """Parts that together have the rows of a group."""
+    """Lists of parts with at least the rows of a row group each."""
     group: list[Part] = []
     rows = 0
     for part in parts:
         group.append(part)
         rows += part.stop - part.start
-        if rows >= _ROWS:
+        if rows >= _MIN_GROUP_ROWS:
             yield group
             group, rows = [], 0
     if group:
         yield group
 
 
-_UNITS = {"": "1", "deg": "degree", "°": "degree"}  # as UDUNITS has them
+_UNITS = {"": "1", "deg": "degree", "°": "degree"}  # names of UDUNITS
 _TITLES = {"mission": "title"}
-_PROBED = 1 << 20  # bytes: what is left of a disk is less than the library asked for
-_NONE = "none"  # the meaning of a flag that says nothing
+_PROBE_BYTES = 1 << 20  # a write of this size fails on a disk that was too full for the library
+_EMPTY_MEANING = "none"  # meaning of the flag of an empty text
 
 
 def write_netcdf(described: Described, parts: Iterable[Part], path: str) -> None:
-    """Write after the CF conventions: a grid has one dimension for each key, a table `case`.
+    """Write by the CF conventions: a grid has one dimension for each key, a table has the dimension `case`.
 
-    Texts are flags, numbers with a list of what they mean; reasons, of which every case may have one of its own, are
-    strings. Numbers without a value are NaN.
+    Texts are flags, numbers with a list of their meanings. Reasons, which may differ in every case, are strings.
+    Missing numbers are NaN.
     """
     from netCDF4 import Dataset
 
@@ -195,34 +195,34 @@ def write_netcdf(described: Described, parts: Iterable[Part], path: str) -> None
                     variable.put(values[variable.column.name], part.start, part.stop, shape)
             for variable in variables:
                 variable.close()
-    except RuntimeError as error:  # of the library: the disk is full, or a file may not become so large
-        if type(error) is not RuntimeError:  # what the parts ended with
+    except RuntimeError as error:  # by the library, if the disk is full or the file exceeds a limit
+        if type(error) is not RuntimeError:  # an error of the sweep itself
             raise
         _hold_to_room(path)
         raise OSError(None, str(error)) from None
 
 
 def _hold_to_room(path: str) -> None:
-    """Write on to a file that the library could not write: the `OSError` of the system says why."""
+    """Append to a file that the library could not write, so that the system raises an `OSError` with the reason."""
     with open(path, "ab") as file:
-        file.write(bytes(_PROBED))
+        file.write(bytes(_PROBE_BYTES))
         file.flush()
         os.fsync(file.fileno())
 
 
 def _dimensions(file: Any, described: Described) -> list[Column]:
-    """Make the dimensions; what is left are the columns that have a value for each case."""
+    """Create the dimensions. Returns the columns with a value for each case."""
     cases = described.cases
     if not cases.is_grid:
         file.createDimension("case", cases.count)
         return list(described.columns)
     by_name = {column.name: column for column in described.columns}
-    for one, axis in zip(cases.varied, cases.columns, strict=True):
-        column = by_name.pop(one.key)
-        file.createDimension(one.key, axis.size)
-        variable = file.createVariable(one.key, str if column.is_text else "f8", (one.key,))
+    for key, axis in zip(cases.varied, cases.columns, strict=True):
+        column = by_name.pop(key.key)
+        file.createDimension(key.key, axis.size)
+        variable = file.createVariable(key.key, str if column.is_text else "f8", (key.key,))
         variable.setncatts(_attributes(column))
-        variable[:] = described.said(one.key, axis)
+        variable[:] = described.converted(key.key, axis)
     return list(by_name.values())
 
 
@@ -232,7 +232,7 @@ def _attributes(column: Column) -> Mapping[str, str]:
 
 
 class _Variable:
-    """One column of a file; a text is kept as the number of its meaning."""
+    """One column of a file. Texts are stored as the numbers of their meanings."""
 
     def __init__(self, file: Any, column: Column, names: tuple[str, ...]) -> None:
         self.column = column
@@ -245,9 +245,9 @@ class _Variable:
         self.variable.setncatts(_attributes(column))
 
     def put(self, values: Values, start: int, stop: int, shape: tuple[int, ...]) -> None:
-        """Write the values of some cases."""
+        """Write the values of the cases `start` to `stop`."""
         if self.is_free and not np.any(values != ""):
-            return  # what is not written is empty
+            return  # strings are empty unless written
         if self.column.is_text and not self.is_free:
             values = np.array([self.codes.setdefault(text, len(self.codes)) for text in values.tolist()], "i4")
         begin = 0
@@ -258,14 +258,14 @@ class _Variable:
             begin = end
 
     def close(self) -> None:
-        """Say what the numbers of texts mean."""
+        """Write the meanings of the numbers of texts."""
         if self.column.is_text and not self.is_free:
             self.variable.flag_values = np.arange(len(self.codes), dtype="i4")
-            self.variable.flag_meanings = " ".join("_".join(text.split()) or _NONE for text in self.codes)
+            self.variable.flag_meanings = " ".join("_".join(text.split()) or _EMPTY_MEANING for text in self.codes)
 
 
 def slabs(start: int, stop: int, shape: tuple[int, ...]) -> Iterator[tuple[slice, ...]]:
-    """Boxes of an array of a shape that hold its elements `start` to `stop`, in order, the last axis the fastest."""
+    """Slices of an array that together contain its elements `start` to `stop` in C order."""
     if start == stop:
         return
     if len(shape) == 1:
@@ -289,9 +289,9 @@ class MissingTablesError(Exception):
 
 
 class TableFormat(NamedTuple):
-    """One format: how to write it, part after part, and the library of the extra `tables` that it needs, if any.
+    """One format: a function that writes it part by part, and its library of the extra `tables`, if any.
 
-    A file that cannot be written is an `OSError`. Memory holds a few parts.
+    `write` raises `OSError` if it cannot write the file. It keeps only a few parts in memory.
     """
 
     name: str
@@ -307,42 +307,42 @@ TABLES = {
 
 
 def writer_of(suffix: str) -> TableFormat:
-    """Find what writes the files of a suffix, one of `TABLES`.
+    """Format of the files with a suffix, one of `TABLES`.
 
     Raises
     ------
     MissingTablesError
-        Its library is not installed; says how to have it.
+        The library of the format is not installed. The message names the command that installs it.
     """
-    found = TABLES[suffix]
-    if found.library:
-        hold_room(OF_TABLES, found.name)
+    table_format = TABLES[suffix]
+    if table_format.library:
+        hold_room(OF_TABLES, table_format.name)
         try:
-            import_module(found.library)
+            import_module(table_format.library)
         except ImportError:
-            raise MissingTablesError(_missing(found.name, found.library)) from None
-    return found
+            raise MissingTablesError(_missing(table_format.name, table_format.library)) from None
+    return table_format
 
 
 def _missing(name: str, library: str) -> str:
     return f"{name} needs {library}, which is not installed; {install_command('tables')} brings it"
 
 
-def dataset(described: Described, whole: Mapping[str, Any]) -> "Dataset":
-    """Lay out the columns of a sweep.
+def dataset(described: Described, values_by_column: Mapping[str, Any]) -> "Dataset":
+    """Columns of a sweep as a dataset.
 
     Parameters
     ----------
     described : Described
         The table.
-    whole : mapping
+    values_by_column : mapping
         Values of each column by its name, (cases,): arrays of NumPy or of Dask.
 
     Returns
     -------
     xarray.Dataset
-        A variable for each column, with `units` and `long_name`; numbers are NaN where there is none, texts empty.
-        Keys that vary stand in the unit that they were said in, as coordinates. Attributes are those of a table.
+        A variable for each column, with `units` and `long_name`. Missing numbers are NaN, missing texts are empty.
+        Keys that vary are coordinates in the unit of the question. Attributes are the metadata of a table.
 
     Raises
     ------
@@ -360,12 +360,12 @@ def dataset(described: Described, whole: Mapping[str, Any]) -> "Dataset":
     }
     dimensions = tuple(varied) if cases.is_grid else ("case",)
     coordinates = {
-        one.key: (one.key if cases.is_grid else "case", described.said(one.key, values), attributes[one.key])
-        for one, values in zip(cases.varied, cases.columns, strict=True)
+        key.key: (key.key if cases.is_grid else "case", described.converted(key.key, values), attributes[key.key])
+        for key, values in zip(cases.varied, cases.columns, strict=True)
     }
     variables = {
         name: (dimensions, values.reshape(cases.shape), attributes[name])
-        for name, values in whole.items()
+        for name, values in values_by_column.items()
         if name not in coordinates
     }
     return Dataset(variables, coordinates, described.facts)

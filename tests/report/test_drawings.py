@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from bisar_budget.findings.mission import MissionFindings
 from bisar_budget.geometry import BistaticGeometry, PlatformState
 from bisar_budget.report.drawing.geometry_views import geometry_elevation, geometry_plan
-from bisar_budget.report.drawing.svg import LINE_HEIGHT, Box, text_width
+from bisar_budget.report.drawing.svg import LINE_PX, Box, text_width
 from tests.conftest import ROOT, findings, found_in
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -208,8 +208,8 @@ def test_no_label_covers_another_or_leaves_the_drawing(kind: str, name: str) -> 
         wide = max(text_width("".join(line.itertext())) for line in lines) * (0.85 if text.get("class") else 1)
         x, y = float(text.get("x", "")), float(text.get("y", ""))
         left = x - {"start": 0, "middle": wide / 2, "end": wide}[text.get("text-anchor", "start")]
-        top = y - 0.75 * LINE_HEIGHT
-        boxes.append(Box(left, top, left + wide, top + LINE_HEIGHT * len(lines) - 3))
+        top = y - 0.75 * LINE_PX
+        boxes.append(Box(left, top, left + wide, top + LINE_PX * len(lines) - 3))
     for box in boxes:
         assert box.left >= -1
         assert box.right <= width + 1

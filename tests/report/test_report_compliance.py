@@ -134,7 +134,7 @@ def drivers(document: Compliance) -> list[tuple[str, str, float]]:
                 (name,) = [part for part in parts(line) if isinstance(part, Name)]
                 (badge,) = [part for part in parts(line) if isinstance(part, Badge)]
                 (use,) = [part for part in parts(line) if isinstance(part, Use)]
-                found.append((name.text, badge.status, use.part))
+                found.append((name.text, badge.status, use.fraction))
     return found
 
 
@@ -168,7 +168,7 @@ class TestView:
             row_id = parts(line["Id"])[0].text
             assert row_id not in shown
             shown[row_id] = {head: plain(cell) for head, cell in line.items()}
-            (bars[row_id],) = [part.part for part in parts(line["Utilization"]) if isinstance(part, Use)]
+            (bars[row_id],) = [part.fraction for part in parts(line["Utilization"]) if isinstance(part, Use)]
             (status,) = [part.status for part in parts(line["Status"])]
             assert status == next(row.status for row in found.rows if row.id == row_id)
         silent = {plain(line["Id"]) for line in lines(document, "Id", "Allowable", "From")}
@@ -224,7 +224,7 @@ class TestView:
         ]
         wavelength, R = 299792458 / 10e9, math.hypot(30e3, 6e3)
         qpe = math.pi * 36 * 150 * 0.005 / (2 * R * wavelength)
-        assert shown[1]["Relative to the largest"].part == pytest.approx(qpe / math.radians(5), rel=1e-9)
+        assert shown[1]["Relative to the largest"].fraction == pytest.approx(qpe / math.radians(5), rel=1e-9)
         assert shown[1]["QPE"] == f"{math.degrees(qpe):.3g} deg"
 
     def test_an_error_in_another_frame_contributes_along_its_own_axes(self) -> None:
@@ -241,7 +241,7 @@ class TestView:
         assert receiver["Owner"] == (Swatch("receiver", 0.5), "receiver")
         assert clock["Share"] == "held to the receiver’s"
         before, after = [block for block in blocks_of(document) if isinstance(block, Stack)]
-        for ended, started in zip(after.parts, before.parts, strict=True):
+        for ended, started in zip(after.shares, before.shares, strict=True):
             assert ended[1] / started[1] == pytest.approx(16)
 
     def test_the_method_names_analysis_and_simulation(self) -> None:

@@ -26,7 +26,7 @@ def derived_equations(model: str = "published") -> list[tuple[str, WorkedEquatio
             found += [
                 (f"{path.stem} {name}", part)
                 for step in steps
-                for part in step.parts
+                for part in step.body
                 if isinstance(part, WorkedEquation) and part.formula in FORMULAS
             ]
     return found

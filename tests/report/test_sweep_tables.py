@@ -122,7 +122,7 @@ def test_parquet_has_groups_of_many_rows(tmp_path: Path, monkeypatch: pytest.Mon
 
     from bisar_budget.report import tables
 
-    monkeypatch.setattr(tables, "_ROWS", 10)
+    monkeypatch.setattr(tables, "_MIN_GROUP_ROWS", 10)
     assert [part[-1].stop - part[0].start for part in tables._groups(swept(TABLE, 4).parts)] == [12, 12]
     file = pq.ParquetFile(written(".parquet", TABLE, tmp_path, 4))
     assert [file.metadata.row_group(group).num_rows for group in range(file.metadata.num_row_groups)] == [12, 12]

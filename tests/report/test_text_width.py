@@ -8,7 +8,7 @@ from bisar_budget.mission.load import load_mission
 from bisar_budget.report import Style
 from bisar_budget.report.explain.explanation import explain
 from bisar_budget.report.formats.verification import as_text
-from bisar_budget.report.words.sentences import WIDTH, table
+from bisar_budget.report.words.sentences import TEXT_WIDTH, table
 from tests.conftest import ROOT, TODAY, findings, mission_text
 
 NAME = "A mission whose name alone is longer than a line of a terminal was ever meant to be, with aircraft"
@@ -39,7 +39,7 @@ def too_long(text: str) -> list[str]:
     """Lines beyond 80 columns that could have been broken: a path or an id stays whole, with the status before it."""
     starts = ("ERROR ", "FAIL ", "NOT EVAL ", "WARN ", "pass AF ", "pass ")
     lines = [next((line.removeprefix(s) for s in starts if line.startswith(s)), line) for line in text.splitlines()]
-    return [line for line in lines if len(line) > WIDTH and " " in line.strip()]
+    return [line for line in lines if len(line) > TEXT_WIDTH and " " in line.strip()]
 
 
 @pytest.fixture

@@ -130,9 +130,9 @@ class TestWhatIsDrawn:
         rows[3:6, 3:9] = "square"
         ring, square = regions(rows)
         assert (ring.row, square.row) == ("ring", "square")
-        assert rows[ring.place] == "ring"
-        assert square.place[0] == 4
-        assert square.place[1] in (5, 6)
+        assert rows[ring.cell] == "ring"
+        assert square.cell[0] == 4
+        assert square.cell[1] in (5, 6)
         assert square.size == (3, 6)
 
     def test_parts_of_one_row_that_are_apart_have_a_name_each(self) -> None:
@@ -144,7 +144,7 @@ class TestWhatIsDrawn:
     def test_places_are_in_their_regions(self, first: int, second: int, seed: int) -> None:
         rows = np.random.default_rng(seed).choice(["a", "b"], (first, second)).astype(object)
         for region in regions(rows):
-            assert rows[region.place] == region.row
+            assert rows[region.cell] == region.row
             assert 1 <= region.size[0] <= first
             assert 1 <= region.size[1] <= second
 

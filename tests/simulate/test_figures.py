@@ -194,7 +194,7 @@ class TestPictures:
         look = moved.look_azimuth
         across = -math.sin(look) * want[0] + math.cos(look) * want[1]
         clean = drawn.cuts[0]
-        assert clean.places[np.argmax(clean.levels)] == pytest.approx(across, abs=0.02)
+        assert clean.positions[np.argmax(clean.levels_db)] == pytest.approx(across, abs=0.02)
 
     def test_rotated_back_is_the_image_without_error(self) -> None:
         """Autofocus in (x′, y′), then back to (x, y): within 3 % of the image that never had the error."""

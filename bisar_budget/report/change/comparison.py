@@ -1,4 +1,4 @@
-"""Effects of a change on missions: what goes in, what it loosens, how much of each limit it erodes, and a gate."""
+"""Effects of a change on missions: changed inputs, loosened rules, erosion of each margin, and a gate."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -21,24 +21,24 @@ from bisar_budget.report.words.sentences import dotted, percent
 from bisar_budget.settings import TABLE
 
 
-# ---------------------------------------------------------------------- what goes in
+# ---------------------------------------------------------------------- inputs
 class Moved(NamedTuple):
-    """A value before and after: of a key as the files write it, or of the geometry; None where there is none."""
+    """A value before and after: text of a key in the file, or a number of the geometry; None for a missing value."""
 
     name: str
-    unit: str  # of a number; empty: text
+    unit: str  # of a number; empty for a text
     before: str | float | None
     after: str | float | None
 
 
 def moved_inputs(before: Mission, after: Mission) -> Iterator[Moved]:
-    """Keys that the files write differently and mean differently: `31 km` is 31000 m."""
-    old, new = written(before), written(after)
+    """Keys whose values differ. Different spellings of one value, such as `31 km` and `31000 m`, are equal."""
+    old, new = texts_of_file(before), texts_of_file(after)
     for path in {**old, **new}:
         if old.get(path) == new.get(path):
             continue
-        meant = [_value(mission, path) for mission in (before, after)]
-        if path in old and path in new and meant[0] is not None and meant[0] == meant[1]:
+        values = [_value(mission, path) for mission in (before, after)]
+        if path in old and path in new and values[0] is not None and values[0] == values[1]:
             continue
         yield Moved(dotted(path), "", old.get(path), new.get(path))
     for name in PLATFORMS:
@@ -46,31 +46,34 @@ def moved_inputs(before: Mission, after: Mission) -> Iterator[Moved]:
         if None not in files and files[0].file == files[1].file and files[0].sha256 != files[1].sha256:
             contents = [file.sha256 and file.sha256[:12] for file in files]
             yield Moved(f"platforms.{name}: content of {files[1].file}", "", *contents)
-        before_, after_ = ({} if file is None else file.beside for file in files)
-        for said in before_.keys() & after_.keys():
-            old_one, new_one = before_[said], after_[said]
-            if old_one and new_one and old_one[0] == new_one[0] and old_one[1] != new_one[1]:
-                contents = [digest[:12] for _, digest in (old_one, new_one)]
-                yield Moved(f"platforms.{name}: content of {new_one[0]}", "", *contents)
+        old_files, new_files = ({} if file is None else file.beside for file in files)
+        for kind in old_files.keys() & new_files.keys():
+            old_file, new_file = old_files[kind], new_files[kind]
+            if old_file and new_file and old_file[0] == new_file[0] and old_file[1] != new_file[1]:
+                contents = [digest[:12] for _, digest in (old_file, new_file)]
+                yield Moved(f"platforms.{name}: content of {new_file[0]}", "", *contents)
 
 
-def written(mission: Mission) -> dict[KeyPath, str]:
-    """Values as the file writes them, or a part that it names, by path; a list of plain values is one."""
+def texts_of_file(mission: Mission) -> dict[KeyPath, str]:
+    """Texts of the values of a mission file by path. A list of plain values is one text.
+
+    Values that the file takes from a part of the catalogue have the name of the part.
+    """
     texts = {
         path: event.value for path, event in mission.places.items() if isinstance(getattr(event, "value", None), str)
     }
-    for taken in mission.taken:
-        texts[tuple(taken.key.split("."))] = f"{figure_text(taken.value)} (part {taken.part})"
+    for figure in mission.taken:
+        texts[tuple(figure.key.split("."))] = f"{figure_text(figure.value)} (part {figure.part})"
     texts |= dict(_set_values(mission))
     lists: dict[KeyPath, list[str]] = {}
     elements = [path for path in texts if isinstance(path[-1], int)]
-    for path in sorted(elements, key=lambda path: int(path[-1])):  # an element that was set stands last
+    for path in sorted(elements, key=lambda path: int(path[-1])):  # an element that was set by an option is last
         lists.setdefault(path[:-1], []).append(texts.pop(path))
     return texts | {path: f"[{', '.join(items)}]" for path, items in lists.items()}
 
 
 def _set_values(mission: Mission) -> Iterator[tuple[KeyPath, str]]:
-    """Values that options put into it, by path; below a key that is new, by the path that the option named."""
+    """Values that options put into a mission, by path. Below a new key the path is that of the option."""
     changed = {".".join(map(str, path)): path for path, event in mission.places.items() if isinstance(event, Changed)}
     for change in mission.changes:
         parts = parts_of(change.key)
@@ -78,28 +81,28 @@ def _set_values(mission: Mission) -> Iterator[tuple[KeyPath, str]]:
 
 
 def _value(mission: Mission, path: KeyPath) -> Any:
-    """The value at a path; None where the mission has no such attribute."""
+    """The value at a path; None if the mission has no such attribute."""
     value: Any = mission
-    for part in path:
+    for key in path:
         if isinstance(value, Mapping):
-            value = value.get(part)
-        elif isinstance(part, int):
-            value = value[part] if isinstance(value, tuple) and part < len(value) else None
+            value = value.get(key)
+        elif isinstance(key, int):
+            value = value[key] if isinstance(value, tuple) and key < len(value) else None
         else:
-            value = getattr(value, part, None)
+            value = getattr(value, key, None)
     return value
 
 
 def moved_geometry(before: MissionFindings, after: MissionFindings) -> Iterator[Moved]:
-    """Numbers of the collection that differ by more than rounding."""
+    """Numbers of the collection geometry that differ by more than rounding."""
     for (name, unit, old), (_, _, new) in zip(_numbers(before), _numbers(after), strict=True):
-        is_same = old == new or (old is not None and new is not None and math.isclose(old, new, rel_tol=1e-9))
-        if not is_same:
+        is_unchanged = old == new or (old is not None and new is not None and math.isclose(old, new, rel_tol=1e-9))
+        if not is_unchanged:
             yield Moved(name, unit, old, new)
 
 
-def _numbers(found: MissionFindings) -> Iterator[tuple[str, str, float | None]]:
-    geometry = found.geometry
+def _numbers(findings: MissionFindings) -> Iterator[tuple[str, str, float | None]]:
+    geometry = findings.geometry
     for name, state in (("transmitter", geometry.transmitter), ("receiver", geometry.receiver)):
         yield f"{name} slant range", "m", state.slant_range
         yield f"{name} azimuth", "deg", math.degrees(state.azimuth)
@@ -108,28 +111,32 @@ def _numbers(found: MissionFindings) -> Iterator[tuple[str, str, float | None]]:
     yield "bistatic angle", "deg", math.degrees(geometry.bistatic_angle)
     yield "look azimuth", "deg", math.degrees(geometry.look_azimuth)
     yield "angle between range and Doppler gradients", "deg", math.degrees(geometry.gradient_angle)
-    yield "range resolution", "m", found.resolution.range
-    yield "cross-range resolution", "m", found.resolution.cross_range
+    yield "range resolution", "m", findings.resolution.range
+    yield "cross-range resolution", "m", findings.resolution.cross_range
 
 
-# ---------------------------------------------------------------------- what is looser
-_COMPUTED = (
+# ---------------------------------------------------------------------- loosened rules
+_COMPUTED_KINDS = (
     "oscillator",
     "spatial_variance",
     "dispersion",
-)  # the file states no such number: a zero is a result, as a level is
-# Each asks for more than the one before it.
+)  # kinds of rows with a computed size, so that a zero is a result
+# Rules in the order of their strictness, the strictest last.
 _RULES = {"combine": ("each", "rss", "sum"), "model": GATING_MODELS}
 
 _WIDEST_FIRST = ("normal", "bound", "uniform")
-_NAMED = ("other", "random")  # kinds of error of which a file may state several, each with a name
-_NUMBERS = (("autofocus", "n_pull", 1), ("allocation", "coverage_factor", -1), ("allocation", "warn_above", 1))
+_NAMED_KINDS = ("other", "random")  # kinds of error that a file may state several times, each with a name
+_LIMITING_NUMBERS = (
+    ("autofocus", "n_pull", 1),
+    ("allocation", "coverage_factor", -1),
+    ("allocation", "warn_above", 1),
+)
 
 
 class Loosened(NamedTuple):
-    """One thing that holds a mission less than before: its id for `--allow`, and how it was and is.
+    """A rule or declaration that is looser than before, in words before and after.
 
-    The id is a key of the mission file, the id of a row, or the kind of an error.
+    The id, for `--allow`, is a key of the mission file, the id of a row, or the kind of an error.
     """
 
     id: str
@@ -138,12 +145,12 @@ class Loosened(NamedTuple):
 
     @property
     def words(self) -> str:
-        """The change in words, before and after, for a gate that refuses it."""
+        """Before and after in one sentence, for a gate that refuses the change."""
         return f"{self.before} -> {self.after}"
 
 
 def loosenings(before: MissionFindings, after: MissionFindings) -> Iterator[Loosened]:
-    """List what the second of two findings holds less than the first; both carry their mission."""
+    """Rules and declarations that are looser in the later findings. Both findings carry their mission."""
     missions = (before.analysed().mission, after.analysed().mission)
     yield from _looser_requirements(*missions)
     yield from _looser_specifications(*missions)
@@ -151,61 +158,63 @@ def loosenings(before: MissionFindings, after: MissionFindings) -> Iterator[Loos
     yield from _rules(before, after)
     yield from _waivers(*missions)
     yield from _waived_rows(before, after)
-    gone = list(_errors(before, after))
-    yield from gone
+    gone_errors = list(_errors(before, after))
+    yield from gone_errors
     yield from _distributions(*missions)
-    yield from _fallen(before, after, [one.id for one in gone])
-    yield from (Loosened(*lost) for lost in lost_doubts(*missions))
+    yield from _fallen(before, after, [error.id for error in gone_errors])
+    yield from (Loosened(*doubt) for doubt in lost_doubts(*missions))
     yield from _sources(before, after)
 
 
 def loosened_settings(before: Mapping[str, Any], after: Mapping[str, Any]) -> Iterator[Loosened]:
-    """List what the settings of a project hold less than before: `strict` that is gone, `exit-zero` that came."""
-    for key, holds in (("strict", True), ("exit-zero", False)):
+    """Settings of a project that are looser than before: `strict` removed, or `exit-zero` added."""
+    for key, strict_value in (("strict", True), ("exit-zero", False)):
         old, new = (values.get(key, False) for values in (before, after))
-        if old is holds and new is not holds:
-            yield Loosened(f"{TABLE}.{key}", *("true" if one else "false" for one in (old, new)))
+        if old is strict_value and new is not strict_value:
+            yield Loosened(f"{TABLE}.{key}", *("true" if value else "false" for value in (old, new)))
 
 
 def _looser_requirements(before: Mission, after: Mission) -> Iterator[Loosened]:
-    """Requirements that are gone or larger."""
+    """Requirements that were removed or have a larger value."""
     for key in Requirements._fields:
         old, new = (getattr(mission.requirements, key) for mission in (before, after))
         if key != "declare" and old is not None and (new is None or _is_above(new, old)):
             path = ("requirements", key)
-            yield Loosened(dotted(path), _said(before, path, old), _said(after, path, new))
+            yield Loosened(dotted(path), _value_text(before, path, old), _value_text(after, path, new))
 
 
 def _looser_specifications(before: Mission, after: Mission) -> Iterator[Loosened]:
-    """Specifications that are gone or larger."""
+    """Specifications that were removed or have a larger value."""
     for key, old in before.specifications.items():
         path, new = ("specifications", key), after.specifications.get(key)
         if old.value is not None and (new is None or new.value is None or _is_above(new.value, old.value)):
-            yield Loosened(dotted(path), _said(before, path, old.value), _said(after, path, new and new.value))
+            yield Loosened(
+                dotted(path), _value_text(before, path, old.value), _value_text(after, path, new and new.value)
+            )
 
 
 def _declarations(before: Mission, after: Mission) -> Iterator[Loosened]:
-    """Errors that the file has to declare no more, by the words that asked for them."""
-    still = {one for asked in after.requirements.declare for one in _owned(asked)}
-    for asked in before.requirements.declare:
-        left = still.intersection(_owned(asked))
-        if len(left) < len(_owned(asked)):
-            yield Loosened(f"requirements.declare.{asked}", asked, ", ".join(sorted(left)) or "none")
+    """Words of `requirements.declare` whose errors need no longer be declared, or not all of them."""
+    later_kinds = {kind for word in after.requirements.declare for kind in _owned(word)}
+    for word in before.requirements.declare:
+        kept = later_kinds.intersection(_owned(word))
+        if len(kept) < len(_owned(word)):
+            yield Loosened(f"requirements.declare.{word}", word, ", ".join(sorted(kept)) or "none")
 
 
-def _owned(asked: str) -> list[str]:
-    """Kinds that a word of `declare` asks for, with their platform."""
-    return [asked] if "." in asked or asked == "timing" else [f"{name}.{asked}" for name in PLATFORMS]
+def _owned(word: str) -> list[str]:
+    """Kinds of error that a word of `declare` requires, with their platform."""
+    return [word] if "." in word or word == "timing" else [f"{name}.{word}" for name in PLATFORMS]
 
 
 def _rules(before: MissionFindings, after: MissionFindings) -> Iterator[Loosened]:
-    """Autofocus, coverage, reserve, model and combination that ask for less."""
+    """Looser values of autofocus, coverage factor, warning threshold, shares, model and combination."""
     missions = (before.analysed().mission, after.analysed().mission)
-    for section, key, sign in _NUMBERS:
+    for section, key, sign in _LIMITING_NUMBERS:
         old, new = (getattr(getattr(mission, section), key) for mission in missions)
         if new is not None and (old is None or _is_above(sign * new, sign * old)):
             path = (section, key)
-            yield Loosened(dotted(path), _said(missions[0], path, old), _said(missions[1], path, new))
+            yield Loosened(dotted(path), _value_text(missions[0], path, old), _value_text(missions[1], path, new))
     if missions[0].allocation.split != missions[1].allocation.split:
         yield from _shares(before, after)
     words = {"combine": (before.combine, after.combine), "model": (before.model, after.model)}
@@ -215,48 +224,48 @@ def _rules(before: MissionFindings, after: MissionFindings) -> Iterator[Loosened
 
 
 def _shares(before: MissionFindings, after: MissionFindings) -> Iterator[Loosened]:
-    """Reserves that are smaller, and shares that grow by more than their reserve gave."""
+    """Smaller reserves, and shares that grow by more than the decrease of the reserve."""
     for metric, key in (("qpe", "quadratic_phase_error"), ("pslr", "pslr"), ("islr", "islr")):
-        old, new = (getattr(found.allocation, metric) for found in (before, after))
+        old, new = (getattr(findings.allocation, metric) for findings in (before, after))
         if _is_above(old.reserve, new.reserve):
             yield Loosened(f"allocation.split.{key}.reserve", f"{old.reserve:.4g}", f"{new.reserve:.4g}")
-        given = max(0.0, old.reserve - new.reserve)
+        released = max(0.0, old.reserve - new.reserve)
         for owner in PLATFORMS if new.clock is None else (*PLATFORMS, "clock"):
-            if _is_above(new.of(owner), old.of(owner) + given):
+            if _is_above(new.of(owner), old.of(owner) + released):
                 yield Loosened(f"allocation.split.{key}.{owner}", f"{old.of(owner):.4g}", f"{new.of(owner):.4g}")
 
 
 def _waivers(before: Mission, after: Mission) -> Iterator[Loosened]:
-    """Waivers that are new, last longer, or name more rows."""
+    """Waivers that are new, last longer, or cover more rows."""
     for waiver in after.waivers:
-        covering = [one for one in before.waivers if _names_as_much(one, waiver)]
-        if not any(one.until >= waiver.until for one in covering):
-            was = max((one.until for one in covering), default=None)
-            old = "not waived" if was is None else f"waived until {was.isoformat()}"
+        covering = [earlier for earlier in before.waivers if _names_as_much(earlier, waiver)]
+        if not any(earlier.until >= waiver.until for earlier in covering):
+            until = max((earlier.until for earlier in covering), default=None)
+            old = "not waived" if until is None else f"waived until {until.isoformat()}"
             yield Loosened(waiver.id, old, f"waived until {waiver.until.isoformat()}")
 
 
 def _names_as_much(old: Waiver, new: Waiver) -> bool:
-    """Whether an earlier waiver names every row that one names; of a pattern in brackets nothing is said."""
+    """Whether an earlier waiver covers every row of a new waiver; False for different patterns in brackets."""
     is_one_row = not any(char in new.id for char in "*?[")
-    # A star of the old one takes wildcards of the new one too, and what stands beside the star is in both.
-    is_part = "[" not in new.id and not any(char in old.id for char in "?[")
-    return old.id == new.id or ((is_one_row or is_part) and fnmatchcase(new.id, old.id))
+    # A star of the old pattern also matches wildcards of the new pattern; the text beside the star is in both.
+    is_narrower = "[" not in new.id and not any(char in old.id for char in "?[")
+    return old.id == new.id or ((is_one_row or is_narrower) and fnmatchcase(new.id, old.id))
 
 
 def _waived_rows(before: MissionFindings, after: MissionFindings) -> Iterator[Loosened]:
-    """Rows and requirements that a waiver keeps from failing, and did not."""
-    named = {waiver.id for waiver in _waivers(before.analysed().mission, after.analysed().mission)}
-    for of in ("rows", "requirements"):
-        old: Mapping[str, Any] = {one.id: one for one in getattr(before, of)}
-        for one in getattr(after, of):
-            was = old[one.id].status if one.id in old else "none"
-            if one.status == "waived" != was and one.id not in named:
-                yield Loosened(one.id, was.replace("_", " "), "waived")
+    """Rows and requirements that are waived and were not."""
+    named_ids = {waiver.id for waiver in _waivers(before.analysed().mission, after.analysed().mission)}
+    for collection in ("rows", "requirements"):
+        old: Mapping[str, Any] = {item.id: item for item in getattr(before, collection)}
+        for item in getattr(after, collection):
+            old_status = old[item.id].status if item.id in old else "none"
+            if item.status == "waived" != old_status and item.id not in named_ids:
+                yield Loosened(item.id, old_status.replace("_", " "), "waived")
 
 
 def _errors(before: MissionFindings, after: MissionFindings) -> Iterator[Loosened]:
-    """Errors that the file declares no more, or as zero; of motion along whatever axes."""
+    """Errors that are no longer declared, or declared as zero. Axes of a motion error count together."""
     old, new = _declared(before), _declared(after)
     stated = (row for row in before.rows if row.declared is not None and row.is_independent)
     for name in dict.fromkeys(_error(row) for row in stated if row.subject.kind not in SUMS):
@@ -266,15 +275,15 @@ def _errors(before: MissionFindings, after: MissionFindings) -> Iterator[Loosene
             yield Loosened(name, "declared", "zero")
 
 
-def _fallen(before: MissionFindings, after: MissionFindings, gone: Sequence[str]) -> Iterator[Loosened]:
-    """Rows whose declared effect fell; an error that is `gone` is named already."""
+def _fallen(before: MissionFindings, after: MissionFindings, gone_errors: Sequence[str]) -> Iterator[Loosened]:
+    """Rows whose declared effect fell, except those of `gone_errors`, which are listed already."""
     for fall in fallen_effects(before, after):
-        if not any(fall.id == name or fall.id.startswith(f"{name}.") for name in gone):
+        if not any(fall.id == name or fall.id.startswith(f"{name}.") for name in gone_errors):
             yield Loosened(fall.id, *fall.words)
 
 
 def _distributions(before: Mission, after: Mission) -> Iterator[Loosened]:
-    """Distributions that are narrower for the same values: a bound is never exceeded, one sigma is."""
+    """Narrower distributions. For the same value a normal distribution is the widest, a uniform the narrowest."""
     sections = [
         (f"platforms.{name}.motion_error", attrgetter(f"platforms.{name}.motion_error")) for name in PLATFORMS
     ]
@@ -284,34 +293,38 @@ def _distributions(before: Mission, after: Mission) -> Iterator[Loosened]:
             yield Loosened(f"{key}.distribution", old, new)
 
 
-def _declared(found: MissionFindings) -> dict[str, bool]:
-    """Errors that a file declares, and whether as more than zero along any axis."""
-    declared: dict[str, bool] = {}
-    for row in found.rows:
+def _declared(findings: MissionFindings) -> dict[str, bool]:
+    """Errors that a file declares, each with whether it is larger than zero along any axis."""
+    is_declared: dict[str, bool] = {}
+    for row in findings.rows:
         if row.declared is not None:
             name = _error(row)
-            is_more = row.declared != 0 or row.unit == "dB" or row.subject.kind in _COMPUTED
-            declared[name] = declared.get(name, False) or is_more
-    return declared
+            is_more = row.declared != 0 or row.unit == "dB" or row.subject.kind in _COMPUTED_KINDS
+            is_declared[name] = is_declared.get(name, False) or is_more
+    return is_declared
 
 
 def _error(row: Row) -> str:
-    """Name of the error that a row is about, without its axis."""
+    """Name of the error of a row, without its axis."""
     return row.id.rpartition(".")[0] if row.subject.kind in MOTION else row.id
 
 
 def _sources(before: MissionFindings, after: MissionFindings) -> Iterator[Loosened]:
-    """Kinds of error that state their source no more; of those with a name each by its own."""
-    had = set(before.kinds.declared) - set(before.kinds.without_source)
-    gone = [kind for kind in after.kinds.without_source if kind in had and kind.rpartition(".")[2] not in _NAMED]
-    old, new = (_named_sources(found.analysed().mission) for found in (before, after))
-    gone += [name for name, source in new.items() if old.get(name) and not source]
-    for name in gone:
+    """Kinds of error without a source that had one. Errors with a name are listed each by its name."""
+    had_source = set(before.kinds.declared) - set(before.kinds.without_source)
+    lost = [
+        kind
+        for kind in after.kinds.without_source
+        if kind in had_source and kind.rpartition(".")[2] not in _NAMED_KINDS
+    ]
+    old, new = (_named_sources(findings.analysed().mission) for findings in (before, after))
+    lost += [name for name, source in new.items() if old.get(name) and not source]
+    for name in lost:
         yield Loosened(f"{name}.source", "stated", "none")
 
 
 def _named_sources(mission: Mission) -> dict[str, str | None]:
-    """Source of each error that has a name of its own, by the id of its row."""
+    """Source of each named error, by the id of its row."""
     sources = {row_id: one.source for one in mission.other_errors for row_id in one.stated}
     for platform in PLATFORMS:
         error = getattr(mission.platforms, platform).motion_error
@@ -323,24 +336,24 @@ def _named_sources(mission: Mission) -> dict[str, str | None]:
     return sources
 
 
-def _is_above(one: float, other: float) -> bool:
-    """Whether by more than reading the same value from another unit makes."""
-    return one > other and not math.isclose(one, other, rel_tol=1e-9)
+def _is_above(value: float, limit: float) -> bool:
+    """Whether a value exceeds a limit by more than rounding in a conversion of units."""
+    return value > limit and not math.isclose(value, limit, rel_tol=1e-9)
 
 
-def _said(mission: Mission, path: tuple[str, ...], value: float | None) -> str:
+def _value_text(mission: Mission, path: tuple[str, ...], value: float | None) -> str:
     if value is None:
         return "none"
     default = f"{math.degrees(value):g} deg" if path[-1] == "quadratic_phase_error" else f"{value:g}"
-    return written(mission).get(path, f"{default} (default)")
+    return texts_of_file(mission).get(path, f"{default} (default)")
 
 
-# ---------------------------------------------------------------------- what comes out
-SMALL = 0.01  # a row that moves by less than this part tells a reader nothing
+# ---------------------------------------------------------------------- results
+SMALL_FRACTION = 0.01  # changes of a row below this fraction are not shown
 
 
 class Change(NamedTuple):
-    """One row before and after; None where the mission has no such row."""
+    """One row before and after; None if the mission has no such row."""
 
     id: str
     before: Row | None
@@ -348,30 +361,30 @@ class Change(NamedTuple):
 
     @property
     def use(self) -> tuple[float, float]:
-        """Part of the limit that is used before and after; what is not declared uses nothing."""
+        """Utilization before and after; 0 for a row that is not declared."""
         before, after = (row.utilization or 0.0 if row else 0.0 for row in (self.before, self.after))
         return before, after
 
     @property
     def erosion(self) -> float:
-        """Part of what was left of the limit that the change uses up, (u₂ − u₁)/(1 − u₁); negative is a gain.
+        """Fraction of the margin that the change uses up, (u₂ − u₁)/(1 − u₁); negative for a gain.
 
-        1 uses up everything. For a row that had nothing left, the relative growth of its use, u₂/u₁ − 1.
+        At 1 the margin is used up. For a row without a margin, the relative growth of its use, u₂/u₁ − 1.
         """
         before, after = self.use
         if before == after:
             return 0.0
-        left = 1 - before
-        return (after - before) / left if left > UTILIZATION_TOLERANCE else after / before - 1
+        remaining = 1 - before
+        return (after - before) / remaining if remaining > UTILIZATION_TOLERANCE else after / before - 1
 
     @property
     def is_newly_failing(self) -> bool:
-        """Whether it fails, or is not evaluated, now and was not."""
+        """Whether the row newly fails or is newly not evaluated."""
         return _is_newly_broken(_status(self.before), _status(self.after))
 
     @property
     def words(self) -> str:
-        """The effect on the limit in words, for a gate that refuses it."""
+        """The effect on the margin in words, for a gate that refuses it."""
         if self.is_newly_failing:
             return _worse(_status(self.after))
         before, after = self.use
@@ -381,21 +394,21 @@ class Change(NamedTuple):
 
     @property
     def is_change(self) -> bool:
-        """Whether anything that is reported differs; that it moved to another line does not count."""
+        """Whether a reported value differs. The line in the file does not count."""
         return _reported(self.before) != _reported(self.after)
 
     @property
     def is_small(self) -> bool:
-        """Whether status and requirement stay, and declared, allowable and what is left move by less than 1 %."""
+        """Whether the status stays, and declared value, allowable and margin change by less than 1 %."""
         before, after = self.before, self.after
-        if before is None or after is None or before.status != after.status or abs(self.erosion) >= SMALL:
+        if before is None or after is None or before.status != after.status or abs(self.erosion) >= SMALL_FRACTION:
             return False
         return _is_near(before.declared, after.declared) and _is_near(before.allowable, after.allowable)
 
     def breaks(self, tolerated: float) -> bool:
-        """Whether it newly fails, or a row that is judged loses more than the tolerated part of what was left.
+        """Whether the row newly fails, or a judged row loses more than the tolerated fraction of its margin.
 
-        So does one that a waiver keeps from failing, before as after: it was granted for the row as it stood.
+        A row that is waived before and after counts as judged: the waiver was granted for its earlier value.
         """
         is_judged = self.after is not None and STATUS[self.after.status].is_held
         is_judged = is_judged or _status(self.before) == _status(self.after) == "waived"
@@ -403,7 +416,7 @@ class Change(NamedTuple):
 
 
 class RequirementMove(NamedTuple):
-    """Statuses of a requirement before and after; None where the mission has no such requirement."""
+    """Statuses of a requirement before and after; None if the mission has no such requirement."""
 
     key: str
     name: str
@@ -412,17 +425,17 @@ class RequirementMove(NamedTuple):
 
     @property
     def id(self) -> str:
-        """Its name in waivers and reports."""
+        """Id of the requirement in waivers and reports."""
         return f"mission.{self.key}"
 
     @property
     def is_newly_failing(self) -> bool:
-        """Whether it is not met, or not evaluated, now and was not."""
+        """Whether the requirement is newly not met or newly not evaluated."""
         return _is_newly_broken(self.before, self.after)
 
 
 class Refusal(NamedTuple):
-    """One thing that a gate refuses: its id, what it does, and whether `--allow` lets it through."""
+    """A change that a gate refuses: its id, its effect in words, and whether `--allow` lets it through."""
 
     id: str
     words: str
@@ -430,27 +443,30 @@ class Refusal(NamedTuple):
 
 
 class Gate(NamedTuple):
-    """A gate: the part of what was left of a limit that a change may use up, and the ids that it lets through."""
+    """A gate: the fraction of a margin that a change may use up, and the ids that it lets through."""
 
     tolerated: float
     allowed: tuple[str, ...] = ()
 
     def only(self, allowed: str) -> "Gate":
-        """The same with one id let through."""
+        """The gate with only one id let through."""
         return self._replace(allowed=(allowed,))
 
     def refusal(self, id: str, words: str, file: str) -> Refusal:
-        """Refuse, or let through: the id, or the id behind the file and a colon, may be named or match a pattern."""
+        """Refusal of a change, let through if `id` or `file:id` is named or matches a pattern of `allowed`."""
         names = (id, f"{file}:{id}")
         return Refusal(
-            id, words, any(name == one or fnmatchcase(name, one) for one in self.allowed for name in names)
+            id,
+            words,
+            any(name == pattern or fnmatchcase(name, pattern) for pattern in self.allowed for name in names),
         )
 
 
 class MissionChange(NamedTuple):
-    """A mission before and after; changes have the largest erosion first. `inputs` are keys of the mission file.
+    """A mission before and after.
 
-    `requirements` are those that stand otherwise now, `loosened` what holds the mission less than before.
+    `changes` are sorted by erosion, the largest first. `inputs` are changed keys of the mission file, `requirements`
+    those with another status, `loosened` the looser rules and declarations.
     """
 
     before: MissionFindings
@@ -463,20 +479,20 @@ class MissionChange(NamedTuple):
     loosened: tuple[Loosened, ...] = ()
 
     def broken(self, tolerated: float) -> list[Change]:
-        """List the rows that a gate refuses."""
+        """Changes of rows that a gate refuses."""
         return [change for change in self.changes if change.breaks(tolerated)]
 
     def refusals(self, gate: Gate) -> list[Refusal]:
-        """List what a gate refuses, and what of it is let through: rows, requirements, and what is loosened."""
+        """Refused rows, requirements and loosened rules, including those that the gate lets through."""
         return [gate.refusal(id, words, self.after.file) for id, words in self._refused(gate.tolerated)]
 
     def _refused(self, tolerated: float) -> Iterator[tuple[str, str]]:
         broken = self.broken(tolerated)
         for change in broken:
             yield change.id, change.words
-        for one in self.requirements:
-            if one.is_newly_failing and one.id not in [change.id for change in broken]:
-                yield one.id, _worse(one.after)
+        for requirement in self.requirements:
+            if requirement.is_newly_failing and requirement.id not in [change.id for change in broken]:
+                yield requirement.id, _worse(requirement.after)
         for loosened in self.loosened:
             yield loosened.id, loosened.words
 
@@ -484,8 +500,8 @@ class MissionChange(NamedTuple):
 class ChangeSet(NamedTuple):
     """The effects of a change on all missions of a run.
 
-    `gone` are mission files that the change removes, `new` those that it adds, `settings` what of the project's
-    settings holds less than before, and `outside` files outside of the repository, which have one version.
+    `gone` are mission files that the change removes, `new` those that it adds, `settings` loosened settings of the
+    project, and `outside` files outside of the repository, which have only one version.
     """
 
     missions: tuple[MissionChange, ...]
@@ -495,25 +511,29 @@ class ChangeSet(NamedTuple):
     outside: tuple[str, ...] = ()
 
     def refusals(self, gate: Gate) -> list[Refusal]:
-        """List what a gate refuses that is of no one mission."""
-        gone = [gate.refusal(file, "the mission file is gone", file) for file in self.gone]
-        return gone + [gate.refusal(one.id, one.words, "pyproject.toml") for one in self.settings]
+        """Refusals that belong to no compared mission: removed mission files and loosened settings."""
+        refusals = [gate.refusal(file, "the mission file is gone", file) for file in self.gone]
+        return refusals + [gate.refusal(loosened.id, loosened.words, "pyproject.toml") for loosened in self.settings]
 
     def is_refused(self, gate: Gate) -> bool:
-        """Whether a gate refuses anything that is not let through."""
-        return not all(one.is_allowed for one in self._all(gate))
+        """Whether a gate refuses a change that it does not let through."""
+        return not all(refusal.is_allowed for refusal in self._all(gate))
 
     def unused(self, gate: Gate) -> list[str]:
-        """List what `--allow` names and nothing needs."""
-        return [one for one in gate.allowed if not any(found.is_allowed for found in self._all(gate.only(one)))]
+        """Patterns of `--allow` that let nothing through."""
+        return [
+            pattern
+            for pattern in gate.allowed
+            if not any(refusal.is_allowed for refusal in self._all(gate.only(pattern)))
+        ]
 
     def _all(self, gate: Gate) -> list[Refusal]:
-        return self.refusals(gate) + [one for mission in self.missions for one in mission.refusals(gate)]
+        return self.refusals(gate) + [refusal for mission in self.missions for refusal in mission.refusals(gate)]
 
 
 def compare(before: MissionFindings, after: MissionFindings) -> MissionChange:
-    """Pair the rows of two findings by id."""
-    old, new = ({row.id: row for row in found.rows} for found in (before, after))
+    """Compare two findings of a mission. Rows are paired by id."""
+    old, new = ({row.id: row for row in findings.rows} for findings in (before, after))
     changes = [Change(row_id, old.get(row_id), new.get(row_id)) for row_id in {**old, **new}]
     changed = [change for change in changes if change.is_change]
     changed.sort(key=lambda change: (not change.is_newly_failing, -change.erosion))
@@ -531,16 +551,16 @@ def compare(before: MissionFindings, after: MissionFindings) -> MissionChange:
 
 
 def _requirements(before: MissionFindings, after: MissionFindings) -> Iterator[RequirementMove]:
-    """Requirements that stand otherwise now."""
-    old, new = ({one.key: one for one in found.requirements} for found in (before, after))
-    for key, one in {**old, **new}.items():
-        statuses = [found[key].status if key in found else None for found in (old, new)]
+    """Requirements with another status than before."""
+    old, new = ({each.key: each for each in findings.requirements} for findings in (before, after))
+    for key, requirement in {**old, **new}.items():
+        statuses = [judged[key].status if key in judged else None for judged in (old, new)]
         if statuses[0] != statuses[1]:
-            yield RequirementMove(key, one.name, *statuses)
+            yield RequirementMove(key, requirement.name, *statuses)
 
 
 def _is_newly_broken(before: str | None, after: str | None) -> bool:
-    """Whether what was held is so no more; what could not be judged and fails now is worse too."""
+    """Whether a status became worse: from any other status to fail, or from a judged status to not evaluated."""
     return (after == "fail" != before) or (after == "not_evaluated" and before not in ("fail", "not_evaluated"))
 
 
@@ -551,7 +571,7 @@ def _worse(status: str | None) -> str:
 def _is_near(before: float | None, after: float | None) -> bool:
     if before is None or after is None:
         return before is after
-    return abs(after - before) < SMALL * max(abs(before), abs(after)) or before == after
+    return abs(after - before) < SMALL_FRACTION * max(abs(before), abs(after)) or before == after
 
 
 def _status(row: Row | None) -> str | None:

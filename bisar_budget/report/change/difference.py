@@ -1,7 +1,7 @@
 """Effects of a change on missions, as text, Markdown or JSON `bisar-budget/diff/1`."""
 
 from collections.abc import Iterable, Iterator
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from bisar_budget.faults import printable
 from bisar_budget.findings.row import Row
@@ -29,40 +29,40 @@ from bisar_budget.units import format_quantity
 
 
 def as_text(comparison: ChangeSet, gate: Gate | None, all_rows: bool = False) -> str:
-    """Write what changed, then a table per mission with the largest erosion first, and one summary line each."""
-    parts = [_text(mission, gate, all_rows) for mission in comparison.missions]
-    if refused := _refused_lines(comparison, gate):
-        parts.append(refused)
-    if said := _of_no_mission(comparison, gate):
-        parts.append([line for text in said for line in wrapped(printable(text), "  ")])
-    return "\n\n".join("\n".join(lines) for lines in parts) + "\n"
+    """Write the changes of each mission, a table of its rows with the largest erosion first, and a summary."""
+    blocks = [_text(mission, gate, all_rows) for mission in comparison.missions]
+    if refused_lines := _refused_lines(comparison, gate):
+        blocks.append(refused_lines)
+    if sentences := _run_sentences(comparison, gate):
+        blocks.append([line for text in sentences for line in wrapped(printable(text), "  ")])
+    return "\n\n".join("\n".join(lines) for lines in blocks) + "\n"
 
 
-def _of_no_mission(comparison: ChangeSet, gate: Gate | None) -> list[str]:
-    """Sentences on missions that came and went, on settings, and on what was not compared or not needed."""
+def _run_sentences(comparison: ChangeSet, gate: Gate | None) -> list[str]:
+    """Sentences on new and removed missions, settings, files outside the repository, and unused `--allow`."""
     sentences = [f"{file}: new, there is nothing to compare it with" for file in comparison.new]
     if gate is None:
         sentences += [f"{file}: the mission file is gone" for file in comparison.gone]
-        sentences += [f"{one.id}: {one.words}" for one in comparison.settings]
+        sentences += [f"{loosened.id}: {loosened.words}" for loosened in comparison.settings]
     else:
-        sentences += [f"--allow {one}: lets nothing through" for one in comparison.unused(gate)]
-    outside = "is outside of the repository; before and after it is read as it is now"
-    return sentences + [f"{file} {outside}" for file in comparison.outside]
+        sentences += [f"--allow {pattern}: lets nothing through" for pattern in comparison.unused(gate)]
+    remark = "is outside of the repository; before and after it is read as it is now"
+    return sentences + [f"{file} {remark}" for file in comparison.outside]
 
 
-def _refusals(of: MissionChange | ChangeSet, gate: Gate | None) -> list[Refusal]:
-    return [] if gate is None else of.refusals(gate)
+def _refusals(change: MissionChange | ChangeSet, gate: Gate | None) -> list[Refusal]:
+    return [] if gate is None else change.refusals(gate)
 
 
-class _Said(NamedTuple):
-    """One thing that changed, in words: what it is (`input`), its name, and before -> after, or what is wrong."""
+class _ChangeInWords(NamedTuple):
+    """A change in words: its kind, such as `input`, its name, and "before -> after" or the reason of a refusal."""
 
     kind: str
     name: str
     words: str
 
 
-_TITLES = {
+_TITLE_OF_KIND = {
     "input": "Inputs",
     "geometry": "Geometry",
     "requirement": "Requirements",
@@ -72,39 +72,44 @@ _TITLES = {
 }
 
 
-def _changed(mission: MissionChange, gate: Gate | None) -> Iterator[_Said]:
-    """Changes beside those of rows, in the order of the titles; a gate refuses what is loosened."""
+def _changed(mission: MissionChange, gate: Gate | None) -> Iterator[_ChangeInWords]:
+    """Changes of inputs, geometry and requirements. Loosened rules follow if no gate lists them as refusals."""
     for kind, moves in (("input", mission.inputs), ("geometry", mission.geometry)):
-        yield from (_Said(kind, one.name, f"{_said(one.before, one)} -> {_said(one.after, one)}") for one in moves)
-    for one in mission.requirements:
-        before, after = ("none" if status is None else STATUS[status].text for status in (one.before, one.after))
-        yield _Said("requirement", one.name, f"{before} -> {after}")
+        for move in moves:
+            values = f"{_value_text(move.before, move)} -> {_value_text(move.after, move)}"
+            yield _ChangeInWords(kind, move.name, values)
+    for requirement in mission.requirements:
+        statuses = (requirement.before, requirement.after)
+        before, after = ("none" if status is None else STATUS[status].text for status in statuses)
+        yield _ChangeInWords("requirement", requirement.name, f"{before} -> {after}")
     if gate is None:
-        yield from (_Said("loosened", one.id, one.words) for one in mission.loosened)
+        yield from (_ChangeInWords("loosened", loosened.id, loosened.words) for loosened in mission.loosened)
 
 
-def _refused(of: MissionChange | ChangeSet, gate: Gate | None) -> list[_Said]:
-    """All that a gate refuses, then all that is let through."""
+def _refused(change: MissionChange | ChangeSet, gate: Gate | None) -> list[_ChangeInWords]:
+    """Refusals of a gate, those that it lets through included."""
     kinds = {False: "**refused**", True: "let through by --allow:"}
-    return [_Said(kinds[one.is_allowed], one.id, one.words) for one in _refusals(of, gate)]
+    return [
+        _ChangeInWords(kinds[refusal.is_allowed], refusal.id, refusal.words) for refusal in _refusals(change, gate)
+    ]
 
 
-def _blocks(said: Iterable[_Said]) -> Iterator[list[str]]:
-    """Lines below a title, a block for each kind."""
-    said = list(said)
-    for kind, title in _TITLES.items():
-        texts = [printable(f"  {one.name}: {one.words}") for one in said if one.kind == kind]
+def _blocks(changes: Iterable[_ChangeInWords]) -> Iterator[list[str]]:
+    """Blocks of lines, one for each kind of change, below a title."""
+    changes = list(changes)
+    for kind, title in _TITLE_OF_KIND.items():
+        texts = [printable(f"  {change.name}: {change.words}") for change in changes if change.kind == kind]
         if texts:
             yield [title, *(line for text in texts for line in wrapped(text, "    "))]
 
 
-def _refused_lines(of: MissionChange | ChangeSet, gate: Gate | None) -> list[str]:
-    return [line for block in _blocks(_refused(of, gate)) for line in block]
+def _refused_lines(change: MissionChange | ChangeSet, gate: Gate | None) -> list[str]:
+    return [line for block in _blocks(_refused(change, gate)) for line in block]
 
 
-def _items(said: Iterable[_Said]) -> list[str]:
-    """The same as a list in Markdown."""
-    return [f"- {one.kind} {markdown_text(one.name)}: {_arrows(one.words)}" for one in said]
+def _items(changes: Iterable[_ChangeInWords]) -> list[str]:
+    """Changes as a list in Markdown."""
+    return [f"- {change.kind} {markdown_text(change.name)}: {_arrows(change.words)}" for change in changes]
 
 
 def _arrows(words: str) -> str:
@@ -128,12 +133,12 @@ def _text(mission: MissionChange, gate: Gate | None, all_rows: bool) -> list[str
 
 
 def _shown(mission: MissionChange, gate: Gate | None, all_rows: bool) -> list[Change]:
-    """Changes worth reading: those of 1 % or more, and those that a gate refuses."""
+    """Changes of rows to show: changes of 1 % or more, and those that a gate refuses; or all of them."""
     refused = mission.broken(gate.tolerated) if gate is not None else []
     return [change for change in mission.changes if all_rows or not change.is_small or change in refused]
 
 
-def _said(value: str | float | None, move: Moved) -> str:
+def _value_text(value: str | float | None, move: Moved) -> str:
     if value is None:
         return "none"
     if isinstance(value, str):
@@ -161,13 +166,13 @@ def _summary(mission: MissionChange, gate: Gate | None, all_rows: bool) -> str:
     small = f" ({hidden} by less than 1 %, not shown without --all)" if hidden else ""
     rows = counted(len(mission.changes), "row")
     text = f"{rows} changed{small}, {mission.unchanged} not, {newly} newly failing"
-    if unmet := sum(one.is_newly_failing for one in mission.requirements):
+    if unmet := sum(requirement.is_newly_failing for requirement in mission.requirements):
         text += f"; {counted(unmet, 'requirement')} newly failing"
     if mission.loosened:
         text += f"; {len(mission.loosened)} loosened"
     if gate is not None:
         refusals = mission.refusals(gate)
-        refused = sum(not one.is_allowed for one in refusals)
+        refused = sum(not refusal.is_allowed for refusal in refusals)
         text += f"; {refused} refused"
         if len(refusals) > refused:
             text += f", {len(refusals) - refused} let through by --allow"
@@ -178,7 +183,7 @@ _COLUMNS = ("row", "declared", "allowable", "use before", "use after", "erosion"
 
 
 def as_markdown(comparison: ChangeSet, gate: Gate | None, all_rows: bool = False) -> str:
-    """Write the same for the comment of a pull request, with declared and allowable values."""
+    """Write the changes as Markdown for a comment on a pull request, with declared and allowable values."""
     lines: list[str] = []
     for mission in comparison.missions:
         lines += [f"### {markdown_text(file_words(mission.after))}: {_summary(mission, gate, all_rows)}", ""]
@@ -202,63 +207,66 @@ def as_markdown(comparison: ChangeSet, gate: Gate | None, all_rows: bool = False
             lines.append(markdown_row(cells))
         lines += [""] if changes else []
     lines += _items(_refused(comparison, gate))
-    lines += [f"- {markdown_text(text)}" for text in _of_no_mission(comparison, gate)]
+    lines += [f"- {markdown_text(text)}" for text in _run_sentences(comparison, gate)]
     return "\n".join(lines).rstrip("\n") + "\n"
 
 
 def _values(change: Change, field: str, mission: MissionChange) -> str:
     texts = []
-    for row, found in ((change.before, mission.before), (change.after, mission.after)):
+    for row, findings in ((change.before, mission.before), (change.after, mission.after)):
         value = getattr(row, field, None)
         rounding = "down" if field == "allowable" else "nearest"
-        texts.append("-" if row is None else row_size(value, row, found, rounding))
+        texts.append("-" if row is None else row_size(value, row, findings, rounding))
     return texts[0] if texts[0] == texts[1] else " → ".join(texts)
 
 
 def as_json(comparison: ChangeSet, gate: Gate | None) -> str:
-    """Write the contract; keys may be added, never changed or removed."""
+    """Write `diff/1`. Keys may be added, never changed or removed."""
     content = {
         "tolerated_erosion": None if gate is None else gate.tolerated,
         "allow": [] if gate is None else list(gate.allowed),
         "allow_unused": [] if gate is None else comparison.unused(gate),
         "gone": comparison.gone,
         "new": comparison.new,
-        "settings": [one._asdict() for one in comparison.settings],
+        "settings": [loosened._asdict() for loosened in comparison.settings],
         "outside_repository": comparison.outside,
-        "refused": [_refusal(one) for one in _refusals(comparison, gate)],
+        "refused": [_refusal(refusal) for refusal in _refusals(comparison, gate)],
         "missions": [_mission(mission, gate) for mission in comparison.missions],
     }
     return document_text("bisar-budget/diff/1", content)
 
 
-def _mission(mission: MissionChange, gate: Gate | None) -> dict[str, Any]:
+def _mission(mission: MissionChange, gate: Gate | None) -> dict[str, object]:
     refusals = _refusals(mission, gate)
-    refused = {one.id for one in refusals if not one.is_allowed}
+    refused = {refusal.id for refusal in refusals if not refusal.is_allowed}
     return {
         **{
             name: {
-                "file": found.file,
-                "status": found.status,
-                "waived_by": [waiver.id for waiver in found.waived_by],
-                **outside_item(found),
+                "file": findings.file,
+                "status": findings.status,
+                "waived_by": [waiver.id for waiver in findings.waived_by],
+                **outside_item(findings),
             }
-            for name, found in (("before", mission.before), ("after", mission.after))
+            for name, findings in (("before", mission.before), ("after", mission.after))
         },
         "unchanged": mission.unchanged,
         "inputs": [{"key": move.name, "before": move.before, "after": move.after} for move in mission.inputs],
         "geometry": [move._asdict() for move in mission.geometry],
-        "requirements": [{**one._asdict(), "is_newly_failing": one.is_newly_failing} for one in mission.requirements],
-        "loosened": [one._asdict() for one in mission.loosened],
-        "refused": [_refusal(one) for one in refusals],
+        "requirements": [
+            {**requirement._asdict(), "is_newly_failing": requirement.is_newly_failing}
+            for requirement in mission.requirements
+        ],
+        "loosened": [loosened._asdict() for loosened in mission.loosened],
+        "refused": [_refusal(refusal) for refusal in refusals],
         "rows": [_document(change, change.id in refused) for change in mission.changes],
     }
 
 
-def _refusal(one: Refusal) -> dict[str, Any]:
-    return {"id": one.id, "reason": one.words, "is_allowed": one.is_allowed}
+def _refusal(refusal: Refusal) -> dict[str, object]:
+    return {"id": refusal.id, "reason": refusal.words, "is_allowed": refusal.is_allowed}
 
 
-def _document(change: Change, is_refused: bool) -> dict[str, Any]:
+def _document(change: Change, is_refused: bool) -> dict[str, object]:
     keys = ("status", "declared", "allowable", "utilization", "margin", "line", "requirement_id")
     return {
         "id": change.id,

@@ -1,4 +1,4 @@
-"""The annex of a compliance report: a sweep, images, draws that somebody asked for; with `--detail full` all rows."""
+"""The annex of a compliance report: sweep, images and draws as requested, and all rows with `--detail full`."""
 
 import math
 from collections import Counter
@@ -40,12 +40,12 @@ from bisar_budget.report.drawing.trades import per_word, stretches
 from bisar_budget.report.explain.explanation import chain, collection_chain
 from bisar_budget.report.formats import verification
 from bisar_budget.report.formats.specification_sheet import specified
-from bisar_budget.report.words.requirements import held
+from bisar_budget.report.words.requirements import probability_words
 from bisar_budget.report.words.sentences import BINDING_WORDS, counted, percent, sentence, waived_count
 from bisar_budget.units import format_quantity
 
-_MOST = 20  # lines of the table of a sweep
-_FEW = 6  # words that are listed in a sentence
+_MAX_LISTED_LINES = 20  # of the table of a sweep
+_MAX_LISTED_WORDS = 6  # words of an axis that a sentence lists
 _SOURCED = (
     *(*MOTION_UNITS, "time_tag", "lever_arm", "vibration", "other"),
     *("imu", "random", "trajectory", "oscillator", "synchronization", "propagation"),
@@ -53,17 +53,17 @@ _SOURCED = (
 
 
 def annex(page: Page, *, several: bool) -> list[doc.Chapter]:
-    """The annex of a mission; none where there is nothing beyond the summary."""
-    found = page.found
-    sections = [] if found.study is None else [_studied(page, found.study)]
-    if found.sheet is not None:
+    """The annex of a mission as one chapter; no chapter if there is nothing beyond the summary."""
+    findings = page.findings
+    sections = [] if findings.study is None else [_studied(page, findings.study)]
+    if findings.sheet is not None:
         sections.append(
-            doc.Chapter("Specifications", list(_specified(page, found.sheet)), f"{page.anchor}-specified")
+            doc.Chapter("Specifications", list(_specified(page, findings.sheet)), f"{page.anchor}-specified")
         )
-    if found.verdicts is not None:
+    if findings.verdicts is not None:
         sections.append(doc.Chapter("Image evidence", list(_evidence(page)), f"{page.anchor}-evidence"))
-    if found.monte_carlo is not None:
-        sections.append(doc.Chapter("Monte Carlo", list(_draws(page, found.monte_carlo)), f"{page.anchor}-draws"))
+    if findings.monte_carlo is not None:
+        sections.append(doc.Chapter("Monte Carlo", list(_draws(page, findings.monte_carlo)), f"{page.anchor}-draws"))
     if page.is_full:
         title = "Formulas, with the numbers put in"
         sections += [
@@ -72,61 +72,64 @@ def annex(page: Page, *, several: bool) -> list[doc.Chapter]:
             doc.Chapter(title, list(_formulas(page)), f"{page.anchor}-formulas", short="Formulas"),
         ]
     title = f"Annex: {page.name}" if several else "Annex"
-    whole = doc.Chapter(title, sections, f"{page.anchor}-annex", level=2, style="annex", is_article=True)
-    return [whole] if sections else []
+    chapter = doc.Chapter(title, sections, f"{page.anchor}-annex", level=2, style="annex", is_article=True)
+    return [chapter] if sections else []
 
 
 # ---------------------------------------------------------------------- specifications
 def _specified(page: Page, sheet: SpecificationSheet) -> Iterator[doc.Block]:
-    """The sheet of the errors that the file has specified, and what it declares of them."""
-    outside = sum(one.declared is not None and not one.holds(one.declared) for one in sheet.specifications)
-    silent = sum(one.declared is None and one.ordered is not None for one in sheet.specifications)
-    said = list[str]()
+    """The sheet of the specified errors, with the number of declared sizes that exceed it."""
+    outside = sum(spec.declared is not None and not spec.holds(spec.declared) for spec in sheet.specifications)
+    silent = sum(spec.declared is None and spec.ordered is not None for spec in sheet.specifications)
+    clauses = list[str]()
     if not sheet.broken:
-        said.append(
+        clauses.append(
             f"of what the file declares {counted(outside, 'figure')} {'is' if outside == 1 else 'are'} larger"
         )
-        said += [f"not declared: {silent}"] if silent else []
-    told = "; ".join(["", *said])
-    what = "Sizes that together meet every requirement, of the errors that "
-    yield doc.Paragraph((what, doc.Code("allocation.specify"), f" names{told}."))
+        clauses += [f"not declared: {silent}"] if silent else []
+    suffix = "; ".join(["", *clauses])
+    subject = "Sizes that together meet every requirement, of the errors that "
+    yield doc.Paragraph((subject, doc.Code("allocation.specify"), f" names{suffix}."))
     yield from specified(sheet, f"{page.anchor}-specified")
     yield doc.Paragraph(doc.Code(f"bisar-budget allocate {quote(page.file)}"), "command")
 
 
 # ---------------------------------------------------------------------- a sweep
 def _studied(page: Page, study: TradeStudy) -> doc.Chapter:
-    """The question of a sweep, the command that gives its cases, what was found, drawn and as a table."""
-    found, trade = page.found, study.trade
+    """The question of a sweep, the command that reproduces its cases, and the result as a drawing and a table."""
+    findings, trade = page.findings, study.trade
     by_word = per_word(trade)
     counts, question = _counts(study), _question(trade)
     if len(trade.axes) == 1:
-        listed = list(_stretches(trade))
+        listed_lines = list(_stretches(trade))
         heads = doc.heads("Values", "Status", doc.Head("Worst row", "id"), *doc.numbers("Utilization"))
         caption = "Where it complies, and what binds there: the row that uses most of its limit"
     else:
-        listed = list(_parts(trade, by_word[1] if by_word else {}))
+        listed_lines = list(_binding_lines(trade, by_word[1] if by_word else {}))
         name: doc.Text = doc.Name(by_word[0].key) if by_word else "Worst row"
-        counts_of_waived = ["Waived"] if study.waived else []
-        heads = doc.heads(doc.Head(name, "id"), *doc.numbers("Cases", "Comply", *counts_of_waived, "Utilization"))
+        waived_heads = ["Waived"] if study.waived else []
+        heads = doc.heads(doc.Head(name, "id"), *doc.numbers("Cases", "Comply", *waived_heads, "Utilization"))
         caption = "What binds in how many cases, and how many of them comply"
         caption = "How many cases comply with each" if by_word else caption
-    said = "; ".join(words for _, words in listed[:_MOST]) + (" ..." if len(listed) > _MOST else ".")
+    ellipsis = " ..." if len(listed_lines) > _MAX_LISTED_LINES else "."
+    list_words = "; ".join(words for _, words in listed_lines[:_MAX_LISTED_LINES]) + ellipsis
     title = f"Trade study: {' and '.join(axis.key for axis in trade.axes)}"
-    svg = trade_drawing(trade, study.rows, found.file, f"{title}, {page.name}", f"{question} {counts} {said}")
-    beside: list[doc.Block] = [
+    svg = trade_drawing(
+        trade, study.rows, findings.file, f"{title}, {page.name}", f"{question} {counts} {list_words}"
+    )
+    illustration: list[doc.Block] = [
         doc.Figure(f"{page.number}-study.svg", page.anchor, doc.Name(title), f"{title} of {page.name}", svg)
     ]
-    if listed:
-        lines = [line for line, _ in listed[:_MOST]]
-        beside.append(doc.TextTable(f"Cases of {page.name}", caption, heads, lines))
+    if listed_lines:
+        lines = [line for line, _ in listed_lines[:_MAX_LISTED_LINES]]
+        illustration.append(doc.TextTable(f"Cases of {page.name}", caption, heads, lines))
     blocks: list[doc.Block] = [
         doc.Paragraph(question),
         doc.Paragraph(f"{counts} Each was checked as the mission itself. This writes them as a table:"),
-        doc.Paragraph(doc.Code(_command(found, study, page.file)), "command"),
-        doc.Group("beside", beside),
+        doc.Paragraph(doc.Code(_command(findings, study, page.file)), "command"),
+        doc.Group("beside", illustration),
     ]
-    if hidden := max(len(listed) - _MOST, 0):
+    if hidden := max(len(listed_lines) - _MAX_LISTED_LINES, 0):
         blocks.append(doc.Paragraph(f"Not shown: {counted(hidden, 'more line')}.", "more"))
     return doc.Chapter("Trade study", blocks, f"{page.anchor}-study", style="study")
 
@@ -139,96 +142,96 @@ def _question(trade: Trade) -> str:
 
 
 def _values(axis: Axis) -> str:
-    """Say which values an axis has."""
+    """Values of an axis in words."""
     count = len(axis.values)
     if axis.words:
-        listed = ", ".join(map(printable, axis.words[:_FEW]))
-        return f"{listed} and {count - _FEW} more" if count > _FEW else listed
+        word_list = ", ".join(map(printable, axis.words[:_MAX_LISTED_WORDS]))
+        return f"{word_list} and {count - _MAX_LISTED_WORDS} more" if count > _MAX_LISTED_WORDS else word_list
     steps = " in equal ratios" if axis.is_log else ""
     return f"{count} values{steps} from {_value(axis, 0)} to {_value(axis, -1)}"
 
 
-def _value(axis: Axis, place: int) -> str:
-    return printable(axis.words[place]) if axis.words else f"{axis.values[place]:.5g} {axis.unit}".rstrip()
+def _value(axis: Axis, index: int) -> str:
+    return printable(axis.words[index]) if axis.words else f"{axis.values[index]:.5g} {axis.unit}".rstrip()
 
 
 def _counts(study: TradeStudy) -> str:
     failing = study.cases - study.complying - study.waived - study.missing - study.unevaluated
-    said = [f"{study.cases} cases", f"{study.complying} comply ({percent(study.complying / study.cases)})"]
+    clauses = [f"{study.cases} cases", f"{study.complying} comply ({percent(study.complying / study.cases)})"]
     if study.waived:
-        said.append(waived_count(study.waived, study.waived_by))
+        clauses.append(waived_count(study.waived, study.waived_by))
     if study.unevaluated:
-        said.append(f"{study.unevaluated} not evaluated")
+        clauses.append(f"{study.unevaluated} not evaluated")
     if failing:
-        said.append(f"{failing} break a requirement")
+        clauses.append(f"{failing} break a requirement")
     if study.missing:
-        said.append(f"{study.missing} {'are' if study.missing > 1 else 'is'} no mission")
-    return f"{said[0]}: {', '.join(said[1:])}."
+        clauses.append(f"{study.missing} {'are' if study.missing > 1 else 'is'} no mission")
+    return f"{clauses[0]}: {', '.join(clauses[1:])}."
 
 
-def _command(found: MissionFindings, study: TradeStudy, file: str) -> str:
-    """The command that gives the cases as a table, and a plot."""
-    analysed = found.analysed().mission
+def _command(findings: MissionFindings, study: TradeStudy, file: str) -> str:
+    """The command that writes the cases as a table and a plot."""
+    analysed = findings.analysed().mission
     words = ["bisar-budget sweep", quote(printable(file))]
     words += [f"--vary {quote(printable(text))}" for text in study.asked]
-    words += [changes_words(found.changes)] if found.changes else []
+    words += [changes_words(findings.changes)] if findings.changes else []
     words += [f"--model {study.model}"] if study.model else []
     words += [f"--date {study.day}"] if analysed.waivers else []
     return " ".join([*words, "-o study.csv --plot study.svg"])
 
 
 def _stretches(trade: Trade) -> Iterator[tuple[doc.Line, str]]:
-    """Lines of values in their order, neighbours with one status and one worst row as one; each word by itself.
+    """Lines of a sweep along one axis, each with its sentence.
 
-    Beside each line what it says in words. The requirement that sets the limit stands by the row, unless the name of
-    the row says it.
+    Neighbouring values with the same status and the same worst row share a line; words have a line each. The binding
+    requirement follows the name of the row, unless the name ends with it.
     """
     (axis,) = trade.axes
     status, rows, uses = (trade.values[name] for name in ("status", "worst_row", "utilization"))
     begins = (status[1:] != status[:-1]) | (rows[1:] != rows[:-1]) | bool(axis.words)
     for start, stop in stretches(begins):
-        where = _value(axis, start) + (f" to {_value(axis, stop - 1)}" if stop - 1 > start else "")
+        value_range = _value(axis, start) + (f" to {_value(axis, stop - 1)}" if stop - 1 > start else "")
         row, use, badge = str(rows[start]), _uses(uses[start:stop]), doc.Badge(str(status[start]))
         name: doc.Text = doc.Name(row) if row else "–"
         binding = str(trade.values["binding_requirement"][start])
         if not row.endswith(binding):
             name = (name, doc.Styled("own-id", BINDING_WORDS.get(binding, binding.replace("_", " "))))
-        said = f"{where}: {STATUS[badge.status].words}" + (f", {row} {use}" if row else "")
-        yield (where, badge, name, use), said
+        text = f"{value_range}: {STATUS[badge.status].words}" + (f", {row} {use}" if row else "")
+        yield (value_range, badge, name, use), text
 
 
 def _uses(uses: NDArray[Any]) -> str:
-    """Utilizations from the lowest to the highest."""
-    known = sorted(float(use) for use in uses if math.isfinite(use))
-    if not known:
+    """Range of the finite utilizations, from the lowest to the highest."""
+    finite_uses = sorted(float(use) for use in uses if math.isfinite(use))
+    if not finite_uses:
         return "–"
-    low, high = percent(known[0]), percent(known[-1])
+    low, high = percent(finite_uses[0]), percent(finite_uses[-1])
     return low if low == high else f"{low} to {high}"
 
 
-def _parts(trade: Trade, by_word: Mapping[str, Trade]) -> Iterator[tuple[doc.Line, str]]:
-    """Lines of cases by word, else by row that is the worst somewhere, most cases first; beside each its words."""
-    cases: dict[str, Mapping[str, NDArray[Any]]] = {printable(word): one.values for word, one in by_word.items()}
+def _binding_lines(trade: Trade, by_word: Mapping[str, Trade]) -> Iterator[tuple[doc.Line, str]]:
+    """Lines of a sweep along two axes, each with its sentence: cases by word, or by worst row, most cases first."""
+    cases: dict[str, Mapping[str, NDArray[Any]]] = {printable(word): each.values for word, each in by_word.items()}
     if not by_word:
         values = {name: trade.values[name].ravel() for name in ("status", "worst_row", "utilization")}
         rows = values["worst_row"]
         names, counts = np.unique(rows[rows != ""].astype(str), return_counts=True)
-        for place in np.argsort(-counts, kind="stable").tolist():
-            cases[str(names[place])] = {name: column[rows == names[place]] for name, column in values.items()}
+        for index in np.argsort(-counts, kind="stable").tolist():
+            cases[str(names[index])] = {name: column[rows == names[index]] for name, column in values.items()}
     is_waived = "waived" in trade.statuses
-    for name, of_case in cases.items():
-        statuses = of_case["status"].tolist()
+    for name, case_values in cases.items():
+        statuses = case_values["status"].tolist()
         comply, waived = complying(Counter(statuses)), statuses.count("waived")
-        apart = f", {waived} waived" if waived else ""
+        waived_words = f", {waived} waived" if waived else ""
         numbers = (str(len(statuses)), str(comply), *([str(waived)] if is_waived else []))
-        line: doc.Line = (doc.Name(name), *numbers, _uses(of_case["utilization"]))
-        yield line, f"{name}: {comply} of {len(statuses)} comply{apart}"
+        line: doc.Line = (doc.Name(name), *numbers, _uses(case_values["utilization"]))
+        yield line, f"{name}: {comply} of {len(statuses)} comply{waived_words}"
 
 
 # ---------------------------------------------------------------------- images
 def _evidence(page: Page) -> Iterator[doc.Block]:
-    """Evidence of images about the limits, beside what was predicted."""
-    verdicts = page.found.verdicts or ()
+    """Measurements in images at the limits, beside the predictions."""
+    verdicts = page.findings.verdicts or ()
     yield doc.Paragraph(
         "Each error was set to its limit in data simulated from exact ranges, and the phase was measured in the "
         "image."
@@ -239,14 +242,19 @@ def _evidence(page: Page) -> Iterator[doc.Block]:
         "image shows. Phases in rad.",
         _heads("Limit", "Budget", "Table II", "Full model", "Exact ranges", "Image"),
         [
-            (doc.Name(one.id), verification.limit(one), *verification.numbers(one), doc.Badge(one.verdict))
-            for one in verdicts
+            (
+                doc.Name(verdict.id),
+                verification.limit(verdict),
+                *verification.numbers(verdict),
+                doc.Badge(verdict.verdict),
+            )
+            for verdict in verdicts
         ],
     )
     refocused: list[doc.Line] = [
-        (doc.Name(one.id), *verification.refocused_cells(one)[:4], doc.Badge(one.verdict_autofocus))
-        for one in verdicts
-        if one.verdict_autofocus
+        (doc.Name(verdict.id), *verification.refocused_cells(verdict)[:4], doc.Badge(verdict.verdict_autofocus))
+        for verdict in verdicts
+        if verdict.verdict_autofocus
     ]
     if refocused:
         yield doc.TextTable(
@@ -255,13 +263,13 @@ def _evidence(page: Page) -> Iterator[doc.Block]:
             _heads("Limit", "Budget", "Residual", "Peak loss"),
             refocused,
         )
-    for number, evidence in enumerate(page.found.image_evidence or (), start=1):
+    for number, evidence in enumerate(page.findings.image_evidence or (), start=1):
         yield _images(page, evidence, number)
     remarks: list[list[doc.Text]] = [[f"{sentence(text)}."] for text in verification.geometry_remarks(verdicts)]
-    for one in verdicts:
-        with_autofocus = one.reason_autofocus and f"with autofocus: {one.reason_autofocus}"
-        if reasons := [reason for reason in (one.reason, with_autofocus) if reason]:
-            remarks.append([(doc.Styled("id", doc.Name(one.id)), f": {'; '.join(reasons)}.")])
+    for verdict in verdicts:
+        with_autofocus = verdict.reason_autofocus and f"with autofocus: {verdict.reason_autofocus}"
+        if reasons := [reason for reason in (verdict.reason, with_autofocus) if reason]:
+            remarks.append([(doc.Styled("id", doc.Name(verdict.id)), f": {'; '.join(reasons)}.")])
     if remarks:
         yield doc.Items(remarks)
 
@@ -271,20 +279,20 @@ def _heads(*heads: str) -> list[doc.Head]:
 
 
 def _images(page: Page, evidence: ImageEvidence, number: int) -> doc.Group:
-    """Images at a limit, and the cuts through them."""
+    """Images at a limit, and cuts through them."""
     row_id = evidence.verdict.id
-    at = f"{row_id} at the limit with autofocus"
-    shown = [("limit", f"{row_id} at the limit", "At the limit", evidence.at_limit)]
+    subject = f"{row_id} at the limit with autofocus"
+    point_images = [("limit", f"{row_id} at the limit", "At the limit", evidence.at_limit)]
     if evidence.before_autofocus and evidence.after_autofocus:
         before, after = "At the limit with autofocus, before it", "The same, after it"
-        shown.append(("before", f"{at}, before it", before, evidence.before_autofocus))
-        shown.append(("after", f"{at}, after it", after, evidence.after_autofocus))
+        point_images.append(("before", f"{subject}, before it", before, evidence.before_autofocus))
+        point_images.append(("after", f"{subject}, after it", after, evidence.after_autofocus))
     chips = [
         doc.ShownImage(
-            f"{page.number}-chip-{number}-{name}.png", title, f"{what}: {chip_caption(image)}", chip_png(image),
-            _on_page(image),
+            f"{page.number}-chip-{number}-{name}.png", title, f"{caption}: {chip_caption(image)}", chip_png(image),
+            _page_size(image),
         )
-        for name, title, what, image in shown
+        for name, title, caption, image in point_images
     ]  # fmt: skip
     title = f"Cross-range cuts of {row_id}"
     svg = impulse_response_cuts(evidence)
@@ -294,7 +302,7 @@ def _images(page: Page, evidence: ImageEvidence, number: int) -> doc.Group:
     return doc.Group("illustration", [words, doc.Group("images", [doc.Images(chips), cuts])], heading)
 
 
-def _on_page(image: PointImage) -> tuple[int, int]:
+def _page_size(image: PointImage) -> tuple[int, int]:
     """Width and height on a page, at most 240 px each. [px]"""
     width, height = chip_size(image)
     shrink = max(1.0, width / 240, height / 240)
@@ -303,15 +311,22 @@ def _on_page(image: PointImage) -> tuple[int, int]:
 
 # ---------------------------------------------------------------------- draws
 def _draws(page: Page, drawn: MonteCarlo) -> Iterator[doc.Block]:
-    """Probability that each requirement holds, with what needs no draws."""
+    """Table of the probability of each requirement, beside sums that need no draws."""
     lines: list[doc.Line] = []
-    for one in drawn.requirements:
-        sizes = ("–" if size is None else format_quantity(size, one.unit) for size in (one.sum, one.rss, one.sigma))
-        in_draws = held(one.probability, one.probability_low, one.probability_high)
-        lines.append((doc.Name(one.id), limit_words(one.limit, one.unit), *sizes, in_draws))
+    for requirement in drawn.requirements:
+        sizes = (
+            "–" if size is None else format_quantity(size, requirement.unit)
+            for size in (requirement.sum, requirement.rss, requirement.sigma)
+        )
+        probability = probability_words(
+            requirement.probability, requirement.probability_low, requirement.probability_high
+        )
+        lines.append(
+            (doc.Name(requirement.id), limit_words(requirement.limit, requirement.unit), *sizes, probability)
+        )
     if drawn.probability is not None and len(drawn.requirements) > 1:
         ends = (drawn.probability_low or 0.0, drawn.probability_high or 1.0)
-        lines.append((doc.Name("all at once"), *("–",) * 4, held(drawn.probability, *ends)))
+        lines.append((doc.Name("all at once"), *("–",) * 4, probability_words(drawn.probability, *ends)))
     if lines:
         yield doc.TextTable(
             f"Monte Carlo of {page.name}",
@@ -321,7 +336,7 @@ def _draws(page: Page, drawn: MonteCarlo) -> Iterator[doc.Block]:
             doc.heads(doc.Head("Requirement", "id"), *doc.numbers("Limit", "Sum", "Rss", "Sigma"), "Over the draws"),
             lines,
         )
-    remarks = [f"{one.id}: {text}" for one in drawn.requirements for text in one.warnings]
+    remarks = [f"{requirement.id}: {text}" for requirement in drawn.requirements for text in requirement.warnings]
     remarks += drawn.notes
     if drawn.probability is None:
         remarks.append("no declared error has a requirement to hold")
@@ -331,7 +346,7 @@ def _draws(page: Page, drawn: MonteCarlo) -> Iterator[doc.Block]:
 
 # ---------------------------------------------------------------------- all rows
 def _rows(page: Page) -> Iterator[doc.Block]:
-    """Rows and contributions that a summary leaves out, with the remarks of all rows."""
+    """Rows and contributions beyond the summary, with the remarks of all rows."""
     if page.hidden:
         yield matrix_table(page, page.hidden, f"Other rows of {page.name}", "Rows that are not in the summary")
     if page.undeclared and page.matrix:
@@ -341,11 +356,11 @@ def _rows(page: Page) -> Iterator[doc.Block]:
     yield from all_contributions(page)
 
 
-def sources(found: MissionFindings) -> tuple[dict[str, list[str]], list[str]]:
-    """Rows by the source that the file names for their error, and the rows of which it names none and should."""
+def sources(findings: MissionFindings) -> tuple[dict[str, list[str]], list[str]]:
+    """Ids of rows by the source of their error in the file, and ids of rows that lack a source."""
     by_source: dict[str, list[str]] = {}
     unsourced = []
-    for row in found.rows:
+    for row in findings.rows:
         if row.declared is None or not row.is_independent:
             continue
         if row.evidence:
@@ -356,7 +371,7 @@ def sources(found: MissionFindings) -> tuple[dict[str, list[str]], list[str]]:
 
 
 def _sources(page: Page) -> Iterator[doc.Block]:
-    by_source, unsourced = sources(page.found)
+    by_source, unsourced = sources(page.findings)
     if by_source:
         yield doc.Facts([(text, doc.Styled("id", doc.listed(ids))) for text, ids in by_source.items()], "remarks")
     if unsourced:
@@ -369,19 +384,19 @@ def _sources(page: Page) -> Iterator[doc.Block]:
 
 
 def _formulas(page: Page) -> Iterator[doc.Block]:
-    """Every derivation with its numbers, then what no single row has."""
-    found = page.found
-    placed = page.mission._replace(file=page.file)  # the same name in every section
+    """Derivations of all rows with their numbers, then the general formulas."""
+    findings = page.findings
+    mission = page.mission._replace(file=page.file)  # every section writes the same path
     yield doc.Paragraph(
         "Formulas are as derived from the geometry; table and equation numbers are those of Rigling & Moses. SI "
         "units and radians, six digits."
     )
-    steps = list(collection_chain(found))
+    steps = list(collection_chain(findings))
     collection = doc.Steps(f"Formulas of the collection, {page.name}", steps, "step long")
     yield doc.Chapter("The collection", [collection], level=4)
     for number, row in enumerate(page.matrix, start=1):
         title = (doc.Styled("id", doc.Name(row.id)), " ", doc.Badge(row.status))
-        derivation = doc.Steps(f"Formulas of {row.id}, {page.name}", list(chain(placed, found, row)))
+        derivation = doc.Steps(f"Formulas of {row.id}, {page.name}", list(chain(mission, findings, row)))
         yield doc.Chapter(title, [derivation], f"{page.anchor}-row-{number}", level=4, style="derivation")
     general = [
         (f"{number or 'Full model'}, {title[:1].lower()}{title[1:]}", [doc.Equality(left, right)])

@@ -1,6 +1,6 @@
-"""A report that people read, as data: sections with blocks of text, tables and pictures, the same in all languages.
+"""A report as data: chapters with blocks of text, tables and pictures, independent of the output language.
 
-`html` and `markdown` write it. Text is plain everywhere, and each of them escapes it.
+The modules `html` and `markdown` write a document. Its texts are plain, and each module escapes them.
 """
 
 from collections.abc import Iterator, Sequence
@@ -10,10 +10,10 @@ from bisar_budget.findings.status import STATUS
 from bisar_budget.report.explain.notation import WorkedEquation
 
 
-# ---------------------------------------------------------------------- parts of a line
+# ---------------------------------------------------------------------- text of a line
 @dataclass(frozen=True, slots=True)
 class Name:
-    """An id or a path, which may break where it is long; `target` is the anchor that it leads to."""
+    """An id or a path, which may break if it is long. `target` is the anchor of its link."""
 
     text: str
     target: str = ""
@@ -21,9 +21,9 @@ class Name:
 
 @dataclass(frozen=True, slots=True)
 class Styled:
-    """Text with a class of the style sheet, which is that of the whole cell where it fills one.
+    """Text with a class of the style sheet. If it fills a cell, the cell has the class.
 
-    Markdown puts what has the class `own-id` or `origin` in brackets.
+    Markdown puts text of the classes `own-id` and `origin` in brackets.
     """
 
     style: str
@@ -38,37 +38,37 @@ class Badge:
 
     @property
     def words(self) -> str:
-        """Its word on a page."""
+        """Word of the status on a page."""
         return STATUS[self.status].words if self.status in STATUS else self.status
 
 
 @dataclass(frozen=True, slots=True)
 class Use:
-    """A bar of a utilization with a mark at the limit; nothing where there is none."""
+    """A bar of a utilization with a mark at the limit; without a utilization it is empty."""
 
-    part: float | None
+    fraction: float | None
     status: str
 
 
 @dataclass(frozen=True, slots=True)
 class Bar:
-    """A bar of a part of the whole, in the colour of its owner."""
+    """A bar of a fraction of the whole, in the colour of its owner."""
 
-    part: float
+    fraction: float
     owner: str
 
 
 @dataclass(frozen=True, slots=True)
 class Swatch:
-    """The key to an owner's part of a `Stack`; Markdown has no stack, and a bar in its stead."""
+    """Colour key of an owner's share in a `Stack`. Markdown has no stack and shows a bar."""
 
     owner: str
-    part: float
+    fraction: float
 
 
 @dataclass(frozen=True, slots=True)
 class Code:
-    """Words to type."""
+    """Text for the reader to type, such as a command."""
 
     text: str
 
@@ -79,18 +79,19 @@ Line = Sequence[Text]
 
 def listed(names: Sequence[str]) -> Text:
     """Names with commas between them."""
-    parts: list[Text] = []
+    texts: list[Text] = []
     for name in names:
-        parts += [", ", Name(name)] if parts else [Name(name)]
-    return tuple(parts)
+        texts += [", ", Name(name)] if texts else [Name(name)]
+    return tuple(texts)
 
 
 # ---------------------------------------------------------------------- blocks
 @dataclass(frozen=True, slots=True)
 class Paragraph:
-    """Sentences; one that ends with a colon introduces the table below it.
+    """Sentences. A paragraph that ends with a colon introduces the table below it.
 
-    `style`: a class of the style sheet. What begins with `verdict` is what a reader looks for, `command` is to copy.
+    `style` is a class of the style sheet: classes that begin with `verdict` mark verdicts, `command` marks a command
+    to copy.
     """
 
     text: Text
@@ -99,7 +100,7 @@ class Paragraph:
 
 @dataclass(frozen=True, slots=True)
 class Facts:
-    """Pairs of a name and what it is; one without a name is another of the name before it."""
+    """Pairs of a name and a value. A pair without a name has the name of the pair before it."""
 
     pairs: Sequence[tuple[Text, Text]]
     style: str = "facts"
@@ -107,7 +108,7 @@ class Facts:
 
 @dataclass(frozen=True, slots=True)
 class Items:
-    """A list, of an item's paragraphs each; numbered where the order counts."""
+    """A list, with the paragraphs of each item; numbered if the order matters."""
 
     items: Sequence[Sequence[Text]]
     style: str = "remarks"
@@ -116,14 +117,14 @@ class Items:
 
 @dataclass(frozen=True, slots=True)
 class Head:
-    """The head of a column of a table, and `number` (to the right) or `id`."""
+    """The head of a table column. Its style is `number` (aligned to the right), `id` or empty."""
 
     text: Text
     style: str = ""
 
 
 def heads(*heads: Head | str) -> list[Head]:
-    """Heads of columns; below one that is only text stands text."""
+    """Heads of columns. A plain text is the head of a column of text."""
     return [Head(head) if isinstance(head, str) else head for head in heads]
 
 
@@ -134,9 +135,9 @@ def numbers(*heads: str) -> list[Head]:
 
 @dataclass(frozen=True, slots=True)
 class TextTable:
-    """Cells below the heads of their columns, the first of each row its name.
+    """A table of text, whose first cell in each row is the name of the row.
 
-    `label` is its name among the parts of a page that scroll; a table without one is narrow.
+    `label` is the accessible name of the scrolling region around the table. A narrow table has no label.
     """
 
     label: str
@@ -148,17 +149,17 @@ class TextTable:
 
 @dataclass(frozen=True, slots=True)
 class Stack:
-    """A bar of the whole: owners with their parts and what these are in words. A page shows it, Markdown does not."""
+    """A bar of the whole budget, divided into shares: owner, fraction and words of each. Markdown leaves it out."""
 
     label: str
-    parts: Sequence[tuple[str, float, str]]
+    shares: Sequence[tuple[str, float, str]]
 
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """A drawing: `name` of its file, `anchor` of its mission, its title, the SVG.
+    """A drawing: `name` of its file, `anchor` of its mission, title, accessible label and SVG.
 
-    `is_told`: the text beside it says what it shows.
+    `is_told` is whether the text beside the drawing describes it.
     """
 
     name: str
@@ -172,7 +173,7 @@ class Figure:
 
 @dataclass(frozen=True, slots=True)
 class ShownImage:
-    """A small image: `name` of its file, what it shows, the PNG, its size on a page. [px]"""
+    """A small image: `name` of its file, title, caption, PNG, width and height on a page. [px]"""
 
     name: str
     title: str
@@ -190,7 +191,7 @@ class Images:
 
 @dataclass(frozen=True, slots=True)
 class Equality:
-    """A formula that no single row has: its sides, by their names in the catalogue."""
+    """A general formula that belongs to no row: both sides, by their names in the catalogue."""
 
     left: str
     right: str
@@ -207,7 +208,7 @@ class Steps:
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Blocks that a page lays out together, below a heading if there is one."""
+    """Blocks that a page lays out together, below an optional heading."""
 
     style: str
     blocks: Sequence["Block"]
@@ -216,7 +217,7 @@ class Group:
 
 @dataclass(frozen=True, slots=True)
 class Chapter:
-    """Blocks below a heading; `short` is its title in the contents, `anchor` empty where nothing leads to it."""
+    """Blocks below a heading. `short` is its title in the contents, `anchor` the target of links to it."""
 
     title: Text
     blocks: Sequence["Block"]
@@ -225,7 +226,7 @@ class Chapter:
     short: str = ""
     style: str = ""
     is_article: bool = False
-    is_listed: bool = True  # in the contents
+    is_listed: bool = True  # whether the contents list the chapter
 
 
 Block = Paragraph | Facts | Items | TextTable | Stack | Figure | Images | Steps | Group | Chapter
@@ -233,7 +234,7 @@ Block = Paragraph | Facts | Items | TextTable | Stack | Figure | Images | Steps 
 
 @dataclass(frozen=True, slots=True)
 class Margins:
-    """Words in the margins of a mission's printed pages: its name, its document, the bytes of its file."""
+    """Texts in the margins of a mission's printed pages: name, document, and digest or path of the file."""
 
     anchor: str
     name: str
@@ -243,7 +244,7 @@ class Margins:
 
 @dataclass(frozen=True, slots=True)
 class Compliance:
-    """A whole report; `subject` is the mission, or how many, `title` what the report is."""
+    """A report. `subject` is the name of the mission or the number of missions, `title` the kind of report."""
 
     version: str
     subject: str
@@ -254,12 +255,12 @@ class Compliance:
 
 
 def blocks_of(block: Compliance | Block) -> Iterator[Block]:
-    """All blocks inside one, in their order, those inside others too."""
+    """All blocks within a report or a block, in order, nested blocks included."""
     inner: Sequence[Block] = ()
     if isinstance(block, Compliance):
         inner = block.chapters
     elif isinstance(block, Chapter | Group):
         inner = block.blocks
-    for one in inner:
-        yield one
-        yield from blocks_of(one)
+    for child in inner:
+        yield child
+        yield from blocks_of(child)

@@ -1,4 +1,4 @@
-"""The compliance report as an HTML page: no script, nothing from elsewhere, light, dark and on paper."""
+"""The compliance report as an HTML page for light and dark screens and paper, without scripts or external files."""
 
 import re
 from base64 import b64encode
@@ -18,15 +18,17 @@ from bisar_budget.report.explain import notation
 from bisar_budget.report.explain.notation import Sum, WorkedEquation
 from bisar_budget.resources import resource
 
-_AFTER = re.compile(r"([._/])(?=\w{2})")  # where a long name may break: an axis stays with what it is of
-_SHAPE = 'viewBox="0 0 {} 8" preserveAspectRatio="none" aria-hidden="true" focusable="false"'
-_USE = _SHAPE.format(120)  # the limit is at 96
-_PART = _SHAPE.format(100)
+_BREAK_POINT = re.compile(
+    r"([._/])(?=\w{2})"
+)  # where a long name may break; one-letter axes stay with the name before
+_BAR_ATTRIBUTES = 'viewBox="0 0 {} 8" preserveAspectRatio="none" aria-hidden="true" focusable="false"'
+_USE_ATTRIBUTES = _BAR_ATTRIBUTES.format(120)  # the limit is at 96
+_SHARE_ATTRIBUTES = _BAR_ATTRIBUTES.format(100)
 
 
 @cache
 def _page() -> Template:
-    """The page around the sections, a file of `resource("templates")`; compiling it takes as long as a mission."""
+    """Template of the page, a file of `resource("templates")`. Its compilation takes as long as a check."""
     environment = Environment(
         loader=FileSystemLoader(resource("templates")),
         autoescape=True,
@@ -50,13 +52,15 @@ def page(document: doc.Compliance) -> str:
         document=document,
         facts=_block(document.facts),
         main=_blocks(document.chapters),
-        inner=lambda chapter: [one for one in chapter.blocks if isinstance(one, doc.Chapter) and one.is_listed],
+        inner=lambda chapter: [
+            block for block in chapter.blocks if isinstance(block, doc.Chapter) and block.is_listed
+        ],
         statuses=STATUS.values(),
     )
 
 
 def _css_string(text: str) -> Markup:
-    """A string of a style sheet: every character but letters, digits and blanks of ASCII is its number."""
+    """A string of a style sheet. Characters other than ASCII letters, digits and blanks become their numbers."""
     safe = (c if c.isascii() and (c.isalnum() or c == " ") else f"\\{ord(c):x} " for c in printable(text))
     return Markup(f'"{"".join(safe)}"')
 
@@ -67,21 +71,21 @@ def _text(text: doc.Text) -> Markup:
         case tuple():
             return Markup("").join(map(_text, text))
         case doc.Name(words, target):
-            broken = Markup(_AFTER.sub(r"\1<wbr>", str(escape(printable(words)))))
+            broken = Markup(_BREAK_POINT.sub(r"\1<wbr>", str(escape(printable(words)))))
             return Markup('<a href="#{}">{}</a>').format(target, broken) if target else broken
         case doc.Styled(style, inner):
             return Markup('<span class="{}">{}</span>').format(style, _text(inner))
         case doc.Badge(status):
             return Markup('<span class="status {}">{}</span>').format(status, text.words)
-        case doc.Use(part, status):
-            if part is None:
+        case doc.Use(fraction, status):
+            if fraction is None:
                 return Markup("")
-            beyond = '<path class="break" d="M108 9l4-10h3l-4 10z"/>' if part > 1.25 else ""
-            bar = f'<rect class="track" width="120" height="8"/>{_fill(min(96 * part, 120))}{beyond}'
-            return Markup(f'<svg class="use {status}" {_USE}>{bar}<path class="limit" d="M96 0v8"/></svg>')
-        case doc.Bar(part, owner):
-            bar = f'<rect class="track" width="100" height="8"/>{_fill(100 * part)}'
-            return Markup(f'<svg class="part {owner}" {_PART}>{bar}</svg>')
+            beyond = '<path class="break" d="M108 9l4-10h3l-4 10z"/>' if fraction > 1.25 else ""
+            bar = f'<rect class="track" width="120" height="8"/>{_fill(min(96 * fraction, 120))}{beyond}'
+            return Markup(f'<svg class="use {status}" {_USE_ATTRIBUTES}>{bar}<path class="limit" d="M96 0v8"/></svg>')
+        case doc.Bar(fraction, owner):
+            bar = f'<rect class="track" width="100" height="8"/>{_fill(100 * fraction)}'
+            return Markup(f'<svg class="part {owner}" {_SHARE_ATTRIBUTES}>{bar}</svg>')
         case doc.Swatch(owner):
             return Markup(f'<span class="swatch {owner}" aria-hidden="true"></span>')
         case doc.Code(words):
@@ -125,7 +129,7 @@ def _block(block: doc.Block) -> Markup:
             )
             return _element("div", "chips", Markup("\n{}").format(Markup("").join(images)))
         case doc.Steps(label, steps, style):
-            return _scroll(label, Markup("").join(_step(title, parts, style) for title, parts in steps))
+            return _scroll(label, Markup("").join(_step(title, equations, style) for title, equations in steps))
         case doc.Group(style, blocks, heading):
             head = Markup("<h4>{}</h4>\n").format(_text(heading)) if heading else ""
             return _element("div", style, Markup("\n{}{}").format(head, _blocks(blocks)))
@@ -140,7 +144,7 @@ def _element(tag: str, style: str, content: Markup) -> Markup:
 
 
 def _scroll(label: str, content: Markup) -> Markup:
-    """A region that the keyboard reaches, in which content that is wider than the page scrolls."""
+    """A region with keyboard focus, in which content wider than the page scrolls."""
     region = '<div class="scroll" tabindex="0" role="region" aria-label="{}">{}</div>'
     return Markup(region).format(printable(label), content)
 
@@ -164,7 +168,7 @@ def _chapter(chapter: doc.Chapter) -> Markup:
 
 
 def _cell(tag: str, text: doc.Text, style: str = "", scope: str = "") -> Markup:
-    """An element of a table or a list of facts; text with a style gives its style to the element."""
+    """An element of a table or a list of facts. The style of its text becomes the style of the element."""
     if isinstance(text, doc.Styled):
         style, text = text.style, text.text
     scoped = Markup(' scope="{}"').format(scope) if scope else ""
@@ -183,49 +187,49 @@ def _table(table: doc.TextTable) -> Markup:
     lines = [Markup("<caption>{}</caption>").format(_text(table.caption))]
     lines += [Markup("<thead><tr>{}</tr></thead>").format(Markup("").join(heads)), Markup("<tbody>")]
     styles = [head.style for head in table.heads]
-    for first, *others in table.rows:
+    for first, *values in table.rows:
         cells = [_cell("th", first, styles[0], "row")]
-        cells += [_cell("td", cell, style) for cell, style in zip(others, styles[1:], strict=True)]
+        cells += [_cell("td", cell, style) for cell, style in zip(values, styles[1:], strict=True)]
         lines.append(Markup("<tr>{}</tr>").format(Markup("").join(cells)))
-    whole = _element("table", table.style, Markup("\n").join(["", *lines, Markup("</tbody>\n")]))
-    return _scroll(table.label, whole) if table.label else whole
+    element = _element("table", table.style, Markup("\n").join(["", *lines, Markup("</tbody>\n")]))
+    return _scroll(table.label, element) if table.label else element
 
 
 def _stack(stack: doc.Stack) -> Markup:
-    said = ", ".join(f"{owner} {words}" for owner, _, words in stack.parts)
+    share_words = ", ".join(f"{owner} {words}" for owner, _, words in stack.shares)
     bars = (
         Markup('<span class="{}" style="width:{:.3f}%">{}</span>').format(
-            owner, 100 * part, owner if part > 0.16 else ""
+            owner, 100 * fraction, owner if fraction > 0.16 else ""
         )
-        for owner, part, _ in stack.parts
+        for owner, fraction, _ in stack.shares
     )
     return Markup(
         '<div class="stack-row"><span class="stack-label">{0}</span>'
         '<div class="stack" role="img" aria-label="{0}: {1}">{2}</div></div>\n'
-    ).format(stack.label, said, Markup("").join(bars))
+    ).format(stack.label, share_words, Markup("").join(bars))
 
 
 def _inline(figure: doc.Figure) -> Markup:
-    """A drawing within the page; the same mission may stand in a report twice."""
+    """A drawing within the page. Its ids begin with the anchor, since a report may contain a mission twice."""
     return Markup(re.sub(r'\b(id|aria-labelledby|aria-describedby)="', rf'\1="{figure.anchor}-', figure.svg))
 
 
-def _step(title: str, parts: Iterable[WorkedEquation | str | doc.Equality], style: str) -> Markup:
+def _step(title: str, equations: Iterable[WorkedEquation | str | doc.Equality], style: str) -> Markup:
     step = '<div class="{}"><p class="step-title">{}</p>{}</div>\n'
-    return Markup(step).format(style, printable(title), Markup("").join(map(_equation, parts)))
+    return Markup(step).format(style, printable(title), Markup("").join(map(_equation, equations)))
 
 
-def _equation(part: WorkedEquation | str | doc.Equality) -> Markup:
-    """One part of a step: a formula as MathML, words and text as text."""
-    if isinstance(part, doc.Equality):
-        sides = (notation.catalogued(side, notation.MATHML) for side in (part.left, part.right))
+def _equation(equation: WorkedEquation | str | doc.Equality) -> Markup:
+    """An equation or text of a step: a formula as MathML, arithmetic and words as text."""
+    if isinstance(equation, doc.Equality):
+        sides = (notation.catalogued(side, notation.MATHML) for side in (equation.left, equation.right))
         formula = notation.math("<mrow>{}<mo>=</mo>{}</mrow>".format(*sides))
         return Markup('<p class="part">{}</p>').format(Markup(formula))
-    if not isinstance(part, WorkedEquation):
-        text = notation.readable(part) if isinstance(part, Sum) else printable(part)
+    if not isinstance(equation, WorkedEquation):
+        text = notation.readable(equation) if isinstance(equation, Sum) else printable(equation)
         return Markup("<p class=part>{}</p>").format(text)
-    if notation.is_formula(part):
-        mathml = notation.as_mathml(part)
+    if notation.is_formula(equation):
+        mathml = notation.as_mathml(equation)
         return Markup("<p class=part>{} {}</p>").format(Markup(mathml.formula), Markup(mathml.numbers))
-    formula, numbers = notation.as_text(part)
+    formula, numbers = notation.as_text(equation)
     return Markup("<p class=part><span>{}</span> <span>{}</span></p>").format(formula, numbers)

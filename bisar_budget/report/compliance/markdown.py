@@ -1,4 +1,4 @@
-"""The compliance report as Markdown for GitHub, which can be read as it is; drawings are files beside it."""
+"""The compliance report as Markdown for GitHub, readable as plain text; its drawings are separate files."""
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
@@ -13,21 +13,21 @@ from bisar_budget.report.explain import notation
 from bisar_budget.report.explain.notation import Sum, WorkedEquation
 from bisar_budget.report.words.sentences import markdown_row, markdown_text, uri
 
-_BAR, _LIMIT = 20, 16  # characters of a bar, and of a use as large as its limit
+_BAR_WIDTH, _LIMIT_WIDTH = 20, 16  # characters: of a bar, and of a use of 100 %
 _BRACKETED = {"own-id": " ({})", "origin": "({})"}
 _DESCRIPTION = re.compile("<desc[^>]*>(.*?)</desc>", re.DOTALL)
 
 
 def as_markdown(report: Report, style: Style) -> str:
-    """Write the report; drawings are linked where `style.assets` says that they lie."""
-    return written(compliance(report, style), uri(style.assets))
+    """Write the report, with links to the drawings in the folder `style.assets`."""
+    return markdown_document(compliance(report, style), uri(style.assets))
 
 
-def written(document: doc.Compliance, assets: str) -> str:
-    """Write a document; `assets` is where its drawings lie, empty: nowhere."""
+def markdown_document(document: doc.Compliance, assets: str) -> str:
+    """Write a document. `assets` is the folder of its drawings; empty: without drawings."""
     subject = "Motion-measurement error budget, bistatic SAR."
-    parts = [f"# {document.title}", subject, *_blocks([document.facts, *document.chapters], assets)]
-    return "\n\n".join(part.rstrip("\n") for part in parts if part) + "\n"
+    texts = [f"# {document.title}", subject, *_blocks([document.facts, *document.chapters], assets)]
+    return "\n\n".join(text.rstrip("\n") for text in texts if text) + "\n"
 
 
 def pictures(report: Report, style: Style) -> Mapping[str, bytes]:
@@ -45,46 +45,46 @@ def pictures(report: Report, style: Style) -> Mapping[str, bytes]:
 def _text(text: doc.Text, badge: str = "**{}**") -> str:
     match text:
         case tuple():
-            line = "".join(_inside(part, badge) for part in text)
-            return line.replace("  ", " ")  # a bar has a space before it where a page has none
+            line = "".join(_inside(inner, badge) for inner in text)
+            return line.replace("  ", " ")  # a bar begins with a space, which may follow another one
         case doc.Name(words):
             return markdown_text(words)
         case doc.Styled(style, inner):
             return _BRACKETED.get(style, "{}").format(_text(inner, badge))
         case doc.Badge():
             return badge.format(markdown_text(text.words))
-        case doc.Use(part):
-            return "" if part is None else f" {_use(part)}"
-        case doc.Bar(part):
-            return _bar(part)
-        case doc.Swatch(_, part):
-            return f"{_bar(part)} "
+        case doc.Use(fraction):
+            return "" if fraction is None else f" {_use(fraction)}"
+        case doc.Bar(fraction):
+            return _bar(fraction)
+        case doc.Swatch(_, fraction):
+            return f"{_bar(fraction)} "
         case doc.Code(words):
             return f"`{words}`"
     return markdown_text(text)
 
 
 def _inside(text: doc.Text, badge: str) -> str:
-    """A part of a line: a space that it begins with is one."""
+    """Text of a fragment of a line. Leading spaces stay, and escapes apply to the text after them."""
     if isinstance(text, str):
         return " " * (len(text) - len(text.lstrip(" "))) + _text(text.lstrip(" "))
     return _text(text, badge)
 
 
-def _bar(part: float) -> str:
-    """A bar of text."""
-    return ("█" * round(_BAR * part)).ljust(_BAR, "░")
+def _bar(fraction: float) -> str:
+    """A bar of characters for a fraction of the whole."""
+    return ("█" * round(_BAR_WIDTH * fraction)).ljust(_BAR_WIDTH, "░")
 
 
-def _use(part: float) -> str:
-    """A bar of text with a mark at the limit; what goes beyond its end has an arrow."""
-    bar = _bar(min(1.0, part * _LIMIT / _BAR))
-    return f"{bar[:_LIMIT]}┃{bar[_LIMIT:]}{'▶' if part > _BAR / _LIMIT else ''}"
+def _use(fraction: float) -> str:
+    """A bar of characters with a mark at the limit. A use beyond its end has an arrow."""
+    bar = _bar(min(1.0, fraction * _LIMIT_WIDTH / _BAR_WIDTH))
+    return f"{bar[:_LIMIT_WIDTH]}┃{bar[_LIMIT_WIDTH:]}{'▶' if fraction > _BAR_WIDTH / _LIMIT_WIDTH else ''}"
 
 
 # ---------------------------------------------------------------------- blocks
 def _blocks(blocks: Iterable[doc.Block], assets: str) -> Iterator[str]:
-    """Pieces that blank lines divide."""
+    """Texts of blocks, to be separated by blank lines."""
     is_introduced = False
     for block in blocks:
         yield from _block(block, assets, is_introduced)
@@ -94,7 +94,7 @@ def _blocks(blocks: Iterable[doc.Block], assets: str) -> Iterator[str]:
 def _block(block: doc.Block, assets: str, is_introduced: bool) -> Iterator[str]:
     match block:
         case doc.Paragraph(doc.Code(words), "command"):
-            yield f"    {printable(words)}"  # indented: no fence of its own can end it
+            yield f"    {printable(words)}"  # indented, since the words could contain a fence
         case doc.Paragraph(text, style):
             yield f"**{_text(text)}**" if style.startswith("verdict") else _text(text)
         case doc.Facts(pairs):
@@ -107,27 +107,27 @@ def _block(block: doc.Block, assets: str, is_introduced: bool) -> Iterator[str]:
         case doc.TextTable():
             if not is_introduced:
                 caption = _text(block.caption)
-                is_complete = ":" in caption or caption.endswith(".")
-                yield f"{caption.removesuffix('.')}." if is_complete else f"{caption}:"
+                is_sentence = ":" in caption or caption.endswith(".")
+                yield f"{caption.removesuffix('.')}." if is_sentence else f"{caption}:"
             yield _table(block)
         case doc.Figure(title=title):
             if assets:
                 yield f"![{_text(title)}]({assets}/{block.name})"
             if not block.is_told:
-                match = _DESCRIPTION.search(block.svg)  # for readers who cannot see it
+                match = _DESCRIPTION.search(block.svg)  # for readers who cannot see the drawing
                 yield markdown_text(unescape(match[1]) if match else "")
         case doc.Images(chips):
             if assets:
                 yield "\n".join(
-                    f'<img src="{assets}/{one.name}" alt="{escape(printable(one.title))}" '
-                    f'width="{one.size[0]}" height="{one.size[1]}">'  # a size, which Markdown cannot say
-                    for one in chips
+                    f'<img src="{assets}/{chip.name}" alt="{escape(printable(chip.title))}" '
+                    f'width="{chip.size[0]}" height="{chip.size[1]}">'  # Markdown has no syntax for a size
+                    for chip in chips
                 )
-                yield "\n".join(f"- {markdown_text(one.caption)}" for one in chips)
+                yield "\n".join(f"- {markdown_text(chip.caption)}" for chip in chips)
         case doc.Steps(_, steps):
-            for title, parts in steps:
-                yield f"{markdown_text(title)}{':' if parts else ''}"
-                yield from _formulas(parts)
+            for title, equations in steps:
+                yield f"{markdown_text(title)}{':' if equations else ''}"
+                yield from _formulas(equations)
         case doc.Group(_, inner, heading):
             if heading:
                 yield f"#### {_text(heading)}"
@@ -138,10 +138,10 @@ def _block(block: doc.Block, assets: str, is_introduced: bool) -> Iterator[str]:
 
 
 def _facts(pairs: Iterable[tuple[doc.Text, doc.Text]]) -> Iterator[str]:
-    before: doc.Text = ""
+    current_name: doc.Text = ""
     for name, value in pairs:
-        before = name or before
-        yield f"- {_text(before)}: {_text(value)}"
+        current_name = name or current_name
+        yield f"- {_text(current_name)}: {_text(value)}"
 
 
 def _table(table: doc.TextTable) -> str:
@@ -151,26 +151,28 @@ def _table(table: doc.TextTable) -> str:
     return "\n".join(map(markdown_row, (heads, rules, *rows)))
 
 
-def _formulas(parts: Iterable[WorkedEquation | str | doc.Equality]) -> Iterator[str]:
-    """A block of LaTeX for each formula, a list of what stands between them."""
+def _formulas(equations: Iterable[WorkedEquation | str | doc.Equality]) -> Iterator[str]:
+    """A block of LaTeX for each formula, and lists of the texts between formulas."""
     lines: list[str] = []
-    for part in parts:
-        if latex := _latex(part):
+    for equation in equations:
+        if latex := _latex(equation):
             yield from ["\n".join(lines)] if lines else []
             lines = []
             yield f"```math\n{latex}\n```"
-        elif isinstance(part, WorkedEquation):
-            lines.append(f"- `{' '.join(notation.as_text(part)).rstrip()}`")  # nothing of the user's is in it
+        elif isinstance(equation, WorkedEquation):
+            lines.append(f"- `{' '.join(notation.as_text(equation)).rstrip()}`")  # without text of the user
         else:
-            text = str(part)
-            lines.append(f"- `{notation.readable(text)}`" if isinstance(part, Sum) else f"- {markdown_text(text)}")
+            text = str(equation)
+            lines.append(
+                f"- `{notation.readable(text)}`" if isinstance(equation, Sum) else f"- {markdown_text(text)}"
+            )
     yield from ["\n".join(lines)] if lines else []
 
 
-def _latex(part: WorkedEquation | str | doc.Equality) -> str:
-    """A formula as LaTeX; nothing of words and of arithmetic."""
-    if isinstance(part, doc.Equality):
-        return " = ".join(notation.catalogued(side, notation.LATEX) for side in (part.left, part.right))
-    if isinstance(part, WorkedEquation) and part.formula and notation.is_formula(part):
-        return "\\begin{{aligned}}\n{} \\\\\n{}\n\\end{{aligned}}".format(*notation.as_latex(part))
+def _latex(equation: WorkedEquation | str | doc.Equality) -> str:
+    """A formula as LaTeX; empty for words and for arithmetic."""
+    if isinstance(equation, doc.Equality):
+        return " = ".join(notation.catalogued(side, notation.LATEX) for side in (equation.left, equation.right))
+    if isinstance(equation, WorkedEquation) and equation.formula and notation.is_formula(equation):
+        return "\\begin{{aligned}}\n{} \\\\\n{}\n\\end{{aligned}}".format(*notation.as_latex(equation))
     return ""

@@ -1,4 +1,4 @@
-"""The rows of a mission in a report: the compliance matrix, and where phase and displacement come from."""
+"""The rows of a mission in a report: the compliance matrix, and the contributions to phase and displacement."""
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
@@ -28,20 +28,20 @@ from bisar_budget.report.words.sentences import (
 )
 from bisar_budget.units import format_in, format_quantity
 
-_TOP = 8  # contributions of a summary
-_MATRIX_ROWS = 40  # of a summary; beyond, those that use least are left to the annex
+_MAX_LARGEST_ROWS = 8  # contributions of a summary
+_MAX_MATRIX_ROWS = 40  # of a summary; the annex has further rows, which use less
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Page:
-    """A mission that a report shows: what its sections share.
+    """Findings about a mission, as the sections of its report share them.
 
-    `file` is the name of the mission file that is shown, `anchor` what tells it from other missions of the report.
-    `matrix` are the rows that are declared or limit something, the worst first, `in_summary` the ids of those that a
-    summary shows.
+    `file` is the path of the mission file on the page, `anchor` identifies the mission within the report. `matrix`
+    are all rows except errors that are not declared, worst first. `in_summary` are the ids of the rows that a summary
+    shows.
     """
 
-    found: MissionFindings
+    findings: MissionFindings
     analysis: Analysis
     file: str
     anchor: str
@@ -58,16 +58,16 @@ class Page:
     @property
     def name(self) -> str:
         """The name of the mission."""
-        return self.found.name
+        return self.findings.name
 
     @property
     def number(self) -> str:
-        """Its place in the report, from 1: the names of its pictures begin with it."""
+        """Number of the mission in the report, from 1. The names of its pictures begin with it."""
         return self.anchor[1:]
 
     @property
     def judged(self) -> list[Row]:
-        """Rows that were held to a limit or could not be, the worst first."""
+        """Rows that were judged or could not be judged, worst first."""
         return [row for row in self.matrix if STATUS[row.status].is_judged]
 
     @property
@@ -76,41 +76,43 @@ class Page:
         return [row for row in self.matrix if row.id not in self.in_summary]
 
 
-def page_of(found: MissionFindings, style: Style, anchor: str) -> Page:
-    """A mission, ready to be shown.
+def page_of(findings: MissionFindings, style: Style, anchor: str) -> Page:
+    """Page of a mission.
 
     Raises
     ------
     ValueError
         The findings do not carry their analysis.
     """
-    rows = worst_first(found.rows)
+    rows = worst_first(findings.rows)
     important = [row for row in rows if matters(row)]
     return Page(
-        found=found,
-        analysis=found.analysed(),
-        file=source_path(found.file, style),
+        findings=findings,
+        analysis=findings.analysed(),
+        file=source_path(findings.file, style),
         anchor=anchor,
         is_full=style.detail == "full",
         matrix=[row for row in rows if row.status != "not_declared"],
         in_summary=frozenset(
-            row.id for place, row in enumerate(important) if place < _MATRIX_ROWS or STATUS[row.status].is_explained
+            row.id
+            for index, row in enumerate(important)
+            if index < _MAX_MATRIX_ROWS or STATUS[row.status].is_explained
         ),
-        undeclared=[row for row in found.rows if row.status == "not_declared"],
+        undeclared=[row for row in findings.rows if row.status == "not_declared"],
     )
 
 
 # ---------------------------------------------------------------------- matrix
 def matrix_table(page: Page, rows: Iterable[Row], label: str, caption: str) -> doc.TextTable:
-    """Lines of the matrix for some of its rows."""
-    places = {row.id: place for place, row in enumerate(page.matrix, start=1)}
-    verdicts = {verdict.id: verdict.verdict for verdict in page.found.verdicts or ()}
+    """Compliance matrix of some of the rows of a page."""
+    numbers = {row.id: number for number, row in enumerate(page.matrix, start=1)}
+    verdicts = {verdict.id: verdict.verdict for verdict in page.findings.verdicts or ()}
     sizes = doc.numbers("Utilization", "Declared", "Allowable", "Margin")
-    said = ("Requirement", "Verified by", "Waiver")
-    columns = doc.heads(doc.Head("Id", "id"), "Status", *sizes, *said, *doc.numbers("Line"))
+    text_heads = ("Requirement", "Verified by", "Waiver")
+    columns = doc.heads(doc.Head("Id", "id"), "Status", *sizes, *text_heads, *doc.numbers("Line"))
     lines: list[doc.Line] = []
     for row in rows:
-        name: doc.Text = doc.Name(row.id, f"{page.anchor}-row-{places[row.id]}" if page.is_full else "")
+        name: doc.Text = doc.Name(row.id, f"{page.anchor}-row-{numbers[row.id]}" if page.is_full else "")
         use = shown_use(row)
         waiver = "; ".join(waiver.words for waiver in row.waivers)
         lines.append(
@@ -118,10 +120,10 @@ def matrix_table(page: Page, rows: Iterable[Row], label: str, caption: str) -> d
                 (name, doc.Styled("own-id", doc.Name(row.requirement_id))) if row.requirement_id else name,
                 doc.Badge(row.status),
                 (dashed(use_words(use)), doc.Use(use, row.status)),
-                dashed(row_size(row.declared, row, page.found)),
-                dashed(allowable_words(row, page.found)),
+                dashed(row_size(row.declared, row, page.findings)),
+                dashed(allowable_words(row, page.findings)),
                 "–" if row.status == "not_evaluated" else margin(row),
-                what_sets_it(page, row),
+                source_of_limit(page, row),
                 method(row, verdicts.get(row.id)),
                 doc.Styled("waiver", waiver) if waiver else "–",
                 "–" if row.line is None else str(row.line),
@@ -132,19 +134,19 @@ def matrix_table(page: Page, rows: Iterable[Row], label: str, caption: str) -> d
 
 
 def undeclared_table(page: Page) -> doc.TextTable:
-    """Errors that the file does not declare, and what each may be."""
+    """Table of the errors that the file does not declare, with their allowables."""
     return doc.TextTable(
         f"Errors that {page.name} does not declare",
         "Not declared, so not judged, and what each may be",
         doc.heads(doc.Head("Id", "id"), *doc.numbers("Allowable"), "From"),
-        [(doc.Name(row.id), dashed(allowable_words(row, page.found)), row.equation) for row in page.undeclared],
+        [(doc.Name(row.id), dashed(allowable_words(row, page.findings)), row.equation) for row in page.undeclared],
     )
 
 
-def grouped(said: Iterable[tuple[str, Sequence[str]]]) -> doc.Facts | None:
-    """Say once what several rows would say alike; None where none says anything."""
+def grouped(row_texts: Iterable[tuple[str, Sequence[str]]]) -> doc.Facts | None:
+    """Texts of rows, with the ids of all rows that share a text; None without a text."""
     groups: dict[str, list[str]] = {}
-    for row_id, texts in said:
+    for row_id, texts in row_texts:
         if texts:
             groups.setdefault("; ".join(texts), []).append(row_id)
     pairs = [(doc.Styled("id", doc.listed(ids)), f"{sentence(text)}.") for text, ids in groups.items()]
@@ -158,14 +160,14 @@ def all_remarks(page: Page) -> Iterator[tuple[str, Sequence[str]]]:
 
 
 def limit_words(value: float, unit: str) -> str:
-    """Round down, everywhere alike: no limit is larger than it is, and none has two sizes on a page."""
+    """Write a limit rounded down. All limits of a page are written by this function."""
     return format_quantity(value, unit, 3, "down")
 
 
 def margin(row: Row) -> str:
-    """Write allowable over declared less one, or the levels' difference, rounded down: never more than there is.
+    """Write the margin, allowable over declared less one, or the difference of levels, rounded down.
 
-    From 1000 % on, how many times the declared value is allowed.
+    From 1000 % on, write the ratio of allowable and declared.
     """
     if row.margin is None:
         return "–"
@@ -183,25 +185,25 @@ def margin(row: Row) -> str:
 
 
 def _down(value: float) -> float:
-    """Round to three digits, never up; one part in 10¹² keeps an exact number what it is."""
+    """Round down to three digits. A tolerance of one part in 10¹² keeps exact numbers."""
     step = 2 - math.floor(math.log10(abs(value)))
     return math.floor(value * 10.0**step * (1 + math.copysign(1e-12, value))) / 10.0**step if step < 300 else value
 
 
-def what_sets_it(page: Page, row: Row) -> str:
-    """Say which requirement sets the allowable of a row."""
-    found, requirements, allocation = page.found, page.mission.requirements, page.found.allocation
+def source_of_limit(page: Page, row: Row) -> str:
+    """Requirement that sets the allowable of a row, in words."""
+    findings, requirements, allocation = page.findings, page.mission.requirements, page.findings.allocation
     binding = row.binding_requirement if row.metric == "quadratic_phase_error" else row.metric
     if binding in ("pslr", "islr"):
         value = requirements.pslr if binding == "pslr" else requirements.islr
-        what = "paired echoes" if binding == "pslr" else "power spread"
+        effect = "paired echoes" if binding == "pslr" else "power spread"
         split = allocation.pslr if binding == "pslr" else allocation.islr
         if value is None:
             return "none stated"
-        return f"{what} ≤ {value:g} dB, {split.of(row.owner):.3g} of the power"
+        return f"{effect} ≤ {value:g} dB, {split.of(row.owner):.3g} of the power"
     if binding == "cubic_phase_error":
         value = requirements.cubic_phase_error
-        return "none stated" if value is None else f"cubic phase ≤ {phase_limit(value, found)}"
+        return "none stated" if value is None else f"cubic phase ≤ {phase_limit(value, findings)}"
     if binding == END_OF_IMAGE:
         return "end of the image: no ground point has the range history of a larger error"
     if binding == "location_error":
@@ -213,17 +215,17 @@ def what_sets_it(page: Page, row: Row) -> str:
         return f"declared: {', '.join(requirements.declare)}"
     if row.subject.kind == "autofocus_pull_in":
         return "all QPE together within what autofocus corrects, π·N_pull"
-    if row.subject.kind == "spatial_variance":  # one correction for the whole scene: no gain
-        return f"QPE differs over the scene by ≤ {phase_limit(allocation.qpe_total, found)}"
+    if row.subject.kind == "spatial_variance":  # one correction serves the whole scene, so that autofocus has no gain
+        return f"QPE differs over the scene by ≤ {phase_limit(allocation.qpe_total, findings)}"
     if row.subject.kind == "dispersion":
-        return f"quadratic phase at the edges of the band ≤ {phase_limit(allocation.qpe_total, found)}"
+        return f"quadratic phase at the edges of the band ≤ {phase_limit(allocation.qpe_total, findings)}"
     limit = allocation.qpe_allowed(row.owner)
     share = "" if row.owner == "mission" else f", {allocation.qpe.of(row.owner):.3g} of the budget"
-    return f"QPE ≤ {phase_limit(limit, found)}{share}"
+    return f"QPE ≤ {phase_limit(limit, findings)}{share}"
 
 
 def method(row: Row, verdict: str | None) -> str:
-    """Say how a row is verified: by analysis, and by the image where one was formed."""
+    """Verification of a row: by analysis, and by simulation if its image was formed."""
     analysis = f"analysis: {row.equation}"
     if verdict is None:
         return analysis
@@ -233,17 +235,20 @@ def method(row: Row, verdict: str | None) -> str:
 # ---------------------------------------------------------------------- contributions
 @dataclass(frozen=True, slots=True)
 class Contribution:
-    """Effect of one declared error; `part` is its size as a part of the largest, `more` what the annex says too."""
+    """Effect of one declared error, of size `fraction` relative to the largest effect.
+
+    `model_cells` are further cells for a phase: its share of the sum, its values by the published and the full model.
+    """
 
     id: str
     subject: Subject
     size: str
-    part: float
-    more: tuple[str, ...] = ()
+    fraction: float
+    model_cells: tuple[str, ...] = ()
 
     @property
     def owner(self) -> str:
-        """Whose error it is: a platform's, both platforms', the clock's, the mission's."""
+        """Owner of the error: a platform, both platforms, the clock or the mission."""
         is_common = self.subject.kind in (*MOTION_UNITS, "time_tag", "random") and self.subject.owner == "mission"
         return "both platforms" if is_common else self.subject.owner
 
@@ -253,88 +258,109 @@ class Contribution:
         return "height" if self.subject.kind == "terrain" else self.subject[3].replace("_", " ")
 
 
-def phases(page: Page) -> list[Contribution]:
-    """Quadratic phase errors, of equal loss, as the file states them, with their part of the sum, and by both models.
+def phase_contributions(page: Page) -> list[Contribution]:
+    """Quadratic phase errors of equal loss of the errors of the file, largest first.
 
-    An error that no image has comes before all others, and the others are no part of a sum with it.
+    Each has its share of the sum and its values by both models. An error without an image has an infinite phase: it
+    comes first, and no error then has a share of the sum.
     """
     by_model: dict[str, dict[str, float]] = {}
     for model in ("published", "full"):
-        of_all = page.analysis.together(model).phases
-        by_model[model] = {one.row_id: float(one.judged(1.0)[0]) for one in of_all}
-    subjects = {row.id: row.subject for row in page.found.rows}
-    gating = [name for name in by_model if page.found.model in (name, "strictest")]
+        phases = page.analysis.together(model).phases
+        by_model[model] = {phase.row_id: float(phase.judged(1.0)[0]) for phase in phases}
+    subjects = {row.id: row.subject for row in page.findings.rows}
+    gating = [name for name in by_model if page.findings.model in (name, "strictest")]
     sizes = {row_id: max(by_model[name][row_id] for name in gating) for row_id in by_model["full"]}
     total, largest = math.fsum(sizes.values()), max(sizes.values(), default=0.0)
     result = []
     for row_id in sorted((row_id for row_id in sizes if sizes[row_id]), key=lambda row_id: -sizes[row_id]):
         qpe = sizes[row_id]
-        part = 1.0 if qpe == largest else qpe / largest
-        of_sum = percent(qpe / total) if math.isfinite(total) else "–"
-        models = (_phase(of_all[row_id], page.found) for of_all in by_model.values())
-        result.append(Contribution(row_id, subjects[row_id], _phase(qpe, page.found), part, (of_sum, *models)))
+        fraction = 1.0 if qpe == largest else qpe / largest
+        sum_share = percent(qpe / total) if math.isfinite(total) else "–"
+        models = (_phase(phases[row_id], page.findings) for phases in by_model.values())
+        result.append(
+            Contribution(row_id, subjects[row_id], _phase(qpe, page.findings), fraction, (sum_share, *models))
+        )
     return result
 
 
-def _phase(value: float, found: MissionFindings) -> str:
-    return format_in(value, "rad", phase_unit(found)) if math.isfinite(value) else "no image"
+def _phase(value: float, findings: MissionFindings) -> str:
+    return format_in(value, "rad", phase_unit(findings)) if math.isfinite(value) else "no image"
 
 
-def moves(page: Page) -> list[Contribution]:
-    """Displacements of the image by errors as the file states them."""
-    rows = {row.id: row.displacement_m for row in page.found.rows}
-    stated = [one.subject for one in page.analysis.stated]
-    stated += [one.subject for one in page.analysis.random if one.declared is not None]
-    stated += [one.subject for one in page.analysis.displacing_tones]
-    known = [(what, rows.get(what.id)) for what in stated]
-    moving = [(what, math.hypot(*by)) for what, by in known if by is not None and any(by)]
-    moving.sort(key=lambda one: -one[1])
-    largest = max((size for _, size in moving), default=1.0)
-    return [Contribution(what.id, what, format_quantity(size, "m"), size / largest) for what, size in moving]
+def displacement_contributions(page: Page) -> list[Contribution]:
+    """Displacements of the image by the errors of the file, largest first."""
+    displacements = {row.id: row.displacement_m for row in page.findings.rows}
+    subjects = [error.subject for error in page.analysis.stated]
+    subjects += [error.subject for error in page.analysis.random if error.declared is not None]
+    subjects += [tone.subject for tone in page.analysis.displacing_tones]
+    distances = [(subject, math.hypot(*(displacements.get(subject.id) or (0.0, 0.0)))) for subject in subjects]
+    distances = [(subject, distance) for subject, distance in distances if distance]
+    distances.sort(key=lambda entry: -entry[1])
+    largest = max((distance for _, distance in distances), default=1.0)
+    return [
+        Contribution(subject.id, subject, format_quantity(distance, "m"), distance / largest)
+        for subject, distance in distances
+    ]
 
 
 def largest_contributions(page: Page) -> Iterator[doc.Block]:
     """Tables of the errors with the largest phases and with the largest displacements."""
-    found = (phases(page), moves(page))
+    by_phase, by_displacement = phase_contributions(page), displacement_contributions(page)
+    phase_caption = "Quadratic phase error of each declared error, before autofocus"
+    displacement_caption = "Displacement of the image by each declared error"
     tables = [
-        _largest(page, found[0], "phase", "QPE", "Quadratic phase error of each declared error, before autofocus"),
-        _largest(page, found[1], "displacement", "Displacement", "Displacement of the image by each declared error"),
+        _largest(page, contributions, name, head, caption)
+        for contributions, name, head, caption in (
+            (by_phase, "phase", "QPE", phase_caption),
+            (by_displacement, "displacement", "Displacement", displacement_caption),
+        )
+        if contributions
     ]
-    if any(found):
-        yield doc.Group("pair", [table for table, errors in zip(tables, found, strict=True) if errors])
-    if not found[0]:
+    if tables:
+        yield doc.Group("pair", tables)
+    if not by_phase:
         yield doc.Paragraph("No declared error of motion, clock or another kind has a quadratic phase.")
-    if not found[1]:
+    if not by_displacement:
         yield doc.Paragraph("No declared error displaces the image.")
 
 
-def _largest(page: Page, found: Sequence[Contribution], about: str, head: str, caption: str) -> doc.TextTable:
-    of_sum = doc.numbers("Of the sum") if any(one.more for one in found) else []
+def _largest(page: Page, contributions: Sequence[Contribution], name: str, head: str, caption: str) -> doc.TextTable:
+    """Table of the largest contributions to the phase or to the displacement."""
+    sum_heads = doc.numbers("Of the sum") if any(error.model_cells for error in contributions) else []
     size = doc.Head(head, "number")
-    columns = doc.heads("Owner", "Kind", "Axis or term", size, "Relative to the largest", *of_sum)
+    columns = doc.heads("Owner", "Kind", "Axis or term", size, "Relative to the largest", *sum_heads)
     lines: list[doc.Line] = [
-        (one.owner, one.subject.kind, one.axis, one.size, doc.Bar(one.part, one.owner), *one.more[:1])
-        for one in found[:_TOP]
+        (
+            error.owner,
+            error.subject.kind,
+            error.axis,
+            error.size,
+            doc.Bar(error.fraction, error.owner),
+            *error.model_cells[:1],
+        )
+        for error in contributions[:_MAX_LARGEST_ROWS]
     ]
-    caption += f": the {_TOP} largest of {len(found)}" if len(found) > _TOP else ""
-    return doc.TextTable(f"Contributions to the {about} of {page.name}", caption, columns, lines, "contributions")
+    count = len(contributions)
+    caption += f": the {_MAX_LARGEST_ROWS} largest of {count}" if count > _MAX_LARGEST_ROWS else ""
+    return doc.TextTable(f"Contributions to the {name} of {page.name}", caption, columns, lines, "contributions")
 
 
 def all_contributions(page: Page) -> Iterator[doc.Block]:
     """Tables of all errors that have a phase, and of all that displace the image."""
     models = ("Gating model", "Of the sum", "Published", "Full")
-    for found, about, heads, caption in (
+    for contributions, title, heads, caption in (
         (
-            phases(page), "contributions to the phase", models,
+            phase_contributions(page), "contributions to the phase", models,
             "Quadratic phase error of every declared error by the model that gates, the published and the full one, "
             "before autofocus; what has none is left out",
         ),
         (
-            moves(page), "displacements", ("Displacement",),
+            displacement_contributions(page), "displacements", ("Displacement",),
             "Displacement of the image by every declared error",
         ),
     ):  # fmt: skip
-        if found:
+        if contributions:
             columns = doc.heads(doc.Head("Id", "id"), *doc.numbers(*heads))
-            lines: list[doc.Line] = [(doc.Name(one.id), one.size, *one.more) for one in found]
-            yield doc.TextTable(f"All {about} of {page.name}", caption, columns, lines, "contributions")
+            lines: list[doc.Line] = [(doc.Name(error.id), error.size, *error.model_cells) for error in contributions]
+            yield doc.TextTable(f"All {title} of {page.name}", caption, columns, lines, "contributions")

@@ -60,10 +60,10 @@ from bisar_budget.report.words.sentences import (
 )
 from bisar_budget.units import format_quantity
 
-_NOTHING = "Nothing was judged"
-_ALONE = "; each error alone"
-_CHANGED = "; with values set by options"
-_DRIVERS = 3
+_NOTHING_JUDGED = "Nothing was judged"
+_EACH_ALONE = "; each error alone"
+_WITH_CHANGES = "; with values set by options"
+_MAX_DRIVER_ROWS = 3
 _DISTRIBUTIONS = {
     "normal": "one-sigma values",
     "uniform": "uniform within the values given",
@@ -93,12 +93,12 @@ _RULES = {
 
 
 def compliance(report: Report, style: Style) -> doc.Compliance:
-    """Arrange the findings of a run for a report that people read.
+    """Compliance report of a run, as a document.
 
     Raises
     ------
     ValueError
-        Findings that do not carry their analysis.
+        Findings do not carry their analysis.
     """
     count = len(report.missions)
     index: list[doc.Line] = []
@@ -127,7 +127,7 @@ def compliance(report: Report, style: Style) -> doc.Compliance:
     about += [("Date", report.day.isoformat())] if report.day else []
     about.append(("Tool", f"bisar-budget {report.version}"))
     sections = [_index(index)] if count > 1 else []
-    sections += [*missions, _made(report), _approval(report), *annexes]
+    sections += [*missions, _provenance(report), _approval(report), *annexes]
     return doc.Compliance(report.version, subject, doc.Facts(about), margins, sections)
 
 
@@ -139,39 +139,44 @@ _WAIVED = (
 
 
 def _judged(status: str, waived: Sequence[int]) -> str:
-    """Verdict on rows and requirements, with what it owes to waivers."""
-    said = [f"{count} {words[count > 1]} waived" for count, words in zip(waived, _WAIVED, strict=True) if count]
-    return "; ".join([STATUS[status].verdict, *said])
+    """Verdict on rows and requirements, with the numbers of waived rows and requirements."""
+    clauses = [f"{count} {words[count > 1]} waived" for count, words in zip(waived, _WAIVED, strict=True) if count]
+    return "; ".join([STATUS[status].verdict, *clauses])
 
 
-def _waived(found: MissionFindings) -> tuple[int, int]:
-    """Number of rows that are waived, and of requirements that are and have no such row: over a limit, not judged."""
-    rows = [row for row in found.rows if row.status == "waived"]
+def _waived(findings: MissionFindings) -> tuple[int, int]:
+    """Number of waived rows over their limit, and of waived rows and requirements that cannot be judged.
+
+    A waived requirement counts only if no waived row shows it.
+    """
+    rows = [row for row in findings.rows if row.status == "waived"]
     over = sum((row.utilization or 0.0) > 1 for row in rows)
-    return over, len(rows) - over + sum(one.status == "waived" for one in unseen(found))
+    return over, len(rows) - over + sum(requirement.status == "waived" for requirement in unseen(findings))
 
 
 def _overall(report: Report) -> str:
-    """Verdict on the run: a mission that declares nothing complies with nothing."""
+    """Verdict on the run. Missions that declare no error are counted apart, since nothing was judged in them."""
     usable = [mission for mission in report.missions if isinstance(mission, MissionFindings)]
     count = len(report.missions)
     empty = sum(mission.is_empty and not mission.changes for mission in usable)
     if empty == count:
-        return _NOTHING
-    said = _judged(report.status, [sum(counts) for counts in zip(*map(_waived, usable), strict=True)] or (0, 0))
+        return _NOTHING_JUDGED
+    verdict_words = _judged(
+        report.status, [sum(counts) for counts in zip(*map(_waived, usable), strict=True)] or (0, 0)
+    )
     if empty:
-        said = f"{said}; of {count} missions {empty} declare no error"
+        verdict_words = f"{verdict_words}; of {count} missions {empty} declare no error"
     if any(mission.changes for mission in usable):
-        said += _CHANGED
-    alone = sum(map(_is_alone, usable))
+        verdict_words += _WITH_CHANGES
+    alone = sum(map(_judges_each_alone, usable))
     if not alone:
-        return said
-    return said + (_ALONE if alone == count else f"{_ALONE} in {alone} of {count} missions")
+        return verdict_words
+    return verdict_words + (_EACH_ALONE if alone == count else f"{_EACH_ALONE} in {alone} of {count} missions")
 
 
-def _is_alone(found: MissionFindings) -> bool:
-    """Whether errors are judged one by one."""
-    return not found.is_empty and found.combine == "each"
+def _judges_each_alone(findings: MissionFindings) -> bool:
+    """Whether each error of a mission is judged alone."""
+    return not findings.is_empty and findings.combine == "each"
 
 
 def _index(lines: Sequence[doc.Line]) -> doc.Chapter:
@@ -185,23 +190,23 @@ def _index(lines: Sequence[doc.Line]) -> doc.Chapter:
 
 
 def _index_line(page: Page) -> doc.Line:
-    """Name of a mission and of what decides it: its worst row, or a requirement that is worse than any row."""
-    found, judged = page.found, page.judged
-    decides = [requirement_id(one) for one in found.requirements if one.status == found.status]
+    """Line of a mission in the index, with its worst row, or a requirement that is worse than any row."""
+    findings, judged = page.findings, page.judged
+    deciding = [requirement_id(each) for each in findings.requirements if each.status == findings.status]
     worst = judged[0].id if judged else ""
-    if decides and not (judged and judged[0].status == found.status):
-        worst = decides[0]
+    if deciding and not (judged and judged[0].status == findings.status):
+        worst = deciding[0]
     use = shown_use(judged[0]) if judged and worst == judged[0].id else None
-    counts = ", ".join(f"{count} {STATUS[status].words}" for status, count in found.summary.items())
-    counts += f"; {waiver_names([one.id for one in found.waived_by])}" if found.waived_by else ""
+    counts = ", ".join(f"{count} {STATUS[status].words}" for status, count in findings.summary.items())
+    counts += f"; {waiver_names([waiver.id for waiver in findings.waived_by])}" if findings.waived_by else ""
     name, decided = doc.Name(page.name, page.anchor), doc.Name(worst) if worst else "–"
-    return name, doc.Name(page.file), doc.Badge(found.status), decided, dashed(use_words(use)), counts
+    return name, doc.Name(page.file), doc.Badge(findings.status), decided, dashed(use_words(use)), counts
 
 
-def _made(report: Report) -> doc.Chapter:
-    which = "s above, each" if len(report.missions) > 1 else " above,"
-    said = (
-        f"By bisar-budget {report.version} from the mission file{which} known by the SHA-256 of its bytes. The same "
+def _provenance(report: Report) -> doc.Chapter:
+    files = "s above, each" if len(report.missions) > 1 else " above,"
+    text = (
+        f"By bisar-budget {report.version} from the mission file{files} known by the SHA-256 of its bytes. The same "
         "input gives the same bytes. Options that bear on the result:"
     )
     options: list[doc.Line] = [
@@ -209,17 +214,17 @@ def _made(report: Report) -> doc.Chapter:
     ]
     columns = doc.heads("Option", "Value", "From")
     table = doc.TextTable("Options of the run", "Options of this run", columns, options or [("none", "–", "–")])
-    return doc.Chapter("How this report was made", [doc.Paragraph(said), table], "made", level=2)
+    return doc.Chapter("How this report was made", [doc.Paragraph(text), table], "made", level=2)
 
 
 def _approval(report: Report) -> doc.Chapter:
-    """The table of signatures; above it what is signed although it is not what its source states."""
+    """The table of signatures, below a table of the figures that a level shifts off their source."""
     blocks: list[doc.Block] = []
     shifted = [
-        (found.name, doc.Styled("id", doc.Name(one.key)), one.level, one.off)
-        for found in report.missions
-        if not isinstance(found, UnusableMission)
-        for one in found.kinds.shifted
+        (findings.name, doc.Styled("id", doc.Name(error.key)), error.level, error.off)
+        for findings in report.missions
+        if not isinstance(findings, UnusableMission)
+        for error in findings.kinds.shifted
     ]
     if shifted:
         heads = doc.heads("Mission", "Key", "Level", "From")
@@ -243,13 +248,15 @@ def _facts_of_file(file: str, digest: str, document: Document, counts: doc.Text)
     return doc.Facts([*pairs, ("Rows", counts)])
 
 
-def _faults(found: UnusableMission, name: str, anchor: str) -> doc.Chapter:
-    """Faults of a file that cannot be used."""
-    said = f"{STATUS['error'].verdict}: the mission file is not usable."
-    lines = [(f"{fault.line or '–'}:{fault.column or '–'}", str(fault)) for fault in found.faults]
+def _faults(mission: UnusableMission, name: str, anchor: str) -> doc.Chapter:
+    """Faults of an unusable file."""
+    verdict_words = f"{STATUS['error'].verdict}: the mission file is not usable."
+    lines = [(f"{fault.line or '–'}:{fault.column or '–'}", str(fault)) for fault in mission.faults]
     columns = doc.heads("Line:column", "Fault")
     table = doc.TextTable(f"Faults of {name}", "Faults of the mission file", columns, lines)
-    return doc.Chapter("Verdict", [doc.Paragraph(said, "verdict error"), table], f"{anchor}-verdict", is_listed=False)
+    return doc.Chapter(
+        "Verdict", [doc.Paragraph(verdict_words, "verdict error"), table], f"{anchor}-verdict", is_listed=False
+    )
 
 
 def _summary(page: Page) -> list[doc.Block]:
@@ -269,50 +276,53 @@ def _summary(page: Page) -> list[doc.Block]:
 
 
 def _verdict(page: Page) -> Iterator[doc.Block]:
-    found, waived = page.found, _waived(page.found)
-    said = _NOTHING if found.is_empty else _judged(found.status, waived)
-    said += f";{confidence}" if (confidence := confidence_words(found)) else ""
-    said += (_CHANGED if found.changes else "") + (_ALONE if _is_alone(found) else "")
-    yield doc.Paragraph(said, f"verdict {found.status}")
-    if doubt := doubtful_model(found):
+    findings, waived = page.findings, _waived(page.findings)
+    verdict_words = _NOTHING_JUDGED if findings.is_empty else _judged(findings.status, waived)
+    verdict_words += f";{confidence}" if (confidence := confidence_words(findings)) else ""
+    verdict_words += (_WITH_CHANGES if findings.changes else "") + (
+        _EACH_ALONE if _judges_each_alone(findings) else ""
+    )
+    yield doc.Paragraph(verdict_words, f"verdict {findings.status}")
+    if doubt := doubtful_model(findings):
         yield doc.Paragraph(doubt)
-    yield doc.Paragraph(f"{sentence(verdict(found))}. {sentence(rule_words(found))}.")
+    yield doc.Paragraph(f"{sentence(verdict(findings))}. {sentence(rule_words(findings))}.")
     yield _requirements(page)
     facts: list[tuple[doc.Text, doc.Text]] = [
-        ("Not judged", f"{one.text} ({', '.join(row.id for row in one.rows)})") for one in unjudged_effects(found)
+        ("Not judged", f"{effect.text} ({', '.join(row.id for row in effect.rows)})")
+        for effect in unjudged_effects(findings)
     ]
-    facts.append(("Declared", f"{len(found.kinds.declared)} of {found.kinds.in_all} kinds of error"))
-    for name, kinds in (("Not declared", found.kinds.missing), ("Without source", found.kinds.without_source)):
+    facts.append(("Declared", f"{len(findings.kinds.declared)} of {findings.kinds.in_all} kinds of error"))
+    for name, kinds in (("Not declared", findings.kinds.missing), ("Without source", findings.kinds.without_source)):
         facts += [(name, ", ".join(kind_names(kinds)))] if kinds else []
-    if found.kinds.shifted:
-        facts.append(("Off the data sheet", ", ".join(shifted_names(found.kinds))))
+    if findings.kinds.shifted:
+        facts.append(("Off the data sheet", ", ".join(shifted_names(findings.kinds))))
     facts += [
-        ("" if place else "Overrides", f"{one.name} {one.value} ({one.origin})")
-        for place, one in enumerate(found.overrides)
+        ("" if index else "Overrides", f"{override.name} {override.value} ({override.origin})")
+        for index, override in enumerate(findings.overrides)
     ]
     yield doc.Facts(facts, "facts wide")
-    if narrow := narrow_gradients(found.geometry):
+    if narrow := narrow_gradients(findings.geometry):
         yield doc.Paragraph(narrow)
     if drivers := list(_drivers(page)):
-        who = "rows that drive" if len(drivers) > 1 else "row that drives"
-        yield doc.Paragraph(f"The {who} it (QPE is the quadratic phase error at the aperture edge):")
-        yield doc.Items([_driver(row, found) for row in drivers], "drivers", is_numbered=True)
+        subject = "rows that drive" if len(drivers) > 1 else "row that drives"
+        yield doc.Paragraph(f"The {subject} it (QPE is the quadratic phase error at the aperture edge):")
+        yield doc.Items([_driver(row, findings) for row in drivers], "drivers", is_numbered=True)
 
 
 def _requirements(page: Page) -> doc.TextTable:
     lines: list[doc.Line] = []
-    for one in requirement_lines(page.found):
-        decided: doc.Text = dashed(one.decided_by)
-        if one.decided_by == one.requirement.row:
-            decided = doc.Styled("id", doc.Name(one.decided_by))
+    for line in requirement_lines(page.findings):
+        decided: doc.Text = dashed(line.decided_by)
+        if line.decided_by == line.requirement.row:
+            decided = doc.Styled("id", doc.Name(line.decided_by))
         lines.append(
             (
-                sentence(one.name) + (" (default)" if one.requirement.is_default else ""),
-                dashed(one.allowed),
-                dashed(one.reached),
-                (dashed(one.use), doc.Use(None if one.use == "-" else one.requirement.utilization, one.status)),
-                doc.Badge(one.status),
-                (decided, ", " if one.decided_by and one.remark else "", one.remark),
+                sentence(line.name) + (" (default)" if line.requirement.is_default else ""),
+                dashed(line.allowed),
+                dashed(line.reached),
+                (dashed(line.use), doc.Use(None if line.use == "-" else line.requirement.utilization, line.status)),
+                doc.Badge(line.status),
+                (decided, ", " if line.decided_by and line.remark else "", line.remark),
             )
         )
     columns = doc.heads("Requirement", *doc.numbers("Allowed", "Reached", "Use"), "Status", "Decided by")
@@ -321,18 +331,18 @@ def _requirements(page: Page) -> doc.TextTable:
 
 
 def _drivers(page: Page) -> Iterator[Row]:
-    """Rows that a verdict rests on: what breaks, is in doubt or is waived; of a pass also what comes nearest."""
-    is_met = STATUS[page.found.status].is_met
-    for row in page.judged[:_DRIVERS]:
+    """Rows that decide the verdict: broken, doubtful or waived rows, and rows with the largest use if all is met."""
+    is_met = STATUS[page.findings.status].is_met
+    for row in page.judged[:_MAX_DRIVER_ROWS]:
         if not STATUS[row.status].is_met or (is_met and row.utilization):
             yield row
 
 
-def _driver(row: Row, found: MissionFindings) -> tuple[doc.Text, doc.Text]:
-    said = f"{sentence(measure(row, found))}."
-    said += f" {sentence('; '.join(row.decisive))}." if row.decisive else ""
+def _driver(row: Row, findings: MissionFindings) -> tuple[doc.Text, doc.Text]:
+    text = f"{sentence(measure(row, findings))}."
+    text += f" {sentence('; '.join(row.decisive))}." if row.decisive else ""
     bar = doc.Use(shown_use(row), row.status)
-    return (doc.Styled("id", doc.Name(row.id)), own_id(row), " ", doc.Badge(row.status), " ", bar), said
+    return (doc.Styled("id", doc.Name(row.id)), own_id(row), " ", doc.Badge(row.status), " ", bar), text
 
 
 def _matrix(page: Page) -> Iterator[doc.Block]:
@@ -348,11 +358,11 @@ def _matrix(page: Page) -> Iterator[doc.Block]:
     shown = [row for row in page.matrix if row.id in page.in_summary]
     yield matrix_table(page, shown, f"Compliance matrix of {page.name}", caption)
     hidden = len(page.hidden)
-    left = [f"{hidden} rows that pass or limit nothing" if hidden > 1 else "1 row that passes or limits nothing"]
-    left = (left if hidden else []) + ([f"{len(page.undeclared)} not declared"] if page.undeclared else [])
-    if left:
-        where: doc.Text = " (in the annex)" if page.is_full else (" (", doc.Code("--detail full"), " has them)")
-        yield doc.Paragraph((f"Not shown: {', '.join(left)}", where, "."), "more")
+    counts = [f"{hidden} rows that pass or limit nothing" if hidden > 1 else "1 row that passes or limits nothing"]
+    counts = (counts if hidden else []) + ([f"{len(page.undeclared)} not declared"] if page.undeclared else [])
+    if counts:
+        annex_words: doc.Text = " (in the annex)" if page.is_full else (" (", doc.Code("--detail full"), " has them)")
+        yield doc.Paragraph((f"Not shown: {', '.join(counts)}", annex_words, "."), "more")
     driving = {row.id for row in _drivers(page)}
     reasons = grouped(
         (row.id, row.decisive) for row in page.judged if STATUS[row.status].is_explained and row.id not in driving
@@ -362,11 +372,11 @@ def _matrix(page: Page) -> Iterator[doc.Block]:
 
 
 def _geometry(page: Page) -> Iterator[doc.Block]:
-    yield doc.Facts([(name, sentence(text)) for name, text in head(page.found)], "facts wide")
+    yield doc.Facts([(name, sentence(text)) for name, text in head(page.findings)], "facts wide")
     figures = []
     for name, title, svg in (
-        ("plan", "Plan: the collection from above", geometry_plan(page.found)),
-        ("elevation", "Elevation: the collection from the side", geometry_elevation(page.found)),
+        ("plan", "Plan: the collection from above", geometry_plan(page.findings)),
+        ("elevation", "Elevation: the collection from the side", geometry_elevation(page.findings)),
     ):
         label = f"{title} of {page.name}"
         figures.append(doc.Figure(f"{page.number}-{name}.svg", page.anchor, title, label, svg, is_told=False))
@@ -375,10 +385,10 @@ def _geometry(page: Page) -> Iterator[doc.Block]:
 
 def _allocation(page: Page) -> Iterator[doc.Block]:
     """Shares of the quadratic phase error and of the power."""
-    found, allocation = page.found, page.found.allocation
+    findings, allocation = page.findings, page.findings.allocation
     total, gain = allocation.qpe_total, allocation.autofocus_gain
     yield doc.Paragraph(
-        f"The quadratic phase error at the aperture edge may be {phase_limit(total, found)} in all; "
+        f"The quadratic phase error at the aperture edge may be {phase_limit(total, findings)} in all; "
         f"{_gain(allocation)}."
     )
     shares = [
@@ -386,26 +396,28 @@ def _allocation(page: Page) -> Iterator[doc.Block]:
     ]
     bars = (("Before autofocus", 1.0), ("With autofocus", gain)) if gain > 1 else (("Budget", 1.0),)
     for label, factor in bars:
-        parts = [
-            (one, part * factor / gain, phase_limit(part * total * factor, found)) for one, part in shares if part
+        segments = [
+            (owner, share * factor / gain, phase_limit(share * total * factor, findings))
+            for owner, share in shares
+            if share
         ]
-        yield doc.Stack(label, parts)
+        yield doc.Stack(label, segments)
     lines: list[doc.Line] = []
-    for owner, part in shares:
-        if part or owner == "clock":
-            limit = part * total if part else allocation.qpe_limit(owner)
-            name: doc.Text = (doc.Swatch(owner, part), owner) if part else owner
-            share = f"{part:.3g}" if part else "held to the receiver’s"
-            lines.append((name, share, phase_limit(limit, found), phase_limit(limit * gain, found)))
+    for owner, share in shares:
+        if share or owner == "clock":
+            limit = share * total if share else allocation.qpe_limit(owner)
+            name: doc.Text = (doc.Swatch(owner, share), owner) if share else owner
+            share_words = f"{share:.3g}" if share else "held to the receiver’s"
+            lines.append((name, share_words, phase_limit(limit, findings), phase_limit(limit * gain, findings)))
     columns = doc.heads("Owner", *doc.numbers("Share", "Before autofocus", "With autofocus"))
     yield doc.TextTable(f"Allocation of {page.name}", "Shares of the quadratic phase error", columns, lines)
     yield from _power_shares(page)
 
 
 def _power_shares(page: Page) -> Iterator[doc.TextTable]:
-    """Shares of the power that vibration and noise may add; that of the clock only where it has one."""
-    required, allocation = page.mission.requirements, page.found.allocation
-    stated = [
+    """Shares of the power that vibration and noise may add. The clock has a column only if it has a share."""
+    required, allocation = page.mission.requirements, page.findings.allocation
+    rows = [
         (name, value, split)
         for name, value, split in (
             ("PSLR", required.pslr, allocation.pslr),
@@ -413,10 +425,10 @@ def _power_shares(page: Page) -> Iterator[doc.TextTable]:
         )
         if value is not None
     ]
-    has_clock = any(split.clock is not None for _, _, split in stated)
+    has_clock = any(split.clock is not None for _, _, split in rows)
     heads = ("Requirement", "Transmitter", "Receiver", *(["Clock"] if has_clock else []))
     lines = []
-    for name, value, split in stated:
+    for name, value, split in rows:
         clock = "–" if split.clock is None else f"{split.clock:.3g}"
         shares = (f"{split.transmitter:.3g}", f"{split.receiver:.3g}", *([clock] if has_clock else []))
         lines.append((name, f"{value:g} dB", *shares))
@@ -434,14 +446,14 @@ def _gain(allocation: Allocation) -> str:
 
 
 def _validity(page: Page) -> Iterator[doc.Block]:
-    found, file = page.found, page.file
-    stated = [(name, sentence(text) + ("" if text.endswith(".") else ".")) for name, text in _assumptions(page)]
-    yield doc.Facts(stated, "facts wide")
+    findings, file = page.findings, page.file
+    assumptions = [(name, sentence(text) + ("" if text.endswith(".") else ".")) for name, text in _assumptions(page)]
+    yield doc.Facts(assumptions, "facts wide")
     warnings: list[doc.Text] = []
-    for warning in found.warnings:
-        place = file if warning.line is None else f"{file}:{warning.line}"
-        warnings.append(("Warning, ", doc.Styled("id", doc.Name(place)), f": {warning.message}."))
-    remarks = [*warnings, *(f"{sentence(note)}." for note in found.notes)]
+    for warning in findings.warnings:
+        location = file if warning.line is None else f"{file}:{warning.line}"
+        warnings.append(("Warning, ", doc.Styled("id", doc.Name(location)), f": {warning.message}."))
+    remarks = [*warnings, *(f"{sentence(note)}." for note in findings.notes)]
     if remarks:
         yield doc.Items([[remark] for remark in remarks])
     inputs = [
@@ -449,24 +461,25 @@ def _validity(page: Page) -> Iterator[doc.Block]:
         for name, value, origin in _inputs(page)
     ]
     yield doc.Facts(inputs, "inputs")
-    by_source, unsourced = sources(found)
-    said = "; ".join(f"“{text}” for {counted(len(rows), 'row')}" for text, rows in by_source.items())
-    texts = [f"Sources: {said}."] if said else []
+    by_source, unsourced = sources(findings)
+    source_words = "; ".join(f"“{text}” for {counted(len(rows), 'row')}" for text, rows in by_source.items())
+    texts = [f"Sources: {source_words}."] if source_words else []
     if unsourced:
         texts.append(f"The file names no source for {counted(len(unsourced), 'declared row')}.")
     if texts:
         yield doc.Paragraph(" ".join(texts))
 
 
-_BESIDE = {"accuracy": "Accuracy", "earth_orientation": "The Earth’s orientation"}  # files that say more of a path
+# Further files of a path.
+_PATH_FILE_NAMES = {"accuracy": "Accuracy", "earth_orientation": "The Earth’s orientation"}
 
 
 def _assumptions(page: Page) -> Iterator[tuple[str, str]]:
-    """Assumptions of the verdict, and where it holds."""
-    mission, found = page.mission, page.found
-    if found.changes:
-        yield "Mission", f"not that of the file, but that of the file with {changes_words(found.changes)}"
-    yield "Model", _VALIDITY[found.model]
+    """Names and texts of the assumptions of the verdict, and of its range of validity."""
+    mission, findings = page.mission, page.findings
+    if findings.changes:
+        yield "Mission", f"not that of the file, but that of the file with {changes_words(findings.changes)}"
+    yield "Model", _VALIDITY[findings.model]
     if mission.has_direct_path:
         yield (
             "Direct path",
@@ -474,35 +487,40 @@ def _assumptions(page: Page) -> Iterator[tuple[str, str]]:
             "platforms, and timing errors have no effect. The published model does not know that: its values are "
             "those without, and a row that it fails is no warning",
         )
-    for name, path in found.paths:
+    for name, path in findings.paths:
         yield f"Path of the {name}", path_words(path)
         if path.sha256 is not None:
             yield f"File of the {name}’s path", f"{path.file or 'in the mission file'}, SHA-256 {path.sha256}"
-        for said, file in path.beside.items():
+        for kind, file in path.beside.items():
             if file is not None:
-                yield f"{_BESIDE[said]} of the {name}’s path", "{}, SHA-256 {}".format(*file)
-    yield "Combination", _RULES[found.combine]
+                yield f"{_PATH_FILE_NAMES[kind]} of the {name}’s path", "{}, SHA-256 {}".format(*file)
+    yield "Combination", _RULES[findings.combine]
     yield "Phases", f"at the centre frequency, c = {SPEED_OF_LIGHT / 1e3:.3f} km/s; at the aperture edge, ±T/2"
-    factor = f"{found.coverage_factor:g} times the file’s value" if found.coverage_factor != 1 else "the file’s value"
+    factor = (
+        f"{findings.coverage_factor:g} times the file’s value"
+        if findings.coverage_factor != 1
+        else "the file’s value"
+    )
     yield "Declared", f"for position, velocity, acceleration and clock {factor}"
     for name in ("transmitter", "receiver"):
         error = getattr(mission.platforms, name).motion_error
         if any(error.stated(kind) for kind in MOTION_UNITS):
-            said = _DISTRIBUTIONS[error.distribution]
-            said += ", position and velocity by their covariance" if error.covariance is not None else ""
-            yield f"Errors of the {name}", f"along the axes of the frame “{error.frame}”; {said}"
+            text = _DISTRIBUTIONS[error.distribution]
+            text += ", position and velocity by their covariance" if error.covariance is not None else ""
+            yield f"Errors of the {name}", f"along the axes of the frame “{error.frame}”; {text}"
     common = mission.common_motion_error
     if common is not None:
-        said = _DISTRIBUTIONS[common.distribution]
+        text = _DISTRIBUTIONS[common.distribution]
         frame = (
             "along the axes of the scene"
             if common.frame == "scene"
             else f"the same along the axes of each platform’s own frame “{common.frame}”"
         )
-        yield "Errors of both platforms", f"{frame}; {said}"
+        yield "Errors of both platforms", f"{frame}; {text}"
     yield (
         "Autofocus",
-        _gain(found.allocation) + ("" if found.allocation.n_pull is None else f" ({mission.autofocus.algorithm})"),
+        _gain(findings.allocation)
+        + ("" if findings.allocation.n_pull is None else f" ({mission.autofocus.algorithm})"),
     )
     yield (
         "Sidelobes",
@@ -520,7 +538,7 @@ def _assumptions(page: Page) -> Iterator[tuple[str, str]]:
             "along, cross and up of the velocity, turning with it; of a platform that stands still along the axes of "
             "the scene. Attitude swings an arm and turns the specific force: the row of the inertial sensor has both",
         )
-    if any(row.subject.kind == "time_tag" for row in found.rows):
+    if any(row.subject.kind == "time_tag" for row in findings.rows):
         yield "Time tags", "a path is measured where its platform is later by so much"
     if any(platform.oscillator for platform in mission.platforms) or mission.synchronization:
         yield (
@@ -535,63 +553,63 @@ def _assumptions(page: Page) -> Iterator[tuple[str, str]]:
             "is as long as over a flat Earth and crosses no free electrons; above, it crosses spherical shells at "
             "7 km and 350 km",
         )
-    for row in found.rows:
+    for row in findings.rows:
         if row.subject.kind == "oscillator" and row.remarks:
             shaken = " under acceleration" if row.subject.axis == "acceleration" else ""
             yield f"Oscillator of the {row.owner}{shaken}", "; ".join(row.remarks)
 
 
 def _air_of(propagation: Propagation) -> str:
-    """Say which air the legs have, and in which time it changes."""
+    """Whether both legs cross the same air, and the correlation time of its changes."""
     legs = {name: propagation.leg(name) for name in Platforms._fields}
     times = {name: leg.correlation_time for name, leg in legs.items() if leg is not None}
-    said = {
+    change_words = {
         name: "as it is within the aperture"
         if time is None
         else f"with a correlation time of {format_quantity(time, 's')}"
         for name, time in times.items()
     }
     air = "one air over both legs" if propagation.is_one_air else "legs independent"
-    if len({*said.values()}) == 1:
-        return f"{air}, {next(iter(said.values()))}"
-    return f"{air}: {', '.join(f'{name} {words}' for name, words in said.items())}"
+    if len({*change_words.values()}) == 1:
+        return f"{air}, {next(iter(change_words.values()))}"
+    return f"{air}: {', '.join(f'{name} {words}' for name, words in change_words.items())}"
 
 
 def _inputs(page: Page) -> Iterator[tuple[str, str, str]]:
-    """Values that the findings rest on, with the line of the file or `default`."""
-    mission, found, file = page.mission, page.found, page.file
+    """Names and values that determine the findings, with their origin: a line of the file, `default` or `--set`."""
+    mission, findings, file = page.mission, page.findings, page.file
 
-    def given(name: str, value: str, path: KeyPath) -> tuple[str, str, str]:
+    def value_from(name: str, value: str, path: KeyPath) -> tuple[str, str, str]:
         if mission.is_changed(path):
             return name, value, "--set"
         is_in_file = path in mission.places
         return name, value, f"{file}:{mission.line(path)}" if is_in_file else "default"
 
     requirements = mission.requirements
-    yield given(
+    yield value_from(
         "centre frequency", format_quantity(mission.radar.center_frequency, "Hz", 6), ("radar", "center_frequency")
     )
-    yield given("bandwidth", format_quantity(mission.radar.bandwidth, "Hz", 6), ("radar", "bandwidth"))
-    yield given(
+    yield value_from("bandwidth", format_quantity(mission.radar.bandwidth, "Hz", 6), ("radar", "bandwidth"))
+    yield value_from(
         "aperture time", format_quantity(mission.collection.aperture_time, "s", 6), ("collection", "aperture_time")
     )
-    stated = {one.key: one for one in found.requirements}
+    judged = {requirement.key: requirement for requirement in findings.requirements}
     for key, name in NAMES.items():
         if key == "declare":
             continue
-        if key not in stated:
+        if key not in judged:
             yield name, "none: computed, not judged", "not in the file"
             continue
-        value = requirement_size(stated[key].value, stated[key], "down")
+        value = requirement_size(judged[key].value, judged[key], "down")
         if key == "quadratic_phase_error":
             value += f" ({requirements.quadratic_phase_error:.4g} rad)"
-        yield given(name, value, ("requirements", key))
+        yield value_from(name, value, ("requirements", key))
     allocation = mission.allocation
     split = allocation.split
-    yield given("split", split if isinstance(split, str) else "shares of the file", ("allocation", "split"))
-    yield given("combination", allocation.combine, ("allocation", "combine"))
-    yield given("model", allocation.model, ("allocation", "model"))
+    yield value_from("split", split if isinstance(split, str) else "shares of the file", ("allocation", "split"))
+    yield value_from("combination", allocation.combine, ("allocation", "combine"))
+    yield value_from("model", allocation.model, ("allocation", "model"))
     if mission.has_direct_path:
-        yield given("clock", "the direct path; the full model gates", ("synchronization", "method"))
-    yield given("coverage factor", f"{allocation.coverage_factor:g}", ("allocation", "coverage_factor"))
-    yield given("warning above", f"{100 * allocation.warn_above:g} % of a limit", ("allocation", "warn_above"))
+        yield value_from("clock", "the direct path; the full model gates", ("synchronization", "method"))
+    yield value_from("coverage factor", f"{allocation.coverage_factor:g}", ("allocation", "coverage_factor"))
+    yield value_from("warning above", f"{100 * allocation.warn_above:g} % of a limit", ("allocation", "warn_above"))

@@ -1,4 +1,4 @@
-"""Evidence of images about a limit, to be looked at: cuts as SVG, chips as PNG, and the words that go with them."""
+"""Images at a limit as evidence: cross-range cuts as SVG, chips (small images) as PNG, and their captions."""
 
 import struct
 import zlib
@@ -9,30 +9,35 @@ from bisar_budget.findings.images import FLOOR_DB, ImageEvidence, PointImage, Ve
 from bisar_budget.report.drawing import svg
 from bisar_budget.units import format_limit, format_quantity
 
-_WIDTH, _HEIGHT = 520.0, 190.0  # px, of the drawing and of one panel
-_LEFT, _EDGE, _TITLE = 46.0, 8.0, 22.0  # px beside and above a panel
+_CUTS_WIDTH_PX, _CUTS_HEIGHT_PX = 520.0, 190.0  # of the drawing and of one panel
+_CUTS_LEFT_PX, _CUTS_EDGE_PX, _CUTS_TITLE_PX = 46.0, 8.0, 22.0  # beside and above a panel
 WITHOUT_ERROR, WITH_ERRORS, FOCUSED = "line dotted", "line receiver dashed", "line transmitter"  # styles
 
 
 class Curve(NamedTuple):
-    """A cut along y′ [m], in dB of the peak without error, and how it is drawn."""
+    """A cut along y′: positions [m], levels over the peak without error [dB], and the style of its line."""
 
     name: str
-    places: Sequence[float]
-    levels: Sequence[float]
+    positions: Sequence[float]
+    levels_db: Sequence[float]
     style: str
 
 
 def impulse_response_cuts(evidence: ImageEvidence) -> str:
-    """Cross-range cuts of a row at its limit over the error-free one, with autofocus in a second panel, as SVG."""
+    """Cross-range cuts of a row at its limit as SVG, over the cut without error.
+
+    Cuts with autofocus are in a second panel.
+    """
     verdict = evidence.verdict
     canvas = svg.Canvas()
     at_limit = evidence.at_limit
     curves = [
         _curve("at the limit", at_limit.cut_db, at_limit.step_m, FOCUSED),
-        _curve("without error", at_limit.error_free_db, at_limit.step_m, WITHOUT_ERROR),  # last: none covers it
+        _curve(
+            "without error", at_limit.error_free_db, at_limit.step_m, WITHOUT_ERROR
+        ),  # last, so that no line covers it
     ]
-    bottom = cut_panel(canvas, 0.0, _WIDTH, _HEIGHT, _at_limit(verdict), curves)
+    bottom = cut_panel(canvas, 0.0, _CUTS_WIDTH_PX, _CUTS_HEIGHT_PX, _at_limit(verdict), curves)
     before, after = evidence.before_autofocus, evidence.after_autofocus
     if before and after:
         curves = [
@@ -40,13 +45,13 @@ def impulse_response_cuts(evidence: ImageEvidence) -> str:
             _curve("after", after.cut_db, after.step_m, FOCUSED),
             _curve("without error", before.error_free_db, before.step_m, WITHOUT_ERROR),
         ]
-        bottom = cut_panel(canvas, bottom + 8, _WIDTH, _HEIGHT, _with_autofocus(verdict), curves)
+        bottom = cut_panel(canvas, bottom + 8, _CUTS_WIDTH_PX, _CUTS_HEIGHT_PX, _with_autofocus(verdict), curves)
     description = (
         "Power along y′, across the bistatic look direction, over the peak of the response without error. "
         + " ".join(numbers_in_words(evidence))
     )
     key = f"cuts {evidence.file} {verdict.id}"
-    return canvas.document((_WIDTH, bottom + 4), key, f"Cross-range cuts: {verdict.id}", description)
+    return canvas.document((_CUTS_WIDTH_PX, bottom + 4), key, f"Cross-range cuts: {verdict.id}", description)
 
 
 def _curve(name: str, levels: Sequence[float], step_m: float, style: str) -> Curve:
@@ -55,7 +60,7 @@ def _curve(name: str, levels: Sequence[float], step_m: float, style: str) -> Cur
 
 
 def numbers_in_words(evidence: ImageEvidence) -> Iterator[str]:
-    """Say what was predicted and what the images show, a sentence for each limit."""
+    """Sentences with the prediction and the measurement at each limit."""
     verdict = evidence.verdict
     yield f"{_at_limit(verdict)}."
     measures = (
@@ -64,9 +69,9 @@ def numbers_in_words(evidence: ImageEvidence) -> Iterator[str]:
         ("PSLR {} dB", None if verdict.pslr_db is None else f"{verdict.pslr_db:.1f}"),
         ("ISLR {} dB", None if verdict.islr_db is None else f"{verdict.islr_db:.1f}"),
     )
-    known = [words.format(value.replace("-", "−")) for words, value in measures if value is not None]
-    if known:
-        yield f"Measured: {', '.join(known)}."
+    measured = [words.format(value.replace("-", "−")) for words, value in measures if value is not None]
+    if measured:
+        yield f"Measured: {', '.join(measured)}."
     if evidence.after_autofocus:
         yield f"{_with_autofocus(verdict)}."
 
@@ -74,7 +79,7 @@ def numbers_in_words(evidence: ImageEvidence) -> Iterator[str]:
 def chip_png(image: PointImage) -> bytes:
     """Write a chip as an 8-bit grey PNG, x′ to the right and y′ up, black at −40 dB of the error-free peak.
 
-    The bytes do not depend on a compression library: the data is stored as it is.
+    The data is stored without compression, so that the bytes do not depend on a compression library.
     """
     lines = (image.chip[row * image.columns : (row + 1) * image.columns] for row in range(image.rows))
     header = struct.pack(">IIBBBBB", image.columns, image.rows, 8, 0, 0, 0, 0)
@@ -86,7 +91,7 @@ def chip_png(image: PointImage) -> bytes:
 
 
 def chip_caption(image: PointImage) -> str:
-    """Say size, orientation and grey scale of a chip."""
+    """Size, orientation and grey scale of a chip, in words."""
     along, across = (format_quantity(side, "m") for side in image.extent_m)
     return (
         f"{along} along x′ (look, to the right) by {across} along y′ (cross-range, up); "
@@ -95,9 +100,9 @@ def chip_caption(image: PointImage) -> str:
 
 
 def chip_size(image: PointImage, pixels_per_sample: int = 3) -> tuple[int, int]:
-    """Width and height on a page that show resolution cells as squares. [px]
+    """Width and height on a page at which resolution cells are square. [px]
 
-    In metres a cell may be ten times as long as it is wide, and a chip to scale a mere strip.
+    A cell may be ten times as long as it is wide, so that a chip to scale would be a narrow strip.
     """
     return image.columns * pixels_per_sample, image.rows * image.thinned * pixels_per_sample
 
@@ -130,17 +135,20 @@ def _phase(value: float | None) -> str:
 def cut_panel(
     canvas: svg.Canvas, top: float, width: float, height: float, title: str, curves: Sequence[Curve]
 ) -> float:
-    """Draw cuts on one panel, its title above, and return where it ends. [px]"""
-    frame = svg.Box(_LEFT, top + _TITLE, width - _EDGE, top + _TITLE + height)
-    places = [place for curve in curves for place in curve.places]
-    across = svg.Scale(min(places), max(places), frame.left, frame.right)
-    up = svg.Scale(FLOOR_DB, max(0.0, *(max(curve.levels) for curve in curves)), frame.bottom, frame.top)
+    """Draw cuts on a panel with its title above. Returns the bottom of the panel. [px]"""
+    frame = svg.Box(_CUTS_LEFT_PX, top + _CUTS_TITLE_PX, width - _CUTS_EDGE_PX, top + _CUTS_TITLE_PX + height)
+    positions = [position for curve in curves for position in curve.positions]
+    across = svg.Scale(min(positions), max(positions), frame.left, frame.right)
+    up = svg.Scale(FLOOR_DB, max(0.0, *(max(curve.levels_db) for curve in curves)), frame.bottom, frame.top)
     canvas.text((frame.left, top + 14), [title], "small")
     svg.outline(canvas, frame, "grid")
     svg.grid(canvas, frame, across, up)
     svg.y_axis(canvas, frame, up, "power [dB]")
     bottom = svg.x_axis(canvas, frame, across, "y′ [m]")
     for curve in curves:
-        points = [(across.at(place), up.at(level)) for place, level in zip(curve.places, curve.levels, strict=True)]
+        points = [
+            (across.at(position), up.at(level))
+            for position, level in zip(curve.positions, curve.levels_db, strict=True)
+        ]
         canvas.polyline(points, curve.style, frame)
     return svg.legend(canvas, bottom, width, [svg.line_entry(canvas, curve.name, curve.style) for curve in curves])

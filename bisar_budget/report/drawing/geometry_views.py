@@ -1,7 +1,7 @@
 """The collection drawn to scale, from above and from the side, as SVG.
 
-What would coincide at the scale of the whole is enlarged in a panel of its own below: a receiver beside the scene of
-a satellite, or two satellites flying together. The description of each drawing says its numbers in words.
+Objects that would coincide at this scale are enlarged in a second panel below: a receiver beside the scene of a
+satellite, or two satellites flying together. The description of each drawing gives its numbers in words.
 """
 
 import math
@@ -15,39 +15,42 @@ from bisar_budget.geometry import BistaticGeometry, PlatformState, Vector, norm
 from bisar_budget.report.drawing import svg
 from bisar_budget.units import format_quantity
 
-Place = tuple[float, float]  # in the plane that is drawn: to the right, up [m]
+PlanePoint = tuple[float, float]  # in the plane of the drawing: to the right, up [m]
 
-_WIDTH = 520.0  # px, of a drawing
-_AXIS, _EDGE = (54.0, 34.0), 8.0  # px, beside and below a panel for its axes; elsewhere
-_APART = 30.0  # px; nearer than this two things are one spot of the drawing
-_CLOSE = 60.0  # px; what is nearer than this in space too deserves an enlargement
-_SAME = 1e-6  # px; no enlargement tells apart what is nearer
-_SPREAD = 0.15  # of a distance: an enlargement shows at least this much each way, however things line up
-_ENLARGED = 2.0  # times; less is not worth a panel
-_VELOCITY, _LOOK, _SMEAR = 44.0, 62.0, 40.0  # px, lengths of arrows
-_SHORT = 0.3  # of an arrow; less of it in the plane of the drawing is drawn as seen from its end
-_SEEN_PATH = 20.0  # px; shorter paths are hidden by marker and arrow
-_NOTE_COLUMNS = 88
-_SCENE: Place = (0.0, 0.0)
+_VIEW_WIDTH_PX = 520.0  # of a drawing
+_AXIS_PX, _VIEW_EDGE_PX = (54.0, 34.0), 8.0  # margins of a panel: beside and below it for axes, and elsewhere
+_SPOT_PX = 30.0  # distance below which two objects share one spot of the drawing
+_ENLARGED_PX = 60.0  # distance in space below which objects on one spot get an enlargement
+_COINCIDENT_PX = 1e-6  # distance below which no enlargement separates two objects
+_MIN_SPREAD_RATIO = 0.15  # half the height and width of an enlargement, at least, over the distance that it shows
+_MIN_ENLARGEMENT_RATIO = 2.0  # smallest enlargement with a panel
+_VELOCITY_PX, _LOOK_PX, _SMEAR_PX = 44.0, 62.0, 40.0  # lengths of arrows
+_END_ON_RATIO = 0.3  # component of a velocity in the plane of the drawing, below which its arrow is drawn end on
+_MIN_PATH_PX = 20.0  # shorter paths are hidden by marker and arrow
+_NOTE_CHARACTERS = 88
+_SCENE: PlanePoint = (0.0, 0.0)
 _PATH_STEPS, _STEPS_PER_PIECE = 32, 4
-_LOWER = 0.75  # of the largest height: an enlargement's
-# Least and largest height of a panel, and its margins: left and right, above, below what is in it. [px]
+_ENLARGEMENT_HEIGHT_RATIO = 0.75  # largest height of an enlargement over the largest height of the main panel
+# Smallest and largest height of a panel, and its margins around the points: left and right, above, below. [px]
 _PLAN, _SIDE = ((210.0, 400.0), (74.0, 66.0, 66.0)), ((130.0, 360.0), (82.0, 52.0, 34.0))
 
 
 class _Platform(NamedTuple):
-    """One platform in one view. `heading` is the unit velocity in the plane, `toward` its part to the viewer."""
+    """One platform in one view.
+
+    `heading` is the unit velocity in the plane, `toward` the component of the unit velocity to the viewer.
+    """
 
     name: str
     state: PlatformState
-    at: Place
-    heading: Place
+    at: PlanePoint
+    heading: PlanePoint
     toward: float
-    path: tuple[Place, ...]
+    path: tuple[PlanePoint, ...]
 
     @property
     def is_still(self) -> bool:
-        """Whether it is fixed to the ground."""
+        """Whether the platform is fixed to the ground."""
         return bool(norm(self.state.velocity) == 0)
 
     @property
@@ -59,14 +62,14 @@ class _Platform(NamedTuple):
 class _View(NamedTuple):
     """The content of one drawing, from above or from the side."""
 
-    found: MissionFindings
+    findings: MissionFindings
     is_plan: bool
     platforms: tuple[_Platform, _Platform]
 
     @property
     def radius(self) -> float:
-        """Radius of the scene; 0 where the file states none. [m]"""
-        return self.found.scene_radius or 0.0
+        """Radius of the scene; 0 if the file states none. [m]"""
+        return self.findings.scene_radius or 0.0
 
 
 def geometry_plan(findings: MissionFindings) -> str:
@@ -99,15 +102,17 @@ def geometry_elevation(findings: MissionFindings) -> str:
         for (name, state), side in zip(_named(geometry), sides, strict=True)
     ]
     overhead = [name for name, state in _named(geometry) if _is_overhead(state)]
-    how = (
+    planes_words = (
         "Each platform in the vertical plane through it and the scene centre: slant ranges and elevations are true. "
         + (f"The {overhead[0]} is overhead." if overhead else f"The planes are {_degrees(turned)} apart in azimuth.")
     )
     description = (
         "Elevation view to scale, height over ground distance from the scene centre. "
-        f"{how} {' '.join(_side_in_words(name, state) for name, state in _named(geometry))}"
+        f"{planes_words} {' '.join(_side_in_words(name, state) for name, state in _named(geometry))}"
     )
-    return _drawing(_View(findings, False, (platforms[0], platforms[1])), "elevation", "the side", description, how)
+    return _drawing(
+        _View(findings, False, (platforms[0], platforms[1])), "elevation", "the side", description, planes_words
+    )
 
 
 def _named(geometry: BistaticGeometry) -> tuple[tuple[str, PlatformState], tuple[str, PlatformState]]:
@@ -115,7 +120,7 @@ def _named(geometry: BistaticGeometry) -> tuple[tuple[str, PlatformState], tuple
 
 
 def _flown(state: PlatformState, aperture_time: float) -> tuple[Vector, ...]:
-    """Places along the aperture; both ends say all of a straight path."""
+    """Positions along the aperture. A straight path has only its two ends."""
     steps = 1 if state.is_straight else _PATH_STEPS
     if state.curve is not None:
         steps = max(steps, _STEPS_PER_PIECE * state.curve.count)
@@ -135,7 +140,7 @@ def _planes_apart(geometry: BistaticGeometry) -> float:
 
 
 def _is_on_other_side(geometry: BistaticGeometry, turned: float) -> bool:
-    """Say whether the receiver goes opposite the transmitter: beyond 90°, or where one would cover the other."""
+    """Whether the receiver is drawn opposite the transmitter: beyond 90°, or if one would cover the other."""
     if turned > math.pi / 2:
         return True
     pair = geometry.transmitter, geometry.receiver
@@ -150,15 +155,19 @@ def _is_overhead(state: PlatformState) -> bool:
 
 
 def _seen(
-    name: str, state: PlatformState, findings: MissionFindings, seen: Callable[[Vector], Place], toward: float
+    name: str,
+    state: PlatformState,
+    findings: MissionFindings,
+    projected: Callable[[Vector], PlanePoint],
+    toward: float,
 ) -> _Platform:
-    """A platform in the plane on which `seen` projects."""
-    path = tuple(map(seen, _flown(state, findings.aperture_time)))
-    return _Platform(name, state, seen(state.position), seen(_direction(state.velocity)), toward, path)
+    """A platform in the plane on which `projected` projects."""
+    path = tuple(map(projected, _flown(state, findings.aperture_time)))
+    return _Platform(name, state, projected(state.position), projected(_direction(state.velocity)), toward, path)
 
 
 def _in_own_plane(name: str, state: PlatformState, side: float, findings: MissionFindings) -> _Platform:
-    # Overhead any vertical plane holds it.
+    # A platform overhead is in every vertical plane.
     azimuth = findings.geometry.look_azimuth if _is_overhead(state) else state.azimuth
     outward = (math.cos(azimuth), math.sin(azimuth))
     x, y, _ = _direction(state.velocity)
@@ -200,120 +209,123 @@ def _compass(value: float, positive: str, negative: str) -> str:
 
 
 class _Panel(NamedTuple):
-    """A part of the page and what it shows: `centre` lies in its middle, at `scale`. [px], [m], [px/m]"""
+    """A panel: its frame [px], the point `centre` of the plane in its middle [m], and its scale [px/m]."""
 
     frame: svg.Box
-    centre: Place
+    centre: PlanePoint
     scale: float
 
-    def pixel(self, place: Place) -> svg.Point:
+    def pixel(self, point: PlanePoint) -> svg.Point:
         x, y = self.frame.middle
-        return x + (place[0] - self.centre[0]) * self.scale, y - (place[1] - self.centre[1]) * self.scale
+        return x + (point[0] - self.centre[0]) * self.scale, y - (point[1] - self.centre[1]) * self.scale
 
 
 def _drawing(view: _View, kind: str, side: str, description: str, note: str = "") -> str:
-    """A view, what is too close enlarged below; a note and what explains the symbols stand at its end."""
+    """Drawing of a view, with an enlargement below if objects are too close, and a note on the symbols."""
     canvas = svg.Canvas()
-    main = _whole(view)
+    main = _main_panel(view)
     enlarged = _enlargement(view, main)
-    of_scene = enlarged is not None and bool(_beside_the_scene(view, main))
+    is_scene_enlarged = enlarged is not None and bool(_platforms_at_scene(view, main))
     _axes(canvas, main, view)
-    _draw_panel(canvas, main, view, is_detail=not of_scene, enlarged=enlarged)
-    bottom = main.frame.bottom + _AXIS[1]
+    _draw_panel(canvas, main, view, is_detail=not is_scene_enlarged, enlarged=enlarged)
+    bottom = main.frame.bottom + _AXIS_PX[1]
     if enlarged:
-        what = (
-            f"Around the {'scene' if of_scene else 'platforms'}, enlarged {_times(enlarged.scale / main.scale)} times"
+        caption = (
+            f"Around the {'scene' if is_scene_enlarged else 'platforms'}, "
+            f"enlarged {_times(enlarged.scale / main.scale)} times"
         )
-        canvas.text((enlarged.frame.left, enlarged.frame.top - 8), [what], "small")
+        canvas.text((enlarged.frame.left, enlarged.frame.top - 8), [caption], "small")
         _outline(canvas, enlarged)
-        _draw_panel(canvas, enlarged, view, is_detail=of_scene, enlarged=None)
+        _draw_panel(canvas, enlarged, view, is_detail=is_scene_enlarged, enlarged=None)
         bottom = enlarged.frame.bottom
     symbols = _symbols(view, [main, enlarged] if enlarged else [main])
-    lines = textwrap.wrap(" ".join(filter(None, [note, *symbols])), _NOTE_COLUMNS)
+    lines = textwrap.wrap(" ".join(filter(None, [note, *symbols])), _NOTE_CHARACTERS)
     for index, line in enumerate(lines):
         canvas.text((main.frame.left, bottom + 18 + 13 * index), [line], "small")
-    title, found = f"Geometry from {side}: {view.found.name}", view.found
+    title, findings = f"Geometry from {side}: {view.findings.name}", view.findings
     if view.radius:
         description += f" The scene has a radius of {format_quantity(view.radius, 'm')}."
-    size = (_WIDTH, bottom + 18 + 13 * len(lines))
-    return canvas.document(size, f"{kind} {found.file}", title, description)
+    size = (_VIEW_WIDTH_PX, bottom + 18 + 13 * len(lines))
+    return canvas.document(size, f"{kind} {findings.file}", title, description)
 
 
-def _whole(view: _View) -> _Panel:
-    """Panel that shows scene and platforms; a scene far larger than the collection is cut off."""
-    places = [_SCENE, *(p.at for p in view.platforms), *(place for p in view.platforms for place in p.path)]
-    if view.radius <= 2 * max(math.hypot(*place) for place in places):
-        places += _extent(view, _SCENE, view.radius)
-    return _fitted(view, places, _EDGE)
+def _main_panel(view: _View) -> _Panel:
+    """Panel with the platforms and the scene. A scene far larger than the collection is clipped."""
+    points = [_SCENE, *(p.at for p in view.platforms), *(point for p in view.platforms for point in p.path)]
+    if view.radius <= 2 * max(math.hypot(*point) for point in points):
+        points += _extent(view, _SCENE, view.radius)
+    return _fitted(view, points, _VIEW_EDGE_PX)
 
 
-def _beside_the_scene(view: _View, main: _Panel) -> list[_Platform]:
-    return [p for p in view.platforms if p.state.slant_range * main.scale < _CLOSE]
+def _platforms_at_scene(view: _View, main: _Panel) -> list[_Platform]:
+    return [p for p in view.platforms if p.state.slant_range * main.scale < _ENLARGED_PX]
 
 
 def _enlargement(view: _View, main: _Panel) -> _Panel | None:
-    """Panel below for platforms beside the scene, or beside each other; None where it would show no more."""
-    top = main.frame.bottom + _AXIS[1] + 26
+    """Panel below for platforms beside the scene or beside each other; None if it would not show more."""
+    top = main.frame.bottom + _AXIS_PX[1] + 26
     first, second = view.platforms
     separation = math.dist(first.state.position, second.state.position)
-    if beside := _beside_the_scene(view, main):
-        reach = max(p.state.slant_range for p in beside)
-        places = [_SCENE, *(place for p in beside for place in (p.at, *p.path))]
-        places += _extent(view, _SCENE, view.radius if view.radius <= 2 * reach else 0.0)
-    elif _SAME < separation * main.scale < _CLOSE and _pixels_apart(main, first, second) < _APART:
+    if platforms_at_scene := _platforms_at_scene(view, main):
+        reach = max(p.state.slant_range for p in platforms_at_scene)
+        points = [_SCENE, *(place for p in platforms_at_scene for place in (p.at, *p.path))]
+        points += _extent(view, _SCENE, view.radius if view.radius <= 2 * reach else 0.0)
+    elif _COINCIDENT_PX < separation * main.scale < _ENLARGED_PX and _pixels_apart(main, first, second) < _SPOT_PX:
         reach = separation
-        places = [first.at, second.at]
+        points = [first.at, second.at]
     else:
         return None
-    east, north = ((min(values) + max(values)) / 2 for values in zip(*places, strict=True))
-    middle = _SCENE if beside else (east, north)
-    panel = _fitted(view, [*places, *_extent(view, middle, _SPREAD * reach)], top, _LOWER)
-    is_still_one_spot = not beside and _pixels_apart(panel, first, second) < _APART
-    return None if is_still_one_spot or panel.scale < _ENLARGED * main.scale else panel
+    east, north = ((min(values) + max(values)) / 2 for values in zip(*points, strict=True))
+    middle = _SCENE if platforms_at_scene else (east, north)
+    panel = _fitted(
+        view, [*points, *_extent(view, middle, _MIN_SPREAD_RATIO * reach)], top, _ENLARGEMENT_HEIGHT_RATIO
+    )
+    is_still_one_spot = not platforms_at_scene and _pixels_apart(panel, first, second) < _SPOT_PX
+    return None if is_still_one_spot or panel.scale < _MIN_ENLARGEMENT_RATIO * main.scale else panel
 
 
 def _symbols(view: _View, panels: Sequence[_Panel]) -> Iterator[str]:
-    """Explanations of the symbols that are not written beside the symbols themselves."""
+    """Explanations of symbols without a label."""
     if any(not p.is_still and not _is_end_on(p) for p in view.platforms):
         yield "Arrows at the platforms: direction of flight, not speed."
     if any(_shows_path(panel, p) for panel in panels for p in view.platforms):
-        yield f"Broad line: path in the aperture of {format_quantity(view.found.aperture_time, 's')}."
+        yield f"Broad line: path in the aperture of {format_quantity(view.findings.aperture_time, 's')}."
     if any(_is_end_on(p) for p in view.platforms):
         yield "Circle with dot: flight towards the viewer; with cross: away."
 
 
-def _extent(view: _View, centre: Place, reach: float) -> list[Place]:
-    """Ends of what reaches so far from a point: all round from above, along the ground from the side."""
+def _extent(view: _View, centre: PlanePoint, reach: float) -> list[PlanePoint]:
+    """Outermost points of a circle around a point: four in the plan, two along the ground in the elevation."""
     x, y = centre
     ends = [(x - reach, y), (x + reach, y)]
     return [*ends, (x, y - reach), (x, y + reach)] if view.is_plan else ends
 
 
-def _fitted(view: _View, places: Sequence[Place], top: float, part: float = 1.0) -> _Panel:
-    """Panel at the largest scale that shows all places and leaves room for what is written beside them."""
-    (lowest, highest), (side, above, below) = _PLAN if view.is_plan else _SIDE
-    highest *= part
-    xs, ys = zip(*places, strict=True)
+def _fitted(view: _View, points: Sequence[PlanePoint], top: float, height_fraction: float = 1.0) -> _Panel:
+    """Panel at the largest scale that shows all points, with margins for their labels."""
+    (lowest, highest), (margin_side, margin_above, margin_below) = _PLAN if view.is_plan else _SIDE
+    highest *= height_fraction
+    xs, ys = zip(*points, strict=True)
     wide, tall = max(xs) - min(xs), max(ys) - min(ys)
-    width = _WIDTH - _AXIS[0] - _EDGE
+    width = _VIEW_WIDTH_PX - _AXIS_PX[0] - _VIEW_EDGE_PX
     scale = min(
-        (width - 2 * side) / wide if wide else math.inf,
-        (highest - above - below) / tall if tall else math.inf,
+        (width - 2 * margin_side) / wide if wide else math.inf,
+        (highest - margin_above - margin_below) / tall if tall else math.inf,
     )
-    height = min(max(lowest, tall * scale + above + below), highest)
-    slack = (height - tall * scale - above - below) / 2 if view.is_plan else 0.0
-    # The middle of the frame is not that of the places where the margins differ; the ground stays down.
-    low = min(ys) - (below + slack) / scale
+    height = min(max(lowest, tall * scale + margin_above + margin_below), highest)
+    slack = (height - tall * scale - margin_above - margin_below) / 2 if view.is_plan else 0.0
+    # With unequal margins the middle of the frame is not that of the points; the ground is at the bottom.
+    low = min(ys) - (margin_below + slack) / scale
     centre = ((max(xs) + min(xs)) / 2, low + height / 2 / scale)
-    return _Panel(svg.Box(_AXIS[0], top, _AXIS[0] + width, top + height), centre, scale)
+    return _Panel(svg.Box(_AXIS_PX[0], top, _AXIS_PX[0] + width, top + height), centre, scale)
 
 
 def _axes(canvas: svg.Canvas, panel: _Panel, view: _View) -> None:
-    """Grid, ticks and names of the axes; the same step both ways, because both are to scale."""
+    """Grid, ticks and names of the axes, with the same step on both axes."""
     frame, scale = panel.frame, panel.scale
     step = svg.round_step(62 / scale)
-    far = max(abs(panel.centre[0]), abs(panel.centre[1])) + (frame.right - frame.left) / scale
-    unit, name = (1e3, "km") if far >= 2e3 else (1.0, "m")
+    reach = max(abs(panel.centre[0]), abs(panel.centre[1])) + (frame.right - frame.left) / scale
+    unit, name = (1e3, "km") if reach >= 2e3 else (1.0, "m")
     half = ((frame.right - frame.left) / 2 / scale, (frame.bottom - frame.top) / 2 / scale)
     for value in svg.ticks(panel.centre[0] - half[0], panel.centre[0] + half[0], step):
         x, _ = panel.pixel((value, 0.0))
@@ -321,7 +333,7 @@ def _axes(canvas: svg.Canvas, panel: _Panel, view: _View) -> None:
             canvas.polyline(frame.upright(x), "grid", is_obstacle=False)
         shown = value if view.is_plan else abs(value)
         text = svg.axis_number(shown / unit)
-        if x + svg.text_width(text) / 2 < _WIDTH:
+        if x + svg.text_width(text) / 2 < _VIEW_WIDTH_PX:
             canvas.text((x, frame.bottom + 13), [text], "axis", "middle")
     for value in svg.ticks(panel.centre[1] - half[1], panel.centre[1] + half[1], step):
         _, y = panel.pixel((0.0, value))
@@ -350,7 +362,7 @@ def _outline(canvas: svg.Canvas, panel: _Panel) -> None:
 
 
 def _draw_panel(canvas: svg.Canvas, panel: _Panel, view: _View, is_detail: bool, enlarged: _Panel | None) -> None:
-    """Lines first, then markers, then labels, which look for what space is left."""
+    """Draw lines, then markers, then labels, which are placed in the remaining space."""
     frame, scene = panel.frame, panel.pixel(_SCENE)
     if view.is_plan:
         if view.radius * panel.scale >= 3:
@@ -366,7 +378,7 @@ def _draw_panel(canvas: svg.Canvas, panel: _Panel, view: _View, is_detail: bool,
         dashes = "dashed" if platform.name == "transmitter" else "dotted"
         canvas.polyline([scene, panel.pixel(platform.at)], f"{platform.name} {dashes}", frame)
         if _shows_path(panel, platform):
-            canvas.polyline([panel.pixel(place) for place in platform.path], f"{platform.name} path", frame)
+            canvas.polyline([panel.pixel(point) for point in platform.path], f"{platform.name} path", frame)
     has_scene = frame.holds(scene)
     labels: list[svg.DrawnLabel] = []
     if is_detail and has_scene:
@@ -390,13 +402,13 @@ def _draw_panel(canvas: svg.Canvas, panel: _Panel, view: _View, is_detail: bool,
 def _labels(
     panel: _Panel, view: _View, visible: Sequence[_Platform], has_scene: bool, enlarged: _Panel | None
 ) -> Iterator[svg.DrawnLabel]:
-    """Labels, with their text and where they belong; things on one spot share a label."""
+    """Labels of platforms and scene. Objects on one spot share a label."""
     frame, scene = panel.frame, panel.pixel(_SCENE)
-    # From the side, what is written of a platform stays above the ground.
+    # From the side, labels of platforms are above the ground.
     above = frame if view.is_plan else frame._replace(bottom=min(frame.bottom, scene[1]))
-    at_scene = [p for p in visible if has_scene and math.dist(panel.pixel(p.at), scene) < _APART]
+    at_scene = [p for p in visible if has_scene and math.dist(panel.pixel(p.at), scene) < _SPOT_PX]
     free = [p for p in visible if p not in at_scene]
-    if len(free) == 2 and _pixels_apart(panel, *free) < _APART:
+    if len(free) == 2 and _pixels_apart(panel, *free) < _SPOT_PX:
         distance = math.dist(*(p.state.position for p in free))
         together = f"{_range(view, free[0])}, {format_quantity(distance, 'm')} apart"
         below = ("enlarged below",) if enlarged else ()
@@ -417,10 +429,10 @@ def _labels(
             radius = f", radius {format_quantity(view.radius, 'm')}" if view.radius else ""
             yield svg.DrawnLabel(scene, (f"scene{radius}",), frame)
     for platform in view.platforms:
-        if platform not in visible and (part := frame.clipped((scene, panel.pixel(platform.at)))):
-            yield svg.DrawnLabel(part[1], (f"to {platform.name}, {_range(view, platform)}",), above)
-    if not has_scene and visible and (part := frame.clipped((panel.pixel(visible[0].at), scene))):
-        yield svg.DrawnLabel(part[1], ("to the scene",), frame)
+        if platform not in visible and (segment := frame.clipped((scene, panel.pixel(platform.at)))):
+            yield svg.DrawnLabel(segment[1], (f"to {platform.name}, {_range(view, platform)}",), above)
+    if not has_scene and visible and (segment := frame.clipped((panel.pixel(visible[0].at), scene))):
+        yield svg.DrawnLabel(segment[1], ("to the scene",), frame)
 
 
 def _range(view: _View, platform: _Platform) -> str:
@@ -429,10 +441,10 @@ def _range(view: _View, platform: _Platform) -> str:
 
 
 def _directions(canvas: svg.Canvas, panel: _Panel, view: _View) -> Iterator[svg.DrawnLabel]:
-    """φ_b of (11), and across it the line along which errors smear, (31)."""
-    scene, look = panel.pixel(_SCENE), view.found.geometry.look_azimuth
-    tip = _turned(scene, _LOOK, look)
-    ends = [_turned(scene, sign * _SMEAR, look + math.pi / 2) for sign in (-1, 1)]
+    """Draw φ_b of (11), and perpendicular to it the line along which errors smear, (31)."""
+    scene, look = panel.pixel(_SCENE), view.findings.geometry.look_azimuth
+    tip = _turned(scene, _LOOK_PX, look)
+    ends = [_turned(scene, sign * _SMEAR_PX, look + math.pi / 2) for sign in (-1, 1)]
     canvas.arrow(scene, tip)
     canvas.arrow(ends[0], ends[1], both_ends=True)
     yield svg.DrawnLabel(tip, (f"look φ_b {_degrees(look)}",), panel.frame)
@@ -444,7 +456,7 @@ def _turned(origin: svg.Point, length: float, azimuth: float) -> svg.Point:
 
 
 def _arc(canvas: svg.Canvas, panel: _Panel, platform: _Platform, radius: float) -> None:
-    """Elevation angle at the scene."""
+    """Draw the elevation angle at the scene as an arc."""
     scene = panel.pixel(_SCENE)
     end = math.atan2(platform.at[1], platform.at[0])
     start = 0.0 if end <= math.pi / 2 else math.pi
@@ -457,7 +469,9 @@ def _velocity(canvas: svg.Canvas, panel: _Panel, platform: _Platform) -> None:
         return
     x, y = panel.pixel(platform.at)
     if _is_end_on(platform):
-        side = 14 if platform.name == "transmitter" else -14  # of two on one spot both are seen
+        side = (
+            14 if platform.name == "transmitter" else -14
+        )  # opposite sides, so that two platforms on one spot show both
         centre = (x + math.copysign(side, side * platform.at[0]), y - 13)
         canvas.circle(centre, 5.5, f"{platform.name}")
         if platform.toward > 0:
@@ -469,12 +483,12 @@ def _velocity(canvas: svg.Canvas, panel: _Panel, platform: _Platform) -> None:
                     platform.name,
                 )
         return
-    tip = (x + _VELOCITY * platform.heading[0], y - _VELOCITY * platform.heading[1])
+    tip = (x + _VELOCITY_PX * platform.heading[0], y - _VELOCITY_PX * platform.heading[1])
     canvas.arrow((x, y), tip, platform.name)
 
 
 def _is_end_on(platform: _Platform) -> bool:
-    return not platform.is_still and math.hypot(*platform.heading) < _SHORT
+    return not platform.is_still and math.hypot(*platform.heading) < _END_ON_RATIO
 
 
 def _marker(canvas: svg.Canvas, at: svg.Point, platform: _Platform) -> None:
@@ -482,7 +496,7 @@ def _marker(canvas: svg.Canvas, at: svg.Point, platform: _Platform) -> None:
     x, y = at
     style = f"marker {'hollow line' if platform.is_still else 'solid'} {platform.name}"
     if platform.name == "transmitter":
-        canvas.polygon([(x, y - 7), (x + 6, y + 3.5), (x - 6, y + 3.5)], style)  # its centroid is the place
+        canvas.polygon([(x, y - 7), (x + 6, y + 3.5), (x - 6, y + 3.5)], style)  # the centroid is at the platform
     else:
         canvas.polygon([(x - 5, y - 5), (x + 5, y - 5), (x + 5, y + 5), (x - 5, y + 5)], style)
 
@@ -493,7 +507,7 @@ def _pixels_apart(panel: _Panel, first: _Platform, second: _Platform) -> float:
 
 def _shows_path(panel: _Panel, platform: _Platform) -> bool:
     length = math.fsum(math.dist(*pair) for pair in pairwise(platform.path))
-    return panel.frame.holds(panel.pixel(platform.at)) and length * panel.scale >= _SEEN_PATH
+    return panel.frame.holds(panel.pixel(platform.at)) and length * panel.scale >= _MIN_PATH_PX
 
 
 def _degrees(angle: float) -> str:

@@ -1,7 +1,7 @@
-"""Figures 3 to 7 of Rigling & Moses for a mission of one's own: their numbers, drawn, saved, and said in a few lines.
+"""Figures 3 to 7 of Rigling & Moses for any mission: their numbers, drawings, files and a summary in words.
 
-All places are in the axes of the scene, (x, y) east and north of its centre, or in the axes (x′, y′) of (10), turned
-about the same centre: a response stands where the errors put it, not at the middle of a patch.
+All coordinates are in the axes of the scene, (x, y) east and north of its centre, or in the axes (x′, y′) of (10),
+rotated about the same centre. A response is at its displaced position, not at the middle of a patch.
 """
 
 import math
@@ -25,19 +25,19 @@ from bisar_budget.simulator.point import PointImages
 from bisar_budget.simulator.realisations import has_unset_clocks
 
 FLOOR_DB = -35.0
-_FINE, _FINE_CUT = 4, 8  # interpolation, at most, so that a mainlobe has a shape
-_PIXELS = 3e5  # of a picture, about
-_DRAWN_DB = -20.0  # what is above lies within the pictures
-_BESIDE = 6  # pixels around it, two cells
-_NEAR = 1.0  # times a picture's larger side: a true place that far away is still shown
-_READ_DB = 0.05  # of an error-free peak; where pixels sample it, it is read to 1e-4 dB
-_RESTORED_DB = 1.0  # below the error-free peak; a focused response is within a fraction of it
-_EQUAL = 8.0  # an image that is not longer for its width than this has equal scales
-_MARKED, _GRID = "#c1502e", "#dddddd"  # of lines that approximate or mark, of a grid
-_NOT_FORMED = "#3a3a3a"  # beside a patch that is narrower than the panel
-_TRUE, _AT, _PEAK = "#5fd3f3", "#7CFC9A", "#f5f0a0"
-_APART = 2  # pixels across: (25) is then beside the peak
-_CUT_SIZE = (300.0, 170.0)  # px of the drawing of the cuts, of its frame
+_FINE_FACTOR, _CUT_FACTOR = 4, 8  # largest interpolation of a picture, and that of a cut, to resolve a mainlobe
+_MAX_PICTURE_PIXELS = 3e5
+_DRAWN_DB = -20.0  # level above which pixels are within the pictures
+_MARGIN_PIXELS = 6  # around these pixels, two resolution cells
+_NEAR_RATIO = 1.0  # distance of a target that is still shown, over the larger side of a picture
+_MAX_READING_ERROR_DB = 0.05  # of an error-free peak, which is read to 1e-4 dB on a regular grid
+_MAX_RESTORED_LOSS_DB = 1.0  # of a focused peak, which is usually a fraction of it below the error-free peak
+_MAX_EQUAL_SCALE_RATIO = 8.0  # of the sides of an image with equal scales on both axes
+_MARK_COLOR, _GRID_COLOR = "#c1502e", "#dddddd"
+_NOT_FORMED_COLOR = "#3a3a3a"  # of a panel beside a narrow patch
+_TARGET_COLOR, _PREDICTION_COLOR, _PEAK_COLOR = "#5fd3f3", "#7CFC9A", "#f5f0a0"
+_PEAK_APART_PIXELS = 2  # distance across from which the position by (25) is apart from the peak
+_CUT_SIZE_PX = (300.0, 170.0)  # width of the drawing of the cuts, and height of its frame
 
 Limits = tuple[float, float, float, float]
 
@@ -45,10 +45,11 @@ Limits = tuple[float, float, float, float]
 class ImagePanel(NamedTuple):
     """An image in dB over the error-free peak, on pixels given by their corners.
 
-    `level_db` is (nx, ny), x or x′ along its first axis, NaN where no image was formed; `corners`
-    (nx + 1, ny + 1, 2) are the corners of those pixels. `true_places` (n, 2) is where the targets stand,
-    `shown_places` (n, 2) where (25) puts them, `image_points` (n, 2) where they peak, none where (25) says the same;
-    `points` (n, 3, 2) where (29) puts the pieces of the aperture. All places are in `axes`. [m]
+    `level_db` is (nx, ny), x or x′ along its first axis, NaN for pixels without an image. `corners`
+    (nx + 1, ny + 1, 2) are the corners of the pixels. `true_places` (n, 2) are the positions of the targets,
+    `shown_places` (n, 2) their image points by (25), and `image_points` (n, 2) their peaks; without peaks if (25)
+    agrees with them. `points` (n, 3, 2) are the image points of the thirds of the aperture by (29). All coordinates
+    are in `axes`. [m]
     """
 
     title: str
@@ -68,9 +69,9 @@ class ImagePanel(NamedTuple):
 
     @property
     def limits(self) -> Limits:
-        """Limits of the axes: they hold the picture, and the true places where they are near. [m]"""
+        """Limits of the axes, which contain the picture and the targets near it. [m]"""
         left, right, bottom, top = self.extent
-        near = _NEAR * max(right - left, top - bottom)
+        near = _NEAR_RATIO * max(right - left, top - bottom)
         x, y = self.true_places.T
         is_near = (x > left - near) & (x < right + near) & (y > bottom - near) & (y < top + near)
         margin = 0.05 * near
@@ -81,11 +82,11 @@ class ImagePanel(NamedTuple):
 
 
 class Sheet(NamedTuple):
-    """All that is drawn.
+    """Numbers of all figures.
 
-    `segments` (3, 2, 2) are the ends of the three pieces of the range error, time [s] and range error [mm], each as
-    long as a third of the aperture; `points` (3, 2) what (29) makes of them for a point at the scene centre [m],
-    `points_by` by which gradients.
+    `segments` (3, 2, 2) are the ends of three lines that approximate the range error, time [s] and range error [mm],
+    each over a third of the aperture. `points` (3, 2) are the image points of these thirds by (29) for a target at
+    the scene centre [m], `points_by` names the gradients of (29).
     """
 
     slow_time: Floats
@@ -101,32 +102,34 @@ class Sheet(NamedTuple):
 
 
 def sheet(images: PointImages) -> Sheet:
-    """Lay out what is drawn of some images."""
+    """Numbers of the figures of some images."""
     peak = float(np.abs(images.error_free).max())
     cosine, sine = math.cos(images.look_azimuth), math.sin(images.look_azimuth)
     turn = np.array([[cosine, -sine], [sine, cosine]])  # (10), from the right
-    true = np.array([[one.east, one.north] for one in images.targets.points])
+    true = np.array([[target.east, target.north] for target in images.targets.points])
     middle = len(images.points) // 2
-    by_25 = images.points[middle] - np.asarray(images.effect.displacement)  # against exact ranges
-    is_elsewhere = float(np.hypot(*by_25)) > _APART * images.spacing[1]
-    shown = np.array([one.shown for one in images.responses])
-    shown_in_scene = np.array([one.shown_in_scene for one in images.responses])
+    predicted = images.points[middle] - np.asarray(images.effect.displacement)  # against exact ranges
+    is_elsewhere = float(np.hypot(*predicted)) > _PEAK_APART_PIXELS * images.spacing[1]
+    shown = np.array([response.shown for response in images.responses])
+    shown_in_scene = np.array([response.shown_in_scene for response in images.responses])
     back = rotated_back(images)
-    how = images.image_former.replace("_", " ")
-    in_scene_how = "backprojection" if images.image_former == "polar_format" else how
+    image_former = images.image_former.replace("_", " ")
+    scene_former = "backprojection" if images.image_former == "polar_format" else image_former
     scene_crop = _bright([images.in_scene, back], peak, images.scene_spacing)
     crop = _bright([images.rotated, images.focused, images.error_free], peak, images.spacing)
 
-    def picture(title: str, image: Complexes, grid: Floats, part: tuple[slice, slice], at: Floats) -> ImagePanel:
-        level, corners = _interpolated(image, grid[..., :2], part, peak)
-        points = (at + by_25)[:, None] + images.points - images.points[middle]
-        peaks = at if is_elsewhere else at[:0]
-        return ImagePanel(title, ("x [m]", "y [m]"), level, corners, true, at + by_25, peaks, points)
+    def image_panel(
+        title: str, image: Complexes, grid: Floats, region: tuple[slice, slice], shown_points: Floats
+    ) -> ImagePanel:
+        level, corners = _interpolated(image, grid[..., :2], region, peak)
+        points = (shown_points + predicted)[:, None] + images.points - images.points[middle]
+        peaks = shown_points if is_elsewhere else shown_points[:0]
+        return ImagePanel(title, ("x [m]", "y [m]"), level, corners, true, shown_points + predicted, peaks, points)
 
     def turned(title: str, image: Complexes) -> ImagePanel:
-        flat = picture(title, image, images.grid, crop, shown)
+        flat = image_panel(title, image, images.grid, crop, shown)
         axes = ("x′ [m]", "y′ [m]")
-        return ImagePanel(title, axes, flat.level_db, *(one @ turn for one in flat[3:]))
+        return ImagePanel(title, axes, flat.level_db, *(points @ turn for points in flat[3:]))
 
     return Sheet(
         slow_time=images.slow_time,
@@ -134,18 +137,18 @@ def sheet(images: PointImages) -> Sheet:
         segments=_segments_of(images),
         points=images.points,
         points_by=images.points_by,
-        in_scene=picture(
-            f"Fig. 5: in (x, y), {in_scene_how}", images.in_scene, images.scene_grid, scene_crop, shown_in_scene
+        in_scene=image_panel(
+            f"Fig. 5: in (x, y), {scene_former}", images.in_scene, images.scene_grid, scene_crop, shown_in_scene
         ),
-        rotated=turned(f"Fig. 6: in (x′, y′), {how}", images.rotated),
+        rotated=turned(f"Fig. 6: in (x′, y′), {image_former}", images.rotated),
         focused=turned("Fig. 7: after autofocus", images.focused),
-        rotated_back=picture("Fig. 7 rotated back to (x, y)", back, images.scene_grid, scene_crop, shown),
+        rotated_back=image_panel("Fig. 7 rotated back to (x, y)", back, images.scene_grid, scene_crop, shown),
         cuts=_cuts_of(images, images.grid[..., :2] @ turn, crop, peak),
     )
 
 
 def rotated_back(images: PointImages) -> Complexes:
-    """Focused image on the pixels of the one along (x, y): what completes image formation in the paper."""
+    """Focused image on the pixels of the image along (x, y), the last step of image formation in the paper."""
     return resampled(images.focused, images.grid, images.scene_grid)
 
 
@@ -158,32 +161,38 @@ def _segments_of(images: PointImages) -> Floats:
 
 
 def _bright(images: list[Complexes], peak: float, spacing: tuple[float, float]) -> tuple[slice, slice]:
-    """Part of a patch to draw: what any image has above a level, its nearest sidelobes, and as far the other way."""
+    """Slices of a patch to draw, equally long in metres along both axes.
+
+    They contain all pixels of any image above a level, with a margin for the nearest sidelobes.
+    """
     bright = np.maximum.reduce([np.abs(image) for image in images]) > peak * 10 ** (_DRAWN_DB / 20)
-    used = [np.nonzero(bright.any(axis=1 - axis))[0] for axis in (0, 1)]
-    ends = [(int(one[0]) - _BESIDE, int(one[-1]) + _BESIDE + 1) if one.size else (0, 1 << 30) for one in used]
+    used_indices = [np.nonzero(bright.any(axis=1 - axis))[0] for axis in (0, 1)]
+    ends = [
+        (int(used[0]) - _MARGIN_PIXELS, int(used[-1]) + _MARGIN_PIXELS + 1) if used.size else (0, 1 << 30)
+        for used in used_indices
+    ]
     longest = max((last - first) * step for (first, last), step in zip(ends, spacing, strict=True))
     slices = []
     for (first, last), step, size in zip(ends, spacing, bright.shape, strict=True):
-        more = max(0, round((longest / step - (last - first)) / 2))
-        slices.append(slice(max(0, first - more), min(size, last + more)))
+        padding = max(0, round((longest / step - (last - first)) / 2))
+        slices.append(slice(max(0, first - padding), min(size, last + padding)))
     return slices[0], slices[1]
 
 
-def _interpolated(image: Complexes, grid: Floats, part: tuple[slice, slice], peak: float) -> tuple[Floats, Floats]:
-    """Interpolated part of an image [dB], and the corners of its pixels [m]."""
-    rows, columns = part
+def _interpolated(image: Complexes, grid: Floats, region: tuple[slice, slice], peak: float) -> tuple[Floats, Floats]:
+    """Interpolated region of an image [dB], and the corners of its pixels [m]."""
+    rows, columns = region
     shape = (rows.stop - rows.start, columns.stop - columns.start)
-    factor = max(1, min(_FINE, math.isqrt(int(_PIXELS / (shape[0] * shape[1])))))
+    factor = max(1, min(_FINE_FACTOR, math.isqrt(int(_MAX_PICTURE_PIXELS / (shape[0] * shape[1])))))
     fine = upsampled(image.T, factor).T[rows.start * factor : rows.stop * factor]
     fine = upsampled(fine, factor)[:, columns.start * factor : columns.stop * factor]
     # Sample k of the interpolation lies at k/factor, its edges half a step on either side.
     row, column = (
-        one.start + (np.arange(count * factor + 1) - 0.5) / factor for one, count in zip(part, shape, strict=True)
+        side.start + (np.arange(count * factor + 1) - 0.5) / factor for side, count in zip(region, shape, strict=True)
     )
-    i, j = (one.ravel() for one in np.meshgrid(row, column, indexing="ij"))
+    i, j = (index.ravel() for index in np.meshgrid(row, column, indexing="ij"))
     corners = between(grid, i, j).reshape(row.size, column.size, 2)
-    is_missing = np.repeat(np.repeat(image[part] == 0, factor, axis=0), factor, axis=1)
+    is_missing = np.repeat(np.repeat(image[region] == 0, factor, axis=0), factor, axis=1)
     return np.where(is_missing, math.nan, _decibels(fine, peak)), corners
 
 
@@ -192,9 +201,9 @@ def _decibels(samples: Complexes, peak: float) -> Floats:
     return level
 
 
-def _cuts_of(images: PointImages, turned: Floats, part: tuple[slice, slice], peak: float) -> tuple[Curve, ...]:
+def _cuts_of(images: PointImages, turned: Floats, region: tuple[slice, slice], peak: float) -> tuple[Curve, ...]:
     """Lines through the peaks, over y′."""
-    columns = np.arange(part[1].start * _FINE_CUT, (part[1].stop - 1) * _FINE_CUT + 1)
+    columns = np.arange(region[1].start * _CUT_FACTOR, (region[1].stop - 1) * _CUT_FACTOR + 1)
     cuts = []
     shown = (
         (images.error_free, "without error", WITHOUT_ERROR),
@@ -203,15 +212,15 @@ def _cuts_of(images: PointImages, turned: Floats, part: tuple[slice, slice], pea
     )
     for row, (image, name, style) in zip(images.rows, shown, strict=True):
         line = line_at(image, row)
-        place = between(turned, np.full(columns.size, row), columns / _FINE_CUT)[:, 1]
-        level = _decibels(upsampled(line, _FINE_CUT)[columns], peak)
-        cuts.append(Curve(name, place.tolist(), level.tolist(), style))
+        position = between(turned, np.full(columns.size, row), columns / _CUT_FACTOR)[:, 1]
+        level = _decibels(upsampled(line, _CUT_FACTOR)[columns], peak)
+        cuts.append(Curve(name, position.tolist(), level.tolist(), style))
     return tuple(cuts)
 
 
 # ---------------------------------------------------------------------- drawn
 def drawn(images: PointImages, title: str, kind: str) -> bytes:
-    """Draw the figures on one sheet, as a `png`, `svg` or `pdf` file."""
+    """Draw all figures on one sheet. Returns the content of a `png`, `svg` or `pdf` file."""
     return figure_file(figure(sheet(images), title), kind)
 
 
@@ -226,20 +235,20 @@ def figure(drawn: Sheet, title: str) -> Any:
     bar = page.colorbar(artist, ax=key, orientation="horizontal", location="bottom", fraction=0.5, pad=0.02)
     bar.set_label("dB to the error-free peak")
     styles = [
-        (_stands(_TRUE), "where the target stands"),
-        (_put(_AT), "where (25) puts it"),
-        ({"ls": "none", "marker": "o", "color": _MARKED, "ms": 5}, "points of (29)"),
+        (_target_mark(_TARGET_COLOR), "where the target stands"),
+        (_prediction_mark(_PREDICTION_COLOR), "where (25) puts it"),
+        ({"ls": "none", "marker": "o", "color": _MARK_COLOR, "ms": 5}, "points of (29)"),
     ]
     if drawn.in_scene.image_points.size:
-        styles.append((_peaks(_PEAK), "where the image peaks"))
+        styles.append((_peak_mark(_PEAK_COLOR), "where the image peaks"))
     marks = [key.plot([], [], label=label, **style)[0] for style, label in styles]
-    key.legend(handles=marks, loc="lower center", facecolor=_NOT_FORMED, labelcolor="white", fontsize=10)
-    page.suptitle(printable(title), parse_math=False)  # a name is no formula
+    key.legend(handles=marks, loc="lower center", facecolor=_NOT_FORMED_COLOR, labelcolor="white", fontsize=10)
+    page.suptitle(printable(title), parse_math=False)  # a $ in a name begins no formula
     return page
 
 
 def drawn_panel(name: str, drawn: Sheet) -> bytes:
-    """Draw a single panel, small, for a page, as a PNG file; `name` is one of `PANELS`."""
+    """Draw a single small panel for a page. Returns the content of a PNG file; `name` is a key of `PANELS`."""
     if name == "cuts":
         return drawing_file(_cuts_drawing(drawn), "png", dpi=112)
     page = new_figure(figsize=(4.4, 3.6))
@@ -251,9 +260,9 @@ def drawn_panel(name: str, drawn: Sheet) -> bytes:
 
 
 def archive(images: PointImages, changes: Sequence[SetValue] = ()) -> bytes:
-    """Give the images, complex, and what explains them, as an NPZ file.
+    """Content of an NPZ file with the complex images, their grids and the errors.
 
-    `changes` are the options that changed the mission; the file has them as texts `KEY=VALUE` (n,).
+    `changes` are the options that changed the mission. The file has them as texts `KEY=VALUE` (n,).
     """
     file = BytesIO()
     np.savez_compressed(
@@ -273,9 +282,9 @@ def archive(images: PointImages, changes: Sequence[SetValue] = ()) -> bytes:
         grid_m=images.grid,
         scene_grid_m=images.scene_grid,
         image_former=images.image_former,
-        targets_m=[[one.east, one.north] for one in images.targets.points],
-        targets_db=[one.level_db for one in images.targets.points],
-        shown_m=[one.shown for one in images.responses],
+        targets_m=[[target.east, target.north] for target in images.targets.points],
+        targets_db=[target.level_db for target in images.targets.points],
+        shown_m=[response.shown for response in images.responses],
         set=np.array([f"{change.key}={change.text}" for change in changes], dtype=str),
     )
     return file.getvalue()
@@ -285,23 +294,25 @@ def _flown(mission: Mission) -> str:
     factor = mission.allocation.coverage_factor
     times = f", {factor:g} times the file's values" if factor != 1 else ""
     errors = (getattr(mission.platforms, name).motion_error for name in PLATFORMS)
-    likely = "; of a covariance its most probable one" if any(error.covariance for error in errors) else ""
+    covariance_words = "; of a covariance its most probable one" if any(error.covariance for error in errors) else ""
     seed = (mission.simulation or Simulation()).seed
-    drawn = f"; of sensors and clocks one time series each, seed {seed}" if has_instruments(mission) else ""
+    realisation_words = (
+        f"; of sensors and clocks one time series each, seed {seed}" if has_instruments(mission) else ""
+    )
     if mission.propagation is not None:
-        drawn += f"; of delays in the air one draw each, seed {seed}, of those that change a time series"
+        realisation_words += f"; of delays in the air one draw each, seed {seed}, of those that change a time series"
     if any(platform.oscillator and platform.oscillator.spurs for platform in mission.platforms):
-        drawn += "; spurs are left out, but for what exchanges fold below one cycle per aperture"
+        realisation_words += "; spurs are left out, but for what exchanges fold below one cycle per aperture"
     if has_instruments(mission) and has_unset_clocks(mission):
-        drawn += "; of oscillators without mean and slope, since the file does not say how they are set"
+        realisation_words += "; of oscillators without mean and slope, since the file does not say how they are set"
     return (
-        f"the declared ones together, with the signs of the file{times}{likely}{drawn}. Some may cancel: the worst "
-        "case is that of check"
+        f"the declared ones together, with the signs of the file{times}{covariance_words}{realisation_words}. "
+        "Some may cancel: the worst case is that of check"
     )
 
 
 def summary(images: PointImages, mission: Mission) -> str:
-    """Say in a few lines what the errors do to the targets and what autofocus brings back."""
+    """Effects of the errors on the targets, and responses after autofocus, as lines of text."""
     clean = images.clean_response
     east, north = (round(float(moved), 3) for moved in images.effect.displacement)
     is_point = len(images.responses) == 1 and images.targets.clutter_db is None
@@ -320,17 +331,20 @@ def summary(images: PointImages, mission: Mission) -> str:
     lines += ["", *(_of_the_point(images) if is_point else _of_targets(images))]
     if images.outside:
         lines += ["", *wrapped(images.outside, "")]
-    off = images.misread_db
-    if abs(off) > _READ_DB:
-        said = (
-            f"peaks, widths and sidelobes are in doubt: the error-free response is read {abs(off):.1g} dB too "
-            f"{'high' if off > 0 else 'low'}, since lines of equal range and of equal Doppler run together beside it"
+    error_db = images.misread_db
+    if abs(error_db) > _MAX_READING_ERROR_DB:
+        text = (
+            f"peaks, widths and sidelobes are in doubt: the error-free response is read {abs(error_db):.1g} dB too "
+            f"{'high' if error_db > 0 else 'low'}, since lines of equal range and of equal Doppler run together "
+            "beside it"
         )
-        lines += ["", *wrapped(said, "")]
-    left = 20 * np.log10(images.focused_response.peak / clean.peak)
-    if left < -_RESTORED_DB:
-        said = f"autofocus does not restore the response: its peak stays {-left:.1f} dB below the error-free one"
-        lines += ["", *wrapped(said, "")]
+        lines += ["", *wrapped(text, "")]
+    restored_db = 20 * np.log10(images.focused_response.peak / clean.peak)
+    if restored_db < -_MAX_RESTORED_LOSS_DB:
+        text = (
+            f"autofocus does not restore the response: its peak stays {-restored_db:.1f} dB below the error-free one"
+        )
+        lines += ["", *wrapped(text, "")]
     return "\n".join(lines) + "\n"
 
 
@@ -342,8 +356,8 @@ def _formed_by(images: PointImages) -> str:
     }[images.image_former]
     response = images.responses[0]
     exact = np.array([response.target.east, response.target.north]) + response.effect.displacement
-    off = float(np.hypot(*(np.asarray(response.shown) - exact)))
-    plane = f"; plane waves put the response {off:.2g} m from where exact ranges do" if off else ""
+    distance_m = float(np.hypot(*(np.asarray(response.shown) - exact)))
+    plane = f"; plane waves put the response {distance_m:.2g} m from where exact ranges do" if distance_m else ""
     return words + plane
 
 
@@ -361,18 +375,18 @@ def _of_the_point(images: PointImages) -> list[str]:
 
 
 def _of_targets(images: PointImages) -> list[str]:
-    """One line for each target; peaks are over its own without error, and widths in its own cut."""
+    """A line for each target. Its peak is relative to its peak without error, its width is that of its cut."""
     lines = [
         f"{'target [m]':>17} {'level':>7} {'moved by [m]':>15} {'phase':>8} {'with errors':>14} {'autofocused':>14}",
         f"{'east':>8} {'north':>8} {'[dB]':>7} {'east':>7} {'north':>7} {'[rad]':>8} "
         f"{'[dB]':>7} {'[m]':>6} {'[dB]':>7} {'[m]':>6}",
     ]
-    for one in images.responses:
-        moved = np.round(one.effect.displacement, 3) + 0.0
+    for response in images.responses:
+        moved = np.round(response.effect.displacement, 3) + 0.0
         lines.append(
-            f"{one.target.east:>8.6g} {one.target.north:>8.6g} {one.target.level_db:>7.4g} "
-            f"{moved[0]:>7.3f} {moved[1]:>7.3f} {one.effect.quadratic:>+8.3f} "
-            f"{_peak_and_width(one.smeared, one.clean)} {_peak_and_width(one.focused, one.clean)}"
+            f"{response.target.east:>8.6g} {response.target.north:>8.6g} {response.target.level_db:>7.4g} "
+            f"{moved[0]:>7.3f} {moved[1]:>7.3f} {response.effect.quadratic:>+8.3f} "
+            f"{_peak_and_width(response.smeared, response.clean)} {_peak_and_width(response.focused, response.clean)}"
         )
     return lines
 
@@ -386,30 +400,30 @@ def _peak_and_width(response: ImpulseResponse | None, clean: ImpulseResponse | N
 def _range_error(panel: Any, drawn: Sheet) -> None:
     panel.plot(drawn.slow_time, drawn.range_error_mm, color="black")
     for segment in drawn.segments:
-        panel.plot(*segment.T, "--", color=_MARKED)
+        panel.plot(*segment.T, "--", color=_MARK_COLOR)
     panel.set(title="Fig. 3: range error, three segments", xlabel="slow time [s]", ylabel="range error [mm]")
-    panel.grid(color=_GRID, lw=0.5)
+    panel.grid(color=_GRID_COLOR, lw=0.5)
 
 
 def _points(panel: Any, drawn: Sheet) -> None:
-    panel.plot(*drawn.points.T, "o-", color=_MARKED, zorder=3)
-    panel.plot(0, 0, **_stands("#1b7fa3"))
-    panel.plot(*drawn.points[1], **_put("#2a8f4f"))
+    panel.plot(*drawn.points.T, "o-", color=_MARK_COLOR, zorder=3)
+    panel.plot(0, 0, **_target_mark("#1b7fa3"))
+    panel.plot(*drawn.points[1], **_prediction_mark("#2a8f4f"))
     panel.set(title=f"Fig. 4: points of the segments, (29)\nby {drawn.points_by}", xlabel="x [m]", ylabel="y [m]")
     span = float(np.ptp(drawn.points, axis=0).max()) or 1.0
     low, high = drawn.points.min(axis=0), drawn.points.max(axis=0)
-    if float(np.hypot(*drawn.points[1])) < 10 * span:  # else the three would be one
+    if float(np.hypot(*drawn.points[1])) < 10 * span:  # farther away the three points would coincide in the panel
         low, high = np.minimum(low, 0), np.maximum(high, 0)
     else:
         _point_to(panel, np.zeros(2), (low + high) / 2, "black")
     half = 0.65 * max(float((high - low).max()), span)
     (x, y) = (low + high) / 2
     panel.set(xlim=(x - half, x + half), ylim=(y - half, y + half), aspect="equal")
-    panel.grid(color=_GRID, lw=0.5)
+    panel.grid(color=_GRID_COLOR, lw=0.5)
 
 
 def _image(panel: Any, picture: ImagePanel, *, with_points: bool = False) -> Any:
-    """Draw each pixel between its own corners, which follow lines of equal range."""
+    """Draw an image. Each pixel is drawn between its corners, since the pixels follow lines of equal range."""
     mesh = panel.pcolormesh(
         picture.corners[..., 0],
         picture.corners[..., 1],
@@ -422,27 +436,27 @@ def _image(panel: Any, picture: ImagePanel, *, with_points: bool = False) -> Any
     )
     panel.set(title=picture.title, xlabel=picture.axes[0], ylabel=picture.axes[1])
     left, right, bottom, top = limits = picture.limits
-    if 1 / _EQUAL < (right - left) / (top - bottom) < _EQUAL:
+    if 1 / _MAX_EQUAL_SCALE_RATIO < (right - left) / (top - bottom) < _MAX_EQUAL_SCALE_RATIO:
         x, y, half = (left + right) / 2, (bottom + top) / 2, max(right - left, top - bottom) / 2
         left, right, bottom, top = limits = (x - half, x + half, y - half, y + half)
         panel.set_aspect("equal")
-    panel.set(xlim=(left, right), ylim=(bottom, top), facecolor=_NOT_FORMED)
+    panel.set(xlim=(left, right), ylim=(bottom, top), facecolor=_NOT_FORMED_COLOR)
     if with_points:
         for three in picture.points:
-            panel.plot(*three.T, "o-", color=_MARKED, ms=4, lw=0.8)
+            panel.plot(*three.T, "o-", color=_MARK_COLOR, ms=4, lw=0.8)
     if picture.image_points.size:
-        panel.plot(*picture.image_points.T, **_peaks(_PEAK))
-    panel.plot(*picture.shown_places.T, **_put(_AT))
-    panel.plot(*picture.true_places.T, **_stands(_TRUE))
+        panel.plot(*picture.image_points.T, **_peak_mark(_PEAK_COLOR))
+    panel.plot(*picture.shown_places.T, **_prediction_mark(_PREDICTION_COLOR))
+    panel.plot(*picture.true_places.T, **_target_mark(_TARGET_COLOR))
     for true in picture.true_places:
         if not _is_within(true, limits):
-            _point_to(panel, true, np.array([(left + right) / 2, (bottom + top) / 2]), _TRUE)
+            _point_to(panel, true, np.array([(left + right) / 2, (bottom + top) / 2]), _TARGET_COLOR)
             break
     return mesh
 
 
-def _stands(color: str) -> dict[str, Any]:
-    """Mark of a target's own place: a cross that leaves the middle free."""
+def _target_mark(color: str) -> dict[str, Any]:
+    """Mark of the position of a target: a cross with a free middle."""
     from matplotlib.path import Path
 
     arms = [(x * r, y * r) for x, y in ((1, 0), (0, 1), (-1, 0), (0, -1)) for r in (0.5, 1.0)]
@@ -450,28 +464,28 @@ def _stands(color: str) -> dict[str, Any]:
     return {"ls": "none", "marker": cross, "color": color, "ms": 17, "mew": 1.5, "mfc": "none"}
 
 
-def _put(color: str) -> dict[str, Any]:
-    """Mark of where a response is."""
+def _prediction_mark(color: str) -> dict[str, Any]:
+    """Mark of the image point of a target by (25): a circle."""
     return {"ls": "none", "marker": "o", "color": color, "ms": 12, "mfc": "none", "mew": 1.2}
 
 
-def _peaks(color: str) -> dict[str, Any]:
-    """Mark of where an image peaks: a square, so that it can be told from a circle."""
+def _peak_mark(color: str) -> dict[str, Any]:
+    """Mark of a peak of an image: a square."""
     return {"ls": "none", "marker": "s", "color": color, "ms": 12, "mfc": "none", "mew": 1.2}
 
 
-def _is_within(place: Floats, limits: Limits) -> bool:
-    return bool(limits[0] <= place[0] <= limits[1] and limits[2] <= place[1] <= limits[3])
+def _is_within(point: Floats, limits: Limits) -> bool:
+    return bool(limits[0] <= point[0] <= limits[1] and limits[2] <= point[1] <= limits[3])
 
 
-def _point_to(panel: Any, place: Floats, middle: Floats, color: str) -> None:
-    """Say how far away a true place is, and where, that the panel does not show."""
-    away = place - middle
+def _point_to(panel: Any, point: Floats, middle: Floats, color: str) -> None:
+    """Write the distance of a target outside the panel, with an arrow in its direction."""
+    away = point - middle
     distance = float(np.hypot(*away))
     panel.text(
         0.04, 0.04, f"the target stands {distance:.3g} m away", color=color, fontsize=8, transform=panel.transAxes
     )
-    start, tip = (0.5 + part * away / distance for part in (0.36, 0.47))
+    start, tip = (0.5 + fraction * away / distance for fraction in (0.36, 0.47))
     arrow = {"arrowstyle": "-|>", "color": color, "lw": 1.5}
     panel.annotate("", tuple(tip), tuple(start), "axes fraction", "axes fraction", arrowprops=arrow)
 
@@ -479,9 +493,9 @@ def _point_to(panel: Any, place: Floats, middle: Floats, color: str) -> None:
 def _cuts_drawing(drawn: Sheet) -> str:
     """The cross-range cuts, as a report draws them."""
     canvas = Canvas()
-    curves = [*drawn.cuts[1:], drawn.cuts[0]]  # none covers the one without error
-    bottom = cut_panel(canvas, 0.0, *_CUT_SIZE, "Cross-range cuts", curves)
-    return canvas.document((_CUT_SIZE[0], bottom + 4), "cuts", "Cross-range cuts", "Power along y′.")
+    curves = [*drawn.cuts[1:], drawn.cuts[0]]  # the cut without error is last, so that no line covers it
+    bottom = cut_panel(canvas, 0.0, *_CUT_SIZE_PX, "Cross-range cuts", curves)
+    return canvas.document((_CUT_SIZE_PX[0], bottom + 4), "cuts", "Cross-range cuts", "Power along y′.")
 
 
 def _cuts(panel: Any, drawn: Sheet) -> None:

@@ -1,7 +1,7 @@
-"""Passes of a satellite as a drawing: their tracks in the sky over the scene, and the resolution that each gives.
+"""Passes of a satellite as a drawing: their tracks in the sky over the scene, and the resolution of each pass.
 
-The sky is seen as a map is: north up, east to the right, the zenith in the middle. A track is in the colour of the
-status, with a head where it sets and a dot at the mid-time.
+The sky is oriented like a map: north up, east to the right, the zenith in the middle. A track has the colour of its
+status, an arrow head at its setting and a dot at the mid-time.
 """
 
 import math
@@ -14,31 +14,37 @@ from bisar_budget.findings.status import RANK
 from bisar_budget.paths.instant import DAY, Instant
 from bisar_budget.report.drawing import svg
 
-_WIDTH = 900.0  # px
-_RIM = 178.0  # px from the zenith to the horizon
-_BESIDE = 34.0  # px for the names of directions
-_APART = 78.0  # px between the sky and the axes of the resolution
-_RIGHT = 24.0  # px beside them, for half a date
-_HEAD = 7.0  # px, of an arrow
-_MANY, _THIN, _BROAD = 20, 1.3, 2.0  # tracks, from which on they are thin; px
-_NUMBERED = 40  # passes, at most
-_HOUR = 3600.0
-_STEPS = (1, 2, 3, 6, 12, 24, 48, 120, 240, 480, 1200, 2400)  # h
-_ROOM = 58.0  # px for a date
-_DASHES = ("", "6 3", "2 2.5")  # of statuses that share a colour
+_SKY_WIDTH_PX = 900.0
+_HORIZON_PX = 178.0  # from the zenith to the horizon
+_DIRECTION_NAMES_PX = 34.0  # margin for the names of directions
+_SKY_GAP_PX = 78.0  # between the sky and the axes of the resolution
+_SKY_RIGHT_PX = 24.0  # margin beside the axes, for half a date
+_ARROW_HEAD_PX = 7.0
+_MIN_THIN_COUNT, _THIN_PX, _BROAD_PX = 20, 1.3, 2.0  # tracks above which lines are thin; widths of lines
+_MAX_NUMBERED_COUNT = 40  # passes with numbers
+_HOUR_S = 3600.0
+_DATE_STEPS_HOURS = (1, 2, 3, 6, 12, 24, 48, 120, 240, 480, 1200, 2400)
+_DATE_PX = 58.0  # width for a date
+_STATUS_DASHES = ("", "6 3", "2 2.5")  # of statuses with the same colour
 
 
 def sky_plot(passes: Passes, title: str, verdict: str) -> str:
     """Draw passes as SVG.
 
-    `verdict` says how many comply: it stands below the name of the mission, and is read to who cannot see the rest.
+    `verdict` is the sentence with the number of complying passes. It is written below the name of the mission, and is
+    the description for readers who cannot see the drawing.
     """
     canvas = svg.Canvas()
-    top = svg.head(canvas, [svg.short(passes.name, _WIDTH), printable(verdict)])
-    middle = (_BESIDE + _RIM + 8, top + _BESIDE + _RIM)
-    statuses = sorted({one.status for one in passes.found}, key=RANK.__getitem__)
+    top = svg.head(canvas, [svg.short(passes.name, _SKY_WIDTH_PX), printable(verdict)])
+    middle = (_DIRECTION_NAMES_PX + _HORIZON_PX + 8, top + _DIRECTION_NAMES_PX + _HORIZON_PX)
+    statuses = sorted({overpass.status for overpass in passes.found}, key=RANK.__getitem__)
     _sky(canvas, middle, passes)
-    frame = svg.Box(2 * (_BESIDE + _RIM) + _APART, middle[1] - _RIM, _WIDTH - _RIGHT, middle[1] + _RIM)
+    frame = svg.Box(
+        2 * (_DIRECTION_NAMES_PX + _HORIZON_PX) + _SKY_GAP_PX,
+        middle[1] - _HORIZON_PX,
+        _SKY_WIDTH_PX - _SKY_RIGHT_PX,
+        middle[1] + _HORIZON_PX,
+    )
     _resolutions(canvas, frame, passes)
     entries = [svg.line_entry(canvas, svg.status_words(name), f"track is-{name}") for name in statuses]
     entries += [
@@ -47,13 +53,15 @@ def sky_plot(passes: Passes, title: str, verdict: str) -> str:
         svg.circle_entry(canvas, "range resolution", 3.6, "open"),
         svg.LegendLine("cross-range resolution", lambda at: _square(canvas, (at[0] + 13, at[1]), "solid")),
     ]
-    bottom = svg.legend(canvas, middle[1] + _RIM + _BESIDE, _WIDTH, entries)
-    width = _THIN if len(passes.found) > _MANY else _BROAD
-    return canvas.document((_WIDTH, bottom + 4), f"{passes.file} passes", title, verdict, _style(statuses, width))
+    bottom = svg.legend(canvas, middle[1] + _HORIZON_PX + _DIRECTION_NAMES_PX, _SKY_WIDTH_PX, entries)
+    width = _THIN_PX if len(passes.found) > _MIN_THIN_COUNT else _BROAD_PX
+    return canvas.document(
+        (_SKY_WIDTH_PX, bottom + 4), f"{passes.file} passes", title, verdict, _style(statuses, width)
+    )
 
 
 def _style(statuses: Sequence[str], width: float) -> str:
-    """Rules for what only these drawings have."""
+    """CSS rules of drawings of passes."""
     light, _ = svg.colours()
     rules = [
         f".track{{fill:none;stroke-width:{width};stroke-linecap:round}}",
@@ -63,7 +71,7 @@ def _style(statuses: Sequence[str], width: float) -> str:
         ".between{fill:none;stroke-width:1;stroke-opacity:.55}",
         ".frame{fill:none;stroke:var(--muted,#595f66);stroke-width:1}",
     ]
-    for name, dashes in svg.marks_within_colours(statuses, _DASHES).items():
+    for name, dashes in svg.marks_within_colours(statuses, _STATUS_DASHES).items():
         colour = f"var(--{svg.tone_of(name)},{light[svg.tone_of(name)]})"
         rules.append(f".track.is-{name}{{stroke:{colour}{f';stroke-dasharray:{dashes}' if dashes else ''}}}")
         rules.append(f".between.is-{name}{{stroke:{colour}}}")
@@ -74,9 +82,9 @@ def _style(statuses: Sequence[str], width: float) -> str:
 
 # ---------------------------------------------------------------- the sky
 def _at(middle: svg.Point, azimuth: float, elevation: float) -> svg.Point:
-    """Place on the page of a direction; azimuth from east, counter-clockwise. [rad]"""
-    radius, turned = _RIM * (1 - 2 * elevation / math.pi), bearing(azimuth)
-    return middle[0] + radius * math.sin(turned), middle[1] - radius * math.cos(turned)
+    """Point on the page of a direction: azimuth from east, counter-clockwise, and elevation. [rad]"""
+    radius, angle = _HORIZON_PX * (1 - 2 * elevation / math.pi), bearing(azimuth)
+    return middle[0] + radius * math.sin(angle), middle[1] - radius * math.cos(angle)
 
 
 def _ring(middle: svg.Point, elevation: float) -> list[svg.Point]:
@@ -84,7 +92,7 @@ def _ring(middle: svg.Point, elevation: float) -> list[svg.Point]:
 
 
 def _sky(canvas: svg.Canvas, middle: svg.Point, passes: Passes) -> None:
-    """The sky with its tracks, and their numbers."""
+    """Draw the sky with its tracks and their numbers."""
     for degrees in range(0, 360, 30):
         azimuth = math.radians(90 - degrees)
         canvas.lines([(_at(middle, azimuth, math.pi / 2), _at(middle, azimuth, 0.0))], "grid")
@@ -97,48 +105,55 @@ def _sky(canvas: svg.Canvas, middle: svg.Point, passes: Passes) -> None:
     canvas.polyline(_ring(middle, 0.0), "frame", is_obstacle=False)
     if passes.min_elevation > 0:
         canvas.polyline(_ring(middle, passes.min_elevation), "thin dashed", is_obstacle=False)
-    tracks = [[_at(middle, *place) for place in one.track.tolist()] for one in passes.found]
+    tracks = [[_at(middle, *direction) for direction in overpass.track.tolist()] for overpass in passes.found]
     worst_first = sorted(zip(passes.found, tracks, strict=True), key=lambda drawn: RANK[drawn[0].status])
-    for one, track in worst_first:  # those that comply lie above the others
-        canvas.polyline(track, f"track is-{one.status}", is_obstacle=False)
-        if one.sets:
-            canvas.polygon(_arrow(track), f"head is-{one.status}", is_obstacle=False)
+    for overpass, track in worst_first:  # complying passes are drawn last, above the others
+        canvas.polyline(track, f"track is-{overpass.status}", is_obstacle=False)
+        if overpass.sets:
+            canvas.polygon(_arrow(track), f"head is-{overpass.status}", is_obstacle=False)
     marks = []
-    for one, track in zip(passes.found, tracks, strict=True):
-        if one.state is None:
+    for overpass, track in zip(passes.found, tracks, strict=True):
+        if overpass.state is None:
             marks.append(track[len(track) // 2])
             continue
-        marks.append(_at(middle, one.state.azimuth, one.state.elevation))
-        canvas.circle(marks[-1], 4, f"dot is-{one.status}")
-    _numbers(canvas, passes.found, marks, svg.Box(8, middle[1] - _RIM, middle[0] + _RIM, middle[1] + _RIM))
+        marks.append(_at(middle, overpass.state.azimuth, overpass.state.elevation))
+        canvas.circle(marks[-1], 4, f"dot is-{overpass.status}")
+    _numbers(
+        canvas,
+        passes.found,
+        marks,
+        svg.Box(8, middle[1] - _HORIZON_PX, middle[0] + _HORIZON_PX, middle[1] + _HORIZON_PX),
+    )
 
 
 def _arrow(track: Sequence[svg.Point]) -> list[svg.Point]:
-    """Head at the end of a track, along its last part."""
+    """Arrow head at the end of a track, along its last segment."""
     (x, y), (u, v) = track[-1], track[-2]
     length = math.dist((x, y), (u, v)) or 1.0
     along = ((x - u) / length, (y - v) / length)
-    back = (x - _HEAD * along[0], y - _HEAD * along[1])
-    side = (-0.45 * _HEAD * along[1], 0.45 * _HEAD * along[0])
+    back = (x - _ARROW_HEAD_PX * along[0], y - _ARROW_HEAD_PX * along[1])
+    side = (-0.45 * _ARROW_HEAD_PX * along[1], 0.45 * _ARROW_HEAD_PX * along[0])
     return [(x, y), (back[0] + side[0], back[1] + side[1]), (back[0] - side[0], back[1] - side[1])]
 
 
-def _numbers(canvas: svg.Canvas, found: Sequence[SatellitePass], marks: Sequence[svg.Point], within: svg.Box) -> None:
-    """Numbers of passes beside their marks; of very many those of the passes that comply, if they are few."""
-    numbered = list(zip(found, marks, strict=True))
-    if len(numbered) > _NUMBERED:
-        numbered = [(one, at) for one, at in numbered if one.complies]
-    if len(numbered) <= _NUMBERED:
-        canvas.labels([svg.DrawnLabel(at, (str(one.number),), within) for one, at in numbered])
+def _numbers(
+    canvas: svg.Canvas, overpasses: Sequence[SatellitePass], marks: Sequence[svg.Point], within: svg.Box
+) -> None:
+    """Write numbers of passes beside their marks. Among very many passes only complying ones have numbers, if few."""
+    numbered_marks = list(zip(overpasses, marks, strict=True))
+    if len(numbered_marks) > _MAX_NUMBERED_COUNT:
+        numbered_marks = [(overpass, at) for overpass, at in numbered_marks if overpass.complies]
+    if len(numbered_marks) <= _MAX_NUMBERED_COUNT:
+        canvas.labels([svg.DrawnLabel(at, (str(overpass.number),), within) for overpass, at in numbered_marks])
 
 
 # ---------------------------------------------------------------- resolution over time
 def _resolutions(canvas: svg.Canvas, frame: svg.Box, passes: Passes) -> None:
-    """Both resolutions of each pass over its mid-time, in equal ratios."""
+    """Draw both resolutions of each pass over its mid-time, on a logarithmic scale."""
     span = passes.stop.since(passes.start)
     across = svg.Scale(0.0, span, frame.left, frame.right)
-    shown = [(one, both) for one in passes.found if (both := _sizes(one))]
-    sizes = [size for _, both in shown for size in both]
+    shown = [(overpass, resolutions) for overpass in passes.found if (resolutions := _sizes(overpass))]
+    sizes = [size for _, resolutions in shown for size in resolutions]
     low, high = (min(sizes), max(sizes)) if sizes else (1.0, 10.0)
     up = svg.Scale(low / 1.3, high * 1.3, frame.bottom, frame.top, is_log=True)
     svg.grid(canvas, frame, None, up)
@@ -156,23 +171,30 @@ def _resolutions(canvas: svg.Canvas, frame: svg.Box, passes: Passes) -> None:
     canvas.upright_text((frame.left - 46, frame.middle[1]), "resolution on the ground [m]", "small")
     if not shown:
         canvas.text(frame.middle, ["no pass has an image"], "small", "middle")
-    for one, (first, second) in shown:
-        x = across.at(one.center.since(passes.start)) if one.center is not None else frame.left
-        range_at, cross_at = (x, up.at(first)), (x, up.at(second))
-        canvas.lines([(range_at, cross_at)], f"between is-{one.status}")
-        canvas.circle(range_at, 3.6, f"open is-{one.status}")
-        _square(canvas, cross_at, f"solid is-{one.status}")
-    labelled = [one for one, _ in shown]
-    tops = [(across.at((one.center or passes.start).since(passes.start)), up.at(max(both))) for one, both in shown]
-    _numbers(canvas, labelled, tops, frame)
+    for overpass, (first, second) in shown:
+        x = across.at(overpass.center.since(passes.start)) if overpass.center is not None else frame.left
+        range_point, cross_point = (x, up.at(first)), (x, up.at(second))
+        canvas.lines([(range_point, cross_point)], f"between is-{overpass.status}")
+        canvas.circle(range_point, 3.6, f"open is-{overpass.status}")
+        _square(canvas, cross_point, f"solid is-{overpass.status}")
+    labelled_passes = [overpass for overpass, _ in shown]
+    tops = [
+        (across.at((overpass.center or passes.start).since(passes.start)), up.at(max(resolutions)))
+        for overpass, resolutions in shown
+    ]
+    _numbers(canvas, labelled_passes, tops, frame)
 
 
-def _sizes(one: SatellitePass) -> tuple[float, float] | None:
-    """Range and cross-range resolution; None where there is no image."""
-    first, second = one.range_resolution, one.cross_range_resolution
-    if first is None or second is None or not (math.isfinite(first) and math.isfinite(second)):
+def _sizes(overpass: SatellitePass) -> tuple[float, float] | None:
+    """Range and cross-range resolution; None without an image."""
+    range_resolution, cross_range_resolution = overpass.range_resolution, overpass.cross_range_resolution
+    if (
+        range_resolution is None
+        or cross_range_resolution is None
+        or not (math.isfinite(range_resolution) and math.isfinite(cross_range_resolution))
+    ):
         return None
-    return first, second
+    return range_resolution, cross_range_resolution
 
 
 def _square(canvas: svg.Canvas, at: svg.Point, style: str) -> None:
@@ -181,9 +203,11 @@ def _square(canvas: svg.Canvas, at: svg.Point, style: str) -> None:
 
 
 def _dates(start: Instant, span: float, width: float) -> Iterator[tuple[float, str]]:
-    """Times after the start that have room for a date, or an hour, and that."""
-    hours = next((step for step in _STEPS if step * _HOUR * width >= span * _ROOM), _STEPS[-1])
-    step = hours * _HOUR
+    """Times of ticks after the start [s], each with its date or hour."""
+    hours = next(
+        (step for step in _DATE_STEPS_HOURS if step * _HOUR_S * width >= span * _DATE_PX), _DATE_STEPS_HOURS[-1]
+    )
+    step = hours * _HOUR_S
     first = math.ceil(start.seconds / step - 1e-9) if hours <= 24 else int(start.seconds > 0) * 24 / hours
     time = first * step - start.seconds
     while time <= span * (1 + 1e-9):

@@ -1,13 +1,14 @@
-"""A small SVG canvas with axes and colours: lines, markers, labels that find a free place. The same bytes each time.
+"""A small SVG canvas with axes and colours: lines, markers, labels that find free space. Its output is reproducible.
 
 Colours are custom properties with a fallback, so that a page which inlines a drawing can set them: --ink, --muted,
---grid, --paper, --transmitter, --receiver. A drawing that is a file of its own brings light and dark itself.
-Nothing but the title and its description has an id, made of `key`: drawings of many missions fit into one page.
+--grid, --paper, --transmitter, --receiver. A drawing in a separate file has its own light and dark colours. Only the
+title and the description have ids, which depend on `key`, so that one page can hold drawings of many missions.
 """
 
 import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache
 from hashlib import sha256
 from itertools import pairwise
@@ -23,8 +24,8 @@ Point = tuple[float, float]  # x to the right, y down [px]
 Segment = tuple[Point, Point]
 Mark = TypeVar("Mark")
 
-FONT = 12.0  # px
-LINE_HEIGHT = 14.5  # px
+FONT_PX = 12.0
+LINE_PX = 14.5  # from a line of text to the next
 _DARK = "--ink:#e6e6e6;--muted:#a9adb3;--grid:#3a3f46;--paper:#16191d;--transmitter:#7db4f2;--receiver:#f0a06a"
 STYLE = (
     "svg.drawing{max-width:100%;height:auto;font:12px system-ui,'Segoe UI',Roboto,'DejaVu Sans',sans-serif}"
@@ -50,15 +51,43 @@ STYLE = (
     f"@media (prefers-color-scheme:dark){{svg:root.drawing{{{_DARK}}}}}"
 )
 
-_NARROW, _WIDE = "fijlrtI.,:;'|!()[] ", "mwMW%@"
-_MARGIN = 2.0  # px around a label
-_OUTSIDE, _COVERED, _CROSSED, _AWAY, _ORDER = 1e4, 60.0, 2.0, 0.6, 0.15  # what a place for a label costs
-# Right of the point first, then above, below, left, as maps are lettered; x and y of the label's middle.
+_NARROW_LETTERS, _WIDE_LETTERS = "fijlrtI.,:;'|!()[] ", "mwMW%@"
+_MARGIN_PX = 2.0  # around a label
+
+
+@dataclass(frozen=True)
+class _LabelCosts:
+    """Costs of a position for a label, in px² of covered area.
+
+    Attributes
+    ----------
+    outside : float
+        For a position that leaves its box.
+    covered : float
+        For each obstacle that it covers, in addition to the covered area.
+    crossed_per_px : float
+        For the length of a line that it covers.
+    distance_per_px : float
+        For the distance between the label and its point.
+    direction : float
+        For each step in the order of directions.
+    """
+
+    outside: float = 1e4
+    covered: float = 60.0
+    crossed_per_px: float = 2.0
+    distance_per_px: float = 0.6
+    direction: float = 0.15
+
+
+_COSTS = _LabelCosts()
+
+# Directions from a point to its label, (x, y), in the order of preference of maps: right, above, below, left.
 _DIRECTIONS = [
     (math.cos(math.radians(angle)), -math.sin(math.radians(angle)))
     for angle in (0, 30, -30, 60, -60, 90, -90, 180, 150, -150, 120, -120)
 ]
-_GAPS = (8.0, 15.0, 24.0, 36.0, 52.0)  # px from the point to the label
+_LABEL_GAPS_PX = (8.0, 15.0, 24.0, 36.0, 52.0)  # from the point to the label
 
 
 class Box(NamedTuple):
@@ -71,30 +100,30 @@ class Box(NamedTuple):
 
     @property
     def middle(self) -> Point:
-        """Its centre."""
+        """Centre of the box."""
         return (self.left + self.right) / 2, (self.top + self.bottom) / 2
 
     def upright(self, x: float) -> Segment:
-        """Line through it from above to below."""
+        """Vertical line through the box at x."""
         return (x, self.top), (x, self.bottom)
 
     def level(self, y: float) -> Segment:
-        """Line through it from left to right."""
+        """Horizontal line through the box at y."""
         return (self.left, y), (self.right, y)
 
-    def covered_by(self, other: "Box") -> float:
-        """Area shared with another. [px²]"""
+    def covered_by(self, box: "Box") -> float:
+        """Area shared with another box. [px²]"""
         left, top, right, bottom = self
-        if other.left >= right or other.right <= left or other.top >= bottom or other.bottom <= top:
-            return 0.0  # most are far apart
-        return (min(right, other.right) - max(left, other.left)) * (min(bottom, other.bottom) - max(top, other.top))
+        if box.left >= right or box.right <= left or box.top >= bottom or box.bottom <= top:
+            return 0.0  # a fast exit for most boxes, which are far apart
+        return (min(right, box.right) - max(left, box.left)) * (min(bottom, box.bottom) - max(top, box.top))
 
     def holds(self, point: Point) -> bool:
-        """Say whether a point lies inside."""
+        """Whether a point is inside the box."""
         return self.left <= point[0] <= self.right and self.top <= point[1] <= self.bottom
 
     def clipped(self, segment: Segment) -> Segment | None:
-        """Part of a line that lies inside (Liang-Barsky)."""
+        """Segment of a line inside the box, by Liang-Barsky; None if the line is outside."""
         (x, y), (u, v) = segment
         dx, dy = u - x, v - y
         enter, leave = 0.0, 1.0
@@ -112,15 +141,15 @@ class Box(NamedTuple):
 
 
 class DrawnLabel(NamedTuple):
-    """Lines of text that belong to a point, to be written inside a box."""
+    """Lines of text for a point, to be written inside a box."""
 
     at: Point
     lines: tuple[str, ...]
     within: Box
 
 
-class _Place(NamedTuple):
-    """Where a label could stand, the side its text is aligned to, and what that costs."""
+class _LabelPosition(NamedTuple):
+    """Position of a label: its box, the anchor of its text, and the cost of the position."""
 
     box: Box
     anchor: str
@@ -128,7 +157,7 @@ class _Place(NamedTuple):
 
 
 class Canvas:
-    """Collects the elements of one drawing, and knows what is taken when labels look for a place."""
+    """Collects the elements of one drawing, and the obstacles that labels avoid."""
 
     def __init__(self) -> None:
         self._elements: list[str] = []
@@ -139,14 +168,14 @@ class Canvas:
     def polyline(
         self, points: Sequence[Point], style: str, within: Box | None = None, is_obstacle: bool = True
     ) -> None:
-        """Draw a line through points, cut at the edges of a box."""
+        """Draw a line through points, clipped to a box."""
         for run in _runs(points, within):
             self._path(_through(run), style)
             if is_obstacle:
                 self.segments += pairwise(run)
 
     def polygons(self, shapes: Iterable[Sequence[Point]], style: str) -> None:
-        """Draw many filled or hollow shapes as one."""
+        """Draw many filled or hollow shapes as one element."""
         self._path("".join(f"{_through(points)}Z" for points in shapes), style)
 
     def polygon(self, points: Sequence[Point], style: str, is_obstacle: bool = True) -> None:
@@ -157,11 +186,11 @@ class Canvas:
             self.obstacles.append(Box(min(xs), min(ys), max(xs), max(ys)))
 
     def lines(self, lines: Iterable[Segment], style: str) -> None:
-        """Draw many lines, each from a point to another, as one."""
+        """Draw many lines, each between two points, as one element."""
         self._path("".join(map(_through, lines)), style)
 
     def boxes(self, boxes: Iterable[Box], style: str) -> None:
-        """Fill many rectangles as one."""
+        """Fill many rectangles as one element."""
         sides = (tuple(map(_number, box)) for box in boxes)
         data = "".join(f"M{left} {top}H{right}V{bottom}H{left}Z" for left, top, right, bottom in sides)
         self._path(data, style)
@@ -189,12 +218,12 @@ class Canvas:
             self.polygon([end, *sides], f"solid {colour}".rstrip(), is_obstacle=False)
 
     def text(self, at: Point, lines: Sequence[str], style: str = "", anchor: str = "start") -> None:
-        """Write lines of text; `at` is the baseline of the first. The first of several is the name of a thing."""
+        """Write lines of text. `at` is on the baseline of the first line, which is a name if further lines follow."""
         x, y = at
         spans = []
         for index, line in enumerate(lines):
             name = ' class="name"' if index == 0 and len(lines) > 1 else ""
-            dy = f' dy="{LINE_HEIGHT}"' if index else ""
+            dy = f' dy="{LINE_PX}"' if index else ""
             spans.append(f'<tspan x="{_number(x)}"{dy}{name}>{_with_subscripts(line)}</tspan>')
         attributes = (f' class="{style}"' if style else "") + (
             f' text-anchor="{anchor}"' if anchor != "start" else ""
@@ -202,59 +231,62 @@ class Canvas:
         self._texts.append(f'<text x="{_number(x)}" y="{_number(y)}"{attributes}>{"".join(spans)}</text>')
 
     def upright_text(self, at: Point, line: str, style: str) -> None:
-        """Write a line that runs upwards, its middle at a point."""
-        x, y = (_number(part) for part in at)
+        """Write a line of text that runs upwards, centred at a point."""
+        x, y = (_number(coordinate) for coordinate in at)
         self._texts.append(
             f'<text class="{style}" text-anchor="middle" transform="translate({x} {y}) rotate(-90)">'
             f"{xml_text(line)}</text>"
         )
 
     def labels(self, labels: Sequence["DrawnLabel"]) -> None:
-        """Write texts near their points, where together they cover least of what is drawn and of each other.
+        """Write labels near their points, at positions with the least overlap with the drawing and other labels.
 
-        They are placed one after the other; the best of several orders counts, because who comes first may take
-        the only place of another.
+        Labels are positioned one after the other. Several orders are tried, because an early label may take the only
+        good position of a later one; the order with the least cost counts.
         """
         options = [self._options(label) for label in labels]
         indices = range(len(labels))
         orders = [[*indices[first:], *indices[:first]] for first in indices]
-        trials = [_chosen(options, order) for order in (*orders, *(order[::-1] for order in orders))]
+        trials = [_positioned(options, order) for order in (*orders, *(order[::-1] for order in orders))]
         _, best = min(trials, key=lambda trial: trial[0]) if trials else (0.0, {})
         for index, label in enumerate(labels):
-            place = best[index]
-            box = place.box
+            candidate = best[index]
+            box = candidate.box
             self.obstacles.append(box)
-            x = {"start": box.left + _MARGIN, "middle": box.middle[0], "end": box.right - _MARGIN}
-            self.text((x[place.anchor], box.top + 0.8 * LINE_HEIGHT), label.lines, anchor=place.anchor)
+            x = {"start": box.left + _MARGIN_PX, "middle": box.middle[0], "end": box.right - _MARGIN_PX}
+            self.text((x[candidate.anchor], box.top + 0.8 * LINE_PX), label.lines, anchor=candidate.anchor)
 
-    def _options(self, label: "DrawnLabel") -> list["_Place"]:
-        """Places around the label's point with their costs, the cheapest first."""
-        width = max(text_width(line) for line in label.lines) + 2 * _MARGIN
-        height = LINE_HEIGHT * len(label.lines)
-        places = list(_places(label.at, width, height))
-        costed = [place._replace(cost=place.cost + self._cost(place.box, label.within)) for place in places]
-        return sorted(costed, key=lambda place: place.cost)
+    def _options(self, label: "DrawnLabel") -> list["_LabelPosition"]:
+        """Positions around the point of a label with their costs, cheapest first."""
+        width = max(text_width(line) for line in label.lines) + 2 * _MARGIN_PX
+        height = LINE_PX * len(label.lines)
+        candidates = list(_positions(label.at, width, height))
+        costed = [
+            candidate._replace(cost=candidate.cost + self._cost(candidate.box, label.within))
+            for candidate in candidates
+        ]
+        return sorted(costed, key=lambda candidate: candidate.cost)
 
     def _cost(self, box: Box, within: Box) -> float:
         over = (within.left - box.left, within.top - box.top, box.right - within.right, box.bottom - within.bottom)
-        outside = sum(max(0.0, one) for one in over)
+        outside = sum(max(0.0, overhang) for overhang in over)
         if outside > 0:
-            return _OUTSIDE + outside * _COVERED
+            return _COSTS.outside + outside * _COSTS.covered
         cost = math.fsum(_overlap(box, obstacle) for obstacle in self.obstacles)
         left, top, right, bottom = box
         for (x, y), (u, v) in self.segments:
             if (x < left and u < left) or (x > right and u > right):
-                continue  # most lines are far away
+                continue  # a fast exit for most lines, which are far away
             if (y < top and v < top) or (y > bottom and v > bottom):
                 continue
-            if (part := box.clipped(((x, y), (u, v)))) is not None:
-                cost += 2 + _CROSSED * math.dist(*part)
+            if (inside := box.clipped(((x, y), (u, v)))) is not None:
+                cost += 2 + _COSTS.crossed_per_px * math.dist(*inside)
         return cost
 
     def document(self, size: tuple[float, float], key: str, title: str, description: str, style: str = "") -> str:
-        """Return the drawing as SVG, with its name and the text that stands for it where it cannot be seen.
+        """The drawing as SVG, with a title and a description for readers who cannot see it.
 
-        `style` are rules of this kind of drawing, beside those of all.
+        `style` are CSS rules of this kind of drawing, in addition to `STYLE`.
         """
         name = "d" + sha256(key.encode("utf-8", "surrogatepass")).hexdigest()[:10]
         width, height = (_number(side) for side in size)
@@ -269,62 +301,68 @@ class Canvas:
 
 
 def _through(points: Iterable[Point]) -> str:
-    """Data of a path from point to point."""
+    """Path data of a line through points."""
     return "M" + "L".join(f"{_number(x)} {_number(y)}" for x, y in points)
 
 
 def text_width(line: str) -> float:
-    """Width of a text, rather too large: whose font it will be is not known. [px]"""
-    return FONT * math.fsum(
-        0.36 if c in _NARROW else 0.95 if c in _WIDE else 0.74 if c.isupper() else 0.62 for c in line
+    """Width of a text, estimated generously because the font is unknown. [px]"""
+    return FONT_PX * math.fsum(
+        0.36 if c in _NARROW_LETTERS else 0.95 if c in _WIDE_LETTERS else 0.74 if c.isupper() else 0.62 for c in line
     )
 
 
-def _places(at: Point, width: float, height: float) -> Iterator["_Place"]:
-    """Places for a label around a point; farther ones, and the left of it, cost a little."""
-    for gap in _GAPS:
+def _positions(at: Point, width: float, height: float) -> Iterator["_LabelPosition"]:
+    """Positions for a label around a point. The cost grows with the distance and the order of directions."""
+    for gap in _LABEL_GAPS_PX:
         for order, (x, y) in enumerate(_DIRECTIONS):
-            # The nearest point of the box is `gap` away; above and below it is centred.
+            # The nearest point of the box is `gap` away. Above and below its point the box is centred.
             left = at[0] + gap * x + (0.0 if x > 0.1 else -width if x < -0.1 else -width / 2)
             top = at[1] + gap * y + (-height / 2 if abs(y) < 0.1 else -height if y < 0 else 0.0)
             anchor = "start" if x > 0.1 else "end" if x < -0.1 else "middle"
-            yield _Place(Box(left, top, left + width, top + height), anchor, _AWAY * gap + _ORDER * order)
+            yield _LabelPosition(
+                Box(left, top, left + width, top + height),
+                anchor,
+                _COSTS.distance_per_px * gap + _COSTS.direction * order,
+            )
 
 
-def _chosen(options: Sequence[Sequence["_Place"]], order: Sequence[int]) -> tuple[float, dict[int, "_Place"]]:
-    """Take the cheapest place for one label after the other; what it costs in all, and the places."""
-    total, taken = 0.0, dict[int, _Place]()
+def _positioned(
+    options: Sequence[Sequence["_LabelPosition"]], order: Sequence[int]
+) -> tuple[float, dict[int, "_LabelPosition"]]:
+    """Total cost, and the position of each label by its index, if labels take positions in the given order."""
+    total, taken = 0.0, dict[int, _LabelPosition]()
     for index in order:
         best, least = options[index][0], math.inf
-        for place in options[index]:
-            if place.cost >= least:
-                break  # sorted: the rest costs more
-            cost = place.cost + math.fsum(_overlap(place.box, other.box) for other in taken.values())
+        for candidate in options[index]:
+            if candidate.cost >= least:
+                break  # positions are sorted by cost
+            cost = candidate.cost + math.fsum(_overlap(candidate.box, placed.box) for placed in taken.values())
             if cost < least:
-                best, least = place, cost
+                best, least = candidate, cost
         taken[index], total = best, total + least
     return total, taken
 
 
-def _overlap(box: Box, other: Box) -> float:
-    area = box.covered_by(other)
-    return _COVERED + area if area else 0.0
+def _overlap(box: Box, obstacle: Box) -> float:
+    area = box.covered_by(obstacle)
+    return _COSTS.covered + area if area else 0.0
 
 
 def _runs(points: Sequence[Point], within: Box | None) -> Iterator[list[Point]]:
-    """Pieces of a line that lie inside a box."""
+    """Connected pieces of a line inside a box."""
     if within is None:
         yield list(points)
         return
     run: list[Point] = []
     for segment in pairwise(points):
-        part = within.clipped(segment)
-        if part is None or math.dist(*part) == 0:
+        inside = within.clipped(segment)
+        if inside is None or math.dist(*inside) == 0:
             continue
-        if run and run[-1] != part[0]:
+        if run and run[-1] != inside[0]:
             yield run
             run = []
-        run = [*run, part[1]] if run else list(part)
+        run = [*run, inside[1]] if run else list(inside)
     if run:
         yield run
 
@@ -337,16 +375,16 @@ def _with_subscripts(line: str) -> str:
 
 
 def _number(value: float) -> str:
-    """A coordinate to a hundredth of a pixel, without trailing zeros; never -0."""
+    """A coordinate to a hundredth of a pixel, without trailing zeros and without -0."""
     text = f"{value:.2f}".rstrip("0").rstrip(".")
     return "0" if text == "-0" else text
 
 
-_LEAST = 1e-9  # of a step: what is drawn may all be at one place
-_ROOM = {"x": 46.0, "y": 26.0}  # px for a number
-_INDENT = 18.0  # px left of a legend
-_LETTERS = 76  # of a line of a legend
-_SMALL = 0.9  # of the width of a text: a legend has a smaller font
+_MIN_STEP = 1e-9  # smallest step of an axis, if all values are equal
+_NUMBER_ROOM_PX = {"x": 46.0, "y": 26.0}  # space for a number at an axis
+_LEGEND_INDENT_PX = 18.0
+_LEGEND_CHARACTERS = 76  # of a line of a legend
+_SMALL_FONT_RATIO = 0.9  # width of a text in the font of a legend over its usual width
 
 
 def axis_number(value: float) -> str:
@@ -355,20 +393,20 @@ def axis_number(value: float) -> str:
 
 
 def ticks(lower: float, upper: float, step: float) -> Sequence[float]:
-    """Multiples of a step from one value to another."""
+    """Multiples of a step between two values."""
     first, last = math.ceil(lower / step - 1e-9), math.floor(upper / step + 1e-9)
     return [index * step for index in range(first, last + 1)]
 
 
 def round_step(least: float) -> float:
-    """Smallest of 1, 2, 5 times a power of ten that is not below a value."""
-    least = max(least, _LEAST)
+    """Smallest number of the form 1, 2 or 5 times a power of ten that is not below a value."""
+    least = max(least, _MIN_STEP)
     power = 10.0 ** math.floor(math.log10(least))
     return next(factor * power for factor in (1, 2, 5, 10) if factor * power >= least * (1 - 1e-9))
 
 
 class Scale(NamedTuple):
-    """From a value to a place. [px]"""
+    """Map from values `low` to `high` to coordinates `start` to `end` [px], linear or logarithmic."""
 
     low: float
     high: float
@@ -377,26 +415,26 @@ class Scale(NamedTuple):
     is_log: bool = False
 
     def at(self, value: float) -> float:
-        """Place of a value."""
-        low, high, value = (math.log(one) if self.is_log else one for one in (self.low, self.high, value))
+        """Coordinate of a value. [px]"""
+        low, high, value = (math.log(number) if self.is_log else number for number in (self.low, self.high, value))
         return self.start + (value - low) / (high - low) * (self.end - self.start)
 
     def ticks(self, room: float) -> Sequence[float]:
-        """Round values, each with room for its number. [px]"""
+        """Round values at distances of at least `room` px."""
         size, (low, high) = abs(self.end - self.start), sorted((self.low, self.high))
         if not self.is_log:
             return ticks(low, high, round_step((high - low) * room / size))
         powers = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
         for factors in ((1, 2, 5), (1, 3), (1,)):
             values = [factor * 10.0**power for power in powers for factor in factors]
-            found = [value for value in values if low * (1 - 1e-9) <= value <= high * (1 + 1e-9)]
-            if all(abs(self.at(b) - self.at(a)) >= room for a, b in pairwise(found)):
+            fitting = [value for value in values if low * (1 - 1e-9) <= value <= high * (1 + 1e-9)]
+            if all(abs(self.at(b) - self.at(a)) >= room for a, b in pairwise(fitting)):
                 break
-        return found
+        return fitting
 
 
 def short(word: str, room: float) -> str:
-    """A word that has room, with an end that says that it is longer. [px]"""
+    """Text of at most `room` px. A longer text ends with an ellipsis."""
     text = printable(word)
     while text_width(text) > room and len(text) > 2:
         text = f"{text[:-2].rstrip('…')}…"
@@ -404,25 +442,25 @@ def short(word: str, room: float) -> str:
 
 
 def head(canvas: Canvas, lines: Sequence[str]) -> float:
-    """Write lines above a drawing that stands alone, its name first; returns where the drawing begins. [px]"""
-    for place, line in enumerate(lines):
-        canvas.text((8, 18 + place * LINE_HEIGHT), [line], "small" if place else "name")
-    return 16 + len(lines) * LINE_HEIGHT if lines else 10.0
+    """Write lines above a drawing, its name first. Returns the top of the drawing. [px]"""
+    for index, line in enumerate(lines):
+        canvas.text((8, 18 + index * LINE_PX), [line], "small" if index else "name")
+    return 16 + len(lines) * LINE_PX if lines else 10.0
 
 
 def x_axis(canvas: Canvas, frame: Box, scale: Scale, label: str, words: Sequence[str] = ()) -> float:
-    """Write numbers or words below a frame, and what they are; returns where they end. [px]"""
+    """Write numbers or words and a label below a frame. Returns the bottom of the axis. [px]"""
     bottom = frame.bottom
     room = (frame.right - frame.left) / max(len(words), 1)
     if any(text_width(word) > room - 4 for word in words):
         names = [short(word, 120.0) for word in words]
-        for place, name in enumerate(names):
-            canvas.upright_text((scale.at(place) + 4, bottom + 6 + text_width(name) / 2), name, "axis")
+        for index, name in enumerate(names):
+            canvas.upright_text((scale.at(index) + 4, bottom + 6 + text_width(name) / 2), name, "axis")
         bottom += max(map(text_width, names)) - 8
     else:
-        for place, word in enumerate(words):
-            canvas.text((scale.at(place), bottom + 14), [printable(word)], "axis", "middle")
-    for value in () if words else scale.ticks(_ROOM["x"]):
+        for index, word in enumerate(words):
+            canvas.text((scale.at(index), bottom + 14), [printable(word)], "axis", "middle")
+    for value in () if words else scale.ticks(_NUMBER_ROOM_PX["x"]):
         x = scale.at(value)
         canvas.lines([((x, bottom), (x, bottom + 4))], "thin")
         canvas.text((x, bottom + 15), [axis_number(value)], "axis", "middle")
@@ -431,10 +469,10 @@ def x_axis(canvas: Canvas, frame: Box, scale: Scale, label: str, words: Sequence
 
 
 def y_axis(canvas: Canvas, frame: Box, scale: Scale, label: str, words: Sequence[str] = ()) -> None:
-    """Write numbers or words left of a frame, and what they are."""
-    for place, word in enumerate(words):
-        canvas.text((frame.left - 6, scale.at(place) + 4), [short(word, frame.left - 24)], "axis", "end")
-    for value in () if words else scale.ticks(_ROOM["y"]):
+    """Write numbers or words and a label to the left of a frame."""
+    for index, word in enumerate(words):
+        canvas.text((frame.left - 6, scale.at(index) + 4), [short(word, frame.left - 24)], "axis", "end")
+    for value in () if words else scale.ticks(_NUMBER_ROOM_PX["y"]):
         y = scale.at(value)
         canvas.lines([((frame.left - 4, y), (frame.left, y))], "thin")
         canvas.text((frame.left - 7, y + 3.5), [axis_number(value)], "axis", "end")
@@ -451,13 +489,13 @@ def outline(canvas: Canvas, frame: Box, style: str) -> None:
 def grid(canvas: Canvas, frame: Box, across: Scale | None, up: Scale | None) -> None:
     """Draw lines at the ticks of one scale or both."""
     if across is not None:
-        canvas.lines([frame.upright(across.at(value)) for value in across.ticks(_ROOM["x"])], "grid")
+        canvas.lines([frame.upright(across.at(value)) for value in across.ticks(_NUMBER_ROOM_PX["x"])], "grid")
     if up is not None:
-        canvas.lines([frame.level(up.at(value)) for value in up.ticks(_ROOM["y"])], "grid")
+        canvas.lines([frame.level(up.at(value)) for value in up.ticks(_NUMBER_ROOM_PX["y"])], "grid")
 
 
 class LegendLine(NamedTuple):
-    """One entry of a legend: its words, and how its mark is drawn from the left middle of 25 px."""
+    """An entry of a legend: its words, and a function that draws its mark, 25 px wide, from its left middle."""
 
     words: str
     mark: Callable[[Point], None]
@@ -474,7 +512,7 @@ def circle_entry(canvas: Canvas, words: str, radius: float, style: str) -> Legen
 
 
 def box_entry(canvas: Canvas, words: str, *styles: str) -> LegendLine:
-    """Entry for a rectangle of some styles, one over the other."""
+    """Entry for a rectangle that is drawn in several styles, one over the other."""
 
     def mark(at: Point) -> None:
         for style in styles:
@@ -484,22 +522,22 @@ def box_entry(canvas: Canvas, words: str, *styles: str) -> LegendLine:
 
 
 def legend(canvas: Canvas, top: float, width: float, entries: Sequence[LegendLine]) -> float:
-    """Write entries in lines below a drawing; returns where they end. [px]"""
-    x, y = _INDENT, top + 20
+    """Write entries in lines below a drawing. Returns the bottom of the legend. [px]"""
+    x, y = _LEGEND_INDENT_PX, top + 20
     for entry in entries:
-        lines = wrap(printable(entry.words), _LETTERS, max_lines=3, placeholder=" …")
-        room = 44 + _SMALL * max(map(text_width, lines))
-        if x + room > width and x > _INDENT:
-            x, y = _INDENT, y + LINE_HEIGHT + 3
+        lines = wrap(printable(entry.words), _LEGEND_CHARACTERS, max_lines=3, placeholder=" …")
+        room = 44 + _SMALL_FONT_RATIO * max(map(text_width, lines))
+        if x + room > width and x > _LEGEND_INDENT_PX:
+            x, y = _LEGEND_INDENT_PX, y + LINE_PX + 3
         entry.mark((x, y - 4))
-        for place, line in enumerate(lines):
-            y += LINE_HEIGHT if place else 0
+        for index, line in enumerate(lines):
+            y += LINE_PX if index else 0
             canvas.text((x + 31, y), [line], "small")
         x += room
     return y + 6
 
 
-EMPTY = "reserve"  # colour of what is no mission
+EMPTY_TONE = "reserve"  # colour of a case without a mission
 
 
 @cache
@@ -512,30 +550,30 @@ def colours() -> tuple[Mapping[str, str], Mapping[str, str]]:
 
 
 def style_sheet(rules: Iterable[str], tones: Iterable[str]) -> str:
-    """Rules of one kind of drawing, with colours that a drawing has on a dark screen if it is a file of its own."""
+    """CSS rules of one kind of drawing, with the dark colours of a drawing in a separate file."""
     _, dark = colours()
     scoped = "".join(f"svg.drawing {rule}" for rule in rules)
-    own = ";".join(f"--{tone}:{dark[tone]}" for tone in dict.fromkeys(tones))
-    return f"{scoped}@media (prefers-color-scheme:dark){{svg:root.drawing{{{own}}}}}" if own else scoped
+    dark_tones = ";".join(f"--{tone}:{dark[tone]}" for tone in dict.fromkeys(tones))
+    return f"{scoped}@media (prefers-color-scheme:dark){{svg:root.drawing{{{dark_tones}}}}}" if dark_tones else scoped
 
 
 def has_no_mission(status: str) -> bool:
-    """Whether a status says that there was nothing to check."""
+    """Whether a status means that there was no mission to check."""
     return STATUS[status].junit == "error"
 
 
 def tone_of(status: str) -> str:
     """Name of the colour of a status."""
-    return EMPTY if has_no_mission(status) else STATUS[status].color
+    return EMPTY_TONE if has_no_mission(status) else STATUS[status].color
 
 
 def status_words(status: str) -> str:
-    """The words of a legend for a status."""
+    """Words for a status in a legend."""
     return "no such mission" if has_no_mission(status) else STATUS[status].words
 
 
 def marks_within_colours(statuses: Sequence[str], marks: Sequence[Mark]) -> Mapping[str, Mark]:
-    """A mark for each status: of those that share a colour the first, the worst, has the first of `marks`."""
+    """A mark for each status. Statuses with the same colour get successive items of `marks`, the first one first."""
     tones = [tone_of(name) for name in statuses]
-    places = (tones[:place].count(tone) for place, tone in enumerate(tones))
-    return {name: marks[min(place, len(marks) - 1)] for name, place in zip(statuses, places, strict=True)}
+    indices = (tones[:index].count(tone) for index, tone in enumerate(tones))
+    return {name: marks[min(index, len(marks) - 1)] for name, index in zip(statuses, indices, strict=True)}

@@ -1,7 +1,7 @@
-"""The drawing of a sweep: utilizations over one key with the limit, a map of statuses or of a column over two.
+"""The drawing of a sweep: utilizations and the limit over one key, or a map of statuses or of a column over two keys.
 
-A report has it inline, with the text and colours of the page; `sweep --plot` as a file of its own, with its own light
-and dark. A polar map is one seen from above: azimuth from east, counter-clockwise, the other key as a radius.
+A report inlines the drawing with the colours of the page. `sweep --plot` writes it to a file with light and dark
+colours. A polar map is a view from above: azimuth from east, counter-clockwise, and the other key as the radius.
 """
 
 import math
@@ -23,23 +23,23 @@ from bisar_budget.report.drawing import svg
 from bisar_budget.report.drawing.trades import borders, cell_edges, level_lines, per_word, regions, runs, thinned
 from bisar_budget.report.words.sentences import percent
 
-_WIDTH, _HEIGHT = 560.0, 270.0  # of a drawing, of its frame [px]
-_LEFT, _RIGHT = 58.0, 12.0  # px beside the frame
-_MOST_LEFT = 190.0  # px that names at an axis may take
-_BAR = 24.0  # px for a word
-_RIM = 165.0  # px, of a polar map
-_HEAT_BAR = 70.0  # px beside a map
-_DECADE, _LEAST = 10.0, 0.1  # % of the limit: an axis shows the one; what is smaller than the other is of no interest
-_STRENGTHS = (0.24, 0.13, 0.36)  # opacity of the first, second and third status of one colour
-_ROWS = ("transmitter", "receiver", "clock", "pass", "mission", "doubt", "reserve")  # colours of curves
-_DASHES = ("", "7 3", "2 3", "9 3 2 3", "5 5", "1 4", "12 4")
-_CELLS = 60  # of a map that have room for words of their own
-_DOTS = 40  # values of a curve that are seen one by one
+_TRADE_WIDTH_PX, _TRADE_HEIGHT_PX = 560.0, 270.0  # width of a drawing, height of its frame
+_TRADE_LEFT_PX, _TRADE_RIGHT_PX = 58.0, 12.0  # margins beside the frame
+_MAX_NAMES_PX = 190.0  # width of names at an axis
+_WORD_PX = 24.0  # height of the bar of a word
+_POLAR_RIM_PX = 165.0  # radius of a polar map
+_HEAT_BAR_PX = 70.0  # width of the colour scale beside a map
+_SHOWN_USE_PERCENT, _MIN_USE_PERCENT = 10.0, 0.1  # largest and smallest lower end of an axis of utilizations
+_STATUS_OPACITIES = (0.24, 0.13, 0.36)  # of the first, second and third status of one colour
+_CURVE_COLOURS = ("transmitter", "receiver", "clock", "pass", "mission", "doubt", "reserve")
+_CURVE_DASHES = ("", "7 3", "2 3", "9 3 2 3", "5 5", "1 4", "12 4")
+_MAX_WORD_CELLS = 60  # of a map with words in each cell
+_MAX_DOTTED_SAMPLES = 40  # of a curve with a dot for each sample
 _LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
-_LINES = ((60, 2), (88, 3))  # characters and lines of the name above a drawing, and of what is said below it
-_STEP = math.radians(3)  # of a curved line
+_HEAD_LINES = ((60, 2), (88, 3))  # characters and lines of the name above a drawing, and of its subtitle
+_CURVE_STEP_RAD = math.radians(3)  # angle of a segment of a curved line
 _VIRIDIS = ("440154", "482878", "3e4989", "31688e", "26828e", "1f9e89", "35b779", "6ece58", "b5de2b", "fde725")
-_HEATS = 48  # colours of a heat map
+_HEAT_COLOUR_COUNT = 48
 
 Floats = NDArray[np.float64]
 
@@ -59,17 +59,17 @@ def trade_drawing(
     Parameters
     ----------
     trade : Trade
-        Over one key or two, the azimuth first where it is `seen_from_above`.
+        Sweep over one key or two. The first axis of a polar map is the azimuth.
     rows : Mapping[str, ndarray]
-        Utilizations of the rows that matter, over the one key that varies. [-]
+        Utilizations of the rows that matter, over the only key that varies. [-]
     key : str
-        What makes the ids of the drawing its own.
+        Key that makes the ids of the drawing unique.
     title, description : str
-        What it shows, and what it says to who cannot see it.
+        Title of the drawing, and a description for readers who cannot see it.
     above : Sequence[str]
-        Lines above it, the name first: for a drawing that stands alone.
+        Lines above a drawing in a separate file, the name first.
     seen_from_above : BistaticGeometry, optional
-        Draws a polar map, with the place of the platform that does not move around.
+        Geometry for a polar map, which shows the direction of the platform that does not vary.
     """
     canvas = svg.Canvas()
     top = svg.head(canvas, above)
@@ -80,16 +80,16 @@ def trade_drawing(
         bottom = _bars(canvas, top, trade, rows)
     else:
         bottom = _map(canvas, top, trade, seen_from_above)
-    return canvas.document((_WIDTH, bottom + 4), f"{key} study", title, description, _style(trade))
+    return canvas.document((_TRADE_WIDTH_PX, bottom + 4), f"{key} study", title, description, _style(trade))
 
 
 def head_of(trade: Trade, mission: Mission, *, is_polar: bool) -> list[str]:
-    """Lines above a drawing that stands alone: the mission, what holds for all cases, and what a polar map shows."""
+    """Lines above a drawing in a separate file: mission, fixed values, changes, model, and axes of a polar map."""
     is_gating = any(axis.key == "allocation.model" for axis in trade.axes)
     model = "" if is_gating else f"{mission.gating_model} model"
-    about = ", ".join(filter(None, (*trade.fixed, changes_words(mission.changes), model)))
+    subtitle = ", ".join(filter(None, (*trade.fixed, changes_words(mission.changes), model)))
     lines = []
-    for text, (width, count) in zip((printable(mission.name), about), _LINES, strict=True):
+    for text, (width, count) in zip((printable(mission.name), subtitle), _HEAD_LINES, strict=True):
         lines += wrap(text, width, max_lines=count, placeholder=" ...")
     if is_polar:
         lines.append(f"angle: {trade.axes[0].label}, radius: {trade.axes[1].label}")
@@ -97,23 +97,23 @@ def head_of(trade: Trade, mission: Mission, *, is_polar: bool) -> list[str]:
 
 
 def _style(trade: Trade) -> str:
-    """Rules for what only these drawings have."""
+    """CSS rules of drawings of sweeps."""
     light, _ = svg.colours()
     rules = []
-    for place, (name, dashes) in enumerate(zip(_ROWS, _DASHES, strict=True)):
-        rules.append(f".row{place}{{fill:none;stroke:var(--{name},{light[name]});stroke-width:1.8")
+    for index, (name, dashes) in enumerate(zip(_CURVE_COLOURS, _CURVE_DASHES, strict=True)):
+        rules.append(f".row{index}{{fill:none;stroke:var(--{name},{light[name]});stroke-width:1.8")
         rules[-1] += f";stroke-dasharray:{dashes}}}" if dashes else "}"
-        rules.append(f".dot{place}{{fill:var(--{name},{light[name]});stroke:var(--paper,#fff);stroke-width:.8}}")
-    for name, strength in svg.marks_within_colours(trade.statuses, _STRENGTHS).items():
+        rules.append(f".dot{index}{{fill:var(--{name},{light[name]});stroke:var(--paper,#fff);stroke-width:.8}}")
+    for name, strength in svg.marks_within_colours(trade.statuses, _STATUS_OPACITIES).items():
         tone = svg.tone_of(name)
         rules.append(
             f".is-{name}{{fill:var(--{tone},{light[tone]});fill-opacity:{strength};shape-rendering:crispEdges}}"
         )
         rules.append(f".bar.is-{name}{{fill-opacity:.75}}")
     if trade.column and len(trade.axes) == 2:
-        for place in range(_HEATS):
-            colour = _heat_colour(place / (_HEATS - 1))
-            rules.append(f".heat{place}{{fill:{colour};stroke:{colour};stroke-width:.6;shape-rendering:crispEdges}}")
+        for index in range(_HEAT_COLOUR_COUNT):
+            colour = _heat_colour(index / (_HEAT_COLOUR_COUNT - 1))
+            rules.append(f".heat{index}{{fill:{colour};stroke:{colour};stroke-width:.6;shape-rendering:crispEdges}}")
     rules.append(".curved{shape-rendering:auto}")
     rules.append(f".limit{{fill:none;stroke:var(--fail,{light['fail']});stroke-width:1.6;stroke-dasharray:7 4}}")
     rules.append(".border{fill:none;stroke:var(--ink,#222);stroke-width:1.7}")
@@ -123,23 +123,25 @@ def _style(trade: Trade) -> str:
     rules.append(".own{fill:var(--paper,#fff);stroke:var(--ink,#222);stroke-width:1.6}")
     rules.append(".frame{fill:none;stroke:var(--muted,#595f66);stroke-width:1}")
     rules.append(".at{fill:none;stroke:var(--ink,#222);stroke-width:1.1;stroke-dasharray:1.5 3}")
-    return svg.style_sheet(rules, [name for name in (*_ROWS, "fail") if name not in ("transmitter", "receiver")])
+    return svg.style_sheet(
+        rules, [name for name in (*_CURVE_COLOURS, "fail") if name not in ("transmitter", "receiver")]
+    )
 
 
-def _heat_colour(part: float) -> str:
-    """Colour of a part, from 0 to 1, of the span of a heat map: Matplotlib's viridis."""
-    place = min(int(part * (len(_VIRIDIS) - 1)), len(_VIRIDIS) - 2)
-    along = part * (len(_VIRIDIS) - 1) - place
-    ends = [[int(one[at : at + 2], 16) for at in (0, 2, 4)] for one in _VIRIDIS[place : place + 2]]
-    return "#" + "".join(f"{round(a + along * (b - a)):02x}" for a, b in zip(*ends, strict=True))
+def _heat_colour(fraction: float) -> str:
+    """Colour of a fraction of the span of a heat map, by Matplotlib's viridis."""
+    index = min(int(fraction * (len(_VIRIDIS) - 1)), len(_VIRIDIS) - 2)
+    remainder = fraction * (len(_VIRIDIS) - 1) - index
+    ends = [[int(colour[start : start + 2], 16) for start in (0, 2, 4)] for colour in _VIRIDIS[index : index + 2]]
+    return "#" + "".join(f"{round(a + remainder * (b - a)):02x}" for a, b in zip(*ends, strict=True))
 
 
 def _value_scale(values: Floats, start: float, end: float, *, is_use: bool) -> svg.Scale:
-    """Scale of a column; of utilizations [%] in equal ratios, with the limit and a decade below it."""
+    """Scale of a column. For utilizations [%] it is logarithmic and contains the limit and a decade below it."""
     finite = values[np.isfinite(values)]
     if is_use:
         finite = np.append(finite[finite > 0], 100.0)
-        low = min(max(_LEAST, float(finite.min())), _DECADE)
+        low = min(max(_MIN_USE_PERCENT, float(finite.min())), _SHOWN_USE_PERCENT)
         return svg.Scale(low / 1.3, 1.3 * float(finite.max()), start, end, is_log=True)
     low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 1.0)
     margin = (high - low) / 20 or abs(high) / 20 or 1.0
@@ -154,19 +156,22 @@ def _swatches(canvas: svg.Canvas, statuses: Sequence[str]) -> list[svg.LegendLin
 def _curves(
     canvas: svg.Canvas, top: float, trade: Trade, rows: Mapping[str, Floats], by_word: Mapping[str, Trade]
 ) -> float:
-    """Utilizations of rows, or of words, over a number with their limit, or a column; behind them the status."""
+    """Curves over a number: utilizations of rows or of words with their limit, or a column.
+
+    The colour of the background is the status.
+    """
     first = next(iter(by_word.values())) if by_word else trade
     (axis,) = first.axes
     name = trade.column or "utilization"
-    named = {word: one.values[name] for word, one in by_word.items()} or (
+    named_values = {word: word_trade.values[name] for word, word_trade in by_word.items()} or (
         {name: trade.values[name]} if trade.column else rows
     )
-    curves = [(word, f"row{place}", values) for place, (word, values) in enumerate(named.items())]
+    curves = [(word, f"row{index}", values) for index, (word, values) in enumerate(named_values.items())]
     if not by_word and not trade.column:
         curves.insert(0, ("worst row", "worst", trade.values[name]))
     factor = 1 if trade.column else 100
     curves = [(word, style, factor * np.asarray(values, float)) for word, style, values in curves]
-    frame = svg.Box(_LEFT, top, _WIDTH - _RIGHT, top + _HEIGHT)
+    frame = svg.Box(_TRADE_LEFT_PX, top, _TRADE_WIDTH_PX - _TRADE_RIGHT_PX, top + _TRADE_HEIGHT_PX)
     across = _axis_scale(axis, frame.left, frame.right)
     all_values = np.concatenate([values for *_, values in curves])
     up = _value_scale(all_values, frame.bottom, frame.top, is_use=not trade.column)
@@ -187,16 +192,16 @@ def _curves(
     svg.outline(canvas, frame, "frame")
     svg.y_axis(canvas, frame, up, trade.heading or ("worst utilization [%]" if by_word else "utilization [%]"))
     bottom = svg.x_axis(canvas, frame, across, axis.label)
-    return svg.legend(canvas, bottom, _WIDTH, [*entries, *_swatches(canvas, statuses)])
+    return svg.legend(canvas, bottom, _TRADE_WIDTH_PX, [*entries, *_swatches(canvas, statuses)])
 
 
 def _curve(
     canvas: svg.Canvas, frame: svg.Box, across: svg.Scale, up: svg.Scale, x: Floats, values: Floats, style: str
 ) -> None:
-    """One curve, broken where there is no value; one alone between two of these is a short line."""
+    """Draw one curve with gaps at missing values. A single value between gaps is a short line."""
     points = [
-        (across.at(at), up.at(value)) if math.isfinite(value) and (value > 0 or not up.is_log) else None
-        for at, value in zip(x.tolist(), values.tolist(), strict=True)
+        (across.at(position), up.at(value)) if math.isfinite(value) and (value > 0 or not up.is_log) else None
+        for position, value in zip(x.tolist(), values.tolist(), strict=True)
     ]
     run: list[svg.Point] = []
     for point in (*points, None):
@@ -208,55 +213,55 @@ def _curve(
         if run:
             canvas.polyline(_seen(run), style, frame)
         run = []
-    if x.size <= _DOTS and style != "worst":
+    if x.size <= _MAX_DOTTED_SAMPLES and style != "worst":
         for point in filter(None, points):
             if frame.holds(point):
                 canvas.circle(point, 2.4, style.replace("row", "dot"))
 
 
 def _seen(points: Sequence[svg.Point]) -> list[svg.Point]:
-    """The visible points of a curve of many: the first, lowest, highest and last of each half pixel."""
+    """The visible points of a dense curve: the first, lowest, highest and last point of each half pixel."""
     height = itemgetter(1)
-    kept: list[svg.Point] = []
+    visible: list[svg.Point] = []
     column: list[svg.Point] = []
     for point in (*points, (math.inf, 0.0)):
         if column and point[0] - column[0][0] > 0.5:
             ends = (column[0], *sorted((min(column, key=height), max(column, key=height))), column[-1])
-            kept += dict.fromkeys(ends)
+            visible += dict.fromkeys(ends)
             column = []
         column.append(point)
-    return kept
+    return visible
 
 
 def _bars(canvas: svg.Canvas, top: float, trade: Trade, rows: Mapping[str, Floats]) -> float:
-    """A bar of utilization, or of a column, for each word, in the colour of its status; on it some rows."""
+    """A bar of utilization or of a column for each word, in the colour of its status, with dots for rows."""
     (axis,) = trade.axes
-    left = min(max(map(svg.text_width, axis.words)) + 34, _MOST_LEFT)
-    canvas.text((8, top + 8), [svg.short(axis.key, _WIDTH)], "small")
-    frame = svg.Box(left, top + 16, _WIDTH - _RIGHT, top + 24 + _BAR * len(axis.words))
+    left = min(max(map(svg.text_width, axis.words)) + 34, _MAX_NAMES_PX)
+    canvas.text((8, top + 8), [svg.short(axis.key, _TRADE_WIDTH_PX)], "small")
+    frame = svg.Box(left, top + 16, _TRADE_WIDTH_PX - _TRADE_RIGHT_PX, top + 24 + _WORD_PX * len(axis.words))
     values = np.asarray(trade.values[trade.column] if trade.column else 100 * trade.values["utilization"], float)
     is_use = not trade.column
-    seen = values if is_use else np.append(values, 0.0)
-    along = _value_scale(seen, frame.left, frame.right - 50, is_use=is_use)  # with room for a number
+    scaled_values = values if is_use else np.append(values, 0.0)
+    along = _value_scale(scaled_values, frame.left, frame.right - 50, is_use=is_use)  # with room for a number
     down = svg.Scale(-0.5, len(axis.words) - 0.5, frame.top + 4, frame.bottom - 4)
     svg.grid(canvas, frame, along, None)
     base = frame.left if is_use else along.at(0.0)
     limit = along.at(100.0) if is_use else math.inf
-    for place, (status, value) in enumerate(zip(trade.values["status"], values.tolist(), strict=True)):
-        y, end = down.at(place), base
-        said = svg.status_words(status)
+    for index, (status, value) in enumerate(zip(trade.values["status"], values.tolist(), strict=True)):
+        y, end = down.at(index), base
+        label = svg.status_words(status)
         if math.isfinite(value):
             end = max(along.at(max(value, along.low)), frame.left + 2)
             canvas.boxes([svg.Box(min(base, end), y - 7, max(base, end), y + 7)], f"bar is-{status}")
-            said = percent(value / 100) if is_use else svg.axis_number(value)
-        beside = max(base, limit if end < limit < end + 60 else end)
-        canvas.text((beside + 6, y + 4), [said], "small")
+            label = percent(value / 100) if is_use else svg.axis_number(value)
+        label_start = max(base, limit if end < limit < end + 60 else end)
+        canvas.text((label_start + 6, y + 4), [label], "small")
     entries = []
     if is_use:
         canvas.lines([frame.upright(limit)], "limit")
         entries.append(svg.line_entry(canvas, "limit", "limit"))
     for number, (row, uses) in enumerate(rows.items() if is_use else ()):
-        shown = [(along.at(100 * use), down.at(place)) for place, use in enumerate(uses.tolist()) if use > 0]
+        shown = [(along.at(100 * use), down.at(index)) for index, use in enumerate(uses.tolist()) if use > 0]
         for point in filter(frame.holds, shown):
             canvas.circle(point, 3, f"dot{number}")
         entries.append(svg.circle_entry(canvas, row, 3, f"dot{number}"))
@@ -266,29 +271,30 @@ def _bars(canvas: svg.Canvas, top: float, trade: Trade, rows: Mapping[str, Float
     svg.outline(canvas, frame, "frame")
     svg.y_axis(canvas, frame, down, "", axis.words)
     bottom = svg.x_axis(canvas, frame, along, trade.heading or "utilization [%]")
-    return svg.legend(canvas, bottom, _WIDTH, [*entries, *_swatches(canvas, trade.statuses)])
+    return svg.legend(canvas, bottom, _TRADE_WIDTH_PX, [*entries, *_swatches(canvas, trade.statuses)])
 
 
 # ---------------------------------------------------------------- two keys
 class _Plane(NamedTuple):
-    """Where a map has a place: to the right and up, or around a middle, in radians, and outwards. [px]"""
+    """Coordinates of a map on its page: to the right and up [px], or azimuth [rad] and radius [px] about `middle`."""
 
     across: svg.Scale
     up: svg.Scale
     middle: svg.Point | None = None
 
     def at(self, p: float, q: float) -> svg.Point:
-        """Place on the page of one on the two scales."""
+        """Point on the page of coordinates on the two scales."""
         if self.middle is None:
             return p, q
         return self.middle[0] + q * math.cos(p), self.middle[1] - q * math.sin(p)
 
     def line(self, points: Sequence[svg.Point]) -> list[svg.Point]:
-        """Line through places on the two scales, on the page."""
+        """Line on the page through points on the two scales."""
         line = [self.at(*points[0])]
         for (p, q), (u, v) in pairwise(points):
-            steps = 1 if self.middle is None else max(1, math.ceil(abs(u - p) / _STEP - 1e-9))
-            line += [self.at(p + (u - p) * step / steps, q + (v - q) * step / steps) for step in range(1, steps + 1)]
+            step_count = 1 if self.middle is None else max(1, math.ceil(abs(u - p) / _CURVE_STEP_RAD - 1e-9))
+            fractions = (step / step_count for step in range(1, step_count + 1))
+            line += [self.at(p + (u - p) * fraction, q + (v - q) * fraction) for fraction in fractions]
         return line
 
     def fill(self, canvas: svg.Canvas, boxes: Iterator[svg.Box], style: str) -> None:
@@ -297,29 +303,29 @@ class _Plane(NamedTuple):
             canvas.boxes(boxes, style)
             return
         corners = ([(a, b), (c, b), (c, d), (a, d)] for a, b, c, d in boxes)
-        canvas.polygons([self.line(four) for four in corners], f"{style} curved")
+        canvas.polygons([self.line(cell) for cell in corners], f"{style} curved")
 
 
 def _axis_scale(axis: Axis, start: float, end: float) -> svg.Scale:
-    """The scale of an axis: on a map the cells of words stand side by side; numbers go from the first to the last."""
+    """The scale of an axis. Words have a cell of width 1 each; numbers span the first to the last value."""
     if axis.words:
         return svg.Scale(-0.5, axis.values[-1] + 0.5, start, end)
     return svg.Scale(float(axis.values[0]), float(axis.values[-1]), start, end, axis.is_log)
 
 
 def _map(canvas: svg.Canvas, top: float, trade: Trade, geometry: BistaticGeometry | None) -> float:
-    """Statuses or a column over two keys, the line of 100 %, and what binds where."""
+    """Map of statuses or of a column over two keys, with the line of 100 % and the binding rows."""
     trade = thinned(trade)
     x, y = trade.axes
-    left = min(max(map(svg.text_width, y.words)) + 34, _MOST_LEFT) if y.words else _LEFT + 10
-    right = _WIDTH - _RIGHT - (_HEAT_BAR if trade.column else 0.0)
-    frame = svg.Box(left, top, right, top + _HEIGHT + 60)
+    left = min(max(map(svg.text_width, y.words)) + 34, _MAX_NAMES_PX) if y.words else _TRADE_LEFT_PX + 10
+    right = _TRADE_WIDTH_PX - _TRADE_RIGHT_PX - (_HEAT_BAR_PX if trade.column else 0.0)
+    frame = svg.Box(left, top, right, top + _TRADE_HEIGHT_PX + 60)
     if geometry is None:
         ends = (frame.top, frame.bottom) if y.words else (frame.bottom, frame.top)
         plane = _Plane(_axis_scale(x, frame.left, frame.right), _axis_scale(y, *ends))
     else:
         plane = _from_above(x, y, frame)
-        frame = frame._replace(top=frame.top + 24, bottom=frame.top + 24 + 2 * _RIM)
+        frame = frame._replace(top=frame.top + 24, bottom=frame.top + 24 + 2 * _POLAR_RIM_PX)
     columns = [plane.across.at(edge) for edge in cell_edges(x)]
     lines = [plane.up.at(edge) for edge in cell_edges(y)]
     statuses = [name for name in trade.statuses if not trade.column or svg.has_no_mission(name)]
@@ -332,11 +338,11 @@ def _map(canvas: svg.Canvas, top: float, trade: Trade, geometry: BistaticGeometr
         entries += _around(canvas, plane, x, geometry)
     has_words = bool(x.words or y.words)
     rows = trade.values["worst_row"]
-    if x.words and y.words and rows.size <= _CELLS:
+    if x.words and y.words and rows.size <= _MAX_WORD_CELLS:
         _in_cells(canvas, trade, columns, lines)
     elif not trade.column:
         between = borders(rows, np.array(columns), np.array(lines)).tolist()
-        canvas.lines([part for line in between for part in pairwise(plane.line(line))], "between")
+        canvas.lines([piece for line in between for piece in pairwise(plane.line(line))], "between")
         entries += _names(canvas, rows, plane, columns, lines)
     if not has_words and (border := _limit(trade, plane)):
         canvas.lines(border, "halo")
@@ -346,14 +352,14 @@ def _map(canvas: svg.Canvas, top: float, trade: Trade, geometry: BistaticGeometr
         canvas.circle(plane.at(plane.across.at(x.own or 0.0), plane.up.at(y.own or 0.0)), 5, "own")
         entries.append(svg.circle_entry(canvas, "this mission", 5, "own"))
     if geometry is not None:
-        return svg.legend(canvas, frame.bottom + 24, _WIDTH, entries)
+        return svg.legend(canvas, frame.bottom + 24, _TRADE_WIDTH_PX, entries)
     svg.outline(canvas, frame, "frame")
     svg.y_axis(canvas, frame, plane.up, y.label, y.words)
-    return svg.legend(canvas, svg.x_axis(canvas, frame, plane.across, x.label, x.words), _WIDTH, entries)
+    return svg.legend(canvas, svg.x_axis(canvas, frame, plane.across, x.label, x.words), _TRADE_WIDTH_PX, entries)
 
 
 def _cells(mask: NDArray[np.bool_], columns: Sequence[float], lines: Sequence[float]) -> Iterator[svg.Box]:
-    """Cells of a mask as rectangles, those side by side along the first axis as one."""
+    """Cells of a mask as rectangles. Neighbours along the first axis share a rectangle."""
     for j in range(mask.shape[1]):
         padded = np.concatenate([[False], mask[:, j], [False]])
         ends = np.flatnonzero(padded[1:] != padded[:-1])
@@ -363,70 +369,76 @@ def _cells(mask: NDArray[np.bool_], columns: Sequence[float], lines: Sequence[fl
 
 
 def _limit(trade: Trade, plane: _Plane) -> list[tuple[svg.Point, svg.Point]]:
-    """Line of 100 %: through the logarithms of utilizations, which turn less than these."""
+    """Line of 100 %, interpolated in the logarithms of utilizations, which are less curved."""
     uses = np.asarray(trade.values["utilization"], float)
-    # Where a row is not evaluated, those that are left do not say how near the limit is.
+    # With a row that is not evaluated, the other rows do not determine the distance to the limit.
     unknown = [name for name in trade.statuses if not STATUS[name].is_held]
     uses = np.where(np.isin(trade.values["status"], unknown), np.nan, uses)
     with np.errstate(divide="ignore", invalid="ignore"):
         levels = np.log(uses)
     x, y = trade.axes
-    places = np.array([plane.across.at(v) for v in x.values]), np.array([plane.up.at(v) for v in y.values])
-    return [(plane.at(*start), plane.at(*end)) for start, end in level_lines(levels, *places)]
+    coordinates = np.array([plane.across.at(v) for v in x.values]), np.array([plane.up.at(v) for v in y.values])
+    return [(plane.at(*start), plane.at(*end)) for start, end in level_lines(levels, *coordinates)]
 
 
 def _heat(
     canvas: svg.Canvas, frame: svg.Box, trade: Trade, plane: _Plane, columns: Sequence[float], lines: Sequence[float]
 ) -> None:
-    """A column in colours with their scale beside it, in equal ratios where it spans more than two decades."""
-    shown = np.asarray(trade.values[trade.column], float)
-    shown = np.where(np.isfinite(shown), shown, np.nan)
-    finite = shown[np.isfinite(shown)]
+    """A column in colours, with a colour scale beside it. Over more than two decades the scale is logarithmic."""
+    column_values = np.asarray(trade.values[trade.column], float)
+    column_values = np.where(np.isfinite(column_values), column_values, np.nan)
+    finite = column_values[np.isfinite(column_values)]
     if not finite.size:
         return
     low, high = float(finite.min()), float(finite.max())
     scale = svg.Scale(low, high if high > low else low + (abs(low) or 1.0), frame.bottom, frame.top)
     scale = scale._replace(is_log=low > 0 and high / low > 100)
-    seen, ends = (np.log(one) if scale.is_log else np.asarray(one) for one in (shown, scale[:2]))
+    scaled_values, ends = (
+        np.log(numbers) if scale.is_log else np.asarray(numbers) for numbers in (column_values, scale[:2])
+    )
     with np.errstate(invalid="ignore"):
-        heats = np.floor((seen - ends[0]) / (ends[1] - ends[0]) * _HEATS).clip(0, _HEATS - 1)
-    left = _WIDTH - _RIGHT - _HEAT_BAR + 14
-    step = (frame.bottom - frame.top) / _HEATS
-    for place in range(_HEATS):
-        plane.fill(canvas, _cells(heats == place, columns, lines), f"heat{place}")
-        bottom = frame.bottom - place * step
-        canvas.boxes([svg.Box(left, bottom - step, left + 12, bottom)], f"heat{place}")
+        heats = np.floor((scaled_values - ends[0]) / (ends[1] - ends[0]) * _HEAT_COLOUR_COUNT)
+        heats = heats.clip(0, _HEAT_COLOUR_COUNT - 1)
+    left = _TRADE_WIDTH_PX - _TRADE_RIGHT_PX - _HEAT_BAR_PX + 14
+    step = (frame.bottom - frame.top) / _HEAT_COLOUR_COUNT
+    for index in range(_HEAT_COLOUR_COUNT):
+        plane.fill(canvas, _cells(heats == index, columns, lines), f"heat{index}")
+        bottom = frame.bottom - index * step
+        canvas.boxes([svg.Box(left, bottom - step, left + 12, bottom)], f"heat{index}")
     for value in scale.ticks(26.0):
         canvas.text((left + 16, scale.at(value) + 3.5), [svg.axis_number(value)], "axis")
-    canvas.upright_text((_WIDTH - 4, frame.middle[1]), svg.short(trade.heading, 420.0), "small")
+    canvas.upright_text((_TRADE_WIDTH_PX - 4, frame.middle[1]), svg.short(trade.heading, 420.0), "small")
 
 
 def _in_cells(canvas: svg.Canvas, trade: Trade, columns: Sequence[float], lines: Sequence[float]) -> None:
     """Write the utilization and the worst row into each cell of a map of words."""
-    room = int((columns[1] - columns[0]) / 6.5)  # characters of a cell
+    max_characters = int((columns[1] - columns[0]) / 6.5)  # characters of a cell
     for (i, j), use in np.ndenumerate(trade.values["utilization"]):
         if math.isfinite(use):
             x, y = (columns[i] + columns[i + 1]) / 2, (lines[j] + lines[j + 1]) / 2
             row = printable(str(trade.values["worst_row"][i, j])).replace(".", ". ")
             canvas.text((x, y - 10), [percent(float(use))], "", "middle")
-            for place, line in enumerate(wrap(row, max(room, 5), max_lines=2, placeholder="…")):
-                canvas.text((x, y + 22 + 13 * place), [line.replace(". ", ".")], "small", "middle")
+            for index, line in enumerate(wrap(row, max(max_characters, 5), max_lines=2, placeholder="…")):
+                canvas.text((x, y + 22 + 13 * index), [line.replace(". ", ".")], "small", "middle")
 
 
 def _names(
     canvas: svg.Canvas, rows: NDArray[Any], plane: _Plane, columns: Sequence[float], lines: Sequence[float]
 ) -> list[svg.LegendLine]:
-    """The name of a row in each region, upright where it is tall, else a letter that the legend explains."""
+    """Write the name of its row in each region: level, upright in a tall region, or as a letter.
+
+    Returns entries of the legend for letters and for regions without a name.
+    """
     letters: dict[str, str] = {}
     named = set()
     cell = [abs(cuts[-1] - cuts[0]) / size for cuts, size in zip((columns, lines), rows.shape, strict=True)]
     for region in regions(rows):
-        i, j = region.place
+        i, j = region.cell
         p, q = (columns[i] + columns[i + 1]) / 2, (lines[j] + lines[j + 1]) / 2
         x, y = plane.at(p, q)
         row = printable(region.row)
         named.add(region.row)
-        if plane.middle is not None:  # a name runs towards the middle, not over the rim
+        if plane.middle is not None:  # a name runs towards the middle
             side = math.cos(p)
             canvas.text((x, y + 4), [row], "", "start" if side < -0.3 else "end" if side > 0.3 else "middle")
             continue
@@ -443,9 +455,9 @@ def _names(
         for row, letter in letters.items()
     ]
     occurring = set(rows.ravel().tolist()) - {""}
-    if others := sorted(occurring - named):
-        listed = f"{', '.join(others[:3])}{' …' * (len(others) > 3)}"
-        entries.append(svg.line_entry(canvas, f"another row binds, in small regions {listed}", "between"))
+    if unnamed := sorted(occurring - named):
+        unnamed_words = f"{', '.join(unnamed[:3])}{' …' * (len(unnamed) > 3)}"
+        entries.append(svg.line_entry(canvas, f"another row binds, in small regions {unnamed_words}", "between"))
     elif len(occurring) > 1:
         entries.append(svg.line_entry(canvas, "another row binds", "between"))
     return entries
@@ -453,52 +465,55 @@ def _names(
 
 # ---------------------------------------------------------------- from above
 def _from_above(around: Axis, radius: Axis, frame: svg.Box) -> _Plane:
-    """Azimuths from east, counter-clockwise; the other key as a radius from 0.
+    """Coordinates of a polar map: azimuths from east, counter-clockwise, and the other key as a radius from 0.
 
-    An elevation is 90 deg in the middle: what is seen from above there stands over the scene.
+    An elevation is 90 deg in the middle, since a platform there is above the scene.
     """
     first, last = float(around.values[0]), float(around.values[-1])
     is_elevation = radius.key.endswith(".elevation")
     inner, rim = (math.pi / 2 / radius.scale, radius.values[0]) if is_elevation else (0.0, radius.values[-1])
     return _Plane(
         svg.Scale(first, last, first * around.scale, last * around.scale),
-        svg.Scale(inner, float(rim), 0.0, _RIM),
-        (frame.middle[0], frame.top + 24 + _RIM),
+        svg.Scale(inner, float(rim), 0.0, _POLAR_RIM_PX),
+        (frame.middle[0], frame.top + 24 + _POLAR_RIM_PX),
     )
 
 
 def _around(canvas: svg.Canvas, plane: _Plane, around: Axis, geometry: BistaticGeometry) -> list[svg.LegendLine]:
-    """Directions, circles with their numbers, and at the rim where the other platform stands."""
+    """Draw directions, circles with their numbers, and a mark at the rim for the platform that does not vary."""
     turn = (0.0, 2 * math.pi)
     names = {0: "east", 90: "north", 180: "west", 270: "south"}
     for degrees in range(0, 360, 45):
         angle = math.radians(degrees)
-        canvas.lines([(plane.at(angle, 0.0), plane.at(angle, _RIM))], "grid")
-        x, y = plane.at(angle, _RIM + 14)
+        canvas.lines([(plane.at(angle, 0.0), plane.at(angle, _POLAR_RIM_PX))], "grid")
+        x, y = plane.at(angle, _POLAR_RIM_PX + 14)
         side = round(math.cos(angle), 3)
         anchor = "start" if side > 0 else "end" if side < 0 else "middle"
         canvas.text((x, y + 4), [names.get(degrees, f"{degrees}°")], "axis", anchor)
-    # Numbers stand beside what is drawn where that is not the whole circle.
+    # If the map is not a full circle, numbers are beside it.
     is_open = plane.across.end - plane.across.start < 1.9 * math.pi
     free = plane.across.start - math.radians(6) if is_open else math.pi / 8
     for value in plane.up.ticks(26.0):
         radius = plane.up.at(value)
         canvas.polyline(plane.line([(angle, radius) for angle in turn]), "grid", is_obstacle=False)
         canvas.text(plane.at(free, radius), [svg.axis_number(value)], "axis", "middle")
-    canvas.polyline(plane.line([(angle, _RIM) for angle in turn]), "frame", is_obstacle=False)
-    moved = [name for name in ("transmitter", "receiver") if f".{name}." in f".{around.key}"]
-    if len(moved) != 1:
+    canvas.polyline(plane.line([(angle, _POLAR_RIM_PX) for angle in turn]), "frame", is_obstacle=False)
+    moved_platforms = [name for name in ("transmitter", "receiver") if f".{name}." in f".{around.key}"]
+    if len(moved_platforms) != 1:
         return []
-    other = "receiver" if moved == ["transmitter"] else "transmitter"
-    east, north, _ = getattr(geometry, other).position
+    still_platform = "receiver" if moved_platforms == ["transmitter"] else "transmitter"
+    east, north, _ = getattr(geometry, still_platform).position
     angle = math.atan2(north, east)
-    points = [plane.at(angle, _RIM - 7), *(plane.at(angle + side, _RIM + 6) for side in (0.045, -0.045))]
-    canvas.polygon(points, f"solid {other}")
+    points = [
+        plane.at(angle, _POLAR_RIM_PX - 7),
+        *(plane.at(angle + side, _POLAR_RIM_PX + 6) for side in (0.045, -0.045)),
+    ]
+    canvas.polygon(points, f"solid {still_platform}")
     return [
         svg.LegendLine(
-            f"direction of the {other}",
+            f"direction of the {still_platform}",
             lambda at: canvas.polygon(
-                [(at[0] + 6, at[1]), *((at[0] + 19, at[1] + side) for side in (7, -7))], f"solid {other}"
+                [(at[0] + 6, at[1]), *((at[0] + 19, at[1] + side) for side in (7, -7))], f"solid {still_platform}"
             ),
         )
     ]

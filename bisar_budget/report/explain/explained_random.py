@@ -1,4 +1,4 @@
-"""How a sensor, a clock, the air or a vibration comes to its phases: figures, line of sight, spectra, integrals."""
+"""Explanation of the phases of sensors, clocks, air and vibrations: figures, lines of sight, spectra, integrals."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -84,14 +84,14 @@ _SYMBOLS = {
     "velocity_random_walk": "N",
     "angle_random_walk": "N_g",
 }
-_PARTS = ("QPE", "cubic", "left")
+_PHASE_SYMBOLS = ("QPE", "cubic", "left")
 _PER_SENSITIVITY = "rad per s²/m"
-_MOMENTS = (-1.0, -0.5, 0.0, 0.5, 1.0)  # of half an aperture
-_WHAT = ("quadratic phase at the aperture edge", "cubic phase there", "what is left after the cubic, rms")
+_MOMENT_FRACTIONS = (-1.0, -0.5, 0.0, 0.5, 1.0)  # of half an aperture
+_PHASE_WORDS = ("quadratic phase at the aperture edge", "cubic phase there", "what is left after the cubic, rms")
 
 
 def explained_random(analysis: Analysis, allocation: Allocation, error: RandomError, row: Row) -> Iterator[Step]:
-    """From the line of the file to the allowable."""
+    """Steps of a random error from the line of the file to the allowable."""
     mission, kind = analysis.mission, error.subject.kind
     model = row.model or "published"
     yield from _declared(mission, error, row)
@@ -120,7 +120,7 @@ def explained_random(analysis: Analysis, allocation: Allocation, error: RandomEr
         yield from _link(mission, error)
     if model == "full":
         yield from _by_exact_ranges(mission, error)
-    yield from _moved(error, model)
+    yield from _displacement(error, model)
     yield from _phases(mission, error, model)
     yield from _allowable(mission, allocation, error, row, model)
 
@@ -136,32 +136,32 @@ def _declared(mission: Mission, error: RandomError, row: Row) -> Iterator[Step]:
         worked = WorkedEquation(
             "declared", "k*|value|", {"k": k, "value": error.declared / k}, error.declared, error.unit
         )
-        of_axes = "; of three axes the largest value" if error.subject.kind in ("imu", *CORRELATED) else ""
-        yield step(f"Coverage factor allocation.coverage_factor{of_axes}", worked)
+        axes_words = "; of three axes the largest value" if error.subject.kind in ("imu", *CORRELATED) else ""
+        yield step(f"Coverage factor allocation.coverage_factor{axes_words}", worked)
 
 
 def _imu(analysis: Analysis, error: RandomError) -> Iterator[Step]:
-    """The formulas of an inertial sensor with the line of sight at mid-aperture."""
+    """Steps of an inertial sensor, with the line of sight at mid-aperture."""
     mission, kind = analysis.mission, error.subject.axis
     symbol = _SYMBOLS[kind]
     formulas = inertial_phases(symbol)
     unit = error.published
     wavelength, T = mission.radar.wavelength, mission.collection.aperture_time
-    # The part along the line of sight is what the published effect has of it.
+    # The component along the line of sight follows from the published effect.
     values = {symbol: 1.0, "T": T, "λ": wavelength}
-    which = next(index for index, formula in enumerate(formulas) if formula)
-    along = (unit.quadratic, unit.cubic)[which] / (_of_one(kind, which, wavelength, T))
-    part = next(one for one in ("f_u", "f_s", "u") if one in formulas[which])
-    values[part] = along
-    if part == "u":
+    order = next(index for index, formula in enumerate(formulas) if formula)
+    along = (unit.quadratic, unit.cubic)[order] / (_unit_effect(kind, order, wavelength, T))
+    component = next(name for name in ("f_u", "f_s", "u") if name in formulas[order])
+    values[component] = along
+    if component == "u":
         name = "the line of sight, u"
     else:
         state: PlatformState = getattr(mission.platforms, error.owner).state
-        east, north, up = (with_unit(one + 0.0, "m/s^2") for one in specific_force(mission, state))
+        east, north, up = (with_unit(force + 0.0, "m/s^2") for force in specific_force(mission, state))
         yield step("Specific force f = a − g, which accelerometers measure", f"f = [{east}, {north}, {up}]")
         name = (
             "what a tilt turns of it into the line of sight, f_u = |u × f|"
-            if part == "f_u"
+            if component == "f_u"
             else "what scale factors have of it along the line of sight, f_s"
         )
     yield step(f"Through {name}, at mid-aperture; of three values the root-sum-square of what each has")
@@ -170,22 +170,23 @@ def _imu(analysis: Analysis, error: RandomError) -> Iterator[Step]:
             k = mission.allocation.coverage_factor if index == 2 else 1.0  # a mean power has no coverage factor
             result = unit[index] * k
             yield step(
-                f"Derived: {_WHAT[index]}, of one unit", WorkedEquation(_PARTS[index], formula, values, result, "rad")
+                f"Derived: {_PHASE_WORDS[index]}, of one unit",
+                WorkedEquation(_PHASE_SYMBOLS[index], formula, values, result, "rad"),
             )
 
 
 def _without_arm(analysis: Analysis, error: RandomError) -> RandomError:
-    """The same figure of an inertial sensor of which no arm swings."""
+    """The error of an inertial sensor on a platform without a lever arm."""
     mission = analysis.mission
     platform = getattr(mission.platforms, error.owner)
     bare = platform._replace(motion_error=platform.motion_error._replace(lever_arm=None))
     platforms = mission.platforms._replace(**{error.owner: bare})
-    found = random_errors(mission._replace(platforms=platforms))
-    return next(one for one in found if one.id == error.id)
+    errors = random_errors(mission._replace(platforms=platforms))
+    return next(each for each in errors if each.id == error.id)
 
 
 def _with_arm(analysis: Analysis, error: RandomError) -> Iterator[Step]:
-    """The part of a tilt that comes through the lever arm."""
+    """Steps of the effect of a tilt through the lever arm."""
     lever = getattr(analysis.mission.platforms, error.owner).motion_error.lever_arm
     if lever is None or lever.arm is None or error.subject.axis not in TILTS:
         return
@@ -194,33 +195,33 @@ def _with_arm(analysis: Analysis, error: RandomError) -> Iterator[Step]:
     yield step(
         "Published model: both together, the line of sight held",
         *(
-            f"{part}/unit = {with_unit(value, unit)}"
-            for part, value in zip(_PARTS, error.published[:3], strict=True)
+            f"{symbol}/unit = {with_unit(value, unit)}"
+            for symbol, value in zip(_PHASE_SYMBOLS, error.published[:3], strict=True)
             if value
         ),
     )
 
 
-_GROWS = {"attitude": "ψ", "gyro_bias": "ε·τ", "angle_random_walk": "N_g·W(τ)"}
+_TILT_GROWTH = {"attitude": "ψ", "gyro_bias": "ε·τ", "angle_random_walk": "N_g·W(τ)"}
 
 
 def _arm(analysis: Analysis, error: RandomError) -> Iterator[Step]:
-    """The arm at mid-aperture, and how far a tilt swings it along the line of sight."""
+    """Steps with the arm at mid-aperture, and its swing along the line of sight by a tilt."""
     mission = analysis.mission
     platform = getattr(mission.platforms, error.owner)
     state, motion = platform.state, platform.motion_error
     figure = error.subject.axis
     arm = arm_at(state, motion.lever_arm.arm, np.zeros(1))[:, 0]
-    tilt = _GROWS[figure]
+    tilt = _TILT_GROWTH[figure]
     yield step(
         f"The arm l at mid-aperture along the axes of the scene; a tilt swings it by {tilt} × R(τ)·l as it turns",
-        f"l = [{', '.join(with_unit(float(part) + 0.0, 'm') for part in arm)}]",
+        f"l = [{', '.join(with_unit(float(coordinate) + 0.0, 'm') for coordinate in arm)}]",
     )
     axes, look = np.array(state.frame(motion.frame)), np.array(state.look)
     sizes = _shares_of_largest(getattr(motion.imu, figure, None))
     seen = [float(look @ np.cross(axis, arm)) * size + 0.0 for axis, size in zip(axes, sizes, strict=True)]
     values = dict(zip(("l_1", "l_2", "l_3"), seen, strict=True))
-    total = math.sqrt(math.fsum(one * one for one in seen))
+    total = math.sqrt(math.fsum(component * component for component in seen))
     worked = WorkedEquation("l_u", "sqrt(l_1^2 + l_2^2 + l_3^2)", values, total, "m per rad")
     yield step(
         "Along the line of sight, u·(ψ × l) about each axis, and of all at their sizes over the largest", worked
@@ -229,7 +230,7 @@ def _arm(analysis: Analysis, error: RandomError) -> Iterator[Step]:
 
 def _shares_of_largest(values: Sequence[float] | None) -> Sequence[float]:
     largest = max(values) if values is not None else 0.0
-    return [one / largest for one in values] if values is not None and largest else (1.0, 1.0, 1.0)
+    return [value / largest for value in values] if values is not None and largest else (1.0, 1.0, 1.0)
 
 
 def _lever_arm(analysis: Analysis, error: RandomError) -> Iterator[Step]:
@@ -241,7 +242,7 @@ def _lever_arm(analysis: Analysis, error: RandomError) -> Iterator[Step]:
         sizes = _shares_of_largest(platform.motion_error.lever_arm.uncertainty)
         seen = [float(look @ axis) * size + 0.0 for axis, size in zip(axes, sizes, strict=True)]
         values = dict(zip(("u_along", "u_cross", "u_up"), seen, strict=True))
-        total = math.sqrt(math.fsum(one * one for one in seen))
+        total = math.sqrt(math.fsum(component * component for component in seen))
         worked = WorkedEquation("u_l", "sqrt(u_along^2 + u_cross^2 + u_up^2)", values, total, "")
         title = (
             "R(τ)·δl along the line of sight at mid-aperture: of each axis of the body, at its size over the largest"
@@ -254,20 +255,22 @@ def _lever_arm(analysis: Analysis, error: RandomError) -> Iterator[Step]:
 
 
 def _by_unit(values: Sequence[float], unit: str) -> list[str]:
-    """Quadratic phase, cubic phase and what is left, as far as they are given, by a unit of an error."""
-    return [f"{part}/unit = {with_unit(value, unit)}" for part, value in zip(_PARTS, values, strict=False)]
+    """Lines of the quadratic phase, cubic phase and remainder by a unit of an error, as many as `values`."""
+    return [
+        f"{symbol}/unit = {with_unit(value, unit)}" for symbol, value in zip(_PHASE_SYMBOLS, values, strict=False)
+    ]
 
 
 def _by_exact_ranges(mission: Mission, error: RandomError) -> Iterator[Step]:
-    """Effects of a unit by the full model, where they differ."""
+    """Step with the effects of a unit by the full model, if they differ from the published model."""
     unit, full = error.published, error.full
     if full[:3] == unit[:3]:
         return
     count = 3 if full.spread != unit.spread else 2
     factors = (1.0, 1.0, _covered(mission, error))
     lines = [
-        f"{part}/unit = {with_unit(value * factor, _per_unit('rad', error))}"
-        for part, value, factor in zip(_PARTS[:count], full[:count], factors, strict=False)
+        f"{symbol}/unit = {with_unit(value * factor, _per_unit('rad', error))}"
+        for symbol, value, factor in zip(_PHASE_SYMBOLS[:count], full[:count], factors, strict=False)
         if value
     ]
     yield step(
@@ -276,14 +279,14 @@ def _by_exact_ranges(mission: Mission, error: RandomError) -> Iterator[Step]:
     )
 
 
-def _moved(error: RandomError, model: str) -> Iterator[Step]:
-    """The displacement by a unit."""
+def _displacement(error: RandomError, model: str) -> Iterator[Step]:
+    """Step to the displacement by a unit."""
     effect = error.effect(model)
     if not effect.displacement > 0:
         return
     values, unit = {"east/unit": effect.east, "north/unit": effect.north}, _per_unit("m", error)
-    by = "(25)" if model == "published" else "exact ranges"
-    title = f"Orders 0 and 1 displace the image, by {by}; rms length"
+    source = "(25)" if model == "published" else "exact ranges"
+    title = f"Orders 0 and 1 displace the image, by {source}; rms length"
     yield step(
         title if error.is_covered else "In whatever direction: half of its square east, half of it north",
         *(f"{symbol} = {with_unit(value, unit)}" for symbol, value in values.items()),
@@ -292,14 +295,14 @@ def _moved(error: RandomError, model: str) -> Iterator[Step]:
 
 
 def _per_unit(unit: str, error: RandomError) -> str:
-    """The unit of what a unit of an error does; one of an oscillator is its noise as declared."""
+    """Unit of an effect of a unit of an error. The unit of an oscillator is its noise as declared."""
     return unit if error.unit == "dB" else f"{unit} per {'unit' if error.unit == '1' else error.unit}"
 
 
-def _of_one(kind: str, which: int, wavelength: float, T: float) -> float:
-    """Effect of one unit along a whole line of sight."""
+def _unit_effect(kind: str, order: int, wavelength: float, T: float) -> float:
+    """Effect of one unit along the line of sight."""
     row = evaluators.inertial_phases(1.0, 1.0, 1.0, wavelength, T)[list(_SYMBOLS).index(kind)]
-    return row[which]
+    return row[order]
 
 
 def _position(analysis: Analysis, error: RandomError) -> Iterator[Step]:
@@ -314,7 +317,7 @@ def _position(analysis: Analysis, error: RandomError) -> Iterator[Step]:
 
 
 def _changing_delay(analysis: Analysis, error: RandomError) -> Iterator[Step]:
-    """The delay of the zenith as a process, where it changes within the aperture."""
+    """Steps of the zenith delay as a process, if it changes within the aperture."""
     correlation_time = correlation_time_of(analysis.mission, error.owner)
     if correlation_time is not None and error.published.quadratic:
         yield from _gauss_markov(
@@ -329,21 +332,24 @@ def _changing_delay(analysis: Analysis, error: RandomError) -> Iterator[Step]:
 def _gauss_markov(
     mission: Mission, error: RandomError, correlation_time: float, along: str, title: str
 ) -> Iterator[Step]:
-    """Parts of the process, and the quadratic phase of a unit along `along` by the published model."""
+    """Steps to the mean squares of the process, and to the quadratic phase of a unit by the published model.
+
+    `along` is the symbol of the component along the line of sight.
+    """
     T, quadratic = mission.collection.aperture_time, error.published.quadratic
     yield step(
         "Half the aperture over the correlation time",
         WorkedEquation("a", "T/(2*τ_c)", {"T": T, "τ_c": correlation_time}, T / (2 * correlation_time), ""),
     )
-    found = gauss_markov(T, correlation_time)
+    mean_squares = gauss_markov(T, correlation_time)
     words = ("quadratic", "cubic", "left after the cubic", "constant", "linear")
     yield step(
         "Mean squares of a process of variance 1 with the spectrum 4·τ_c/(1 + (2πf·τ_c)²)",
-        *(f"{word} = {number(value)}" for word, value in zip(words, found, strict=False)),
+        *(f"{word} = {number(value)}" for word, value in zip(words, mean_squares, strict=False)),
     )
     k = 2 * math.pi / mission.radar.wavelength
-    values = {"λ": mission.radar.wavelength, along: quadratic / (k * math.sqrt(found.quadratic)),
-              "q": found.quadratic}  # fmt: skip
+    values = {"λ": mission.radar.wavelength, along: quadratic / (k * math.sqrt(mean_squares.quadratic)),
+              "q": mean_squares.quadratic}  # fmt: skip
     worked = WorkedEquation("QPE/unit", f"2*π*{along}*sqrt(q)/λ", values, quadratic, _per_unit("rad", error))
     yield step(title, worked)
 
@@ -355,7 +361,7 @@ def _oscillator(mission: Mission, error: RandomError) -> Iterator[Step]:
     spectrum = "S = f_0²·S_y(f)/f²" if oscillator.phase_noise is None else "S = 2·L(f)·(f_0/f_osc)²"
     yield step(
         f"One-sided spectrum of phase at {mission.radar.center_frequency:.6g} Hz, {spectrum} [rad²/Hz]",
-        *_written(pieces),
+        *_pieces_text(pieces),
     )
     if not error.published.quadratic:
         yield step(no_effect(mission, error))
@@ -371,42 +377,49 @@ def _oscillator(mission: Mission, error: RandomError) -> Iterator[Step]:
         yield step(f"Phases times the coverage factor {number(k)}; what is left is a mean power and has none")
 
 
-def _slow(what: str, frequency: float, left: LeftTone, free: float, mission: Mission, unit: str) -> Iterator[Step]:
-    """A tone, or what it is folded to, below one cycle per aperture; its squares add to those of the noise."""
+def _slow(
+    kind: str, frequency: float, remaining: LeftTone, free: float, mission: Mission, unit: str
+) -> Iterator[Step]:
+    """Step of a tone, or of its folded frequencies, below one cycle per aperture. Its squares add to the noise."""
     T = mission.collection.aperture_time
     slow = [
-        f"{place:.6g} Hz, {place * T:.3g} cycles per aperture: {number(share)} of the amplitude"
-        for place, share in zip(left.frequencies, left.shares, strict=True)
-        if place * T < SLOWEST_ECHO_CYCLES and share > 0
+        f"{slow_frequency:.6g} Hz, {slow_frequency * T:.3g} cycles per aperture: {number(share)} of the amplitude"
+        for slow_frequency, share in zip(remaining.frequencies, remaining.shares, strict=True)
+        if slow_frequency * T < SLOWEST_ECHO_CYCLES and share > 0
     ]
     if slow:
-        parts = left.slow_parts(T)
-        quadratic, cubic = (free * math.sqrt(float(part)) for part in (parts.quadratic, parts.cubic))
-        where = "folded by straight lines" if left.is_folded else f"{frequency * T:.3g} cycles per aperture"
-        shown = slow if left.is_folded else ()
-        title = f"{what} at {frequency:.6g} Hz, {where}, in its worst phase"
+        phase_squares = remaining.slow_parts(T)
+        quadratic, cubic = (
+            free * math.sqrt(float(square)) for square in (phase_squares.quadratic, phase_squares.cubic)
+        )
+        fold_words = "folded by straight lines" if remaining.is_folded else f"{frequency * T:.3g} cycles per aperture"
+        shown = slow if remaining.is_folded else ()
+        title = f"{kind} at {frequency:.6g} Hz, {fold_words}, in its worst phase"
         yield step(title, *shown, *_by_unit((quadratic, cubic), unit))
 
 
-def _written(pieces: Sequence[PowerLawPiece]) -> list[str]:
-    return [f"{one.low:.6g} Hz to {one.high:.6g} Hz: {one.density:.6g} * {_power_of_f(-one.slope)}" for one in pieces]
+def _pieces_text(pieces: Sequence[PowerLawPiece]) -> list[str]:
+    return [
+        f"{piece.low:.6g} Hz to {piece.high:.6g} Hz: {piece.density:.6g} * {_power_of_f(-piece.slope)}"
+        for piece in pieces
+    ]
 
 
 def _power_of_f(exponent: float) -> str:
-    """Write a power of f; what is negative stands in brackets, so that nobody reads it as a difference."""
+    """Text of a power of f. A negative exponent is in brackets, so that it is not read as a difference."""
     exponent = exponent or 0.0  # white noise has the power −0.0
     return f"f^{exponent:.6g}" if exponent >= 0 else f"f^(\u2212{-exponent:.6g})"
 
 
 def _setting(pieces: Sequence[PowerLawPiece], mission: Mission, sync: Synchronization) -> Iterator[Step]:
-    """Drift since a clock was set: orders 0 and 1 of its range error, at the radar's centre frequency."""
+    """Step of the drift since a clock was set: orders 0 and 1 of its range error at the centre frequency."""
     T, age, averaging = (
-        np.array([one or 0.0]) for one in (mission.collection.aperture_time, sync.age, sync.averaging)
+        np.array([value or 0.0]) for value in (mission.collection.aperture_time, sync.age, sync.averaging)
     )
-    found = set_parts(pieces, T, age, averaging)
+    orders = set_parts(pieces, T, age, averaging)
     per_phase = mission.radar.wavelength / (2 * math.pi)
-    c_0, c_1 = per_phase * math.sqrt(found.constant[0]), per_phase * math.sqrt(found.linear[0]) * 2 / float(T[0])
-    known = float(found.constant_linear[0] / math.sqrt(found.constant[0] * found.linear[0])) if c_0 else 0.0
+    c_0, c_1 = per_phase * math.sqrt(orders.constant[0]), per_phase * math.sqrt(orders.linear[0]) * 2 / float(T[0])
+    correlation = float(orders.constant_linear[0] / math.sqrt(orders.constant[0] * orders.linear[0])) if c_0 else 0.0
     yield step(
         "Orders 0 and 1 of a tone that are left of a clock set by a line: ∫ S·(λ/2π)²·A_m·A_n* df of each pair",
         "A₀ = j₀(πfT) − e^(−2πifH)·[j₀(πft_c) + H·(6i/t_c)·j₁(πft_c)]",
@@ -415,33 +428,33 @@ def _setting(pieces: Sequence[PowerLawPiece], mission: Mission, sync: Synchroniz
         f"t_c = {with_unit(float(averaging[0]), 's')}",
         f"σ(c₀) = {with_unit(c_0, 'm')}",
         f"σ(c₁) = {with_unit(c_1, 'm/s')}",
-        f"correlation = {number(known)}",
+        f"correlation = {number(correlation)}",
     )
 
 
 def _integrals(
     pieces: Sequence[PowerLawPiece], mission: Mission, sync: Synchronization | None, unit: str = "rad"
 ) -> Iterator[Step]:
-    """The parts that each piece of a spectrum adds to the mean squares."""
+    """Steps with the contributions of the pieces of a spectrum to the mean squares."""
     T, interval = mission.collection.aperture_time, None if sync is None else sync.interval
     if sync is not None and sync.is_direct_path:
         geometry, delay = mission.geometry, mission.geometry.echo_delay
         ways = [float(path.slant_range) for path in (*geometry.both, geometry.apart)]
-        each, density = [heard_parts((piece,), T, delay) for piece in pieces], "S_left"
+        piece_parts, density = [heard_parts((piece,), T, delay) for piece in pieces], "S_left"
         values = dict(zip(("R_t", "R_r", "b"), ways, strict=True)) | {"c": SPEED_OF_LIGHT}
         yield step(
             "Heard over the baseline b, and a delay Δt later by the echo: S_left = S·4·sin²(πf·Δt)",
             WorkedEquation("delay", "(R_t + R_r - b)/c", values, delay, "s"),
         )
     elif interval is None:
-        each, density = [parts((piece,), T) for piece in pieces], "S"
+        piece_parts, density = [parts((piece,), T) for piece in pieces], "S"
     else:
-        each, density = [synchronized_parts((piece,), T, interval) for piece in pieces], "S_left"
+        piece_parts, density = [synchronized_parts((piece,), T, interval) for piece in pieces], "S_left"
         yield step(
             f"Exchanges each T_s = {interval:.6g} s, straight lines between: "
             "S_left = S·(1 − sinc²(f·T_s))² + sinc⁴(f·T_s)·Σ S(|f + m/T_s|), m ≠ 0"
         )
-    k = 1.0 if unit != "rad" else mission.allocation.coverage_factor  # else it is in what is declared
+    k = 1.0 if unit != "rad" else mission.allocation.coverage_factor  # the declared value contains it for other units
     for index, (symbol, transfer) in enumerate(
         (
             ("QPE/unit", "[7.5·j₂(πfT)]²"),
@@ -449,7 +462,7 @@ def _integrals(
             ("left/unit", "[1 − Σ(2n+1)·jₙ(πfT)²], n to 3"),
         )
     ):
-        terms = [one[index] for one in each]
+        terms = [mean_squares[index] for mean_squares in piece_parts]
         factor = k if index < 2 else 1.0
         total = factor * math.sqrt(math.fsum(terms))
         text = " + ".join(number(term) for term in terms)
@@ -471,12 +484,12 @@ def _link(mission: Mission, error: RandomError) -> Iterator[Step]:
     yield step("Integrated with the squares of 7.5·j₂(πfT), of 17.5·j₃(πfT), and 1 − Σ(2n+1)·jₙ²(πfT)", *lines)
 
 
-def _stated(vibration: Vibration | FeltVibration, spectrum: Spectrum) -> Iterator[Step]:
-    """The spectrum of acceleration, or of displacement, as pieces, with its level."""
-    what, unit = ("acceleration", "g²/Hz") if spectrum.is_accelerated else ("displacement", "m²/Hz")
+def _spectrum_steps(vibration: Vibration | FeltVibration, spectrum: Spectrum) -> Iterator[Step]:
+    """Steps with the points of a spectrum of acceleration or displacement, and with its level."""
+    quantity, unit = ("acceleration", "g²/Hz") if spectrum.is_accelerated else ("displacement", "m²/Hz")
     scale = STANDARD_GRAVITY**2 if spectrum.is_accelerated else 1.0
     points = [f"{f:.6g} Hz: {density / scale:.6g} {unit}" for f, density in spectrum.points]
-    yield step(f"One-sided spectrum of {what}, straight over logarithms, nothing beside its points", *points)
+    yield step(f"One-sided spectrum of {quantity}, straight over logarithms, nothing beside its points", *points)
     if vibration.spectrum_level:
         power = float(power_of(vibration))
         worked = WorkedEquation("p", "10^(L/10)", {"L": vibration.spectrum_level}, power, "")
@@ -489,7 +502,7 @@ def _spectrum(mission: Mission, error: RandomError) -> Iterator[Step]:
     spectrum = vibration.spectrum
     if spectrum is None:
         return
-    yield from _stated(vibration, spectrum)
+    yield from _spectrum_steps(vibration, spectrum)
     rms = displacement_rms(spectrum, float(power_of(vibration)))
     yield step(
         "Root mean square of the displacement, S_x = S_a/(2πf)^4, all frequencies",
@@ -508,7 +521,7 @@ def _spectrum(mission: Mission, error: RandomError) -> Iterator[Step]:
     pieces = pieces_of_vibration(mission, name)
     yield step(
         "One-sided spectrum of phase along the line of sight, one way, S = S_x·(2π/λ)² [rad²/Hz]",
-        *_written(pieces),
+        *_pieces_text(pieces),
     )
     if not error.published.spread and not error.published.quadratic:
         yield step(no_effect(mission, error))
@@ -517,20 +530,20 @@ def _spectrum(mission: Mission, error: RandomError) -> Iterator[Step]:
 
 
 def _acceleration(mission: Mission, error: RandomError) -> Iterator[Step]:
-    """Random vibration of an oscillator, its slow tones, and the turn of its platform."""
+    """Steps of the random vibration of an oscillator, its slow tones, and the turn of its platform."""
     name, f_0, sync = error.owner, mission.radar.center_frequency, mission.synchronization
-    one = felt(mission, name)
-    if one is None or not any(error.published[:3]):
+    felt_vibration = felt(mission, name)
+    if felt_vibration is None or not any(error.published[:3]):
         if not lacks_a_spectrum(mission, name):
             yield step(no_effect(mission, error))
         return
     yield step("Fractional frequency y = Γ·a, with Γ and the acceleration as they point at their worst")
     pieces = pieces_by_acceleration(mission, name)
-    if pieces and one.vibration.spectrum is not None:
-        yield from _stated(one.vibration, one.vibration.spectrum)
+    if pieces and felt_vibration.vibration.spectrum is not None:
+        yield from _spectrum_steps(felt_vibration.vibration, felt_vibration.vibration.spectrum)
         yield step(
             f"One-sided spectrum of phase at {f_0:.6g} Hz by a unit of Γ, S = (f_0/f)²·S_a [rad²/Hz]",
-            *_written(pieces),
+            *_pieces_text(pieces),
         )
         yield from _integrals(pieces, mission, sync, _PER_SENSITIVITY)
     for line in accelerated_tones(mission):
@@ -545,15 +558,15 @@ def _acceleration(mission: Mission, error: RandomError) -> Iterator[Step]:
             "displaces, and its change bends. Of three axes the root-sum-square is the most that a Γ does",
             WorkedEquation("drift/unit", "c*a", values, SPEED_OF_LIGHT * acceleration, "m/s per s²/m"),
         )
-    left = error.published.spread * mission.allocation.coverage_factor
+    spread_per_unit = error.published.spread * mission.allocation.coverage_factor
     yield step(
         "Together, by a unit of Γ: independent parts add as squares",
-        *_by_unit((*error.published[:2], left), _PER_SENSITIVITY),
+        *_by_unit((*error.published[:2], spread_per_unit), _PER_SENSITIVITY),
     )
 
 
 def _delay_on_a_leg(analysis: Analysis, error: RandomError, name: str) -> Iterator[Step]:
-    """From the delay of the zenith to that of the leg over the aperture, of a unit."""
+    """Steps from a unit of the zenith delay to the delay of the leg over the aperture."""
     mission, delay = analysis.mission, error.subject.axis
     path: PlatformState = getattr(analysis.geometry, name)
     (x, y, z), height = path.position, float(height_of(path.position))
@@ -576,7 +589,7 @@ def _delay_on_a_leg(analysis: Analysis, error: RandomError, name: str) -> Iterat
         worked = WorkedEquation("g", f"{ELECTRON_DELAY_M3_PER_S2:g}*m/f_0^2", values, factor * scale, "m per 1/m^2")
         yield step("Group delay by a unit; the phase at the centre frequency is advanced by as much", worked)
     half = mission.collection.aperture_time / 2
-    times = [half * moment for moment in _MOMENTS]
+    times = [half * moment for moment in _MOMENT_FRACTIONS]
     yield step(
         f"Delay on the leg of the {name} by a unit as the elevation changes over the aperture",
         *(
@@ -594,24 +607,24 @@ def _delay_on_a_leg(analysis: Analysis, error: RandomError, name: str) -> Iterat
 def _phases(mission: Mission, error: RandomError, model: str) -> Iterator[Step]:
     if error.declared is None:
         return
-    other = "full" if model == "published" else "published"
-    is_same = error.published[:5] == error.full[:5] and not error.full.hidden
-    is_left_same = error.published.spread == error.full.spread
-    for name in (model,) if is_same else (model, other):
+    other_model = "full" if model == "published" else "published"
+    is_equal = error.published[:5] == error.full[:5] and not error.full.hidden
+    is_spread_equal = error.published.spread == error.full.spread
+    for name in (model,) if is_equal else (model, other_model):
         effect, k = error.effect(name), _covered(mission, error)
-        mark = "_full" if name == "full" and not is_same else ""
+        mark = "_full" if name == "full" and not is_equal else ""
         lines: list[WorkedEquation] = []
-        for symbol, per_unit in zip(_PARTS, effect[:3], strict=True):
-            if not per_unit or (symbol == "left" and is_left_same and name != model):
+        for symbol, per_unit in zip(_PHASE_SYMBOLS, effect[:3], strict=True):
+            if not per_unit or (symbol == "left" and is_spread_equal and name != model):
                 continue
             result = per_unit * error.declared
             values, formula = {f"{symbol}/unit": per_unit, "declared": error.declared}, f"{symbol}/unit*declared"
             if symbol == "left" and k != 1:  # a mean power has no coverage factor
                 values |= {"left/unit": per_unit * k, "k": k}
                 formula += "/k"
-            marked = symbol if symbol == "left" and is_left_same else f"{symbol}{mark}"
+            marked = symbol if symbol == "left" and is_spread_equal else f"{symbol}{mark}"
             lines.append(WorkedEquation(marked, formula, values, result, "rad"))
-            if symbol == "QPE" and is_same:
+            if symbol == "QPE" and is_equal:
                 lines.append(WorkedEquation("QPE_full", "QPE", {"QPE": result}, result, "rad"))
         if effect.hidden:
             hidden, qpe = effect.hidden * error.declared, effect.quadratic * error.declared
@@ -621,17 +634,17 @@ def _phases(mission: Mission, error: RandomError, model: str) -> Iterator[Step]:
             lines.append(
                 WorkedEquation("equal_full", "sqrt(QPE^2 + hidden^2)", values, math.hypot(qpe, hidden), "rad")
             )
-        by = "both models" if is_same else f"the {name} model{'' if name == model else ', for comparison'}"
+        model_words = "both models" if is_equal else f"the {name} model{'' if name == model else ', for comparison'}"
         if effect.displacement > 0:
             values = {"moved/unit": effect.displacement, "declared": error.declared}
             result = effect.displacement * error.declared
             lines.append(WorkedEquation(f"moved{mark}", "moved/unit*declared", values, result, "m"))
         if lines:
-            yield step(f"Of what is declared, by {by}", *lines)
+            yield step(f"Of what is declared, by {model_words}", *lines)
 
 
 def _covered(mission: Mission, error: RandomError) -> float:
-    """Coverage factor within what is declared; that of an oscillator is in its phases."""
+    """Coverage factor within the declared value. That of an oscillator is in its phases instead, which gives 1."""
     return 1.0 if error.unit == "dB" else float(error.coverage(mission))
 
 
@@ -640,7 +653,7 @@ def _allowable(mission: Mission, allocation: Allocation, error: RandomError, row
         yield step("Allowable: not known", row.reason)
         return
     effect = error.effect(model)
-    held = held_effect(mission, effect, error.coverage(mission), allocation.autofocus_gain)
+    limited = held_effect(mission, effect, error.coverage(mission), allocation.autofocus_gain)
     limit = allocation.qpe_allowed(error.owner)
     if error.is_covered:  # an effect from elsewhere has no quadratic phase here
         yield from limit_steps(allocation, error.owner, limit)
@@ -657,28 +670,28 @@ def _allowable(mission: Mission, allocation: Allocation, error: RandomError, row
         part, gain = "judged/unit", allocation.autofocus_gain
         values = {"QPE/unit": effect.quadratic, "hidden/unit": effect.hidden, "gain": gain}
         worked = WorkedEquation(
-            part, "sqrt((QPE/unit)^2 + (gain*hidden/unit)^2)", values, held.quadratic, f"rad per {_unit(error)}"
+            part, "sqrt((QPE/unit)^2 + (gain*hidden/unit)^2)", values, limited.quadratic, f"rad per {_unit(error)}"
         )
         yield step("With what band and turn hide, of which autofocus corrects nothing", worked)
-    if held.quadratic:
-        yield by("by_QPE", part, limit, held.quadratic, "Allowable by the quadratic phase")
+    if limited.quadratic:
+        yield by("by_QPE", part, limit, limited.quadratic, "Allowable by the quadratic phase")
     if effect.cubic and required.cubic_phase_error is not None:
         title = f"Allowable by requirements.{CUBIC}, without share and gain"
         yield by("by_cubic", "cubic/unit", required.cubic_phase_error, effect.cubic, title)
-    if held.spread and required.islr is not None:
+    if limited.spread and required.islr is not None:
         spread = "left/unit"
-        if held.spread != effect.spread:
+        if limited.spread != effect.spread:
             spread = "spread/unit"
-            yield from _with_cubic(mission, error, effect, held)
+            yield from _with_cubic(mission, error, effect, limited)
         power, share = 10 ** (required.islr / 10), allocation.islr.of(error.owner)
         energy = mainlobe_energy(mission)
         rule, values = allowed_variance(model, power, energy)
         rms = spread_phase(power, model, energy) * math.sqrt(share)
         worked = WorkedEquation("rms", f"sqrt({rule})*sqrt(s)", {**values, "s": share}, rms, "rad")
         yield step(f"Phase that may be left, requirements.islr {required.islr:g} dB, share s of its power", worked)
-        sizes["by_ISLR"] = rms / held.spread
+        sizes["by_ISLR"] = rms / limited.spread
         k = _covered(mission, error)
-        values = {"rms": rms, spread: held.spread * k, "k": k}
+        values = {"rms": rms, spread: limited.spread * k, "k": k}
         formula = f"rms/({spread})" if k == 1 else f"k*rms/({spread})"
         worked = WorkedEquation("by_ISLR", formula, values, sizes["by_ISLR"], _unit(error))
         yield step("Allowable by requirements.islr", worked)
@@ -688,15 +701,15 @@ def _allowable(mission: Mission, allocation: Allocation, error: RandomError, row
     yield from smallest_size(row, sizes)
 
 
-def _with_cubic(mission: Mission, error: RandomError, effect: RandomEffect, held: RandomEffect) -> Iterator[Step]:
-    """Add the power of the cubic phase to what is left, where no requirement of its own takes it."""
+def _with_cubic(mission: Mission, error: RandomError, effect: RandomEffect, limited: RandomEffect) -> Iterator[Step]:
+    """Step that adds the power of the cubic phase to the remainder, if no requirement of its own judges it."""
     k, factor = _covered(mission, error), float(error.coverage(mission))
     values = {"cubic/unit": effect.cubic, "left/unit": effect.spread * k, "k": factor}
-    # What is left is shown of one sigma, the cubic phase with the factor of what is declared or without it.
+    # The remainder is shown for one sigma, the cubic phase with the coverage factor of the declared value or without.
     formula = "4*(cubic/unit)^2/175" if k == factor else "4*(cubic/unit/k)^2/175"
     formula = f"sqrt((left/unit)^2 + {formula})" if effect.spread else f"sqrt({formula})"
     worked = WorkedEquation(
-        "spread/unit", formula, values, held.spread * k, f"rad{f' per {_unit(error)}' * bool(_unit(error))}"
+        "spread/unit", formula, values, limited.spread * k, f"rad{f' per {_unit(error)}' * bool(_unit(error))}"
     )
     title = "No requirements.cubic_phase_error: ISLR holds the power of the cubic phase too, without coverage factor"
     yield step(title, worked)

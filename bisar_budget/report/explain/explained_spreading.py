@@ -1,4 +1,4 @@
-"""How tones come to their echoes and displace, and noise to the power that spreads: one by one, and all together."""
+"""Explanations of tones, with their echoes and displacements, and of power that noise spreads, alone and in total."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -36,7 +36,7 @@ from bisar_budget.faults import printable
 from bisar_budget.findings.row import Row
 from bisar_budget.geometry import GroundVector
 from bisar_budget.mission.model import Mission
-from bisar_budget.report.explain.explained_error import combined, limit_steps, no_limit, place, stated
+from bisar_budget.report.explain.explained_error import combined, limit_steps, location, no_limit, stated
 from bisar_budget.report.explain.notation import Step, Sum, WorkedEquation, number, step, with_unit
 
 
@@ -54,25 +54,25 @@ def _level(model: str, variance: str) -> str:
 
 
 def explained_islr(analysis: Analysis, allocation: Allocation, row: Row) -> Iterator[Step]:
-    """Powers of everything that spreads, together."""
+    """Steps to the total of all powers that spread."""
     mission, model, owner = analysis.mission, row.model or "published", row.owner
-    members = {one.row_id: one.variance for one in declared_powers(analysis, owner, model)}
+    members = {each.row_id: each.variance for each in declared_powers(analysis, owner, model)}
     total, energy = math.fsum(members.values()), mainlobe_energy(mission)
-    known: dict[str, float] = {}
+    constants: dict[str, float] = {}
     rule = "the published rule takes the variance for it"
     if model != "published":
-        known = {"e": math.e, "E": energy}
+        constants = {"e": math.e, "E": energy}
         rule = "a phase of variance v leaves e^-v of the response, of which a share E lies within its first nulls"
     if row.declared is None:
         yield step("Nothing that spreads is declared")
     else:
         yield from _tones_and_cubic(analysis, allocation, owner, model, members)
         width = max(len(name) for name in members)
-        listed = [f"{printable(name):<{width}}  {power:.6g} rad²" for name, power in members.items()]
+        lines = [f"{printable(name):<{width}}  {power:.6g} rad²" for name, power in members.items()]
         terms = " + ".join(number(power) for power in members.values())
         title = "Squares of the rms phases that spread: independent, so they add"
-        yield step(title, *listed, Sum(f"v = {terms} = {with_unit(total, 'rad²')}"))
-        worked = WorkedEquation("declared", _level(model, "v"), {"v": total, **known}, row.declared, "dB")
+        yield step(title, *lines, Sum(f"v = {terms} = {with_unit(total, 'rad²')}"))
+        worked = WorkedEquation("declared", _level(model, "v"), {"v": total, **constants}, row.declared, "dB")
         yield step(f"As ISLR: {rule}", worked)
     if row.allowable is None:
         return
@@ -81,7 +81,7 @@ def explained_islr(analysis: Analysis, allocation: Allocation, row: Row) -> Iter
     limit = spread_phase(power, model, energy) ** 2 * share
     worked = WorkedEquation("v_max", f"{formula}*s", {**values, "s": share}, limit, "rad²")
     yield step("Variance that requirements.islr allows, share s of the power", worked)
-    worked = WorkedEquation("allowable", _level(model, "v_max"), {"v_max": limit, **known}, row.allowable, "dB")
+    worked = WorkedEquation("allowable", _level(model, "v_max"), {"v_max": limit, **constants}, row.allowable, "dB")
     yield step("As ISLR", worked)
     if row.utilization is not None:
         values = {"v": total, "v_max": limit}
@@ -92,11 +92,11 @@ def explained_islr(analysis: Analysis, allocation: Allocation, row: Row) -> Iter
 def _tones_and_cubic(
     analysis: Analysis, allocation: Allocation, owner: str, model: str, members: Mapping[str, float]
 ) -> Iterator[Step]:
-    """Powers of what is no noise: tones and the cubic phase, where no requirement of their own takes them."""
+    """Steps to the powers of tones and of the cubic phase, if no requirement of their own judges them."""
     powers = [
-        Sum(f"{one.subject.id} = {number(one.phase)}^2/2 = {with_unit(members[one.subject.id], 'rad²')}")
-        for one in tones(analysis.mission)
-        if one.subject.id in members
+        Sum(f"{tone.subject.id} = {number(tone.phase)}^2/2 = {with_unit(members[tone.subject.id], 'rad²')}")
+        for tone in tones(analysis.mission)
+        if tone.subject.id in members
     ]
     if powers:
         yield step("No requirements.pslr: a tone spreads half the square of its peak phase", *powers)
@@ -105,37 +105,38 @@ def _tones_and_cubic(
         return
     together = analysis.together("full" if model == "full" else "published")
     cubic = float(together.cubic_without_coverage(allocation.islr, owner)[0])
-    parts = together.phase_parts(together.cubics_without_coverage(allocation.islr, owner), together.rule_of_all)
+    sizes_by_name = together.phase_parts(
+        together.cubics_without_coverage(allocation.islr, owner), together.rule_of_all
+    )
     title = "Cubic phase of the declared errors, without coverage factor"
-    yield from combined(title, together.rule_of_all, parts, cubic, symbol="φ_3")
+    yield from combined(title, together.rule_of_all, sizes_by_name, cubic, symbol="φ_3")
     worked = WorkedEquation("v_3", "4*φ_3^2/175", {"φ_3": cubic}, members[cubic_row], "rad²")
     yield step("No requirements.cubic_phase_error: its mean square after the fit of a line spreads", worked)
 
 
 def explained_pslr(mission: Mission, row: Row) -> Iterator[Step]:
-    """From all tones to the highest echo that they make in the worst of their phases."""
-    found = tones(mission)
-    echo = highest_echo(found)
+    """Steps from all tones to their highest echo in the worst of their phases."""
+    all_tones = tones(mission)
+    echo = highest_echo(all_tones)
     if echo is None:
         yield step("No tone is declared: no vibration from one cycle per aperture on, no spur")
     else:
-        width = max(len(one.subject.id) for one in found)
-        listed = [f"{one.subject.id:<{width}}  {one.phase:.6g} rad, {one.cycles:.6g} cells" for one in found]
-        yield step("Tones: peak phase, and distance of their echoes from the response", *listed)
-        together = [one for one, is_in in zip(found, echo.is_of, strict=True) if is_in]
-        pairs = {together[other].subject.id: together[one] for one, other in quadratures(together)}
-        apart = list(pairs.values())
+        width = max(len(tone.subject.id) for tone in all_tones)
+        lines = [f"{tone.subject.id:<{width}}  {tone.phase:.6g} rad, {tone.cycles:.6g} cells" for tone in all_tones]
+        yield step("Tones: peak phase, and distance of their echoes from the response", *lines)
+        echo_tones = [tone for tone, is_in in zip(all_tones, echo.is_of, strict=True) if is_in]
+        pairs = {echo_tones[second].subject.id: echo_tones[first] for first, second in quadratures(echo_tones)}
+        paired = list(pairs.values())
         terms = " + ".join(
-            f"{_with_its_pair(one, pairs.get(one.subject.id))}*{number(abs(np.sinc(echo.cycles - one.cycles)))}"
-            for one in together
-            if one not in apart
+            f"{_with_its_pair(tone, pairs.get(tone.subject.id))}*{number(abs(np.sinc(echo.cycles - tone.cycles)))}"
+            for tone in echo_tones
+            if tone not in paired
         )
-        title = (
-            f"Highest echo: at x = {number(echo.cycles)} cells, of {', '.join(one.subject.id for one in together)}"
-        )
+        ids = ", ".join(tone.subject.id for tone in echo_tones)
+        title = f"Highest echo: at x = {number(echo.cycles)} cells, of {ids}"
         if pairs:
             title += "; motion and oscillator are a quarter of a turn apart, so that squares of the two add"
-        if len(together) - len(pairs) > 1:
+        if len(echo_tones) - len(pairs) > 1:
             title += ", each φ·|sinc(x − f·T)| in the worst phases, sinc(x) = sin(πx)/(πx)"
         yield step(title, Sum(f"φ = {terms} = {with_unit(echo.phase, 'rad')}"))
         yield from _echo_level(echo)
@@ -145,13 +146,13 @@ def explained_pslr(mission: Mission, row: Row) -> Iterator[Step]:
     if row.allowable is None:
         return
     worked = WorkedEquation("allowable", "required", {"required": row.allowable}, row.allowable, "dB")
-    yield step(f"requirements.pslr, all of it, {place(mission, ('requirements', 'pslr'))}", worked)
+    yield step(f"requirements.pslr, all of it, {location(mission, ('requirements', 'pslr'))}", worked)
     yield from use_of_amplitudes(row)
 
 
-def _with_its_pair(one: Tone, other: Tone | None) -> str:
-    """Peak phase of a tone, or with that of one a quarter of a turn away."""
-    return number(one.phase) if other is None else f"sqrt({number(one.phase)}^2 + {number(other.phase)}^2)"
+def _with_its_pair(tone: Tone, pair_tone: Tone | None) -> str:
+    """Text of the peak phase of a tone, or of the root-sum-square with a tone a quarter of a turn away."""
+    return number(tone.phase) if pair_tone is None else f"sqrt({number(tone.phase)}^2 + {number(pair_tone.phase)}^2)"
 
 
 def _echo_level(echo: Echo) -> Iterator[Step]:
@@ -169,7 +170,7 @@ def _echo_level(echo: Echo) -> Iterator[Step]:
 
 
 def use_of_amplitudes(row: Row) -> Iterator[Step]:
-    """Utilization of a row in decibel, where it has one."""
+    """Step to the utilization of a row in decibel, if it has one."""
     if row.utilization is None or row.declared is None or row.allowable is None:
         return
     values = {"declared": row.declared, "allowable": row.allowable}
@@ -178,17 +179,17 @@ def use_of_amplitudes(row: Row) -> Iterator[Step]:
 
 
 def moved_by_tone(parts: Sequence[TonePart], model: str, moved: GroundVector) -> Iterator[Step]:
-    """The orders of a tone, and what they displace; of several axes, and of one that is folded, each."""
-    by = "(25)" if model == "published" else "exact ranges"
-    for index, part in enumerate(parts):
-        if (part.displacement[:, 0] < 1e-3 * np.abs(moved)).all():
+    """Steps to the orders of a tone and their displacement, for each axis and for a folded frequency."""
+    source = "(25)" if model == "published" else "exact ranges"
+    for index, tone_part in enumerate(parts):
+        if (tone_part.displacement[:, 0] < 1e-3 * np.abs(moved)).all():
             continue
         axis = f"_{index + 1}" if len(parts) > 1 else ""
-        c, worked = part.orders[:, 0].tolist(), list[WorkedEquation]()
-        for name, each, size in zip(
-            ("east", "north"), part.per_metre[..., 0].T, part.displacement[:, 0], strict=True
+        c, worked = tone_part.orders[:, 0].tolist(), list[WorkedEquation]()
+        for name, metre_effects, size in zip(
+            ("east", "north"), tone_part.per_metre[..., 0].T, tone_part.displacement[:, 0], strict=True
         ):
-            p = np.where(np.abs(each) > ROUNDING * np.abs(each).max(), each, 0.0).tolist()
+            p = np.where(np.abs(metre_effects) > ROUNDING * np.abs(metre_effects).max(), metre_effects, 0.0).tolist()
             values = {f"{symbol}{n}": order[n] for symbol, order in (("c_", c), ("p_", p)) for n in range(4)}
             formula = (
                 "sqrt((c_0*p_0 - c_2*p_2)^2 + (c_1*p_1 - c_3*p_3)^2)"
@@ -198,32 +199,32 @@ def moved_by_tone(parts: Sequence[TonePart], model: str, moved: GroundVector) ->
             worked.append(WorkedEquation(f"{name}{axis}", formula, values, float(size), "m"))
         yield step(
             "Orders of the tone at the aperture edge, c_0 = A·j₀(x), c_1 = 3·A·j₁(x), x = π·f·T, and what a metre of "
-            f"each displaces by {by}, p: east and north each in its worst phase",
+            f"each displaces by {source}, p: east and north each in its worst phase",
             *worked,
         )
     if len(parts) > 1:
-        of_axes = np.array([part.displacement[:, 0] for part in parts]).T
+        axis_displacements = np.array([tone_part.displacement[:, 0] for tone_part in parts]).T
         sums = (
             Sum(f"{name} = {' + '.join(map(number, sizes))} = {with_unit(total, 'm')}")
-            for name, sizes, total in zip(("east", "north"), of_axes, moved, strict=True)
+            for name, sizes, total in zip(("east", "north"), axis_displacements, moved, strict=True)
         )
         yield step("Each may be in any phase: displacements add", *sums)
 
 
 def explained_spur(mission: Mission, allocation: Allocation, row: Row) -> Iterator[Step]:
-    """From the tone of an oscillator to its paired echoes, and to what the platform's share allows."""
+    """Steps from a spur of an oscillator to its paired echoes, and to the level that the platform's share allows."""
     oscillator = getattr(mission.platforms, row.owner).oscillator
     path = ("platforms", row.owner, "oscillator", "spurs")
     entry = row.subject.entry or 0
     frequency, level = oscillator.spurs[entry]
-    yield step(f"Declared in {place(mission, path)}", f"{frequency:.6g} Hz: {level:.6g} dBc")
+    yield step(f"Declared in {location(mission, path)}", f"{frequency:.6g} Hz: {level:.6g} dBc")
     f_0 = mission.radar.center_frequency
     values, formula = {"L": level, "f_0": f_0, "f_osc": oscillator.frequency or f_0}, "L + 20*log(f_0/f_osc)/log(10)"
-    spur = next(one for one in spurs_of(mission) if (one.name, one.entry) == (row.owner, entry))
-    left = spur.echo
+    spur = next(each for each in spurs_of(mission) if (each.name, each.entry) == (row.owner, entry))
+    remaining = spur.echo
     title = "At the centre frequency; an echo has the amplitude of the sideband"
-    if left != 1:
-        values, formula = {**values, "left": left}, f"{formula} + 20*log(left)/log(10)"
+    if remaining != 1:
+        values, formula = {**values, "left": remaining}, f"{formula} + 20*log(left)/log(10)"
         title += ", times what the synchronization leaves of it"
     yield step(title, WorkedEquation("declared", formula, values, row.declared or 0.0, "dB"))
     limits, sizes = tone_limits(mission, allocation)[1].get(row.owner), dict[str, float]()
@@ -242,7 +243,7 @@ def explained_spur(mission: Mission, allocation: Allocation, row: Row) -> Iterat
 
 
 def _phase_at_limit(mission: Mission, row: Row, limits: VibrationLimits, symbol: str) -> tuple[float, Step]:
-    """Peak phase of a vibration at the limit of the platform of a tone, and how it comes about. [rad]"""
+    """Peak phase of a vibration at the limit of the platform of a tone, and its step. [rad]"""
     values = {"A": float(limits.by(row.model or "published")), "λ": mission.radar.wavelength}
     phase = 2 * math.pi * values["A"] / values["λ"]
     by_power = "" if row.metric == "pslr" else ", √2 times the rms value that ISLR allows"
@@ -251,72 +252,74 @@ def _phase_at_limit(mission: Mission, row: Row, limits: VibrationLimits, symbol:
 
 
 def explained_tone(mission: Mission, allocation: Allocation, row: Row) -> Iterator[Step]:
-    """From a vibration of an oscillator to its paired echoes, and to the sensitivity that the share allows."""
+    """Steps from a vibration of an oscillator to its echoes, and to the sensitivity that the share allows."""
     name, entry = row.owner, row.subject.entry or 0
-    one = next(one for one in accelerated_tones(mission) if (one.name, one.entry) == (name, entry))
-    felt_one, f_0 = felt(mission, name), mission.radar.center_frequency
-    is_own = felt_one is not None and felt_one.is_own
-    section = ("oscillator",) if is_own else ("motion_error",)
+    tone = next(tone for tone in accelerated_tones(mission) if (tone.name, tone.entry) == (name, entry))
+    felt_vibration, f_0 = felt(mission, name), mission.radar.center_frequency
+    has_own_vibration = felt_vibration is not None and felt_vibration.is_own
+    section = ("oscillator",) if has_own_vibration else ("motion_error",)
     path = ("platforms", name, *section, "vibration", "sinusoidal", entry, "amplitude")
-    a = float(one.acceleration)
+    a = float(tone.acceleration)
     gamma = ("platforms", name, "oscillator", "acceleration_sensitivity")
-    yield step(f"Γ, declared in {place(mission, gamma)}", f"Γ = {with_unit(one.sensitivity, 's^2/m')}")
+    yield step(f"Γ, declared in {location(mission, gamma)}", f"Γ = {with_unit(tone.sensitivity, 's^2/m')}")
     if row.evidence:
         yield step("Evidence", printable(row.evidence))
-    yield step(f"Acceleration of the vibration, declared in {place(mission, path)}", f"a = {with_unit(a, 'm/s^2')}")
-    values, formula = {"f_0": f_0, "Γ": one.sensitivity, "a": a, "f": one.frequency}, "f_0*Γ*a/f"
+    yield step(
+        f"Acceleration of the vibration, declared in {location(mission, path)}", f"a = {with_unit(a, 'm/s^2')}"
+    )
+    values, formula = {"f_0": f_0, "Γ": tone.sensitivity, "a": a, "f": tone.frequency}, "f_0*Γ*a/f"
     title = "Derived: peak phase of the tone, a quarter of a turn from the motion itself"
-    if one.echo != 1:
-        values, formula = {**values, "left": one.echo}, f"{formula}*left"
+    if tone.echo != 1:
+        values, formula = {**values, "left": tone.echo}, f"{formula}*left"
         title += ", times what the synchronization leaves of it"
-    yield step(title, WorkedEquation("φ", formula, values, one.phase, "rad"))
-    if one.phase:
-        level = 20 * math.log10(one.phase / 2)
-        yield step("Its echoes", WorkedEquation("l", "20*log(φ/2)/log(10)", {"φ": one.phase}, level, "dB"))
+    yield step(title, WorkedEquation("φ", formula, values, tone.phase, "rad"))
+    if tone.phase:
+        level = 20 * math.log10(tone.phase / 2)
+        yield step("Its echoes", WorkedEquation("l", "20*log(φ/2)/log(10)", {"φ": tone.phase}, level, "dB"))
     limits, sizes = tone_limits(mission, allocation)[1].get(name), dict[str, float]()
     if row.allowable is None:
         yield no_limit(row)
         return
-    yield from _worst_phases(one.left, one.free * one.sensitivity, mission)
+    yield from _worst_phases(tone.left, tone.free * tone.sensitivity, mission)
     yield from near_phases(mission, allocation, row, row.qpe_full_rad or 0.0, sizes)
     if limits is not None:
         phase, at_limit = _phase_at_limit(mission, row, limits, "φ_max")
         yield at_limit
-        if not one.phase:
+        if not tone.phase:
             yield step("Allowable", Sum(f"allowable = {with_unit(row.allowable, row.unit)}"))
             return
-        values = {"Γ": one.sensitivity, "φ_max": phase, "φ": one.phase}
-        sizes["by_echoes"] = one.sensitivity * phase / one.phase
+        values = {"Γ": tone.sensitivity, "φ_max": phase, "φ": tone.phase}
+        sizes["by_echoes"] = tone.sensitivity * phase / tone.phase
         yield step("Its echoes", WorkedEquation("by_echoes", "Γ*φ_max/φ", values, sizes["by_echoes"], row.unit))
     yield smallest_of(row, sizes)
 
 
-def _worst_phases(left: LeftTone, free: float, mission: Mission) -> Iterator[Step]:
-    """Quadratic and cubic phase of the echoes of a tone that lie below three cycles per aperture."""
+def _worst_phases(tone: LeftTone, free: float, mission: Mission) -> Iterator[Step]:
+    """Steps to the quadratic and cubic phase of the echoes of a tone below three cycles per aperture."""
     T = mission.collection.aperture_time
     near = [
         (free * float(share), float(frequency) * T)
-        for frequency, share in zip(left.frequencies, left.echoes(T), strict=True)
+        for frequency, share in zip(tone.frequencies, tone.echoes(T), strict=True)
         if frequency * T < ECHO_CYCLES and free * share
     ]
     if not near:
         return
     quadratic = "Quadratic phase in the worst phase, 7.5·j₂(πn)·φ of n cycles per aperture"
-    for title, symbols, part in (
+    for title, symbols, order_part in (
         (quadratic, ("QPE", "QPE_full"), quadratic_part),
         ("Cubic phase likewise, 17.5·j₃(πn)·φ", ("cubic",), cubic_part),
     ):
-        terms = " + ".join(f"{number(phase)}*{number(float(part(cycles)))}" for phase, cycles in near)
-        total = with_unit(math.fsum(phase * float(part(cycles)) for phase, cycles in near), "rad")
+        terms = " + ".join(f"{number(phase)}*{number(float(order_part(cycles)))}" for phase, cycles in near)
+        total = with_unit(math.fsum(phase * float(order_part(cycles)) for phase, cycles in near), "rad")
         yield step(title, *(Sum(f"{symbol} = {terms} = {total}") for symbol in symbols))
 
 
 def near_phases(
     mission: Mission, allocation: Allocation, row: Row, judged: float, sizes: dict[str, float]
 ) -> Iterator[Step]:
-    """From the judged quadratic [rad] and the cubic phase of a tone below three cycles to the size they allow.
+    """Steps from the judged quadratic [rad] and the cubic phase of a slow tone to the size that they allow.
 
-    Nothing of a faster one. The size is put into `sizes`, by its symbol.
+    A tone of three cycles per aperture or more has no such steps. The size is added to `sizes`, by its symbol.
     """
     limit, allowed = allocation.qpe_allowed(row.owner), mission.requirements.cubic_phase_error
     if not judged and not row.cubic_rad:
@@ -338,15 +341,15 @@ def near_phases(
 
 
 def smallest_of(row: Row, sizes: Mapping[str, float]) -> Step:
-    """The allowable of a tone, the smallest of sizes by their symbols."""
+    """Step to the allowable of a tone, the smallest of sizes, which are given by their symbols."""
     formula = f"min({', '.join(sizes)})" if len(sizes) > 1 else next(iter(sizes))
     return step("Allowable", WorkedEquation("allowable", formula, sizes, row.allowable or 0.0, row.unit))
 
 
 def explained_power(mission: Mission, allocation: Allocation, row: Row) -> Iterator[Step]:
-    """From a stated ISLR to the phase that spreads as much, and to what is required."""
+    """Steps from a stated ISLR to the phase that spreads the same power, and to the requirement."""
     index, model = row.subject.entry or 0, row.model or "full"
-    power = next(one for one in stated_powers(mission) if one.subject == row.subject)
+    power = next(each for each in stated_powers(mission) if each.subject == row.subject)
     yield from stated(mission, ("other_errors", index, "islr"), row.declared, row.evidence)
     yield effect_from_elsewhere()
     ratio, energy = 10 ** (power.islr / 10), mainlobe_energy(mission)
@@ -366,5 +369,5 @@ def explained_power(mission: Mission, allocation: Allocation, row: Row) -> Itera
 
 
 def effect_from_elsewhere() -> Step:
-    """The step of what is stated as an effect."""
+    """The step of an error that is stated by its effect."""
     return step("Stated by its effect on the image, whatever makes it; it has no coverage factor")

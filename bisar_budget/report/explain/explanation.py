@@ -1,4 +1,4 @@
-"""How a row, or a requirement, comes to its status: from its line in the file by the equations to the verdict."""
+"""Explanation of a row or a requirement: its line in the file, the equations with their numbers, and the verdict."""
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -56,8 +56,8 @@ from bisar_budget.report.explain.explained_error import (
     effect,
     end_of_the_image,
     limit_steps,
+    location,
     missing,
-    place,
     smallest_size,
 )
 from bisar_budget.report.explain.explained_random import explained_random
@@ -76,93 +76,97 @@ from bisar_budget.report.explain.notation import Step, Sum, WorkedEquation, numb
 from bisar_budget.report.words.requirements import requirement_finding, requirement_id
 from bisar_budget.report.words.sentences import own_id, percent, row_limit, row_size, wrapped
 
-_DEEPER = 3  # a broken equation goes on; no symbol has the width that would put its equals sign there
-_LONGEST_UNIT = 16  # letters, of what may follow a number
+_CONTINUATION_COLUMNS = 3  # further indent of a broken equation, at which no equals sign can be
+_MAX_UNIT_CHARACTERS = 16  # of a unit after a number
 
 
-def explain(mission: Mission, found: MissionFindings, row_id: str) -> str:
-    """Write the chain of equations of one row of a mission, with the numbers put in."""
-    row = next(row for row in found.rows if row.id == row_id)
+def explain(mission: Mission, findings: MissionFindings, row_id: str) -> str:
+    """Text of the equations of one row of a mission, with their numbers."""
+    row = next(row for row in findings.rows if row.id == row_id)
     title = f"{STATUS[row.status].text} {printable(f'{row.id}{own_id(row)}')}"
-    steps = _lines(_to_utilization(mission, found, row))
+    steps = _lines(_to_utilization(mission, findings, row))
     if row.declared is not None and row.allowable is not None and row.utilization is not None:
         steps.append(f"                = {percent(row.utilization)}")  # under the sum of the last step
-    return _text(mission, title, [*steps, *_lines(not_judged(found, row)), *_verdict(row, found)])
+    return _text(mission, title, [*steps, *_lines(not_judged(findings, row)), *_verdict(row, findings)])
 
 
-def explain_requirement(mission: Mission, found: MissionFindings, one: JudgedRequirement) -> str:
-    """Write how a requirement of a mission stands, and the rows that judge it."""
-    title = f"{STATUS[one.status].text} {requirement_id(one)}"
-    return _text(mission, title, [*_lines(finding_of(mission, found, one)), "", requirement_finding(one, found)])
+def explain_requirement(mission: Mission, findings: MissionFindings, requirement: JudgedRequirement) -> str:
+    """Text of a requirement of a mission: status, line in the file, and the rows that judge it."""
+    title = f"{STATUS[requirement.status].text} {requirement_id(requirement)}"
+    return _text(
+        mission,
+        title,
+        [*_lines(finding_of(mission, findings, requirement)), "", requirement_finding(requirement, findings)],
+    )
 
 
 def _lines(steps: Iterable[Step]) -> list[str]:
-    return [line for one in steps for line in one.lines]
+    return [line for each_step in steps for line in each_step.lines]
 
 
 def _text(mission: Mission, title: str, body: Iterable[str]) -> str:
     lines = [f"{title} of {printable(mission.name)}"]
     lines += [f"Not as the file says: {changes_words(mission.changes)}"] if mission.changes else []
     lines += ["", *body]
-    return "\n".join(part for line in lines for part in _fitted(line)) + "\n"
+    return "\n".join(fitted for line in lines for fitted in _fitted(line)) + "\n"
 
 
 def _fitted(line: str) -> list[str]:
-    """Break a line, an equation deeper than any begins, and never between a result, its sign and its unit."""
+    """Break a line. Equations continue with a deeper indent, and are not broken between `=`, result and unit."""
     start = len(line) - len(line.lstrip())
     if not start:
         return wrapped(line, "  ")
     joined = line.replace("= ", "=\u00a0")
     body, _, unit = joined.rpartition(" ")
-    if body.strip() and len(unit) < _LONGEST_UNIT:
+    if body.strip() and len(unit) < _MAX_UNIT_CHARACTERS:
         joined = f"{body}\u00a0{unit}"
-    return [part.replace("\u00a0", " ") for part in wrapped(joined, " " * (start + _DEEPER))]
+    return [line_part.replace("\u00a0", " ") for line_part in wrapped(joined, " " * (start + _CONTINUATION_COLUMNS))]
 
 
-def chain(mission: Mission, found: MissionFindings, row: Row) -> Iterator[Step]:
-    """Steps from the line of the mission file to how much of the allowable a row uses, or why that is not judged."""
-    yield from _to_utilization(mission, found, row)
-    yield from not_judged(found, row)
+def chain(mission: Mission, findings: MissionFindings, row: Row) -> Iterator[Step]:
+    """Steps from the line of the mission file to the utilization of a row, or to the reason why it is not judged."""
+    yield from _to_utilization(mission, findings, row)
+    yield from not_judged(findings, row)
 
 
-def _to_utilization(mission: Mission, found: MissionFindings, row: Row) -> Iterator[Step]:
-    analysis = found.analysed()
+def _to_utilization(mission: Mission, findings: MissionFindings, row: Row) -> Iterator[Step]:
+    analysis = findings.analysed()
     together = analysis.together("full" if row.model == "full" else "published")
     source = next((source for source in analysis.sources if source.id == row.id), None)
     if source is not None:
         yield from declaration(mission, source)
         yield from effect(analysis, source, row.model)
         yield from _budget(analysis, source, row)
-    elif (random := next((one for one in analysis.random if one.id == row.id), None)) is not None:
-        yield from explained_random(analysis, found.allocation, random, row)
+    elif (random_error := next((error for error in analysis.random if error.id == row.id), None)) is not None:
+        yield from explained_random(analysis, findings.allocation, random_error, row)
     elif row.subject.kind == "oscillator" and row.subject.axis == "acceleration":
-        yield from explained_tone(mission, found.allocation, row)
+        yield from explained_tone(mission, findings.allocation, row)
     elif row.subject.axis == "spur":
-        yield from explained_spur(mission, found.allocation, row)
+        yield from explained_spur(mission, findings.allocation, row)
     elif row.subject.kind == "other":
-        yield from explained_power(mission, found.allocation, row)
+        yield from explained_power(mission, findings.allocation, row)
     elif row.subject.kind == "pslr":
         yield from explained_pslr(mission, row)
     elif row.subject.kind == "islr":
-        yield from explained_islr(analysis, found.allocation, row)
+        yield from explained_islr(analysis, findings.allocation, row)
     elif row.subject.kind == "vibration":
-        yield from _vibration_in_its_unit(mission, found.allocation, row, analysis.slow_tones.get(row.id))
+        yield from _vibration_in_its_unit(mission, findings.allocation, row, analysis.slow_tones.get(row.id))
     elif row.subject.kind in (QUADRATIC, "autofocus_pull_in"):
-        yield from _phase_aggregate(together, found, row)
+        yield from _phase_aggregate(together, findings, row)
     elif row.subject.kind == CUBIC:
-        yield from _cubic_aggregate(together, found, row)
+        yield from _cubic_aggregate(together, findings, row)
     elif row.subject.kind == "dispersion":
-        yield from _dispersion(analysis, found, row)
+        yield from _dispersion(analysis, findings, row)
     elif row.subject.kind == "spatial_variance":
-        yield from _spatial_variance(analysis, found, row)
+        yield from _spatial_variance(analysis, findings, row)
     elif row.subject.kind == LOCATION:
-        yield from _location_aggregate(mission, together, found, row)
+        yield from _location_aggregate(mission, together, findings, row)
     elif row.metric == SPECIFICATION:
         key = next(key for key in mission.specifications if name_of_error(key) == row.subject.axis)
         path = ("specifications", key)
-        yield step(f"Specified in {place(mission, path)}", as_written(mission, path))
+        yield step(f"Specified in {location(mission, path)}", as_written(mission, path))
         if row.declared is not None:
-            yield step("Declared, of three axes the largest", f"{key} = {row_size(row.declared, row, found)}")
+            yield step("Declared, of three axes the largest", f"{key} = {row_size(row.declared, row, findings)}")
     elif row.metric == DECLARE:
         yield from declarations(mission)
     for tone in analysis.displacing_tones:
@@ -175,14 +179,14 @@ def _to_utilization(mission: Mission, found: MissionFindings, row: Row) -> Itera
         yield step("Utilization", WorkedEquation("utilization", "declared/allowable", values, row.utilization, ""))
 
 
-def collection_chain(found: MissionFindings) -> Iterator[Step]:
-    """Steps to what is true of the collection whatever the errors are: look and smear direction, determinant of Q."""
+def collection_chain(findings: MissionFindings) -> Iterator[Step]:
+    """Steps to look direction, smear direction and determinant of Q, which do not depend on errors."""
     values: dict[str, float] = {}
-    for name, state in (("t", found.geometry.transmitter), ("r", found.geometry.receiver)):
+    for name, state in (("t", findings.geometry.transmitter), ("r", findings.geometry.receiver)):
         (x, y, _), (v_x, v_y, _) = state.position, state.velocity
         values |= {f"φ̄_{name}": state.azimuth, f"θ̄_{name}": state.elevation, f"R_{name}": state.slant_range}
         values |= {f"x_{name}": x, f"y_{name}": y, f"v_x{name}": v_x, f"v_y{name}": v_y}
-    look, s = found.geometry.look_azimuth, found.geometry.range_gradient
+    look, s = findings.geometry.look_azimuth, findings.geometry.range_gradient
     yield step("(11), bistatic look direction", WorkedEquation("φ_b", notation.LOOK_AZIMUTH, values, look, "rad"))
     east, north = notation.SMEAR
     yield step(
@@ -190,12 +194,12 @@ def collection_chain(found: MissionFindings) -> Iterator[Step]:
         WorkedEquation("east", east, values, s[1], ""),
         WorkedEquation("north", north, values, -s[0], ""),
     )
-    determinant = found.analysed().published.plane.determinant
+    determinant = findings.analysed().published.plane.determinant
     yield step("(30), range held constant", WorkedEquation("det Q", notation.DETERMINANT, values, determinant, "1/s"))
 
 
 def _budget(analysis: Analysis, source: ErrorSource, row: Row) -> Iterator[Step]:
-    """From the requirements to the smallest size that one of them allows."""
+    """Steps from the requirements to the smallest size that they allow."""
     allocation, requirements = analysis.allocation, analysis.mission.requirements
     limit = allocation.qpe_allowed(source.owner)
     yield from limit_steps(allocation, source.owner, limit)
@@ -217,14 +221,14 @@ def _budget(analysis: Analysis, source: ErrorSource, row: Row) -> Iterator[Step]
             yield step(
                 "Allowable by the quadratic phase", WorkedEquation("by_QPE", formula, values, by_quadratic, row.unit)
             )
-    others = (
+    other_limits = (
         (CUBIC, "by_cubic", requirements.cubic_phase_error, "rad"),
         (LOCATION, "by_location", requirements.location_error, "m"),
     )
-    for name, symbol, required, unit in others if source.is_motion else ():
+    for name, symbol, required, unit in other_limits if source.is_motion else ():
         size = None if required is None else model.allowable(source, name, required)
         if name == row.binding_requirement:
-            size = row.allowable  # the search of the check began elsewhere: in the last digits it may differ
+            size = row.allowable  # the search of the check may differ in the last digits
         if required is None or size is None:
             continue
         if model.ends_image(source, size):
@@ -246,7 +250,7 @@ def _budget(analysis: Analysis, source: ErrorSource, row: Row) -> Iterator[Step]
 def _vibration_in_its_unit(
     mission: Mission, allocation: Allocation, row: Row, tone: SlowTone | None
 ) -> Iterator[Step]:
-    """The same of a line in metres; of one that the file states in g, with the way from there and back."""
+    """Steps of a vibration. A line that the file states in g is converted to metres and back."""
     lines = lines_of(mission, row.owner)
     entry = row.subject.entry or 0
     if row.unit == "m" or row.declared is None:
@@ -263,7 +267,7 @@ def _vibration_in_its_unit(
 
 
 def _vibration(mission: Mission, allocation: Allocation, row: Row, tone: SlowTone | None) -> Iterator[Step]:
-    """From the file to the limits of both models, for one line, lines near each other, or noise."""
+    """Steps of a vibration from the file to the limits of both models, for a line, near lines, or noise."""
     platform, entry = row.owner, row.subject.entry or 0
     is_sinusoid, is_sum = row.subject.axis != "wideband", row.subject.axis == "sinusoidal.sum"
     path: KeyPath = ("platforms", platform, "motion_error", "vibration", "sinusoidal" if is_sinusoid else "wideband")
@@ -273,7 +277,7 @@ def _vibration(mission: Mission, allocation: Allocation, row: Row, tone: SlowTon
         yield from _near_lines(mission, platform, entry, row.declared)
     else:
         path = (*path, entry, "amplitude") if is_sinusoid else (*path, "rms")
-        yield step(f"Declared in {place(mission, path)}", as_written(mission, path))
+        yield step(f"Declared in {location(mission, path)}", as_written(mission, path))
         if is_sinusoid:
             yield from _displacement(mission, platform, entry)
         if row.metric != QUADRATIC:
@@ -283,13 +287,13 @@ def _vibration(mission: Mission, allocation: Allocation, row: Row, tone: SlowTon
     wavelength, sizes = mission.radar.wavelength, dict[str, float]()
     if tone is not None and row.qpe_full_rad is not None:
         words = "By exact ranges, each axis in its worst phase, with what the displacement adds"
-        yield step(words, _of_axes("QPE_full", [one.quadratic for one in tone.declared.axes()]))
+        yield step(words, _of_axes("QPE_full", [phase.quadratic for phase in tone.declared.axes()]))
         if row.metric == QUADRATIC:
             yield from _slow_vibration(mission, allocation, row, tone)
             return
         axes = tone.declared.axes()
-        yield step("By either model", _of_axes("QPE", [one.quadratic for one in axes]))
-        yield step("Cubic phase likewise", _of_axes("cubic", [one.cubic for one in axes]))
+        yield step("By either model", _of_axes("QPE", [phase.quadratic for phase in axes]))
+        yield step("Cubic phase likewise", _of_axes("cubic", [phase.cubic for phase in axes]))
         judged = tone.declared.judged(allocation.autofocus_gain).item()
         yield from near_phases(mission, allocation, row, judged, sizes)
     by_echoes = row.metric == "pslr"
@@ -299,7 +303,7 @@ def _vibration(mission: Mission, allocation: Allocation, row: Row, tone: SlowTon
             yield smallest_of(row, sizes)
         return
     by_models = row.allowable_published, row.allowable_full
-    if sizes:  # by its echoes alone
+    if sizes:  # limits of the echoes alone
         limits = tone_limits(mission, allocation)[1][platform]
         by_models = float(limits.published), float(limits.full)
     name = row.metric.upper()
@@ -319,30 +323,30 @@ def _vibration(mission: Mission, allocation: Allocation, row: Row, tone: SlowTon
         *_limit("published", published, values, by_models[0], is_power=is_power),
     )
     if by_echoes:
-        part = amplitude_share(split, platform)
+        amplitude_part = amplitude_share(split, platform)
         shares = {"s_t": split.transmitter, "s_r": split.receiver}
         yield step(
             "Both platforms at one frequency: echoes add in amplitude, its part a",
-            WorkedEquation("a", notation.amplitude_share(platform), shares, part, ""),
+            WorkedEquation("a", notation.amplitude_share(platform), shares, amplitude_part, ""),
         )
         level = math.sqrt(ratio * (split.transmitter + split.receiver))
         values = {
-            "a": part,
+            "a": amplitude_part,
             "λ": wavelength,
             "φ": echo_phase(level),
         }
         title = "First principles; φ is the phase whose echoes have this level, J₁(φ)/J₀(φ) = l"
         powers = {"PSLR": ratio, "s_t": split.transmitter, "s_r": split.receiver}
-        known = [
+        definitions = [
             WorkedEquation("l", "sqrt(PSLR*(s_t + s_r))", powers, level, ""),
             WorkedEquation("φ", "", {}, values["φ"], "rad"),
         ]
     else:
         title = "First principles, independent on both platforms; a phase of σ rad has the ISLR (exp(σ²) − 1)/E"
         values = {**values, "E": mainlobe_energy(mission)}
-        known = []
+        definitions = []
     full = notation.FULL_VIBRATION[row.metric]
-    yield step(title, *known, *_limit("full", full, values, by_models[1], is_power=is_power))
+    yield step(title, *definitions, *_limit("full", full, values, by_models[1], is_power=is_power))
     sizes |= dict(zip(("published", "full"), by_models, strict=True))
     model = mission.gating_model
     chosen = ["published", "full"] if model == "strictest" else [model]
@@ -356,7 +360,7 @@ def _vibration(mission: Mission, allocation: Allocation, row: Row, tone: SlowTon
 def _limit(
     model: str, formula: str, values: Mapping[str, float], result: float, *, is_power: bool
 ) -> Iterator[WorkedEquation]:
-    """Limit of a vibration by a model; of a line that ISLR holds by its power, the amplitude of that rms value."""
+    """Limit of a vibration by a model. With `is_power` the limit is an rms value, which gives the amplitude."""
     if not is_power:
         yield WorkedEquation(model, formula, values, result, "m")
         return
@@ -366,11 +370,11 @@ def _limit(
 
 
 def _slow_vibration(mission: Mission, allocation: Allocation, row: Row, tone: SlowTone) -> Iterator[Step]:
-    """From the phases of a vibration below one cycle per aperture to the amplitude that they allow."""
+    """Steps from the phases of a vibration below one cycle per aperture to the amplitude that they allow."""
     axes, gain = tone.declared.axes(), allocation.autofocus_gain
-    yield step("By either model", _of_axes("QPE", [one.quadratic for one in axes]))
-    yield step("Cubic phase likewise", _of_axes("cubic", [one.cubic for one in axes]))
-    judged = _of_axes("judged", [one.judged(gain) for one in axes])
+    yield step("By either model", _of_axes("QPE", [phase.quadratic for phase in axes]))
+    yield step("Cubic phase likewise", _of_axes("cubic", [phase.cubic for phase in axes]))
+    judged = _of_axes("judged", [phase.judged(gain) for phase in axes])
     yield step("Judged: with gain times the phase of as much loss that band and turn do not resolve, squared", judged)
     limit, required = allocation.qpe_allowed(row.owner), mission.requirements
     yield from limit_steps(allocation, row.owner, limit)
@@ -396,52 +400,58 @@ def _slow_vibration(mission: Mission, allocation: Allocation, row: Row, tone: Sl
         "Part of the limit that the declared vibration uses", WorkedEquation("use", "judged/limit", values, use, "")
     )
     values = {"use": use, "allowable": sizes[smallest]}
-    what = "Declared, the amplitude along the line of sight that uses as much"
-    yield step(what, WorkedEquation("declared", "use*allowable", values, row.declared or 0.0, "m"))
+    title = "Declared, the amplitude along the line of sight that uses as much"
+    yield step(title, WorkedEquation("declared", "use*allowable", values, row.declared or 0.0, "m"))
 
 
 def _of_axes(symbol: str, phases: Sequence[Floats]) -> Sum:
-    """Sum of the phases of axes. [rad]"""
-    numbers = [one.item() for one in phases]
+    """Sum of the phases of all axes. [rad]"""
+    numbers = [phase.item() for phase in phases]
     return Sum(f"{symbol} = {' + '.join(map(number, numbers))} = {with_unit(math.fsum(numbers), 'rad')}")
 
 
 def _displacement(mission: Mission, platform: str, entry: int) -> Iterator[Step]:
-    """Amplitudes in metres of a line that the file states in g."""
+    """Steps to the amplitudes in metres of a line that the file states in g."""
     line = getattr(mission.platforms, platform).motion_error.vibration.sinusoidal[entry]
     if not isinstance(line, AcceleratedSinusoid):
         return
-    both = zip(
-        *((one if isinstance(one, tuple) else (one,)) for one in (line.amplitude, line.displacement)), strict=True
+    axes = zip(
+        *((size if isinstance(size, tuple) else (size,)) for size in (line.amplitude, line.displacement)), strict=True
     )
-    for amplitude, displacement in both:
+    for amplitude, displacement in axes:
         values = {"a": amplitude, "f": line.frequency}
         yield step("As a displacement", WorkedEquation("A", "a/(2*π*f)^2", values, displacement, "m"))
 
 
 def _line_of_sight(mission: Mission, platform: str, is_sinusoid: bool, entry: int, declared: float) -> Iterator[Step]:
-    """The part of a vibration along three axes in the line of sight; of any, in the range less the direct path."""
+    """Step to the component of a vibration along the line of sight, or in the range less the direct path."""
     vibration = getattr(mission.platforms, platform).motion_error.vibration
     value = vibration.sinusoidal[entry].displacement if is_sinusoid else vibration.wideband.rms
-    whither, is_vector = "Along the line of sight, as it turns, rms over the aperture", isinstance(value, tuple)
+    title, is_vector = "Along the line of sight, as it turns, rms over the aperture", isinstance(value, tuple)
     if mission.has_direct_path:
-        whither = "In the range less the direct path, as it turns, rms over the aperture"
+        title = "In the range less the direct path, as it turns, rms over the aperture"
     seen = seen_of_axes(mission, platform, is_vector=is_vector)
     if not is_vector:
         if mission.has_direct_path:
             text = f"{number(value)}*{number(seen[0])}"
-            yield step(whither, Sum(f"declared = {text} = {with_unit(declared, 'm')}"))
+            yield step(title, Sum(f"declared = {text} = {with_unit(declared, 'm')}"))
         return
-    parts = [f"{number(size)}*{number(along)}" for size, along in zip(value, seen, strict=True)]
+    products = [f"{number(size)}*{number(along)}" for size, along in zip(value, seen, strict=True)]
     if is_sinusoid:
-        text, how = " + ".join(f"|{part}|" for part in parts), "axes may vibrate in any phase: projections add"
+        text, rule = (
+            " + ".join(f"|{product}|" for product in products),
+            "axes may vibrate in any phase: projections add",
+        )
     else:
-        text, how = "sqrt(" + " + ".join(f"({part})^2" for part in parts) + ")", "independent axes: squares add"
-    yield step(f"{whither}, {how}", Sum(f"declared = {text} = {with_unit(declared, 'm')}"))
+        text, rule = (
+            "sqrt(" + " + ".join(f"({product})^2" for product in products) + ")",
+            "independent axes: squares add",
+        )
+    yield step(f"{title}, {rule}", Sum(f"declared = {text} = {with_unit(declared, 'm')}"))
 
 
 def _near_lines(mission: Mission, platform: str, index: int, total: float) -> Iterator[Step]:
-    """Lines near each other: what each adds where the echoes together are highest."""
+    """Step of lines near each other: the amplitude of each at the frequency with the highest sum of echoes."""
     lines, T = lines_of(mission, platform), mission.collection.aperture_time
     members = near_lines([line.frequency * T for line in lines])[index]
     near = [lines[member] for member in members]
@@ -457,25 +467,25 @@ def _near_lines(mission: Mission, platform: str, index: int, total: float) -> It
     yield step(title, f"declared = {sizes} = {total:.6g} m")
 
 
-def _phase_aggregate(together: Together, found: MissionFindings, row: Row) -> Iterator[Step]:
-    owner, is_pull_in, allocation = row.owner, row.subject.kind == "autofocus_pull_in", found.allocation
+def _phase_aggregate(together: Together, findings: MissionFindings, row: Row) -> Iterator[Step]:
+    owner, is_pull_in, allocation = row.owner, row.subject.kind == "autofocus_pull_in", findings.allocation
     members = together.owed(allocation.qpe, owner)
     if is_pull_in:
-        parts = together.phase_parts(quadratics(members), "sum")
-        yield from combined("QPE of the declared errors", "sum", parts, row.declared)
+        sizes_by_name = together.phase_parts(quadratics(members), "sum")
+        yield from combined("QPE of the declared errors", "sum", sizes_by_name, row.declared)
         values = {"N_pull": allocation.n_pull or 0.0}
         worked = WorkedEquation("allowable", "π*N_pull", values, row.allowable or 0.0, "rad")
         yield step("What autofocus corrects, Section VI", worked)
         return
-    rule, gain = found.combine, allocation.autofocus_gain
+    rule, gain = findings.combine, allocation.autofocus_gain
     title = (
         "Quadratic phase of equal loss of the declared errors"
         if row.model == "full"
         else "QPE of the declared errors"
     )
     if gain == 1 or rule == "each" or row.model != "full":
-        parts = together.phase_parts(together.judged_parts(members), rule)
-        yield from combined(title, rule, parts, row.declared)
+        sizes_by_name = together.phase_parts(together.judged_parts(members), rule)
+        yield from combined(title, rule, sizes_by_name, row.declared)
         yield from limit_steps(allocation, owner, row.allowable or 0.0)
         return
     yield from combined(
@@ -493,83 +503,83 @@ def _phase_aggregate(together: Together, found: MissionFindings, row: Row) -> It
         yield step("Of the phase of equal loss so much is allowed as reaches the limit", worked)
 
 
-def _cubic_aggregate(together: Together, found: MissionFindings, row: Row) -> Iterator[Step]:
-    parts = together.phase_parts(cubics(together.phases))
-    yield from combined("Cubic phase of the declared errors", found.combine, parts, row.declared)
+def _cubic_aggregate(together: Together, findings: MissionFindings, row: Row) -> Iterator[Step]:
+    sizes_by_name = together.phase_parts(cubics(together.phases))
+    yield from combined("Cubic phase of the declared errors", findings.combine, sizes_by_name, row.declared)
     if row.allowable is not None:
         yield step("Allowable", f"requirements.cubic_phase_error = {row.allowable:.6g} rad")
 
 
-def _dispersion(analysis: Analysis, found: MissionFindings, row: Row) -> Iterator[Step]:
-    """Quadratic phase over the band of each leg, and of both."""
+def _dispersion(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterator[Step]:
+    """Steps to the quadratic phase over the band of each leg and of both legs."""
     mission = analysis.mission
     legs = dispersed_legs(mission, mission.geometry)
     for name, phase in legs.items():
         path, propagation = getattr(mission.geometry, name), mission.propagation
         if propagation is None:
             continue
-        content = propagation.content(name) * found.coverage_factor
+        content = propagation.content(name) * findings.coverage_factor
         values = {
             "K": ELECTRON_DELAY_M3_PER_S2 * content * float(leg_factor(CONTENT, path.position, path.position)),
             "c": SPEED_OF_LIGHT,
             "f_0": mission.radar.center_frequency,
             "B": mission.radar.bandwidth,
         }
-        declared_at = place(mission, propagation.path(name, CONTENT))
+        declared_at = location(mission, propagation.path(name, CONTENT))
         yield step(f"Declared in {declared_at}, on the leg of the {name}", f"content = {content:.6g}/m²")
         yield step(
             f"Quadratic phase at the edges of the band, K = 40.308 m³/s² · content along the leg of the {name}",
             WorkedEquation(f"phase_{name[0]}", "2*π*K/(c*f_0)*(B/(2*f_0))^2", values, float(phase), "rad"),
         )
     is_one_air = mission.propagation is not None and mission.propagation.is_one_air
-    rule = "sum" if is_one_air else found.combine  # of one air the legs add
+    rule = "sum" if is_one_air else findings.combine  # delays in the same air add
     yield from combined("Both legs", rule, [(name, float(phase)) for name, phase in legs.items()], row.declared)
     yield step("Allowable: all of the requirement, without share and gain", f"allowable = {row.allowable:.6g} rad")
 
 
-def _spatial_variance(analysis: Analysis, found: MissionFindings, row: Row) -> Iterator[Step]:
-    """Phases at the centre and at the worst place of the scene's edge, and the largest difference."""
-    scene = found.scene
+def _spatial_variance(analysis: Analysis, findings: MissionFindings, row: Row) -> Iterator[Step]:
+    """Steps to the largest difference of phases between the centre and the edge of the scene."""
+    scene = findings.scene
     if scene is None or scene.degeneracy or row.declared is None:
         return
     east, north = at(scene.radius, scene.azimuth)
     differences = differences_at(analysis.errors, scene.radius, scene.azimuth, analysis.random)
-    parts = phase_parts(differences, found.combine, analysis.groups)
+    sizes_by_name = phase_parts(differences, findings.combine, analysis.groups)
     yield step(
         f"Full model at the scene’s edge, {east:.6g} m east, {north:.6g} m north of the centre, less at the centre"
     )
-    yield from combined("Difference of QPE of the declared errors", found.combine, parts, row.declared)
-    yield step("Budget of what one autofocus correction leaves", f"total = {found.allocation.qpe_total:.6g} rad")
+    yield from combined("Difference of QPE of the declared errors", findings.combine, sizes_by_name, row.declared)
+    yield step("Budget of what one autofocus correction leaves", f"total = {findings.allocation.qpe_total:.6g} rad")
 
 
-def _location_aggregate(mission: Mission, together: Together, found: MissionFindings, row: Row) -> Iterator[Step]:
-    rule = "the longest sum over all signs of the vectors" if found.combine == "sum" else RULES[found.combine]
-    parts = together.displacement_parts()
+def _location_aggregate(mission: Mission, together: Together, findings: MissionFindings, row: Row) -> Iterator[Step]:
+    rule = "the longest sum over all signs of the vectors" if findings.combine == "sum" else RULES[findings.combine]
+    moves = together.displacement_parts()
     title = "(25), (30)" if row.model == "published" else "Full model, each by the sign that moves farther"
-    if found.combine == "sum":
+    if findings.combine == "sum":
         wander = dict(together.undirected_moves)
         vectors = [
             f"{printable(name)}: {with_unit(math.hypot(x, y), 'm')} whichever way"
             if name in wander
             else f"{printable(name)}: {with_unit(x, 'm')} east, {with_unit(y, 'm')} north"
-            for name, (x, y) in parts
+            for name, (x, y) in moves
         ]
         longest = [] if row.declared is None else [f"combined = {row.declared:.6g} m"]
         yield step(f"{title}: displacements, {rule}", *(vectors or ["none"]), *longest)
     else:
-        lengths = [(name, math.hypot(*move)) for name, move in parts]
+        lengths = [(name, math.hypot(*move)) for name, move in moves]
         title = f"{title}: displacement of the declared errors"
-        yield from combined(title, found.combine, lengths, row.declared, unit="m")
+        yield from combined(title, findings.combine, lengths, row.declared, unit="m")
     if row.allowable is not None:
-        where = place(mission, ("requirements", "location_error"))
-        yield step("Allowable", f"requirements.location_error = {row.allowable:.6g} m, {where}")
+        key_location = location(mission, ("requirements", "location_error"))
+        yield step("Allowable", f"requirements.location_error = {row.allowable:.6g} m, {key_location}")
 
 
-def _verdict(row: Row, found: MissionFindings) -> Iterator[str]:
+def _verdict(row: Row, findings: MissionFindings) -> Iterator[str]:
     yield ""
     texts = [text for text in (row.reason, *row.notes) if text]
-    declared = "" if row.declared is None else f", declared {row_size(row.declared, row, found)}"
-    allowable = "" if row.allowable is None else f", allowable {row_limit(row, found)}"
+    declared = "" if row.declared is None else f", declared {row_size(row.declared, row, findings)}"
+    allowable = "" if row.allowable is None else f", allowable {row_limit(row, findings)}"
     yield f"{STATUS[row.status].text}{declared}{allowable}"
     yield from (f"    {printable(text)}" for text in texts)
 
@@ -577,41 +587,41 @@ def _verdict(row: Row, found: MissionFindings) -> Iterator[str]:
 _EFFECTS = {"cubic": "Cubic phase", "spread": "Rms phase that spreads", "tone": "Peak phase of the tones"}
 
 
-def finding_of(mission: Mission, found: MissionFindings, one: JudgedRequirement) -> Iterator[Step]:
-    """Where a requirement stands in the file, and the rows that judge it."""
-    path = ("requirements", one.key)
-    if one.key == DECLARE:
+def finding_of(mission: Mission, findings: MissionFindings, requirement: JudgedRequirement) -> Iterator[Step]:
+    """Steps with the line of a requirement in the file, and the rows that judge it."""
+    path = ("requirements", requirement.key)
+    if requirement.key == DECLARE:
         yield from _asked_for(mission)
-    elif one.is_default:
+    elif requirement.is_default:
         yield step("The file does not state it: the default")
     else:
-        yield step(f"Required in {place(mission, path)}", as_written(mission, path))
-    judging = [row for row in found.rows if row.id in one.rows]
+        yield step(f"Required in {location(mission, path)}", as_written(mission, path))
+    judging = [row for row in findings.rows if row.id in requirement.rows]
     width = max((len(row.id) for row in judging), default=0)
-    listed = [
+    lines = [
         f"{printable(row.id):<{width}}  {STATUS[row.status].text}"
         + ("" if row.utilization is None else f", {percent(row.utilization)}")
         for row in judging
     ]
-    yield step("Rows that judge it", *(listed or ["none"]))
+    yield step("Rows that judge it", *(lines or ["none"]))
 
 
 def declarations(mission: Mission) -> Iterator[Step]:
-    """The errors that must be declared, and those of them that the file lacks."""
+    """Steps with the errors that must be declared, and those that the file lacks."""
     yield from _asked_for(mission)
-    missing = [one.lacks or one.key for one in missing_declarations(mission)]
-    yield step("Not in the file", *(missing or ["nothing: all of it is declared"]))
+    missing_keys = [declaration.lacks or declaration.key for declaration in missing_declarations(mission)]
+    yield step("Not in the file", *(missing_keys or ["nothing: all of it is declared"]))
 
 
 def _asked_for(mission: Mission) -> Iterator[Step]:
     asked = ", ".join(mission.requirements.declare)
-    yield step(f"Required in {place(mission, ('requirements', 'declare'))}", f"requirements.declare: [{asked}]")
+    yield step(f"Required in {location(mission, ('requirements', 'declare'))}", f"requirements.declare: [{asked}]")
 
 
-def not_judged(found: MissionFindings, row: Row) -> Iterator[Step]:
-    """Numbers behind what could not be judged: an effect, a path in doubt, a place that is not known."""
-    analysis = found.analysed()
-    mission, reason = analysis.mission, _reason(found, row)
+def not_judged(findings: MissionFindings, row: Row) -> Iterator[Step]:
+    """Steps behind a row that could not be judged: an effect, a path in doubt, or an unknown displacement."""
+    analysis = findings.analysed()
+    mission, reason = analysis.mission, _reason(findings, row)
     if reason is None:
         return
     code = reason.code
@@ -624,13 +634,13 @@ def not_judged(found: MissionFindings, row: Row) -> Iterator[Step]:
     elif code == "air-stays":
         yield _air_that_changes(reason)
     else:
-        for one in untaken_effects(analysis):
-            if row.id in one.makers and one.makers[row.id][0]:
-                yield from _untaken(analysis, row, one)
+        for effect in untaken_effects(analysis):
+            if row.id in effect.makers and effect.makers[row.id][0]:
+                yield from _untaken(analysis, row, effect)
 
 
 def _air_that_changes(reason: Note) -> Step:
-    """Effect of delays that stay, as if they changed, and its share of what is allowed."""
+    """Step of constant delays in the air: their effect as if they changed, and its share of the allowable."""
     values: Sequence[Any] = reason.values
     _, correlation_time, key, size, use, _ = values
     unit = {"islr": "dB", LOCATION: "m"}.get(key, "rad")
@@ -640,27 +650,29 @@ def _air_that_changes(reason: Note) -> Step:
     )
 
 
-def _reason(found: MissionFindings, row: Row) -> Note | None:
-    """Why a row is not judged, or the requirement that is the mission's own row of it."""
+def _reason(findings: MissionFindings, row: Row) -> Note | None:
+    """Reason why a row, or the requirement with the same id, is not judged; None if it is judged."""
     if row.status in ("not_evaluated", "waived"):
         return row.reason
     if row.status == "not_declared":
-        for one in found.requirements:
-            if one.id == row.id and one.status in ("not_evaluated", "waived"):
-                return one.reason
+        for requirement in findings.requirements:
+            if requirement.id == row.id and requirement.status in ("not_evaluated", "waived"):
+                return requirement.reason
     return None
 
 
-def _untaken(analysis: Analysis, row: Row, one: UntakenEffect) -> Iterator[Step]:
-    """How large an effect is that no requirement takes, what would be negligible, and the part of a row."""
-    kind = one.kind
+def _untaken(analysis: Analysis, row: Row, untaken: UntakenEffect) -> Iterator[Step]:
+    """Steps of an effect that no requirement judges: its size, the negligible size, and the size of a row in it."""
+    kind = untaken.kind
     totals = []
     for model in analysis.gates:
-        together, parts = analysis.together(model), effect_parts(analysis, model)[kind]
+        together, sizes_by_name = analysis.together(model), effect_parts(analysis, model)[kind]
         rule = together.rule_of_all
-        totals.append((float(together.combined(parts, rule)[0]), rule, together.phase_parts(parts, rule)))
-    total, rule, parts = max(totals, key=lambda found: found[0])
-    yield from combined(f"{_EFFECTS[kind]}: no requirement takes it", rule, parts, total, symbol="total")
+        totals.append(
+            (float(together.combined(sizes_by_name, rule)[0]), rule, together.phase_parts(sizes_by_name, rule))
+        )
+    total, rule, sizes_by_name = max(totals, key=lambda candidate: candidate[0])
+    yield from combined(f"{_EFFECTS[kind]}: no requirement takes it", rule, sizes_by_name, total, symbol="total")
     required = analysis.mission.requirements.quadratic_phase_error
     values = {"required": required}
     level = min(NEGLIGIBLE_FRACTION * required, SMALL_RAD)
@@ -670,33 +682,35 @@ def _untaken(analysis: Analysis, row: Row, one: UntakenEffect) -> Iterator[Step]
     yield step(
         "Below a tenth of requirements.quadratic_phase_error and below 0.08 rad it would be negligible", worked
     )
-    largest, own = max(float(size[0]) for size in one.parts.values()), float(one.parts[row.id][0])
-    count = sum(float(size[0]) > 0 for size in one.parts.values())
+    largest, row_size_rad = max(float(size[0]) for size in untaken.parts.values()), float(untaken.parts[row.id][0])
+    count = sum(float(size[0]) > 0 for size in untaken.parts.values())
     values = {"largest": largest, "negligible": level}
     worked = WorkedEquation(
-        "least", f"min({MAKER_FRACTION:g}*largest, negligible/{count})", values, float(one.least[0]), "rad"
+        "least", f"min({MAKER_FRACTION:g}*largest, negligible/{count})", values, float(untaken.least[0]), "rad"
     )
     title = (
         "Parts of at least a tenth of the largest make it up, and smaller ones that together would not be negligible"
     )
-    yield step(f"{title}; this row’s is {with_unit(own, 'rad')}", worked)
+    yield step(f"{title}; this row’s is {with_unit(row_size_rad, 'rad')}", worked)
 
 
 def _path_in_doubt(mission: Mission, row: Row) -> Iterator[Step]:
-    """How far a path may be from the truth, and the position errors that the file declares of it."""
-    for one in input_doubts(mission):
-        if row.owner != "mission" and not is_in_doubt(row.subject, one.owner, mission, one.kind):
+    """Steps of a path in doubt: its possible error, and the position errors that the file declares."""
+    for doubt in input_doubts(mission):
+        if row.owner != "mission" and not is_in_doubt(row.subject, doubt.owner, mission, doubt.kind):
             continue
-        if one.is_stated:
-            yield _stated_by_source(one)
+        if doubt.is_stated:
+            yield _stated_by_source(doubt)
             continue
-        if one.is_of_log:
-            yield _of_log(one)
+        if doubt.is_of_log:
+            yield _of_log(doubt)
             continue
-        platform: Platform = getattr(mission.platforms, one.owner)
+        platform: Platform = getattr(mission.platforms, doubt.owner)
         error, path = platform.motion_error, platform.path
-        said = f": {printable(path.doubt_of)}" if path is not None and path.doubt_of else ""
-        yield step(f"How far the {one.owner}’s path may be off{said}", f"doubt = {with_unit(one.doubt, 'm')}")
+        doubt_words = f": {printable(path.doubt_of)}" if path is not None and path.doubt_of else ""
+        yield step(
+            f"How far the {doubt.owner}’s path may be off{doubt_words}", f"doubt = {with_unit(doubt.doubt, 'm')}"
+        )
         declared = declared_position_error(error)
         if declared is None:
             yield step("It declares no position error")
@@ -707,29 +721,31 @@ def _path_in_doubt(mission: Mission, row: Row) -> Iterator[Step]:
         yield step("Position errors that it declares, without coverage factor: less than the doubt", line)
 
 
-def _of_log(one: InputDoubt) -> Step:
-    """Residual of a log, or the step of its fixes, beside the most that may go unsaid."""
-    if one.kind == RESIDUAL:
-        title = f"Phase that the smooth path leaves of the {one.owner}’s log along the line of sight, rms"
-        return step(title, f"left = {with_unit(one.doubt, 'rad')}", f"most = {with_unit(one.declared, 'rad')}")
-    title = f"The step to which the {one.owner}’s log writes its fixes, beside the declared position error"
-    most = MOST_GRID_SHARE * one.declared
-    return step(title, f"step = {with_unit(one.doubt, 'm')}", f"most = a tenth of it = {with_unit(most, 'm')}")
+def _of_log(doubt: InputDoubt) -> Step:
+    """Step with the residual of a log or the resolution of its fixes, and the largest negligible value."""
+    if doubt.kind == RESIDUAL:
+        title = f"Phase that the smooth path leaves of the {doubt.owner}’s log along the line of sight, rms"
+        return step(title, f"left = {with_unit(doubt.doubt, 'rad')}", f"most = {with_unit(doubt.declared, 'rad')}")
+    title = f"The step to which the {doubt.owner}’s log writes its fixes, beside the declared position error"
+    largest = MOST_GRID_SHARE * doubt.declared
+    return step(title, f"step = {with_unit(doubt.doubt, 'm')}", f"most = a tenth of it = {with_unit(largest, 'm')}")
 
 
-def _stated_by_source(one: InputDoubt) -> Step:
-    """The error that the source of a path states, and the declared one along the same axis."""
-    unit = MOTION_UNITS[one.kind]
-    title = f"The {one.kind} error that the source of the {one.owner}’s path states exceeds the declared one"
-    return step(title, f"stated = {with_unit(one.doubt, unit)}", f"declared = {with_unit(one.declared, unit)}")
+def _stated_by_source(doubt: InputDoubt) -> Step:
+    """Step with the error that the source of a path states, and the declared error along the same axis."""
+    unit = MOTION_UNITS[doubt.kind]
+    title = f"The {doubt.kind} error that the source of the {doubt.owner}’s path states exceeds the declared one"
+    return step(title, f"stated = {with_unit(doubt.doubt, unit)}", f"declared = {with_unit(doubt.declared, unit)}")
 
 
 def _displacing(analysis: Analysis, row: Row) -> Iterator[Step]:
-    """Phases of the clocks that move the image by an amount that the file leaves open."""
+    """Step with the phases of clocks whose displacement of the image is unknown."""
     model, lines = row.model or "published", []
     names = {error.id for error in analysis.random if error.displaces_unknown}
-    for one in analysis.together(model).own:
-        if one.row_id in names:
-            qpe, cubic = (with_unit(float(phase[0]), "rad") for phase in (one.qpe_rad, one.cubic_rad))
-            lines.append(f"{printable(one.row_id)}: QPE {qpe}, cubic {cubic}")
+    for contribution in analysis.together(model).own:
+        if contribution.row_id in names:
+            qpe, cubic = (
+                with_unit(float(phase[0]), "rad") for phase in (contribution.qpe_rad, contribution.cubic_rad)
+            )
+            lines.append(f"{printable(contribution.row_id)}: QPE {qpe}, cubic {cubic}")
     yield step("Not in the displacement, by an amount that is not computed", *lines)

@@ -1,8 +1,8 @@
-"""Steps and formulas that an explanation writes, as text with numbers put in, as MathML and as LaTeX.
+"""Steps and formulas of an explanation, as text with numbers, as MathML and as LaTeX.
 
-The derivation has most formulas in one piece, and `catalogue` has those typeset. What an explanation adds in
-between (a projection on an axis, a sum over both platforms) is plain text in the same notation: + - * / ^,
-brackets, | |, sqrt and log, and symbols such as β̃_2.
+`catalogue` has the formulas of the derivation typeset. Formulas that only explanations have, such as a projection on
+an axis or a sum over both platforms, are plain text in the same notation: + - * / ^, brackets, | |, sqrt and log, and
+symbols such as β̃_2.
 """
 
 import re
@@ -17,7 +17,7 @@ from bisar_budget.report.words.sentences import xml_text
 _TOKEN = re.compile(r"\s*(\d+(?:\.\d+)?|det Q|[^\W\d_][\w\u0300-\u036f\u20d0-\u20ff]*|[-+*/^()|])")
 _LETTER = re.compile(r"(?:adj|[^\W\d_][\u0300-\u036f\u20d0-\u20ff]*)(?:_\w+)?")
 _FUNCTIONS = ("sqrt", "log")
-_ABOVE = {
+_ACCENTS = {
     "\u0303": ("tilde", "~"),
     "\u0304": ("bar", "¯"),
     "\u0302": ("hat", "^"),
@@ -30,17 +30,20 @@ _GREEK = {"β": r"\beta", "λ": r"\lambda", "π": r"\pi", "φ": r"\phi", "θ": r
 
 
 class Node(NamedTuple):
-    """Part of a formula: an operation on other parts, or a name or number."""
+    """Node of a formula: an operation on its children, or a leaf with a name or a number."""
 
     kind: str
-    parts: tuple["Node", ...] = ()
+    children: tuple["Node", ...] = ()
     text: str = ""
 
 
 class Language(NamedTuple):
-    """How to write each operation; `%s` stands for its parts. `place` is where the catalogue has this language."""
+    """Templates of the operations in a language, with `%s` for each child.
 
-    place: int
+    `catalogue_index` is the index of this language in the entries of the catalogue.
+    """
+
+    catalogue_index: int
     number: str
     negative: str
     power_of_ten: str
@@ -58,7 +61,7 @@ class Language(NamedTuple):
 
 
 MATHML = Language(
-    place=1,
+    catalogue_index=1,
     number="<mn>%s</mn>",
     negative="<mrow><mo>−</mo>%s</mrow>",
     power_of_ten="<mrow>%s<mo>·</mo><msup><mn>10</mn>%s</msup></mrow>",
@@ -75,7 +78,7 @@ MATHML = Language(
     minus="−",
 )
 LATEX = Language(
-    place=0,
+    catalogue_index=0,
     number="%s",
     negative="-%s",
     power_of_ten=r"%s \cdot 10^{%s}",
@@ -95,7 +98,7 @@ LATEX = Language(
 
 @lru_cache(maxsize=256)
 def is_mathematical(formula: str) -> bool:
-    """Whether all its symbols are letters: a budget times a share reads better in words."""
+    """Whether all symbols of a formula are letters. Other formulas, such as budget times share, stay in words."""
     try:
         parsed(formula)
     except ValueError:
@@ -106,82 +109,82 @@ def is_mathematical(formula: str) -> bool:
 
 @lru_cache(maxsize=256)
 def parsed(formula: str) -> Node:
-    """Read a formula.
+    """Parse a formula.
 
     Raises
     ------
     ValueError
-        It is no formula in this notation.
+        The text is no formula in this notation.
     """
     tokens = [match[1] for match in _TOKEN.finditer(formula)]
     if "".join(tokens).replace(" ", "") != formula.replace(" ", ""):
         raise ValueError(f"not a formula: {formula}")
-    node, rest = _sum(tuple(tokens))
-    if rest:
+    node, remaining = _sum(tuple(tokens))
+    if remaining:
         raise ValueError(f"not a formula: {formula}")
     return node
 
 
-def written(formula: str, language: Language, numbers: Mapping[str, str] | None = None) -> str:
-    """Write a formula, `numbers` for the names that it has.
+def formula_text(formula: str, language: Language, numbers: Mapping[str, str] | None = None) -> str:
+    """Write a formula in a language, with `numbers` in place of names.
 
     Raises
     ------
     ValueError
-        It is no formula in this notation.
+        The text is no formula in this notation.
     """
 
-    def write(part: Node) -> str:
-        cells = tuple(write(inner) for inner in part.parts)
-        if part.kind == "leaf":
-            if part.text[0].isdigit():
-                return language.number % part.text
-            return numbers[part.text] if numbers and part.text in numbers else symbol(part.text, language)
-        if part.kind == "+":
+    def write(node: Node) -> str:
+        cells = tuple(write(child) for child in node.children)
+        if node.kind == "leaf":
+            if node.text[0].isdigit():
+                return language.number % node.text
+            return numbers[node.text] if numbers and node.text in numbers else symbol(node.text, language)
+        if node.kind == "+":
             return language.row % "".join(cells)
-        if part.kind == "*":
+        if node.kind == "*":
             return language.row % (language.times if numbers is None else language.dot).join(cells)
-        if part.kind in ("plus", "minus"):
-            sign = language.operator % ("+" if part.kind == "plus" else language.minus)
-            return (sign.lstrip() if part.text else sign) + cells[0]
-        if part.kind == "power" and ("<msup>" in cells[0] or "cdot" in cells[0]):
-            return language.power % (language.brackets % cells[0], cells[1])  # of a power of ten
-        if part.kind == "/":
-            return language.fraction % tuple(write(_bare(inner)) for inner in part.parts)
-        return str(getattr(language, part.kind) % cells)
+        if node.kind in ("plus", "minus"):
+            sign = language.operator % ("+" if node.kind == "plus" else language.minus)
+            return (sign.lstrip() if node.text else sign) + cells[0]
+        if node.kind == "power" and ("<msup>" in cells[0] or "cdot" in cells[0]):
+            return language.power % (language.brackets % cells[0], cells[1])  # a power of ten in the base
+        if node.kind == "/":
+            return language.fraction % tuple(write(_bare(child)) for child in node.children)
+        return str(getattr(language, node.kind) % cells)
 
     return write(parsed(formula))
 
 
 def symbol(name: str, language: Language) -> str:
-    """Set a symbol: its letter with what stands above it, and its subscript."""
+    """Typeset a symbol: its letter with accents, and its subscript."""
     if name in SYMBOLS:
-        return SYMBOLS[name][language.place]
+        return SYMBOLS[name][language.catalogue_index]
     head, _, below = name.partition("_")
     spelled = normalize("NFD", head)
     letter, *accents = tuple(spelled) if len(normalize("NFC", head)) == 1 or combining(spelled[1]) else (head,)
     if language is LATEX:
         text = _GREEK.get(letter, letter) if len(letter) == 1 else rf"\mathrm{{{letter}}}"
         for accent in accents:
-            text = rf"\{_ABOVE[accent][0]}{{{text}}}"
+            text = rf"\{_ACCENTS[accent][0]}{{{text}}}"
         word = below if len(below) < 3 else rf"\mathrm{{{below}}}"
         return f"{text}_{{{word}}}" if below else text
     text = f"<mi>{letter}</mi>"
     for accent in accents:
-        text = f'<mover accent="true">{text}<mo>{_ABOVE[accent][1]}</mo></mover>'
+        text = f'<mover accent="true">{text}<mo>{_ACCENTS[accent][1]}</mo></mover>'
     tag = "mn" if below.isdigit() else "mi"
     return f"<msub>{text}<{tag}>{below}</{tag}></msub>" if below else text
 
 
 def _bare(node: Node) -> Node:
-    """The node without its brackets, which nothing over or under a line needs."""
-    return node.parts[0] if node.kind == "brackets" else node
+    """The node without its outer brackets, which numerators and denominators do not need."""
+    return node.children[0] if node.kind == "brackets" else node
 
 
-_Read = tuple[Node, tuple[str, ...]]
+_ParsedPart = tuple[Node, tuple[str, ...]]
 
 
-def _sum(tokens: tuple[str, ...]) -> _Read:
+def _sum(tokens: tuple[str, ...]) -> _ParsedPart:
     terms: list[Node] = []
     if tokens[:1] == ("-",):
         first, tokens = _product(tokens[1:])
@@ -193,21 +196,21 @@ def _sum(tokens: tuple[str, ...]) -> _Read:
         kind = "plus" if tokens[0] == "+" else "minus"
         term, tokens = _product(tokens[1:])
         terms.append(Node(kind, (term,)))
-    is_one = len(terms) == 1 and terms[0].kind != "minus"
-    return (terms[0] if is_one else Node("+", tuple(terms))), tokens
+    is_single = len(terms) == 1 and terms[0].kind != "minus"
+    return (terms[0] if is_single else Node("+", tuple(terms))), tokens
 
 
-def _product(tokens: tuple[str, ...]) -> _Read:
+def _product(tokens: tuple[str, ...]) -> _ParsedPart:
     node, tokens = _power(tokens)
     while tokens[:1] in (("*",), ("/",)):
         operator = tokens[0]
         factor, tokens = _power(tokens[1:])
-        both = (*node.parts, factor) if operator == "*" == node.kind else (node, factor)
-        node = Node(operator, both)
+        factors = (*node.children, factor) if operator == "*" == node.kind else (node, factor)
+        node = Node(operator, factors)
     return node, tokens
 
 
-def _power(tokens: tuple[str, ...]) -> _Read:
+def _power(tokens: tuple[str, ...]) -> _ParsedPart:
     base, tokens = _atom(tokens)
     if tokens[:1] == ("^",):
         exponent, tokens = _atom(tokens[1:])
@@ -215,25 +218,25 @@ def _power(tokens: tuple[str, ...]) -> _Read:
     return base, tokens
 
 
-def _atom(tokens: tuple[str, ...]) -> _Read:
+def _atom(tokens: tuple[str, ...]) -> _ParsedPart:
     if not tokens:
         raise ValueError("a formula ends too early")
-    token, rest = tokens[0], tokens[1:]
-    if token in _FUNCTIONS and rest[:1] == ("(",):
-        inner, rest = _closed(rest[1:], ")")
-        return Node(token, (inner,)), rest
+    token, remaining = tokens[0], tokens[1:]
+    if token in _FUNCTIONS and remaining[:1] == ("(",):
+        inner, remaining = _closed(remaining[1:], ")")
+        return Node(token, (inner,)), remaining
     if token == "(":
-        inner, rest = _closed(rest, ")")
-        return Node("brackets", (inner,)), rest
+        inner, remaining = _closed(remaining, ")")
+        return Node("brackets", (inner,)), remaining
     if token == "|":
-        inner, rest = _closed(rest, "|")
-        return Node("bars", (inner,)), rest
+        inner, remaining = _closed(remaining, "|")
+        return Node("bars", (inner,)), remaining
     if token in "+-*/^)":
         raise ValueError(f"{token} out of place")
-    return Node("leaf", text=token), rest
+    return Node("leaf", text=token), remaining
 
 
-def _closed(tokens: tuple[str, ...], end: str) -> _Read:
+def _closed(tokens: tuple[str, ...], end: str) -> _ParsedPart:
     inner, tokens = _sum(tokens)
     if tokens[:1] != (end,):
         raise ValueError(f"{end} is missing")
@@ -245,7 +248,7 @@ _LETTERS = {"position": "p\u0303", "velocity": "ṽ", "acceleration": "ã"}
 EDGE_PHASE = TEXTS["edge phase"]
 CLOCK_PHASE = TEXTS["Table II t̃_2 0"]
 VIBRATION = {"pslr": TEXTS["Vibration A 1"], "islr": TEXTS["Vibration σ 1"]}
-# From first principles; of a sinusoid φ is the phase of the echoes that both platforms may make.
+# From first principles. For a sinusoid φ is the phase whose echoes reach the limit of both platforms.
 FULL_VIBRATION = {"pslr": TEXTS["echoes"], "islr": TEXTS["noise"]}
 AUTOFOCUS_GAIN = TEXTS["autofocus gain"]
 SMEAR = (TEXTS["smear east"], TEXTS["smear north"])
@@ -265,7 +268,7 @@ def motion_coefficients(kind: str, axis: str, platform: str) -> dict[int, str]:
 
 
 def motion_phase(kind: str, axis: str, platform: str) -> str | None:
-    """Cell of Table II; None for a position error, which has none."""
+    """Cell of Table II; None for a position error, which has no quadratic phase."""
     return TEXTS.get(f"Table II {motion_symbol(kind, axis, platform)} 0")
 
 
@@ -275,17 +278,20 @@ def clock_coefficient(order: int) -> str:
 
 
 def inertial_phases(symbol: str) -> tuple[str, ...]:
-    """Quadratic phase, cubic phase and what is left of one unit of a figure of an inertial sensor; empty: none."""
-    return tuple(TEXTS.get(f"Inertial sensors {symbol} {part}", "") for part in range(3))
+    """Formulas of the quadratic phase, cubic phase and remainder of a unit of an inertial sensor's figure.
+
+    A formula is empty if the figure has no such phase.
+    """
+    return tuple(TEXTS.get(f"Inertial sensors {symbol} {order}", "") for order in range(3))
 
 
 def amplitude_share(platform: str) -> str:
-    """Part of a platform in an amplitude that both make."""
+    """Formula of the share of a platform in an amplitude of both platforms."""
     return TEXTS[f"amplitude share {platform[0]}"]
 
 
 class WorkedEquation(NamedTuple):
-    """A formula as text, and what it gives for values of its symbols; an empty formula: the result is known."""
+    """A formula as text, the values of its symbols and its result. A known result has an empty formula."""
 
     symbol: str
     formula: str
@@ -295,7 +301,7 @@ class WorkedEquation(NamedTuple):
 
     @property
     def lines(self) -> tuple[str, ...]:
-        """The formula, and under it the same with numbers; their equals signs stand above each other."""
+        """The formula, and below it the formula with numbers and the result, with aligned equals signs."""
         if not self.formula:
             return (f"{self.symbol} = {with_unit(self.result, self.unit)}",)
         margin = " " * sum(not combining(letter) for letter in self.symbol)
@@ -304,32 +310,32 @@ class WorkedEquation(NamedTuple):
 
 
 class Sum(str):
-    """Text that is a sum with its numbers, and nothing of the user's own."""
+    """Text of a sum with its numbers, without any text of the user."""
 
     __slots__ = ()
 
 
 class Step(NamedTuple):
-    """One step of an explanation: what it is or where it stands, and the equations or texts under it."""
+    """One step of an explanation: a title, and the equations or texts below it."""
 
     title: str
-    parts: tuple[WorkedEquation | str, ...] = ()
+    body: tuple[WorkedEquation | str, ...] = ()
 
     @property
     def lines(self) -> Iterator[str]:
-        """The title, what belongs to it indented."""
+        """The title, and the indented lines below it."""
         yield self.title
-        for part in self.parts:
-            yield from (f"    {line}" for line in (part.lines if isinstance(part, WorkedEquation) else (part,)))
+        for item in self.body:
+            yield from (f"    {line}" for line in (item.lines if isinstance(item, WorkedEquation) else (item,)))
 
 
-def step(title: str, *parts: WorkedEquation | str) -> Step:
-    """One step of an explanation with what stands under its title."""
-    return Step(title, parts)
+def step(title: str, *body: WorkedEquation | str) -> Step:
+    """One step of an explanation with the equations or texts below its title."""
+    return Step(title, body)
 
 
 def filled(formula: str, values: Mapping[str, float]) -> str:
-    """Put numbers for the symbols, six digits each; negative ones in brackets."""
+    """Replace the symbols of a formula by numbers of six digits, negative numbers in brackets."""
     names = sorted(values, key=len, reverse=True)
     # A symbol ends where no letter, digit or accent follows: v_x is not the start of v_xt.
     pattern = re.compile(r"(?<![\w\u0300-\u036f])(?:" + "|".join(map(re.escape, names)) + r")(?![\w\u0300-\u036f])")
@@ -337,7 +343,7 @@ def filled(formula: str, values: Mapping[str, float]) -> str:
 
 
 def number(value: float) -> str:
-    """Six digits, so that a reader can repeat the sum."""
+    """Six digits, with brackets around a negative number."""
     text = six_digits(value)
     return f"({text})" if text.startswith("-") else text
 
@@ -348,11 +354,11 @@ def six_digits(value: float) -> str:
 
 
 def with_unit(value: float, unit: str) -> str:
-    """Six digits and the unit; nothing behind what is a ratio."""
+    """Six digits and the unit. A ratio has no unit."""
     return f"{six_digits(value)} {'' if unit == '1' else unit.replace('^2', '²')}".rstrip()
 
 
-_MINUS = re.compile("(?<!e)-")  # not the one of a power of ten
+_MINUS = re.compile("(?<!e)-")  # except the sign of an exponent of ten
 
 
 class Typeset(NamedTuple):
@@ -363,39 +369,39 @@ class Typeset(NamedTuple):
 
 
 def is_formula(equation: WorkedEquation) -> bool:
-    """Whether it is to be set as a formula: one of the derivation, or one in letters."""
+    """Whether an equation is typeset as a formula: a formula of the derivation, or one in letters."""
     return not equation.formula or equation.formula in FORMULAS or is_mathematical(equation.formula)
 
 
 def as_text(equation: WorkedEquation) -> Typeset:
-    """For a reader: · between factors, no carets."""
+    """Text of an equation with · between factors and without carets."""
     formula, *numbers = equation.lines
     return Typeset(readable(formula), readable("".join(numbers).lstrip()))
 
 
 def readable(text: str) -> str:
-    """Write a sum as people do, not as programs."""
+    """Text of a formula with mathematical signs for the operators of programs."""
     return _MINUS.sub("−", text.replace("*", " · ").replace("^2", "²").replace("sqrt(", "√("))
 
 
 def as_mathml(equation: WorkedEquation) -> Typeset:
-    """Three `math` elements, so that a narrow page can break between them."""
+    """MathML of an equation in three `math` elements, between which a narrow page can break."""
     unit = ""
     if equation.unit:
         unit = f'<mspace width="0.25em"/><mtext>{xml_text(equation.unit.replace("^2", "²"))}</mtext>'
     result = f"<mrow>{_number_in(MATHML, equation.result)}{unit}</mrow>"
-    left = symbol(equation.symbol, MATHML)
+    symbol_mathml = symbol(equation.symbol, MATHML)
     if not equation.formula:
-        return Typeset(math(f"<mrow>{left}<mo>=</mo>{result}</mrow>"), "")
+        return Typeset(math(f"<mrow>{symbol_mathml}<mo>=</mo>{result}</mrow>"), "")
     formula, numbers = _in_letters_and_numbers(equation, MATHML)
     return Typeset(
-        math(f"<mrow>{left}<mo>=</mo>{formula}</mrow>"),
+        math(f"<mrow>{symbol_mathml}<mo>=</mo>{formula}</mrow>"),
         f"{math(f'<mrow><mo>=</mo>{numbers}</mrow>')} {math(f'<mrow><mo>=</mo>{result}</mrow>')}",
     )
 
 
 def as_latex(equation: WorkedEquation) -> Typeset:
-    """Without delimiters; both parts are aligned at their first `=`."""
+    """LaTeX of an equation without delimiters. Both lines are aligned at their first `=`."""
     unit = rf"\,\mathrm{{{equation.unit.replace('^2', '^{2}')}}}" if equation.unit else ""
     result = f"{_number_in(LATEX, equation.result)}{unit}"
     formula, numbers = _in_letters_and_numbers(equation, LATEX)
@@ -403,42 +409,43 @@ def as_latex(equation: WorkedEquation) -> Typeset:
 
 
 def _in_letters_and_numbers(equation: WorkedEquation, language: Language) -> tuple[str, str]:
-    """The formula of an equation, and the same with numbers put in, negative ones in brackets."""
+    """The formula of an equation, and the formula with numbers, negative numbers in brackets."""
     if equation.formula in FORMULAS:
-        formula = FORMULAS[equation.formula][language.place]
-        known = {SYMBOLS[name][language.place]: value for name, value in equation.values.items() if name in SYMBOLS}
-        return formula, (_mathml_filled if language is MATHML else _latex_filled)(formula, known)
+        formula = FORMULAS[equation.formula][language.catalogue_index]
+        index = language.catalogue_index
+        values_by_symbol = {SYMBOLS[name][index]: value for name, value in equation.values.items() if name in SYMBOLS}
+        return formula, (_mathml_filled if language is MATHML else _latex_filled)(formula, values_by_symbol)
     numbers = {name: _number_in(language, value) for name, value in equation.values.items()}
     numbers |= {name: language.brackets % numbers[name] for name, value in equation.values.items() if value < 0}
-    return written(equation.formula, language), written(equation.formula, language, numbers)
+    return formula_text(equation.formula, language), formula_text(equation.formula, language, numbers)
 
 
 def math(content: str) -> str:
-    """Wrap content in a `math` element that stands in a line and is as large as on one of its own."""
+    """Wrap content in an inline `math` element with the size of a displayed formula."""
     return f'<math displaystyle="true">{content}</math>'
 
 
 def catalogued(formula: str, language: Language) -> str:
     """A formula or symbol of the catalogue in a language, without numbers and without the element around it."""
-    return (FORMULAS.get(formula) or SYMBOLS[formula])[language.place]
+    return (FORMULAS.get(formula) or SYMBOLS[formula])[language.catalogue_index]
 
 
 def _mathml_filled(formula: str, values: Mapping[str, float]) -> str:
-    """Put numbers for elements. What is a power's base, or negative, stands in brackets."""
+    """Replace elements by numbers. Bases of powers with a power of ten, and negative numbers, are in brackets."""
 
-    def written(match: re.Match[str]) -> str:
+    def filled_match(match: re.Match[str]) -> str:
         value = values[match[2]]
         bare = _number_in(MATHML, value)
         needs_brackets = value < 0 or (match[1] and "<msup>" in bare)
         return match[1] + (f"<mrow><mo>(</mo>{bare}<mo>)</mo></mrow>" if needs_brackets else bare)
 
     elements = "|".join(re.escape(element) for element in sorted(values, key=len, reverse=True))
-    text = re.sub(f"(<msup>|)({elements})", written, formula) if values else formula
+    text = re.sub(f"(<msup>|)({elements})", filled_match, formula) if values else formula
     return text.replace("<mo>\u2062</mo>", "<mo>·</mo>")
 
 
 def _latex_filled(formula: str, values: Mapping[str, float]) -> str:
-    def written(match: re.Match[str]) -> str:
+    def filled_match(match: re.Match[str]) -> str:
         value = values[match[0]]
         bare = _number_in(LATEX, value)
         is_base = formula[match.end() : match.end() + 1] == "^"
@@ -446,18 +453,18 @@ def _latex_filled(formula: str, values: Mapping[str, float]) -> str:
         return rf"\left({bare}\right)" if needs_brackets else bare
 
     if values:
-        formula = _latex_symbols(values).sub(written, formula)
+        formula = _latex_symbols(values).sub(filled_match, formula)
     return formula.replace(r"\,", r"\cdot")
 
 
 def _latex_symbols(values: Mapping[str, float]) -> re.Pattern[str]:
-    """Symbols, each whole: neither a letter of a command nor the start of one."""
+    """Pattern of complete symbols, which are no letters of a LaTeX command."""
     longest_first = "|".join(re.escape(symbol) for symbol in sorted(values, key=len, reverse=True))
     return re.compile(rf"(?<![A-Za-z\\])(?:{longest_first})(?![A-Za-z])")
 
 
 def _number_in(language: Language, value: float) -> str:
-    """Six digits; large and small ones as a power of ten."""
+    """A number with six digits, with a power of ten if it is large or small."""
     digits, _, exponent = six_digits(abs(value)).partition("e")
     number = language.number % digits
     if exponent:

@@ -1,12 +1,12 @@
 """Findings that need attention, at the value in the mission file: commands of GitHub's runner, and SARIF 2.1.0.
 
-Rows that pass, judge nothing or are not declared are not in them, and a requirement is where no row shows how it
-stands; so is what from outside a file bears on its verdict.
+Rows that pass, judge nothing or are not declared are left out. A requirement is a finding if it is broken or waived
+and no row shows that. Overrides from outside a mission file are a finding as well.
 """
 
 import json
 from collections.abc import Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from bisar_budget.faults import Fault, Place, Region, changes_words, printable
 from bisar_budget.findings.mission import MissionFindings, Report, UnusableMission
@@ -35,8 +35,10 @@ from bisar_budget.report.words.sentences import (
     waiver_names,
 )
 
-_ORDER = ("error", "warning", "notice")
-_SHOWN_IN_SUMMARY = 20
+_Object = dict[str, object]  # an object of SARIF, which is JSON
+
+_WORST_FIRST = ("error", "warning", "notice")
+_MAX_SUMMARY_LINES = 20
 
 
 class _Annotation(NamedTuple):
@@ -48,11 +50,11 @@ class _Annotation(NamedTuple):
 
 
 def as_github(report: Report, style: Style) -> str:
-    """Write one command per finding; a run without findings says so in a line that is no command.
+    """Write one command per finding, worst first. Without findings, write one line that is not a command.
 
-    The runner shows ten errors and ten warnings of a step, so the worst come first.
+    The runner shows ten errors and ten warnings of a step.
     """
-    annotations = sorted(_annotations(report, style), key=lambda found: _ORDER.index(found.command))
+    annotations = sorted(_annotations(report, style), key=lambda annotation: _WORST_FIRST.index(annotation.command))
     lines = [_command(annotation) for annotation in annotations]
     return "\n".join(lines or [f"bisar-budget: {counted(len(report.missions), 'mission')}, no findings"]) + "\n"
 
@@ -62,14 +64,14 @@ def _annotations(report: Report, style: Style) -> Iterator[_Annotation]:
         file = source_path(mission.file, style)
         if isinstance(mission, UnusableMission):
             for fault in mission.faults:
-                yield _Annotation("error", file, _place(fault), "Unusable mission file", str(fault))
+                yield _Annotation("error", file, _fault_region(fault), "Unusable mission file", str(fault))
             continue
-        for one in unseen(mission):
-            title = f"{STATUS[one.status].text} {requirement_id(one)}"
-            how = requirement_finding(one, mission)
-            yield _Annotation(STATUS[one.status].github, file, _region_of(one.line), title, how)
-        if outside := overrides_words(mission):
-            yield _Annotation("notice", file, None, "Overrides", outside)
+        for requirement in unseen(mission):
+            title = f"{STATUS[requirement.status].text} {requirement_id(requirement)}"
+            text = requirement_finding(requirement, mission)
+            yield _Annotation(STATUS[requirement.status].github, file, _region_of(requirement.line), title, text)
+        if overrides := overrides_words(mission):
+            yield _Annotation("notice", file, None, "Overrides", overrides)
         for row in worst_first(mission.rows):
             if command := STATUS[row.status].github:
                 title = f"{STATUS[row.status].text} {row.id}"
@@ -78,7 +80,7 @@ def _annotations(report: Report, style: Style) -> Iterator[_Annotation]:
             yield _Annotation("warning", file, _region_of(warning.line), "Mission file", warning.message)
 
 
-def _place(fault: Fault) -> Region | None:
+def _fault_region(fault: Fault) -> Region | None:
     return None if fault.line is None else Region(fault.line, fault.column or 1)
 
 
@@ -91,7 +93,7 @@ def _region_of(line: int | None) -> Region | None:
 def _command(annotation: _Annotation) -> str:
     properties = {"file": annotation.file} if annotation.file != "-" else {}
     region = annotation.region
-    if region is not None and properties:  # a line of standard input is no place in a repository
+    if region is not None and properties:  # standard input has no lines in a repository
         properties |= {"line": str(region.line)}
         if region.end_line is not None and region.end_line != region.line:
             properties |= {"endLine": str(region.end_line)}  # GitHub takes columns within one line only
@@ -99,8 +101,8 @@ def _command(annotation: _Annotation) -> str:
             properties |= {"col": str(region.column)}
             properties |= {"endColumn": str(region.end_column)} if region.end_column is not None else {}
     properties |= {"title": annotation.title}
-    written = ",".join(f"{key}={command_property(value)}" for key, value in properties.items())
-    return f"::{annotation.command} {written}::{command_text(annotation.message)}"
+    property_text = ",".join(f"{key}={command_property(value)}" for key, value in properties.items())
+    return f"::{annotation.command} {property_text}::{command_text(annotation.message)}"
 
 
 def step_summary(report: Report, style: Style) -> str:
@@ -119,31 +121,34 @@ def step_summary(report: Report, style: Style) -> str:
             use = percent(row.utilization)
         if mission.changes:
             file += " " + markdown_text(changes_words(mission.changes))
-        if outside := overrides_words(mission, with_changes=False):
-            file += "; overrides: " + markdown_text(outside)
+        if overrides := overrides_words(mission, with_changes=False):
+            file += "; overrides: " + markdown_text(overrides)
         status = (
             STATUS[mission.status].text
             + confidence_words(mission)
             + ("; each error alone" if mission.combine == "each" else "")
         )
         if mission.waived_by:
-            file += "; " + markdown_text(waiver_names([one.id for one in mission.waived_by]))
+            file += "; " + markdown_text(waiver_names([waiver.id for waiver in mission.waived_by]))
         lines.append(markdown_row((status, file, markdown_text(row.id), use)))
     usable = [mission for mission in report.missions if isinstance(mission, MissionFindings)]
-    broken = [
-        requirement_finding(one, found) for found in usable for one in found.requirements if STATUS[one.status].fails
+    failures = [
+        requirement_finding(requirement, mission)
+        for mission in usable
+        for requirement in mission.requirements
+        if STATUS[requirement.status].fails
     ]
-    broken += [finding(row, found) for found in usable for row in found.rows if STATUS[row.status].fails]
-    lines += ["", *(f"- {markdown_text(said)}" for said in broken[:_SHOWN_IN_SUMMARY])] if broken else []
-    if len(broken) > _SHOWN_IN_SUMMARY:
-        lines.append(f"- and {len(broken) - _SHOWN_IN_SUMMARY} more")
+    failures += [finding(row, mission) for mission in usable for row in mission.rows if STATUS[row.status].fails]
+    lines += ["", *(f"- {markdown_text(text)}" for text in failures[:_MAX_SUMMARY_LINES])] if failures else []
+    if len(failures) > _MAX_SUMMARY_LINES:
+        lines.append(f"- and {len(failures) - _MAX_SUMMARY_LINES} more")
     return "\n".join(lines) + "\n\n"
 
 
 SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
 SRCROOT = "%SRCROOT%"
 
-# Rule id to what is held to what, and what to do about it.
+# Rule id: title of the rule, and its explanation with remedies.
 RULES = {
     "quadratic_phase_error": (
         "Quadratic phase error within its share of the budget",
@@ -201,30 +206,30 @@ _RULE_INDEX = {rule: index for index, rule in enumerate(RULES)}
 
 
 def as_sarif(report: Report, style: Style) -> str:
-    """Write one log with one run: code scanning and editors show it.
+    """Write one log with one run, for code scanning and editors.
 
-    What is waived is a result with a suppression, a file that cannot be used gives notifications of the tool.
+    A waived finding is a result with a suppression. Faults of an unusable file are notifications of the tool.
     """
-    results: list[dict[str, Any]] = []
+    results: list[_Object] = []
     notifications = []
-    artifacts: dict[str, dict[str, Any]] = {}  # by URI: a file may be named in two ways
+    artifacts: dict[str, _Object] = {}  # by URI: a file may be named in two ways
     for mission, identity in zip(report.missions, identities(report.missions, style), strict=True):
         location = _artifact_location(mission.file, style)
         artifacts.setdefault(location["uri"], {"location": location, "mimeType": "application/yaml"})
-        artifact = {**location, "index": list(artifacts).index(location["uri"])}
+        artifact: _Object = {**location, "index": list(artifacts).index(location["uri"])}
         if isinstance(mission, UnusableMission):
             notifications += [_notification(fault, artifact) for fault in mission.faults]
             continue
-        results += [_requirement(one, mission, artifact, identity) for one in unseen(mission)]
+        results += [_requirement(requirement, mission, artifact, identity) for requirement in unseen(mission)]
         results += [_result(row, mission, artifact, identity) for row in mission.rows if STATUS[row.status].sarif]
         results += [
-            _located("mission_file", "warning", one.message, one.line, artifact, identity.of(one.message))
-            for one in mission.warnings
+            _located("mission_file", "warning", warning.message, warning.line, artifact, identity.of(warning.message))
+            for warning in mission.warnings
         ]
-        if outside := overrides_words(mission):
-            said = f"Overrides: {outside}"
+        if overrides := overrides_words(mission):
+            text = f"Overrides: {overrides}"
             name = identity.of("from outside the file")
-            results.append(_located("mission_file", "note", said, None, artifact, name))
+            results.append(_located("mission_file", "note", text, None, artifact, name))
     run = {
         "tool": {"driver": _driver(report.version)},
         "columnKind": "unicodeCodePoints",
@@ -237,7 +242,7 @@ def as_sarif(report: Report, style: Style) -> str:
     return json.dumps({"$schema": SCHEMA, "version": "2.1.0", "runs": [run]}, allow_nan=False) + "\n"
 
 
-def _driver(version: str) -> dict[str, Any]:
+def _driver(version: str) -> _Object:
     return {
         "name": "bisar-budget",
         "version": version,
@@ -252,7 +257,7 @@ def _driver(version: str) -> dict[str, Any]:
     }
 
 
-def _rule(rule: str, short: str, help_text: str) -> dict[str, Any]:
+def _rule(rule: str, short: str, help_text: str) -> _Object:
     is_remark = rule in ("mission_file", "autofocus_pull_in")
     return {
         "id": rule,
@@ -269,13 +274,13 @@ def _rule(rule: str, short: str, help_text: str) -> dict[str, Any]:
     }
 
 
-def _artifact_location(file: str, style: Style) -> dict[str, Any]:
+def _artifact_location(file: str, style: Style) -> dict[str, str]:
     path = "standard input" if file == "-" else source_path(file, style)
     address = uri(path)
     return {"uri": address} if address.startswith("file:") else {"uri": address, "uriBaseId": SRCROOT}
 
 
-def _result(row: Row, mission: MissionFindings, artifact: dict[str, Any], identity: Identity) -> dict[str, Any]:
+def _result(row: Row, mission: MissionFindings, artifact: _Object, identity: Identity) -> _Object:
     rule = "autofocus_pull_in" if row.subject.kind == "autofocus_pull_in" else row.metric
     rule = rule if rule in RULES else "other"
     name = identity.of(row.id, row.requirement_id)
@@ -298,26 +303,28 @@ def _result(row: Row, mission: MissionFindings, artifact: dict[str, Any], identi
 
 
 def _requirement(
-    one: JudgedRequirement, mission: MissionFindings, artifact: dict[str, Any], identity: Identity
-) -> dict[str, Any]:
-    level, name = STATUS[one.status].sarif, identity.of(requirement_id(one))
-    result = _located(one.key, level, requirement_finding(one, mission), one.line, artifact, name)
+    requirement: JudgedRequirement, mission: MissionFindings, artifact: _Object, identity: Identity
+) -> _Object:
+    level, name = STATUS[requirement.status].sarif, identity.of(requirement_id(requirement))
+    result = _located(
+        requirement.key, level, requirement_finding(requirement, mission), requirement.line, artifact, name
+    )
     result["properties"] = _properties(
         mission,
-        status=one.status,
-        metric=one.key,
-        unit=one.unit or None,
-        declared=one.reached,
-        allowable=one.allowed,
-        utilization=one.utilization,
-        decided_by=one.row,
-        **share_columns(one),
+        status=requirement.status,
+        metric=requirement.key,
+        unit=requirement.unit or None,
+        declared=requirement.reached,
+        allowable=requirement.allowed,
+        utilization=requirement.utilization,
+        decided_by=requirement.row,
+        **share_columns(requirement),
     )
-    return result | _suppressed(one.status, one.waivers, artifact)
+    return result | _suppressed(requirement.status, requirement.waivers, artifact)
 
 
 def _properties(mission: MissionFindings, **values: str | float | None) -> dict[str, str | float]:
-    """Properties that have a value, made harmless, with those of the mission."""
+    """Properties of the mission and of a finding that have a value. Texts are made printable."""
     values = {
         "mission": mission.name,
         "confidence": mission.confidence,
@@ -332,9 +339,13 @@ def _properties(mission: MissionFindings, **values: str | float | None) -> dict[
 
 
 def _located(
-    rule: str, level: str, message: str, line: int | None, artifact: dict[str, Any], name: tuple[str, ...]
-) -> dict[str, Any]:
-    """Return a result; `name` stays the same when lines move, and tells it from others. Its subject comes last."""
+    rule: str, level: str, message: str, line: int | None, artifact: _Object, name: tuple[str, ...]
+) -> _Object:
+    """A result with its location and fingerprint.
+
+    The fingerprint depends on the rule and on `name`, which identifies the finding and stays when lines move. The
+    last item of `name` is the subject of the finding.
+    """
     return {
         "ruleId": rule,
         "ruleIndex": _RULE_INDEX[rule],
@@ -346,12 +357,12 @@ def _located(
                 "logicalLocations": [{"fullyQualifiedName": printable(name[-1]), "kind": "member"}],
             }
         ],
-        # Code scanning tells an old alert from a new one by this key alone.
+        # Code scanning recognises an old alert by this key alone.
         "partialFingerprints": {"primaryLocationLineHash": digest(rule, *name)[:16] + ":1"},
     }
 
 
-def _location(artifact: dict[str, Any], region: dict[str, int]) -> dict[str, Any]:
+def _location(artifact: _Object, region: dict[str, int]) -> _Object:
     return {"physicalLocation": {"artifactLocation": artifact, "region": region}}
 
 
@@ -365,11 +376,14 @@ def _sarif_region(line: int | None) -> dict[str, int]:
     return region
 
 
-def _suppressed(status: str, waivers: Sequence[AppliedWaiver], artifact: dict[str, Any]) -> dict[str, Any]:
-    """The waiver, if there is one: it stands in the file that is checked, which the standard calls `inSource`."""
+def _suppressed(status: str, waivers: Sequence[AppliedWaiver], artifact: _Object) -> _Object:
+    """Suppression by the first waiver that has not expired; empty if the status is not waived.
+
+    The waiver is written in the checked file, which the standard calls `inSource`.
+    """
     if status != "waived" or not waivers:
         return {}
-    waiver = next(one for one in waivers if not one.is_expired)
+    waiver = next(waiver for waiver in waivers if not waiver.is_expired)
     suppression = {
         "kind": "inSource",
         "status": "accepted",
@@ -380,7 +394,7 @@ def _suppressed(status: str, waivers: Sequence[AppliedWaiver], artifact: dict[st
     return {"suppressions": [suppression]}
 
 
-def _notification(fault: Fault, artifact: dict[str, Any]) -> dict[str, Any]:
+def _notification(fault: Fault, artifact: _Object) -> _Object:
     region: dict[str, int] = {"startLine": fault.line or 1}
     if fault.column is not None:
         region["startColumn"] = fault.column

@@ -3,7 +3,6 @@
 import math
 import re
 from collections.abc import Iterator, Sequence
-from typing import Any
 
 from bisar_budget.design.compare import Comparison, PartState
 from bisar_budget.design.sensitivity import LITTLE, Relaxed, Sensitivity, Slope
@@ -32,30 +31,32 @@ Answer = Solution | Comparison | Sensitivity
 
 
 def as_json(answers: Sequence[Answer], style: Style) -> str:
-    """Write the contract of the command that was asked; values in SI, null where there is none."""
+    """Write `solve/1` or `sensitivity/1`, as the answers need. Values are in SI; a missing value is null."""
     command = "sensitivity" if isinstance(answers[0], Sensitivity) else "solve"
-    missions = [{"file": one.file, "name": one.name, **outside_item(one), **_document(one)} for one in answers]
+    missions = [
+        {"file": answer.file, "name": answer.name, **outside_item(answer), **_document(answer)} for answer in answers
+    ]
     return document_text(f"bisar-budget/{command}/1", {"missions": missions})
 
 
-def _document(found: Answer) -> dict[str, Any]:
-    if isinstance(found, Sensitivity):
-        return _ranked(found)
-    return _solved(found) if isinstance(found, Solution) else _compared(found)
+def _document(answer: Answer) -> dict[str, object]:
+    if isinstance(answer, Sensitivity):
+        return _ranked(answer)
+    return _solved(answer) if isinstance(answer, Solution) else _compared(answer)
 
 
 def as_text(answers: Sequence[Answer], style: Style) -> str:
-    """Write each answer as lines for a person: crossings, a table of parts, or a table of numbers."""
-    return "\n\n".join("\n".join(_lines(one, style)) for one in answers) + "\n"
+    """Write each answer as text for a terminal: crossings, a table of parts, or a table of slopes."""
+    return "\n\n".join("\n".join(_lines(answer, style)) for answer in answers) + "\n"
 
 
-def _lines(found: Answer, style: Style) -> Iterator[str]:
-    if isinstance(found, Sensitivity):
-        return _lines_of_numbers(found, style)
-    return _lines_of_crossings(found, style) if isinstance(found, Solution) else _lines_of_parts(found, style)
+def _lines(answer: Answer, style: Style) -> Iterator[str]:
+    if isinstance(answer, Sensitivity):
+        return _lines_of_numbers(answer, style)
+    return _lines_of_crossings(answer, style) if isinstance(answer, Solution) else _lines_of_parts(answer, style)
 
 
-def _solved(solution: Solution) -> dict[str, Any]:
+def _solved(solution: Solution) -> dict[str, object]:
     best = solution.best
     return {
         "key": solution.key,
@@ -83,32 +84,32 @@ def _solved(solution: Solution) -> dict[str, Any]:
     }
 
 
-def _imaged(found: Imaged | None) -> dict[str, Any] | None:
-    """Write what images say; the verdict is that of `verify --format json`."""
-    if found is None:
+def _imaged(imaged: Imaged | None) -> dict[str, object] | None:
+    """Item of the verified row. The verdict has the form of `verify --format json`."""
+    if imaged is None:
         return None
     return {
-        "row": found.row,
-        "at": found.at,
-        "verdict": "not_evaluated" if found.verdict is None else found.verdict.verdict,
-        "verdict_autofocus": None if found.verdict is None else found.verdict.verdict_autofocus,
-        "reason": found.reason or None,
-        "image": None if found.verdict is None else verdict_item(found.verdict),
+        "row": imaged.row,
+        "at": imaged.at,
+        "verdict": "not_evaluated" if imaged.verdict is None else imaged.verdict.verdict,
+        "verdict_autofocus": None if imaged.verdict is None else imaged.verdict.verdict_autofocus,
+        "reason": imaged.reason or None,
+        "image": None if imaged.verdict is None else verdict_item(imaged.verdict),
     }
 
 
-def _compared(found: Comparison) -> dict[str, Any]:
-    """The same keys for parts of the catalogue: there is no value, and no border."""
-    best = next(iter(found.complying), None)
+def _compared(comparison: Comparison) -> dict[str, object]:
+    """Item of a comparison of catalogue parts, with the keys of `_solved`. Keys of values and borders are null."""
+    best = next(iter(comparison.complying), None)
     return {
-        "key": found.key,
+        "key": comparison.key,
         "scale": False,
         "unit": None,
-        "target": found.target,
-        "row": found.row,
-        "model": found.model,
+        "target": comparison.target,
+        "row": comparison.row,
+        "model": comparison.model,
         "between": None,
-        "status": found.status,
+        "status": comparison.status,
         "value": None,
         "text": None if best is None else best.id,
         "binding_row": None if best is None else best.standing.row,
@@ -118,15 +119,15 @@ def _compared(found: Comparison) -> dict[str, Any]:
         "given": None,
         "crossings": [],
         "nearest": None,
-        "places_without_mission": sum(part.standing.status == "error" for part in found.parts),
-        "places_waived": sum(part.standing.status == "waived" for part in found.parts),
-        "waived_by": list(dict.fromkeys(waiver for part in found.parts for waiver in part.standing.waived_by)),
-        "parts": [_part(part) for part in found.parts],
-        "verified": _imaged(found.imaged),
+        "places_without_mission": sum(part.standing.status == "error" for part in comparison.parts),
+        "places_waived": sum(part.standing.status == "waived" for part in comparison.parts),
+        "waived_by": list(dict.fromkeys(waiver for part in comparison.parts for waiver in part.standing.waived_by)),
+        "parts": [_part(part) for part in comparison.parts],
+        "verified": _imaged(comparison.imaged),
     }
 
 
-def _part(part: PartState) -> dict[str, Any]:
+def _part(part: PartState) -> dict[str, object]:
     return {
         "id": part.id,
         "name": part.name,
@@ -143,7 +144,7 @@ def _part(part: PartState) -> dict[str, Any]:
     }
 
 
-def _crossing(crossing: Crossing) -> dict[str, Any]:
+def _crossing(crossing: Crossing) -> dict[str, object]:
     return {
         "value": crossing.inside.value,
         "complies": "below" if crossing.is_upper else "above",
@@ -153,59 +154,61 @@ def _crossing(crossing: Crossing) -> dict[str, Any]:
     }
 
 
-def _state(state: State) -> dict[str, Any]:
+def _state(state: State) -> dict[str, object]:
     return {**state._asdict(), "reason": state.reason or None, "waived_by": list(state.waived_by)}
 
 
-def _lines_of_parts(found: Comparison, style: Style) -> Iterator[str]:
-    """Say which parts comply, and how near the others are."""
-    count, total = len(found.complying), len(found.parts)
-    what = f"row {printable(found.row)} complies" if found.row else "the mission complies"
-    said = f"{what} with {count} of {total} parts" if count else f"{what} with none of {total} parts"
-    if waived := [part.standing for part in found.parts if part.standing.status == "waived"]:
-        ids = tuple(dict.fromkeys(waiver for one in waived for waiver in one.waived_by))
-        said += f", {waived_count(len(waived), ids)}"
-    remark = f"; {found.model} model{', neither fails nor warns' if found.target == 'warn' else ''}"
-    yield from title_lines(found, f"{printable(found.key)}: {said}", _SGR[found.status], style, remark=remark)
-    is_mixed = len({part.kind for part in found.parts}) > 1
+def _lines_of_parts(comparison: Comparison, style: Style) -> Iterator[str]:
+    """Lines of a comparison: verdict, table of parts with their use of the budget, and footnotes."""
+    count, total = len(comparison.complying), len(comparison.parts)
+    subject = f"row {printable(comparison.row)} complies" if comparison.row else "the mission complies"
+    verdict = f"{subject} with {count} of {total} parts" if count else f"{subject} with none of {total} parts"
+    if standings := [part.standing for part in comparison.parts if part.standing.status == "waived"]:
+        waivers = tuple(dict.fromkeys(waiver for standing in standings for waiver in standing.waived_by))
+        verdict += f", {waived_count(len(standings), waivers)}"
+    remark = f"; {comparison.model} model{', neither fails nor warns' if comparison.target == 'warn' else ''}"
+    yield from title_lines(
+        comparison, f"{printable(comparison.key)}: {verdict}", _SGR[comparison.status], style, remark=remark
+    )
+    is_mixed = len({part.kind for part in comparison.parts}) > 1
     rows = [["part", *(["kind"] if is_mixed else []), "status", "use", ""]]
-    for part in found.parts:
-        stands = part.standing
-        row = printable(part.reason) if part.reason else stands.row or _undecided(stands.requirement)
-        row += f" ({waiver_names(stands.waived_by)})" if stands.waived_by else ""
+    for part in comparison.parts:
+        standing = part.standing
+        row = printable(part.reason) if part.reason else standing.row or _undecided(standing.requirement)
+        row += f" ({waiver_names(standing.waived_by)})" if standing.waived_by else ""
         marks = f"{' *' if part.is_given else ''}{' -' if part.silent_on else ''}"
         kind = [part.kind] if is_mixed else []
-        rows.append([f"{part.id}{marks}", *kind, STATUS[stands.status].text, use_words(stands.utilization), row])
+        rows.append([f"{part.id}{marks}", *kind, STATUS[standing.status].text, use_words(standing.utilization), row])
     yield from table(rows)
     yield ""
-    if any(part.is_given for part in found.parts):
-        stays = "; of several each stays while parts of the other kind change" if found.kept else ""
+    if any(part.is_given for part in comparison.parts):
+        stays = "; of several each stays while parts of the other kind change" if comparison.kept else ""
         yield from wrapped(f"*  named by the file{stays}", "   ")
-    if any(part.silent_on for part in found.parts):
+    if any(part.silent_on for part in comparison.parts):
         yield from wrapped("-  says nothing of figures that others have: these errors are not declared", "   ")
     yield from wrapped("What complies has the smallest margin first, what does not the nearest miss.", "  ")
-    if found.overridden:
-        yield from wrapped(f"Stated by the file itself, with every part: {', '.join(found.overridden)}.", "  ")
-    if found.imaged is not None:
-        yield from wrapped(f"Imaged: {_shown(found.imaged)}.", "  ")
+    if comparison.overridden:
+        yield from wrapped(f"Stated by the file itself, with every part: {', '.join(comparison.overridden)}.", "  ")
+    if comparison.imaged is not None:
+        yield from wrapped(f"Imaged: {_shown(comparison.imaged)}.", "  ")
 
 
 def _lines_of_crossings(solution: Solution, style: Style) -> Iterator[str]:
-    said = f"{_subject(solution)}: {_answer(solution)}"
-    yield from title_lines(solution, said, _SGR[solution.status], style)
+    verdict = f"{_key_words(solution)}: {_range_words(solution)}"
+    yield from title_lines(solution, verdict, _SGR[solution.status], style)
     for name, text in _facts(solution):
         yield from wrapped(f"{name:<12} {text}", " " * 13)
 
 
-def _subject(solution: Solution) -> str:
+def _key_words(solution: Solution) -> str:
     return f"errors of {printable(solution.key)}" if solution.is_scale else printable(solution.key)
 
 
-def _said(solution: Solution, value: float) -> str:
+def _value_text(solution: Solution, value: float) -> str:
     return f"factor {solution.texts[value]}" if solution.is_scale else solution.texts[value]
 
 
-def _answer(solution: Solution) -> str:
+def _range_words(solution: Solution) -> str:
     if solution.status == "all":
         return "every value of the range complies"
     if solution.status in ("waived", "none"):
@@ -215,10 +218,10 @@ def _answer(solution: Solution) -> str:
 
 
 def _intervals(solution: Solution) -> Iterator[str]:
-    """Say which parts of the range comply."""
+    """Words of each interval of the range that complies, such as "up to 3 m"."""
     start = ""
     for crossing in solution.crossings:
-        value = _said(solution, crossing.inside.value)
+        value = _value_text(solution, crossing.inside.value)
         if not crossing.is_upper:
             start = f"from {value}"
         else:
@@ -230,12 +233,12 @@ def _intervals(solution: Solution) -> Iterator[str]:
 
 def _facts(solution: Solution) -> Iterator[tuple[str, str]]:
     if solution.given is not None:
-        given = solution.given
-        yield "Mission", f"{_said(solution, given.value)}: {_stands(given)}"
-    what = f"row {printable(solution.row)}" if solution.row else "the mission"
+        state = solution.given
+        yield "Mission", f"{_value_text(solution, state.value)}: {_state_words(state)}"
+    subject = f"row {printable(solution.row)}" if solution.row else "the mission"
     strict = "complies without a warning" if solution.target == "warn" else "complies"
-    low, high = (_said(solution, value) for value in (solution.low, solution.high))
-    yield "Searched", f"{low} to {high}, for where {what} {strict}; {solution.model} model"
+    low, high = (_value_text(solution, value) for value in (solution.low, solution.high))
+    yield "Searched", f"{low} to {high}, for where {subject} {strict}; {solution.model} model"
     if len(solution.crossings) > 2 or (len(solution.crossings) == 2 and not solution.crossings[1].is_upper):
         yield "Monotonic", f"no: compliance changes {len(solution.crossings)} times"
     elif len(solution.crossings) == 2:
@@ -246,8 +249,9 @@ def _facts(solution: Solution) -> Iterator[tuple[str, str]]:
         waivers = waiver_names(solution.waived_by)
         yield "Waived", f"at {solution.waived} of the places looked at, where it does not comply ({waivers})"
     for crossing in solution.crossings:
-        yield "Inside", f"{_said(solution, crossing.inside.value)}: {_stands(crossing.inside)}{_resolves(crossing)}"
-        yield "Outside", f"{_said(solution, crossing.outside.value)}: {_stands(crossing.outside)}"
+        inside, outside = crossing.inside, crossing.outside
+        yield "Inside", f"{_value_text(solution, inside.value)}: {_state_words(inside)}{_resolution(crossing)}"
+        yield "Outside", f"{_value_text(solution, outside.value)}: {_state_words(outside)}"
         if crossing.is_verified:
             yield "Checked", "both, as they are written here"
         else:
@@ -263,38 +267,44 @@ def _facts(solution: Solution) -> Iterator[tuple[str, str]]:
         is_miss = not solution.nearest.complies
         nearest = solution.nearest
         if is_miss and nearest.status == "not_evaluated":
-            yield "Not judged", f"where nothing fails, such as {_said(solution, nearest.value)}: {_stands(nearest)}"
+            yield (
+                "Not judged",
+                f"where nothing fails, such as {_value_text(solution, nearest.value)}: {_state_words(nearest)}",
+            )
             return
-        yield "Nearest" if is_miss else "Least left", f"{_said(solution, nearest.value)}: {_stands(nearest)}"
+        yield (
+            "Nearest" if is_miss else "Least left",
+            f"{_value_text(solution, nearest.value)}: {_state_words(nearest)}",
+        )
 
 
-def _shown(found: Imaged) -> str:
-    """Say what images show of the row that binds."""
-    said = f"{printable(found.row)} at {printable(found.at)}"
-    one = found.verdict
-    if one is None:
-        return f"{said}: no verdict, {found.reason}"
-    words = [one.verdict.replace("_", " ")]
-    _, measured = one.judged_phases_rad
-    if measured is not None and one.budget_rad is not None:
-        shows = f"the image shows {measured:.3g} rad{one.of_equal_loss}"
-        words.append(f"its limit is {one.budget_rad:.3g} rad, {shows}")
-    elif one.measured_db is not None and one.requirement_db is not None:
-        words.append(f"{one.requirement_db:.4g} dB is required, the image shows {one.measured_db:.4g} dB")
-    if one.verdict_autofocus is not None:
-        words.append(f"after autofocus {one.verdict_autofocus.replace('_', ' ')}")
-    if found.reason:
-        words.append(printable(found.reason))
-    return f"{said}: {', '.join(words)}"
+def _shown(imaged: Imaged) -> str:
+    """Verdict of the image on the binding row, in words."""
+    row = f"{printable(imaged.row)} at {printable(imaged.at)}"
+    verdict = imaged.verdict
+    if verdict is None:
+        return f"{row}: no verdict, {imaged.reason}"
+    words = [verdict.verdict.replace("_", " ")]
+    _, measured = verdict.judged_phases_rad
+    if measured is not None and verdict.budget_rad is not None:
+        shows = f"the image shows {measured:.3g} rad{verdict.of_equal_loss}"
+        words.append(f"its limit is {verdict.budget_rad:.3g} rad, {shows}")
+    elif verdict.measured_db is not None and verdict.requirement_db is not None:
+        words.append(f"{verdict.requirement_db:.4g} dB is required, the image shows {verdict.measured_db:.4g} dB")
+    if verdict.verdict_autofocus is not None:
+        words.append(f"after autofocus {verdict.verdict_autofocus.replace('_', ' ')}")
+    if imaged.reason:
+        words.append(printable(imaged.reason))
+    return f"{row}: {', '.join(words)}"
 
 
 def _undecided(requirement: str | None) -> str:
-    """Say what is wrong where no row decides: a requirement that cannot be judged."""
+    """Words for a state without a deciding row; they name the requirement that cannot be judged."""
     return "no row decides" if requirement is None else f"{NAMES[requirement]} cannot be judged"
 
 
-def _stands(state: State) -> str:
-    """Say how the mission stands at a value."""
+def _state_words(state: State) -> str:
+    """Status of the mission at a value, with the deciding row and its use of the requirement."""
     word = STATUS[state.status].text
     word += f" ({waiver_names(state.waived_by)})" if state.waived_by else ""
     if state.reason:
@@ -306,7 +316,7 @@ def _stands(state: State) -> str:
     return f"{word}, {printable(state.row)}{use} ({requirement})"
 
 
-def _resolves(crossing: Crossing) -> str:
+def _resolution(crossing: Crossing) -> str:
     state = crossing.inside
     if state.range_resolution_m is None or state.cross_range_resolution_m is None:
         return ""
@@ -314,23 +324,23 @@ def _resolves(crossing: Crossing) -> str:
     return "; resolution {} range, {} cross range".format(*sizes)
 
 
-def _ranked(found: Sensitivity) -> dict[str, Any]:
+def _ranked(sensitivity: Sensitivity) -> dict[str, object]:
     return {
-        "model": found.model,
-        "status": found.status,
-        "worst_row": found.worst_row,
-        "binding_requirement": found.requirement,
-        "utilization": found.utilization,
-        "row": found.row,
-        "row_utilization": found.row_utilization,
-        "numbers": [_slope(slope) | {"to_limit": found.to_limit(slope)} for slope in found.slopes],
-        "without_effect": list(found.unchanging),
-        "skipped": [skipped._asdict() for skipped in found.skipped],
-        "relaxed": [_relaxed(relaxed) for relaxed in found.relaxed] if found.is_balanced else None,
+        "model": sensitivity.model,
+        "status": sensitivity.status,
+        "worst_row": sensitivity.worst_row,
+        "binding_requirement": sensitivity.requirement,
+        "utilization": sensitivity.utilization,
+        "row": sensitivity.row,
+        "row_utilization": sensitivity.row_utilization,
+        "numbers": [_slope(slope) | {"to_limit": sensitivity.to_limit(slope)} for slope in sensitivity.slopes],
+        "without_effect": list(sensitivity.unchanging),
+        "skipped": [skipped._asdict() for skipped in sensitivity.skipped],
+        "relaxed": [_relaxed(relaxed) for relaxed in sensitivity.relaxed] if sensitivity.is_balanced else None,
     }
 
 
-def _slope(slope: Slope) -> dict[str, Any]:
+def _slope(slope: Slope) -> dict[str, object]:
     return {
         "key": slope.key,
         "text": slope.text,
@@ -349,9 +359,9 @@ def _slope(slope: Slope) -> dict[str, Any]:
     }
 
 
-def _relaxed(relaxed: Relaxed) -> dict[str, Any]:
-    def platform(others: tuple[str, float, float] | None) -> dict[str, Any] | None:
-        return None if others is None else dict(zip(("row", "before", "after"), others, strict=True))
+def _relaxed(relaxed: Relaxed) -> dict[str, object]:
+    def platform(change: tuple[str, float, float] | None) -> dict[str, object] | None:
+        return None if change is None else dict(zip(("row", "before", "after"), change, strict=True))
 
     return {
         "key": relaxed.key,
@@ -362,42 +372,42 @@ def _relaxed(relaxed: Relaxed) -> dict[str, Any]:
     }
 
 
-def _lines_of_numbers(found: Sensitivity, style: Style) -> Iterator[str]:
-    """The numbers that change something; first that which has to change least to use up the margin."""
-    status = STATUS[found.status]
-    requirement = BINDING_WORDS.get(found.requirement, found.requirement.replace("_", " "))
-    said = f"worst utilization {percent(found.utilization)}: {printable(found.worst_row)} ({requirement})"
-    row = []
-    if found.row is not None and found.row_utilization is not None:
-        row = [f"row {printable(found.row)}: {percent(found.row_utilization)}"]
-    remark = f": {status.text}, {found.model} model"
-    yield from title_lines(found, said, status.sgr, style, more=row, remark=remark)
-    yield from _table(found)
-    yield from _notes(found)
-    if found.is_balanced:
+def _lines_of_numbers(sensitivity: Sensitivity, style: Style) -> Iterator[str]:
+    """Lines of a sensitivity. Numbers are sorted by the change that uses up the margin, smallest first."""
+    status = STATUS[sensitivity.status]
+    requirement = BINDING_WORDS.get(sensitivity.requirement, sensitivity.requirement.replace("_", " "))
+    text = f"worst utilization {percent(sensitivity.utilization)}: {printable(sensitivity.worst_row)} ({requirement})"
+    row_text = []
+    if sensitivity.row is not None and sensitivity.row_utilization is not None:
+        row_text = [f"row {printable(sensitivity.row)}: {percent(sensitivity.row_utilization)}"]
+    remark = f": {status.text}, {sensitivity.model} model"
+    yield from title_lines(sensitivity, text, status.sgr, style, more=row_text, remark=remark)
+    yield from _table(sensitivity)
+    yield from _notes(sensitivity)
+    if sensitivity.is_balanced:
         yield ""
-        yield from _balance(found)
+        yield from _balance(sensitivity)
 
 
-def _table(found: Sensitivity) -> Iterator[str]:
-    shown = found.shown
+def _table(sensitivity: Sensitivity) -> Iterator[str]:
+    shown = sensitivity.shown
     if not shown:
         yield "No number of the file changes it."
         return
-    of_row = [] if found.row is None else ["of the row"]
-    rows = [["key", "value", "to limit", "per", "worst", *of_row, ""]]
+    row_head = [] if sensitivity.row is None else ["of the row"]
+    rows = [["key", "value", "to limit", "per", "worst", *row_head, ""]]
     for slope in shown:
-        in_row = [] if slope.row_change is None else [_points(slope.row_change)]
-        mixed = next((row for row in (slope.row_above, slope.row_below) if row != found.worst_row), "")
+        row_cell = [] if slope.row_change is None else [_points(slope.row_change)]
+        mixed = next((row for row in (slope.row_above, slope.row_below) if row != sensitivity.worst_row), "")
         note = f"({printable(mixed)})" if slope.is_mixed else ""
         rows.append(
             [
                 printable(slope.key),
                 printable(slope.given),
-                to_limit(found, slope),
+                to_limit(sensitivity, slope),
                 slope.per_text,
                 _points(slope.change),
-                *in_row,
+                *row_cell,
                 note,
             ]
         )
@@ -411,14 +421,14 @@ def _table(found: Sensitivity) -> Iterator[str]:
     )
 
 
-def to_limit(found: Sensitivity, slope: Slope) -> str:
-    """Write the change that uses up the margin: in percent, from tenfold on as a factor, or in degrees or decibel."""
-    change = found.to_limit(slope)
+def to_limit(sensitivity: Sensitivity, slope: Slope) -> str:
+    """Change of a number that uses up the margin: in percent, as a factor from tenfold on, in degrees or in dB."""
+    change = sensitivity.to_limit(slope)
     if change is None:
         return "-"
     if slope.is_proportional:
-        part = change / slope.value
-        return f"{100 * part:+.3g} %" if -0.99 < part < 9 else f"x {float(f'{1 + part:.3g}'):g}"
+        ratio = change / slope.value
+        return f"{100 * ratio:+.3g} %" if -0.99 < ratio < 9 else f"x {float(f'{1 + ratio:.3g}'):g}"
     return f"{change:+.3g} dB" if slope.per_text.endswith("dB") else f"{math.degrees(change):+.3g} deg"
 
 
@@ -426,44 +436,57 @@ def _points(change: float) -> str:
     return f"{100 * change:+.3g}" if change else "0"
 
 
-def _notes(found: Sensitivity) -> Iterator[str]:
-    shown = found.shown
+def _notes(sensitivity: Sensitivity) -> Iterator[str]:
+    shown = sensitivity.shown
     if any(slope.is_mixed for slope in shown):
         yield from wrapped(
             "In parentheses: the row that is the worst beside the value. The change is made of the slopes of both.",
             "  ",
         )
-    if little := len(found.slopes) - len(shown):
-        yield f"Less than a ten-thousandth of it: {counted(little, 'number')} (JSON lists them)."
-    if found.unchanging:
-        yield f"Without effect: {counted(len(found.unchanging), 'number')} (JSON lists them)."
-    if found.skipped:
-        kinds = ", ".join(dict.fromkeys(re.split("[:;]", one.reason)[0].removeprefix("is ") for one in found.skipped))
-        yield from wrapped(f"Left out: {len(found.skipped)} keys ({kinds}).", "  ")
+    if negligible := len(sensitivity.slopes) - len(shown):
+        yield f"Less than a ten-thousandth of it: {counted(negligible, 'number')} (JSON lists them)."
+    if sensitivity.unchanging:
+        yield f"Without effect: {counted(len(sensitivity.unchanging), 'number')} (JSON lists them)."
+    if sensitivity.skipped:
+        kinds = ", ".join(
+            dict.fromkeys(re.split("[:;]", skipped.reason)[0].removeprefix("is ") for skipped in sensitivity.skipped)
+        )
+        yield from wrapped(f"Left out: {len(sensitivity.skipped)} keys ({kinds}).", "  ")
 
 
-def _balance(found: Sensitivity) -> Iterator[str]:
-    moving = [one for one in found.relaxed if one.moves_shares]
-    if not moving:
+def _balance(sensitivity: Sensitivity) -> Iterator[str]:
+    moving_errors = [error for error in sensitivity.relaxed if error.moves_shares]
+    if not moving_errors:
         yield "Shares are balanced; no error that is doubled would move them."
         return
     yield from wrapped("Shares are balanced. What an error that is doubled costs the others:", "  ")
     yield ""
     rows = [["doubled", "shares t/r", "transmitter", "receiver", ""]]
-    for one in moving:
-        shares = ["/".join(f"{100 * share:.3g}" for share in both) for both in (one.shares_before, one.shares_after)]
-        rows.append([printable(one.key), " -> ".join(shares), _then(one.transmitter), _then(one.receiver), ""])
+    for error in moving_errors:
+        shares = [
+            "/".join(f"{100 * share:.3g}" for share in platform_shares)
+            for platform_shares in (error.shares_before, error.shares_after)
+        ]
+        rows.append(
+            [
+                printable(error.key),
+                " -> ".join(shares),
+                _change_words(error.transmitter),
+                _change_words(error.receiver),
+                "",
+            ]
+        )
     yield from table(rows)
     yield ""
     yield from wrapped(
         "Of each platform the worst utilization of what is not doubled, before and after; shares in percent.", "  "
     )
-    if still := len(found.relaxed) - len(moving):
-        yield f"Doubling moves no share of {counted(still, 'other')}."
+    if unmoved := len(sensitivity.relaxed) - len(moving_errors):
+        yield f"Doubling moves no share of {counted(unmoved, 'other')}."
 
 
-def _then(others: tuple[str, float, float] | None) -> str:
-    if others is None:
+def _change_words(change: tuple[str, float, float] | None) -> str:
+    if change is None:
         return "-"
-    _, before, after = others
+    _, before, after = change
     return percent(before) if abs(after - before) <= LITTLE * before else f"{percent(before)} -> {percent(after)}"

@@ -1,8 +1,9 @@
-"""The table of requirements and the rows as CSV for a spreadsheet: SI values, a line for each, a header.
+"""Requirements and rows as CSV for a spreadsheet: a header, and a line of SI values for each requirement and row.
 
-`kind` tells them apart. A requirement has the id `requirement.islr`, what the mission reaches under `declared`, what
-the file requires under `allowable`, and the row that decides under `decided_by`. Where a share of it decides, the
-utilization is that of the share, which has its own two numbers.
+The column `kind` says whether a line is a requirement or a row. The line of a requirement has an id such as
+`requirement.islr`, the reached value in the column `declared`, the required value in `allowable`, and the deciding
+row in `decided_by`. If a share of the requirement decides, the utilization is that of the share, whose values are in
+the columns `share_allowed` and `share_reached`.
 """
 
 import csv
@@ -63,27 +64,28 @@ COLUMNS = (
 )
 
 
-# Columns that are values of a row; text of the user's own is made harmless below.
-_OF_ROW = tuple(
+# Columns that are fields of a row. Columns with text of the user are written apart.
+_ROW_COLUMNS = tuple(
     column for column in COLUMNS if column in Row._fields and column not in ("requirement_id", "evidence")
 )
-_values_of = attrgetter(*_OF_ROW)
+_values_of = attrgetter(*_ROW_COLUMNS)
 
 
 def piece(mission: MissionFindings | UnusableMission, style: Style) -> str:
-    """Write every requirement and row of a mission; of an unusable file a line per fault, with the status `error`."""
+    """Write every requirement and row of a mission, or every fault of an unusable file with the status `error`."""
     return csv_text(_faults(mission) if isinstance(mission, UnusableMission) else _rows(mission))
 
 
 def joined(pieces: Sequence[Piece], version: str, style: Style) -> str:
-    """Write them below their header."""
+    """Write the lines of all missions below a header."""
     return csv_text([COLUMNS]) + "".join(piece.text for piece in pieces)
 
 
 def csv_text(rows: Iterable[Sequence[object]]) -> str:
-    """Write rows as lines of CSV; None is an empty cell, a number has all digits that it needs to be read back.
+    """Write rows as lines of CSV.
 
-    Text that a spreadsheet would take for a formula is made harmless here, in every CSV.
+    None is an empty cell. Numbers have all digits that reproduce them. Text that a spreadsheet would take for a
+    formula is made harmless.
     """
     output = io.StringIO()
     harmless = ([spreadsheet_text(cell) if isinstance(cell, str) else cell for cell in row] for row in rows)
@@ -108,20 +110,20 @@ def _rows(mission: MissionFindings) -> Iterator[list[object]]:
     file, name = mission.file, mission.name
     changed = changes_words(mission.changes) or None
     outside = overrides_words(mission) or None
-    of_mission = {
+    mission_cells = {
         "file": file,
         "mission": name,
         "set": changed,
         "overrides": outside,
         "confidence": None if mission.is_empty else mission.confidence,
     }
-    for one in mission.requirements:
-        cells = of_mission | _requirement(one)
+    for requirement in mission.requirements:
+        cells = mission_cells | _requirement(requirement)
         yield [cells.get(column) for column in COLUMNS]
     verdicts = {verdict.id: verdict.verdict for verdict in mission.verdicts or ()}
     for row in mission.rows:
         x, y = row.displacement_m or (None, None)
-        cells = dict(zip(_OF_ROW, _values_of(row), strict=True)) | {
+        cells = dict(zip(_ROW_COLUMNS, _values_of(row), strict=True)) | {
             "file": file,
             "mission": name,
             "id": row.id,
@@ -139,25 +141,25 @@ def _rows(mission: MissionFindings) -> Iterator[list[object]]:
         yield [cells.get(column) for column in COLUMNS]
 
 
-def _requirement(one: JudgedRequirement) -> dict[str, object]:
+def _requirement(requirement: JudgedRequirement) -> dict[str, object]:
     return {
-        "id": requirement_id(one),
-        "status": one.status,
-        "metric": one.key,
-        "unit": one.unit,
-        "declared": one.reached,
-        "allowable": one.allowed,
-        "utilization": one.utilization,
-        "line": one.line,
-        "reason": one.reason,
-        "notes": "; ".join([*use_remarks(one), *(waiver.words for waiver in one.waivers)]),
+        "id": requirement_id(requirement),
+        "status": requirement.status,
+        "metric": requirement.key,
+        "unit": requirement.unit,
+        "declared": requirement.reached,
+        "allowable": requirement.allowed,
+        "utilization": requirement.utilization,
+        "line": requirement.line,
+        "reason": requirement.reason,
+        "notes": "; ".join([*use_remarks(requirement), *(waiver.words for waiver in requirement.waivers)]),
         "kind": "requirement",
-        "decided_by": one.row,
-        **share_columns(one),
-        "waived_by": _waived_by(one),
+        "decided_by": requirement.row,
+        **share_columns(requirement),
+        "waived_by": _waived_by(requirement),
     }
 
 
-def _waived_by(one: Row | JudgedRequirement) -> str | None:
-    """Ids of the waivers that hold, as the file writes them; None where nothing is waived."""
-    return "; ".join(waiver.id for waiver in one.waived_by) or None
+def _waived_by(judged: Row | JudgedRequirement) -> str | None:
+    """Ids of the waivers in force, as the file writes them; None without a waiver."""
+    return "; ".join(waiver.id for waiver in judged.waived_by) or None

@@ -5,7 +5,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from bisar_budget import __version__
 from bisar_budget.faults import Fault
@@ -28,9 +28,9 @@ FORMAT = "bisar-budget/check/1"
 
 
 def piece(mission: MissionFindings | UnusableMission, style: Style) -> str:
-    """Write the part of one mission, a row to a line; a number that is not finite is never written."""
-    found = _unusable(mission) if isinstance(mission, UnusableMission) else _mission(mission)
-    return _indented(found, _LEVELS, _MARGIN)
+    """Write the item of one mission, with a line for each row. A number that is not finite is an error."""
+    item = _unusable(mission) if isinstance(mission, UnusableMission) else _mission(mission)
+    return _indented(item, _INDENTED_LEVELS, _MARGIN)
 
 
 def joined(pieces: Sequence[Piece], version: str, style: Style) -> str:
@@ -41,19 +41,22 @@ def joined(pieces: Sequence[Piece], version: str, style: Style) -> str:
     return f'{head},\n  "missions": [\n{_MARGIN}{missions}\n  ]\n}}\n'
 
 
-# Names of a row's values in the contract, in the order of its fields; what follows them is in `notes`.
+# Keys of a row's values in the contract, in the order of the fields of `Row` before `waivers`.
 _RENAMED = {"subject": "id", "remarks": "notes"}
-_ROW = tuple(_RENAMED.get(name, name) for name in Row._fields[: Row._fields.index("waivers")])
-_LEVELS, _MARGIN = 2, "    "  # of a mission: itself and its rows; what is inside a row stays on its line
+_ROW_KEYS = tuple(_RENAMED.get(name, name) for name in Row._fields[: Row._fields.index("waivers")])
+_INDENTED_LEVELS, _MARGIN = 2, "    "  # of a mission and of its rows; the content of a row stays on its line
 
 
 @cache
-def _encoder(separator: str) -> Callable[[Any], str]:
+def _encoder(separator: str) -> Callable[[object], str]:
     return json.JSONEncoder(allow_nan=False, separators=(separator, ": ")).encode
 
 
-def _indented(value: Any, levels: int, margin: str = "") -> str:
-    """Indent the upper levels. json.dumps(indent=…) runs in Python and costs as much as the check itself."""
+def _indented(value: object, levels: int, margin: str = "") -> str:
+    """JSON of a value whose upper levels are indented.
+
+    `json.dumps` with an indentation runs in Python and takes as long as the check itself.
+    """
     if levels == 0 or not value or not isinstance(value, dict | list | tuple):
         return _encoder(", ")(value)
     inner = margin + "  "
@@ -68,28 +71,28 @@ def _indented(value: Any, levels: int, margin: str = "") -> str:
     else:
         opening, closing = "[", "]"
         if levels == 1:
-            # Within a string the quote before `id` would stand behind a backslash: this cuts between rows only.
+            # A quote within a string follows a backslash, so the text is cut between rows only.
             content = _encoder(", ")(value)[1:-1].replace('}, {"id": ', f'}}{between}{{"id": ')
         else:
             content = between.join([_indented(item, levels - 1, inner) for item in value])
     return f"{opening}\n{inner}{content}\n{margin}{closing}"
 
 
-def document_text(form: str, content: Mapping[str, Any]) -> str:
-    """A document of the contract `form` of another command; a number that is not finite is refused."""
+def document_text(form: str, content: Mapping[str, object]) -> str:
+    """Text of a JSON document of the contract `form`. A number that is not finite is an error."""
     return json.dumps({"format": form, "version": __version__, **content}, indent=2, allow_nan=False) + "\n"
 
 
-def outside_item(found: "AboutMission") -> dict[str, Any]:
-    """Changes from outside the file of a mission, as every contract has them."""
+def outside_item(mission: "AboutMission") -> dict[str, object]:
+    """Changes and overrides from outside the mission file, the same in every contract."""
     return {
-        "set": [change._asdict() for change in found.changes],
-        "overrides": [one._asdict() for one in found.overrides],
+        "set": [change._asdict() for change in mission.changes],
+        "overrides": [override._asdict() for override in mission.overrides],
     }
 
 
-def fault_item(fault: Fault) -> dict[str, Any]:
-    """A fault of a file, as the contract has it."""
+def fault_item(fault: Fault) -> dict[str, object]:
+    """Item of a fault of a file."""
     return {
         "line": fault.line,
         "column": fault.column,
@@ -102,7 +105,7 @@ def fault_item(fault: Fault) -> dict[str, Any]:
     }
 
 
-def _unusable(mission: UnusableMission) -> dict[str, Any]:
+def _unusable(mission: UnusableMission) -> dict[str, object]:
     return {
         "file": mission.file,
         "name": None,
@@ -111,7 +114,7 @@ def _unusable(mission: UnusableMission) -> dict[str, Any]:
     }
 
 
-def _mission(mission: MissionFindings) -> dict[str, Any]:
+def _mission(mission: MissionFindings) -> dict[str, object]:
     allocation = mission.allocation
     return {
         "file": mission.file,
@@ -163,12 +166,12 @@ def _mission(mission: MissionFindings) -> dict[str, Any]:
             "autofocus_radius_m": mission.scene.autofocus_radius,
             "searched_radius_m": mission.scene.searched,
         },
-        "requirements": [_requirement(one) for one in mission.requirements],
+        "requirements": [_requirement(requirement) for requirement in mission.requirements],
         "declared_kinds": mission.kinds.declared,
         "not_declared": mission.kinds.missing,
         "without_source": mission.kinds.without_source,
-        "shifted": [asdict(one) for one in mission.kinds.shifted],
-        "overrides": [one._asdict() for one in mission.overrides],
+        "shifted": [asdict(shifted) for shifted in mission.kinds.shifted],
+        "overrides": [override._asdict() for override in mission.overrides],
         "summary": mission.summary,
         "rows": [_row(row) for row in mission.rows],
         "warnings": [_warning(warning) for warning in mission.warnings],
@@ -176,12 +179,12 @@ def _mission(mission: MissionFindings) -> dict[str, Any]:
         "note_codes": [note.code for note in mission.notes],
         "errors": [],
         "monte_carlo": None if mission.monte_carlo is None else monte_carlo_item(mission.monte_carlo),
-        "verification": None if mission.verdicts is None else [verdict_item(one) for one in mission.verdicts],
+        "verification": None if mission.verdicts is None else [verdict_item(verdict) for verdict in mission.verdicts],
         **({} if mission.study is None else {"sweep": _study(mission.study)}),
     }
 
 
-def _study(study: TradeStudy) -> dict[str, Any]:
+def _study(study: TradeStudy) -> dict[str, object]:
     return {
         "vary": list(study.asked),
         "cases": study.cases,
@@ -193,45 +196,45 @@ def _study(study: TradeStudy) -> dict[str, Any]:
     }
 
 
-def _warning(warning: FileWarning) -> dict[str, Any]:
+def _warning(warning: FileWarning) -> dict[str, object]:
     return {"line": warning.line, "message": warning.message, "code": warning.message.code}
 
 
-def verdict_item(verdict: Verdict) -> dict[str, Any]:
-    """Write what images say of a limit, with the codes of the reasons."""
+def verdict_item(verdict: Verdict) -> dict[str, object]:
+    """Item of the verdict of images on a limit, with the codes of its reasons."""
     reasons = {"reason_code": verdict.reason, "reason_autofocus_code": verdict.reason_autofocus}
     return verdict._asdict() | {name: None if reason is None else reason.code for name, reason in reasons.items()}
 
 
-def _requirement(one: JudgedRequirement) -> dict[str, Any]:
-    found: dict[str, Any] = one._asdict()
-    found["waivers"] = [waiver.words for waiver in one.waivers]
-    found["share"] = None if one.share is None else asdict(one.share)
-    found["waived_by"] = [waiver.id for waiver in one.waived_by]
-    return found | {"reason_code": None if one.reason is None else one.reason.code}
+def _requirement(requirement: JudgedRequirement) -> dict[str, object]:
+    item: dict[str, object] = requirement._asdict()
+    item["waivers"] = [waiver.words for waiver in requirement.waivers]
+    item["share"] = None if requirement.share is None else asdict(requirement.share)
+    item["waived_by"] = [waiver.id for waiver in requirement.waived_by]
+    return item | {"reason_code": None if requirement.reason is None else requirement.reason.code}
 
 
-def _row(row: Row) -> dict[str, Any]:
-    found: dict[str, Any] = dict(zip(_ROW, row, strict=False))
+def _row(row: Row) -> dict[str, object]:
+    item: dict[str, object] = dict(zip(_ROW_KEYS, row, strict=False))
     notes = row.notes
-    found |= {
+    item |= {
         "id": row.id,
         "notes": notes,
         "waived_by": [waiver.id for waiver in row.waived_by],
         "reason_code": None if row.reason is None else row.reason.code,
         "note_codes": [note.code for note in notes],
     }
-    return found
+    return item
 
 
-def monte_carlo_item(drawn: MonteCarlo) -> dict[str, Any]:
-    """How often requirements hold, as the contract has it."""
+def monte_carlo_item(drawn: MonteCarlo) -> dict[str, object]:
+    """Item of the Monte Carlo result, with the probability of each requirement."""
     return {**drawn._asdict(), "requirements": [requirement._asdict() for requirement in drawn.requirements]}
 
 
-def _platform(mission: MissionFindings, name: str) -> dict[str, Any]:
+def _platform(mission: MissionFindings, name: str) -> dict[str, object]:
     state: PlatformState = getattr(mission.geometry, name)
-    found: dict[str, Any] = {
+    item: dict[str, object] = {
         "slant_range_m": state.slant_range,
         "azimuth_rad": state.azimuth,
         "elevation_rad": state.elevation,
@@ -239,7 +242,7 @@ def _platform(mission: MissionFindings, name: str) -> dict[str, Any]:
     }
     path = dict(mission.paths).get(name)
     if path is not None:
-        found["path"] = {
+        item["path"] = {
             "source": path.source,
             "file": path.file,
             "sha256": path.sha256,
@@ -251,17 +254,20 @@ def _platform(mission: MissionFindings, name: str) -> dict[str, Any]:
             "samples": path.samples,
             "stretch_s": path.stretch,
             "doubt_m": path.largest_doubt_m,
-            "stated": [_stated_accuracy(one) for one in path.stated],
+            "stated": [_stated_accuracy(stated) for stated in path.stated],
             **{
-                said: None if file is None else dict(zip(("file", "sha256"), file, strict=True))
-                for said, file in path.beside.items()
+                key: None if file is None else dict(zip(("file", "sha256"), file, strict=True))
+                for key, file in path.beside.items()
             },
         }
-    return found
+    return item
 
 
-def _stated_accuracy(stated: StatedAccuracy) -> dict[str, Any]:
-    """Sigmas that the source of a path states, along the scene's axes, or the one that it names no direction of."""
+def _stated_accuracy(stated: StatedAccuracy) -> dict[str, object]:
+    """Item of the standard deviations that the source of a path states.
+
+    They are along the axes of the scene, or one total without a direction.
+    """
     variances = [row[index] for index, row in enumerate(stated.covariance or ())]
     sigmas = [math.sqrt(max(variance, 0.0)) for variance in variances]
     return {

@@ -3,9 +3,8 @@
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from datetime import UTC, date, datetime
-from typing import Any
 
 from bisar_budget import __version__
 from bisar_budget.design.passes import Passes, SatellitePass
@@ -32,7 +31,7 @@ from bisar_budget.units import format_quantity
 
 # ---------------------------------------------------------------- for programs
 def as_json(passes: Passes, style: Style) -> str:
-    """Write the contract; values in SI and radians, null where there is none."""
+    """Write `passes/1`. Values are in SI and radians; a missing value is null."""
     content = {
         "file": passes.file,
         "name": passes.name,
@@ -45,21 +44,21 @@ def as_json(passes: Passes, style: Style) -> str:
         **outside_item(passes),
         "without_orbit": [
             {
-                "platform": one.platform,
-                "from": one.start.as_text(),
-                "until": one.stop.as_text(),
-                "reason": one.reason,
+                "platform": gap.platform,
+                "from": gap.start.as_text(),
+                "until": gap.stop.as_text(),
+                "reason": gap.reason,
             }
-            for one in passes.unknown
+            for gap in passes.unknown
         ],
         "summary": _summarized(passes),
-        "passes": [_item(one) for one in passes.found],
+        "passes": [_item(overpass) for overpass in passes.found],
     }
     return document_text("bisar-budget/passes/1", content)
 
 
 def _summarized(passes: Passes) -> dict[str, int]:
-    """Number of passes that comply, that are waived, and that do neither."""
+    """Number of passes that comply, are waived, fail, are not evaluated, and have no mission."""
     counts = passes.counts
     return {
         "comply": len(passes.complying),
@@ -70,53 +69,55 @@ def _summarized(passes: Passes) -> dict[str, int]:
     }
 
 
-def _item(one: SatellitePass) -> dict[str, Any]:
+def _item(overpass: SatellitePass) -> dict[str, object]:
     """Values of a pass, by the keys of JSON and CSV."""
-    state = one.state
-    found: dict[str, Any] = {
-        "number": one.number,
-        "status": one.status,
-        "center_time": None if one.center is None else one.center.as_text(),
-        "rise_time": one.start.as_text() if one.rises else None,
-        "set_time": one.stop.as_text() if one.sets else None,
-        "start_time": one.start.as_text(),
-        "stop_time": one.stop.as_text(),
-        "culmination_time": one.culmination.as_text(),
-        "max_elevation_rad": one.max_elevation,
+    state = overpass.state
+    values: dict[str, object] = {
+        "number": overpass.number,
+        "status": overpass.status,
+        "center_time": None if overpass.center is None else overpass.center.as_text(),
+        "rise_time": overpass.start.as_text() if overpass.rises else None,
+        "set_time": overpass.stop.as_text() if overpass.sets else None,
+        "start_time": overpass.start.as_text(),
+        "stop_time": overpass.stop.as_text(),
+        "culmination_time": overpass.culmination.as_text(),
+        "max_elevation_rad": overpass.max_elevation,
         "elevation_rad": None if state is None else state.elevation,
         "azimuth_rad": None if state is None else state.azimuth,
-        "bearing_rad": one.bearing,
+        "bearing_rad": overpass.bearing,
         "slant_range_m": None if state is None else state.slant_range,
-        "side": one.side or None,
-        "direction": None if state is None else direction(one),
+        "side": overpass.side or None,
+        "direction": None if state is None else direction(overpass),
         "squint_rad": None if state is None else state.squint,
-        "bistatic_angle_rad": one.bistatic_angle,
-        "gradient_angle_rad": one.gradient_angle,
-        "range_resolution_m": one.range_resolution,
-        "cross_range_resolution_m": one.cross_range_resolution,
-        "doubt_m": one.doubt,
-        "requirement": one.requirement,
-        "row": one.row,
-        "utilization": one.utilization,
-        "reason": one.reason or None,
-        "waived_by": list(one.waived_by),
+        "bistatic_angle_rad": overpass.bistatic_angle,
+        "gradient_angle_rad": overpass.gradient_angle,
+        "range_resolution_m": overpass.range_resolution,
+        "cross_range_resolution_m": overpass.cross_range_resolution,
+        "doubt_m": overpass.doubt,
+        "requirement": overpass.requirement,
+        "row": overpass.row,
+        "utilization": overpass.utilization,
+        "reason": overpass.reason or None,
+        "waived_by": list(overpass.waived_by),
     }
-    return {key: None if isinstance(one, float) and not math.isfinite(one) else one for key, one in found.items()}
+    return {
+        key: None if isinstance(value, float) and not math.isfinite(value) else value for key, value in values.items()
+    }
 
 
-def direction(one: SatellitePass) -> str:
+def direction(overpass: SatellitePass) -> str:
     """Direction of the satellite along its orbit, towards north or south."""
-    return "ascending" if one.is_ascending else "descending"
+    return "ascending" if overpass.is_ascending else "descending"
 
 
 def as_csv(passes: Passes, style: Style) -> str:
-    """Write a line for each pass, values in SI and radians, empty where there is none."""
-    whose = [passes.file, passes.name, passes.platform]
+    """Write a line for each pass. Values are in SI and radians; a missing value is an empty cell."""
+    identity = [passes.file, passes.name, passes.platform]
     outside = overrides_words(passes) or None
     lines: list[list[object]] = [["file", "name", "platform", *_item(_NO_PASS), "overrides"]]
-    for one in passes.found:
-        values = _item(one) | {"waived_by": "; ".join(one.waived_by) or None}
-        lines.append([*whose, *values.values(), outside])
+    for overpass in passes.found:
+        values = _item(overpass) | {"waived_by": "; ".join(overpass.waived_by) or None}
+        lines.append([*identity, *values.values(), outside])
     return csv_text(lines)
 
 
@@ -144,33 +145,33 @@ _WAIVERS = ("waived by", "", "<")  # a column where any pass is waived
 
 
 def as_text(passes: Passes, style: Style) -> str:
-    """Write lines for a person: how many comply, a table of at most 100 columns and waivers, and what decides."""
+    """Write text for a terminal: verdict, a table of at most 100 columns and waivers, and the deciding rows."""
     return "\n".join(_lines(passes, style)) + "\n"
 
 
 def verdict(passes: Passes) -> str:
-    """How many passes comply, of how many, when and above what; those that are waived are counted apart."""
+    """Number of complying passes and of all passes, period and least elevation. Waived passes are counted apart."""
     count = len(passes.found)
     comply = len(passes.complying)
     if not count:
-        said = "no pass"
+        compliance = "no pass"
     elif passes.counts["waived"]:
-        said = ", ".join(_counted(passes))
+        compliance = ", ".join(_counted(passes))
     elif count == 1:
-        said = f"one pass, which {'complies' if comply else 'does not comply'}"
+        compliance = f"one pass, which {'complies' if comply else 'does not comply'}"
     elif comply == count:
-        said = f"all {count} passes comply"
+        compliance = f"all {count} passes comply"
     else:
-        said = f"{comply or 'none'} of {count} passes {'complies' if comply == 1 else 'comply'}"
+        compliance = f"{comply or 'none'} of {count} passes {'complies' if comply == 1 else 'comply'}"
     squint = f"squint {math.degrees(passes.squint):.4g} deg" if passes.squint else "broadside"
     return (
-        f"{said}: {passes.platform} above {math.degrees(passes.min_elevation):.4g} deg and at {squint}, "
+        f"{compliance}: {passes.platform} above {math.degrees(passes.min_elevation):.4g} deg and at {squint}, "
         f"{short_time(passes.start)} to {short_time(passes.stop)}"
     )
 
 
 def _counted(passes: Passes) -> Iterator[str]:
-    """Numbers of passes by how they stand; what occurs nowhere is said of those that fail alone."""
+    """Numbers of passes by status. Statuses without a pass are left out, except for failures."""
     counts = passes.counts
     count = len(passes.found)
     yield f"{count} pass{'es' if count > 1 else ''}: {len(passes.complying)} comply"
@@ -202,38 +203,38 @@ def _lines(passes: Passes, style: Style) -> Iterator[str]:
         yield from wrapped(text, "  ")
 
 
-def _table(found: Sequence[SatellitePass], style: Style) -> Iterator[str]:
-    columns = (*_HEADS, _WAIVERS) if any(one.waived_by for one in found) else _HEADS
-    cells = [_cells(one)[: len(columns)] for one in found]
-    heads = [tuple(head[place] for head in columns) for place in (0, 1)]
+def _table(overpasses: Sequence[SatellitePass], style: Style) -> Iterator[str]:
+    columns = (*_HEADS, _WAIVERS) if any(overpass.waived_by for overpass in overpasses) else _HEADS
+    cells = [_cells(overpass)[: len(columns)] for overpass in overpasses]
+    heads = [tuple(head[index] for head in columns) for index in (0, 1)]
     widths = [max(len(row[column]) for row in (*heads, *cells)) for column in range(len(columns))]
     widths[0] = 8  # as in every table
     sides = "".join(head[2] for head in columns)
     for head in heads:
         yield spaced(head, widths, sides).rstrip()
-    for one, row in zip(found, cells, strict=True):
+    for overpass, row in zip(overpasses, cells, strict=True):
         line = spaced(row, widths, sides).rstrip()
-        yield style.coloured(line[:8], STATUS[one.status].sgr) + line[8:]
+        yield style.coloured(line[:8], STATUS[overpass.status].sgr) + line[8:]
 
 
-def _cells(one: SatellitePass) -> tuple[str, ...]:
-    state, minutes = one.state, one.stop.since(one.start) / 60
-    sizes = (one.range_resolution, one.cross_range_resolution)
+def _cells(overpass: SatellitePass) -> tuple[str, ...]:
+    state, minutes = overpass.state, overpass.stop.since(overpass.start) / 60
+    sizes = (overpass.range_resolution, overpass.cross_range_resolution)
     return (
-        STATUS[one.status].text,
-        str(one.number),
-        _seconds(one.center) if one.center is not None else f"{_seconds(one.culmination)}*",
+        STATUS[overpass.status].text,
+        str(overpass.number),
+        _seconds(overpass.center) if overpass.center is not None else f"{_seconds(overpass.culmination)}*",
         f"{minutes:.1f}" if minutes < 1000 else f"{minutes:.0f}",
-        f"{_degrees(None if state is None else state.elevation)}/{_degrees(one.max_elevation)}",
-        _degrees(one.bearing),
-        one.side or "-",
-        "-" if state is None else "asc" if one.is_ascending else "desc",
-        _degrees(one.bistatic_angle, 1),
-        _degrees(one.gradient_angle, 1),
+        f"{_degrees(None if state is None else state.elevation)}/{_degrees(overpass.max_elevation)}",
+        _degrees(overpass.bearing),
+        overpass.side or "-",
+        "-" if state is None else "asc" if overpass.is_ascending else "desc",
+        _degrees(overpass.bistatic_angle, 1),
+        _degrees(overpass.gradient_angle, 1),
         " x ".join(map(_metres, sizes)) if None not in sizes else "-",
-        "-" if one.doubt is None else format_quantity(one.doubt, "m"),
-        use_words(one.utilization),
-        ", ".join(map(printable, one.waived_by)),
+        "-" if overpass.doubt is None else format_quantity(overpass.doubt, "m"),
+        use_words(overpass.utilization),
+        ", ".join(map(printable, overpass.waived_by)),
     )
 
 
@@ -247,21 +248,30 @@ def _degrees(angle: float | None, digits: int = 0) -> str:
 
 
 def _notes(passes: Passes) -> Iterator[str]:
-    """Notes below the passes: the deciding rows, once for all that share one, cuts, and unknowns."""
+    """Notes below the passes: deciding rows, reasons, passes cut by the period, and times without an orbit.
+
+    Passes with the same deciding row or reason share one note.
+    """
     for text, numbers in _grouped(passes.found, _decided):
         yield f"{sentence(text)}: {numbers}."
-    for text, numbers in _grouped(passes.found, lambda one: one.reason and _figureless(one)):
-        first = next(one for one in passes.found if one.reason and _figureless(one) == text)
+    for text, numbers in _grouped(passes.found, lambda overpass: overpass.reason and _figureless(overpass)):
+        first = next(overpass for overpass in passes.found if overpass.reason and _figureless(overpass) == text)
         of_first = f" (numbers of {first.number})" if first.reason != text and not numbers.isdecimal() else ""
         yield f"{STATUS[first.status].text} {numbers}: {printable(first.reason)}{of_first}."
-    if any(one.center is None for one in passes.found):
+    if any(overpass.center is None for overpass in passes.found):
         yield "* of the culmination: there is no mid-time."
-    for numbers, where in (
-        (_numbers(one.number for one in passes.found if not one.rises), "Began before what was looked at"),
-        (_numbers(one.number for one in passes.found if not one.sets), "Goes on after what was looked at"),
+    for numbers, event in (
+        (
+            _numbers(overpass.number for overpass in passes.found if not overpass.rises),
+            "Began before what was looked at",
+        ),
+        (
+            _numbers(overpass.number for overpass in passes.found if not overpass.sets),
+            "Goes on after what was looked at",
+        ),
     ):
         if numbers:
-            yield f"{where}: {numbers}."
+            yield f"{event}: {numbers}."
     for gap in passes.unknown:
         yield (
             f"No orbit of the {gap.platform} {short_time(gap.start)} to {short_time(gap.stop)}: "
@@ -276,44 +286,48 @@ def _notes(passes: Passes) -> Iterator[str]:
         )
 
 
-def _decided(one: SatellitePass) -> str:
-    if one.requirement is None:
+def _decided(overpass: SatellitePass) -> str:
+    if overpass.requirement is None:
         return ""
-    name = NAMES.get(one.requirement, one.requirement.replace("_", " "))
-    waived = f", not met but waived ({waiver_names(one.waived_by)})" if one.waived_by else ""
-    return f"{name} decides" + (f", by {printable(one.row)}" if one.row else "") + waived
+    name = NAMES.get(overpass.requirement, overpass.requirement.replace("_", " "))
+    waived = f", not met but waived ({waiver_names(overpass.waived_by)})" if overpass.waived_by else ""
+    return f"{name} decides" + (f", by {printable(overpass.row)}" if overpass.row else "") + waived
 
 
-def _figureless(one: SatellitePass) -> str:
-    """The kind of a reason: its words without their numbers."""
-    return f"{one.status} {re.sub(r'-?[0-9][0-9.]*', '#', one.reason)}"
+def _figureless(overpass: SatellitePass) -> str:
+    """Status and reason of a pass, with every number of the reason replaced by `#`."""
+    return f"{overpass.status} {re.sub(r'-?[0-9][0-9.]*', '#', overpass.reason)}"
 
 
-def _grouped(found: Sequence[SatellitePass], said: Callable[[SatellitePass], str]) -> Iterator[tuple[str, str]]:
+def _grouped(
+    overpasses: Sequence[SatellitePass], text_of: Callable[[SatellitePass], str]
+) -> Iterator[tuple[str, str]]:
     """Sentences about passes, each with the numbers of its passes."""
     groups: dict[str, list[int]] = {}
-    for one in found:
-        if text := said(one):
-            groups.setdefault(text, []).append(one.number)
+    for overpass in overpasses:
+        if text := text_of(overpass):
+            groups.setdefault(text, []).append(overpass.number)
     for text, numbers in groups.items():
         yield text, _numbers(numbers)
 
 
-def _numbers(numbers: Any) -> str:
-    """Numbers as 1, 3 to 5; empty where there is none."""
+def _numbers(numbers: Iterable[int]) -> str:
+    """Numbers as "1, 3 to 5". Empty without numbers."""
     runs: list[list[int]] = []
     for number in numbers:
         if runs and number == runs[-1][-1] + 1:
             runs[-1].append(number)
         else:
             runs.append([number])
-    said = (str(run[0]) if len(run) == 1 else f"{run[0]}{', ' if len(run) == 2 else ' to '}{run[-1]}" for run in runs)
-    return ", ".join(said)
+    run_words = (
+        str(run[0]) if len(run) == 1 else f"{run[0]}{', ' if len(run) == 2 else ' to '}{run[-1]}" for run in runs
+    )
+    return ", ".join(run_words)
 
 
 # ---------------------------------------------------------------- for a calendar
-_HALF_HOUR = 1800.0  # s; no satellite passes twice in it, and newer elements move no pass by as much
-_OCTETS = 75  # of a line, its end not counted
+_UID_PERIOD_S = 1800.0  # a satellite passes at most once within it, and newer elements move a pass by less
+_MAX_LINE_BYTES = 75  # without the end of the line
 
 
 def as_ics(passes: Passes, stamp: date) -> str:
@@ -324,20 +338,21 @@ def as_ics(passes: Passes, stamp: date) -> str:
     """
     lines = ["BEGIN:VCALENDAR", "VERSION:2.0", f"PRODID:-//bisar-budget//passes {__version__}//EN"]
     seen: Counter[str] = Counter()
-    made = _stamp(datetime(stamp.year, stamp.month, stamp.day, tzinfo=UTC))
-    for one in passes.found:
-        half_hours = math.floor((one.culmination.day * DAY + one.culmination.seconds) / _HALF_HOUR)
+    timestamp = _stamp(datetime(stamp.year, stamp.month, stamp.day, tzinfo=UTC))
+    for overpass in passes.found:
+        half_hours = math.floor((overpass.culmination.day * DAY + overpass.culmination.seconds) / _UID_PERIOD_S)
+        start, stop = overpass.start, overpass.stop
         uid = digest(passes.name, passes.platform, str(half_hours))[:32]
         seen[uid] += 1
         lines += [
             "BEGIN:VEVENT",
             f"UID:{uid}{f'-{seen[uid]}' if seen[uid] > 1 else ''}@bisar-budget",
-            f"DTSTAMP:{made}",
-            f"DTSTART:{_stamp(Instant(one.start.day, math.floor(one.start.seconds)).as_datetime())}",
-            f"DTEND:{_stamp(Instant(one.stop.day, math.floor(one.stop.seconds) + 1.0).as_datetime())}",
-            *_folded(f"SUMMARY:{_escaped(_summary(one, passes))}"),
-            *_folded(f"DESCRIPTION:{_escaped(chr(10).join(_description(one, passes)))}"),
-            f"CATEGORIES:{_escaped(STATUS[one.status].words)}",
+            f"DTSTAMP:{timestamp}",
+            f"DTSTART:{_stamp(Instant(start.day, math.floor(start.seconds)).as_datetime())}",
+            f"DTEND:{_stamp(Instant(stop.day, math.floor(stop.seconds) + 1.0).as_datetime())}",
+            *_folded(f"SUMMARY:{_escaped(_summary(overpass, passes))}"),
+            *_folded(f"DESCRIPTION:{_escaped(chr(10).join(_description(overpass, passes)))}"),
+            f"CATEGORIES:{_escaped(STATUS[overpass.status].words)}",
             "TRANSP:TRANSPARENT",
             "END:VEVENT",
         ]
@@ -349,61 +364,63 @@ def _stamp(moment: datetime) -> str:
     return moment.strftime("%Y%m%dT%H%M%SZ")
 
 
-def _summary(one: SatellitePass, passes: Passes) -> str:
-    return f"{STATUS[one.status].text}: pass {one.number} of {printable(passes.name)}"
+def _summary(overpass: SatellitePass, passes: Passes) -> str:
+    return f"{STATUS[overpass.status].text}: pass {overpass.number} of {printable(passes.name)}"
 
 
-def _description(one: SatellitePass, passes: Passes) -> Iterator[str]:
+def _description(overpass: SatellitePass, passes: Passes) -> Iterator[str]:
     """Facts about a pass, a line each."""
     yield f"{printable(passes.file)}, {passes.platform}, {passes.model} model"
-    state = one.state
-    if one.center is not None and state is not None:
-        yield f"Mid-time {one.center.as_text()}"
+    state = overpass.state
+    if overpass.center is not None and state is not None:
+        yield f"Mid-time {overpass.center.as_text()}"
         yield (
-            f"Elevation {_degrees(state.elevation, 1)} deg from {_degrees(one.bearing)} deg (north, clockwise), "
-            f"{format_quantity(state.slant_range, 'm')} away"
+            f"Elevation {_degrees(state.elevation, 1)} deg from {_degrees(overpass.bearing)} deg "
+            f"(north, clockwise), {format_quantity(state.slant_range, 'm')} away"
         )
-        yield f"{sentence(direction(one))}, looks {one.side}"
-    yield f"Highest {_degrees(one.max_elevation, 1)} deg at {one.culmination.as_text()}"
-    if one.bistatic_angle is not None:
+        yield f"{sentence(direction(overpass))}, looks {overpass.side}"
+    yield f"Highest {_degrees(overpass.max_elevation, 1)} deg at {overpass.culmination.as_text()}"
+    if overpass.bistatic_angle is not None:
         yield (
-            f"Bistatic angle {_degrees(one.bistatic_angle, 1)} deg, gradients {_degrees(one.gradient_angle, 1)} deg "
-            "apart"
+            f"Bistatic angle {_degrees(overpass.bistatic_angle, 1)} deg, "
+            f"gradients {_degrees(overpass.gradient_angle, 1)} deg apart"
         )
-        sizes = (format_quantity(size or 0.0, "m") for size in (one.range_resolution, one.cross_range_resolution))
+        sizes = (
+            format_quantity(size or 0.0, "m") for size in (overpass.range_resolution, overpass.cross_range_resolution)
+        )
         yield "Resolution {} range, {} cross range".format(*sizes)
-    if one.doubt is not None:
-        yield f"The satellite may be {format_quantity(one.doubt, 'm')} off"
-    if said := _decided(one):
-        use = "" if one.utilization is None else f", {percent(one.utilization)} used"
-        yield f"{sentence(said)}{use}"
-    if one.reason:
-        yield sentence(printable(one.reason))
+    if overpass.doubt is not None:
+        yield f"The satellite may be {format_quantity(overpass.doubt, 'm')} off"
+    if decision := _decided(overpass):
+        use = "" if overpass.utilization is None else f", {percent(overpass.utilization)} used"
+        yield f"{sentence(decision)}{use}"
+    if overpass.reason:
+        yield sentence(printable(overpass.reason))
     if outside := overrides_words(passes):
         yield f"Overrides: {outside}"
 
 
 def _escaped(text: str) -> str:
-    """Text of RFC 5545, 3.3.11: a backslash before what separates."""
+    """Text of RFC 5545, 3.3.11: a backslash before each separator."""
     text = text.replace("\\", "\\\\").replace(";", "\\;").replace(",", "\\,").replace("\n", "\\n")
     return text.encode("utf-8", "backslashreplace").decode()
 
 
 def _folded(line: str) -> Iterator[str]:
-    """Lines of at most 75 octets, of which all but the first begin with a space; no character is cut.
+    """Lines of at most 75 bytes. Every line after the first begins with a space. No character is cut.
 
-    None goes on with a colon, and two `#` stand on two lines: a log takes either for a command.
+    No continued line begins with a colon, and adjacent `#` are put on two lines: logs take either for a command.
     """
     start, size = 0, 0
-    for place, letter in enumerate(line):
+    for index, letter in enumerate(line):
         octets = len(letter.encode())
-        is_command = letter == line[place - 1 : place] == "#"
-        if is_command or size + octets > _OCTETS - 1:
-            cut = place
+        is_command = letter == line[index - 1 : index] == "#"
+        if is_command or size + octets > _MAX_LINE_BYTES - 1:
+            cut = index
             while line[cut] == ":" and cut > start + 1:
                 cut -= 1
-            cut = cut if cut > start + 1 else place  # colons alone
+            cut = cut if cut > start + 1 else index  # the line consists of colons
             yield f"{' ' if start else ''}{line[start:cut]}"
-            start, size = cut, len(line[cut:place].encode())
+            start, size = cut, len(line[cut:index].encode())
         size += octets
     yield f"{' ' if start else ''}{line[start:]}"

@@ -1,11 +1,10 @@
-"""The sheet of specifications: `allocate/1`, CSV, text for a terminal, Markdown and HTML for whoever buys.
+"""The sheet of specifications: `allocate/1`, CSV, text for a terminal, Markdown and HTML for a purchaser.
 
-Its specifications are also requirements below those of the mission, for Sphinx-Needs and for StrictDoc.
+Sphinx-Needs and StrictDoc read the specifications as requirements derived from the requirements of the mission.
 """
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Any
 
 from bisar_budget import __version__
 from bisar_budget.design.offers import Offer, OfferedFigure
@@ -16,7 +15,7 @@ from bisar_budget.findings.status import STATUS
 from bisar_budget.mission.changes import parts_of
 from bisar_budget.report import Style
 from bisar_budget.report.compliance import document as doc
-from bisar_budget.report.drawing.share_bars import LIMITS, limiting, share_bars
+from bisar_budget.report.drawing.share_bars import LEAST_WEIGHT_FRACTION, limiting, share_bars
 from bisar_budget.report.formats.csv_table import csv_text
 from bisar_budget.report.formats.json_document import document_text, outside_item
 from bisar_budget.report.formats.text_table import requirement_table
@@ -26,20 +25,20 @@ from bisar_budget.report.words.identity import Identity, distinct, identities
 from bisar_budget.report.words.requirements import RequirementLine, requirement_lines
 from bisar_budget.report.words.sentences import counted, need_text, percent, rst_text, share_percent, table, wrapped
 
-_LISTED = 3  # parts of the catalogue that a table names
+_LISTED_COUNT = 3  # parts of the catalogue that a table names
 _COLUMNS = ("file", "key", "value", "ordered", "unit", "text", "declared", "weight", "parts")
 
 
-Answer = tuple[SpecificationSheet, Offer | None]  # the offer is what is held to the sheet, if any
+Answer = tuple[SpecificationSheet, Offer | None]  # a sheet, and the offer that is compared with it
 
 
 # ---------------------------------------------------------------- for programs
 def as_json(answers: Sequence[Answer], style: Style) -> str:
-    """Write the contract; values in SI, null where there is none."""
-    return document_text("bisar-budget/allocate/1", {"missions": [_document(one) for one in answers]})
+    """Write `allocate/1`. Values are in SI; a missing value is null."""
+    return document_text("bisar-budget/allocate/1", {"missions": [_document(answer) for answer in answers]})
 
 
-def _document(answer: Answer) -> dict[str, Any]:
+def _document(answer: Answer) -> dict[str, object]:
     sheet, offer = answer
     return {
         "file": sheet.file,
@@ -52,38 +51,38 @@ def _document(answer: Answer) -> dict[str, Any]:
         "reserve": sheet.reserve,
         "requirements": [
             {
-                "key": one.key,
-                "value": one.value,
-                "unit": one.unit,
-                "used": one.utilization,
-                "status": one.status,
-                "row": one.row,
-                "reason": str(one.reason) if one.reason else None,
+                "key": requirement.key,
+                "value": requirement.value,
+                "unit": requirement.unit,
+                "used": requirement.utilization,
+                "status": requirement.status,
+                "row": requirement.row,
+                "reason": str(requirement.reason) if requirement.reason else None,
             }
-            for one in sheet.requirements
+            for requirement in sheet.requirements
         ],
         "specifications": [
             {
-                "key": one.key,
-                "weight": one.weight,
-                "value": one.value,
-                "ordered": one.ordered,
-                "unit": one.unit,
-                "text": one.text or None,
-                "shares": dict(one.shares),
-                "declared": one.declared,
-                "parts": list(one.parts),
+                "key": spec.key,
+                "weight": spec.weight,
+                "value": spec.value,
+                "ordered": spec.ordered,
+                "unit": spec.unit,
+                "text": spec.text or None,
+                "shares": dict(spec.shares),
+                "declared": spec.declared,
+                "parts": list(spec.parts),
             }
-            for one in sheet.specifications
+            for spec in sheet.specifications
         ],
         "rows": [row._asdict() for row in sheet.rows],
-        "broken": [one._asdict() for one in sheet.broken],
+        "broken": [row._asdict() for row in sheet.broken],
         "notes": list(sheet.notes),
         "offer": None if offer is None else _offer(offer),
     }
 
 
-def _offer(offer: Offer) -> dict[str, Any]:
+def _offer(offer: Offer) -> dict[str, object]:
     return {
         "file": offer.file,
         "status": offer.status,
@@ -94,21 +93,23 @@ def _offer(offer: Offer) -> dict[str, Any]:
 
 
 def as_csv(answers: Sequence[Answer], style: Style) -> str:
-    """Write a line for each specification, values in SI; what each takes of a requirement stands behind the rest."""
-    shares = [key for key in NAMES if any(key in one.shares for sheet, _ in answers for one in sheet.specifications)]
+    """Write a line for each specification, in SI. The last columns are its shares of the requirements."""
+    shares = [
+        key for key in NAMES if any(key in spec.shares for sheet, _ in answers for spec in sheet.specifications)
+    ]
     lines: list[list[object]] = [[*_COLUMNS, *(f"share of {key}" for key in shares)]]
     for sheet, _ in answers:
-        for one in sheet.specifications:
-            sizes = (one.value, one.ordered, one.unit, one.text, one.declared, one.weight)
-            parts = [f"{one.shares.get(key, 0.0):.6g}" for key in shares]
-            lines.append([printable(sheet.file), printable(one.key), *sizes, " ".join(one.parts), *parts])
+        for spec in sheet.specifications:
+            sizes = (spec.value, spec.ordered, spec.unit, spec.text, spec.declared, spec.weight)
+            share_cells = [f"{spec.shares.get(key, 0.0):.6g}" for key in shares]
+            lines.append([printable(sheet.file), printable(spec.key), *sizes, " ".join(spec.parts), *share_cells])
     return csv_text(lines)
 
 
 # ---------------------------------------------------------------- for a terminal
 def as_text(answers: Sequence[Answer], style: Style) -> str:
-    """Write each sheet as lines for a person."""
-    return "\n\n".join("\n".join(_lines(one, style)) for one in answers) + "\n"
+    """Write each sheet as text for a terminal."""
+    return "\n\n".join("\n".join(_lines(answer, style)) for answer in answers) + "\n"
 
 
 def _lines(answer: Answer, style: Style) -> Iterator[str]:
@@ -116,7 +117,7 @@ def _lines(answer: Answer, style: Style) -> Iterator[str]:
     sgr = "32" if sheet.complies else "1;31"
     yield from title_lines(sheet, _verdict(sheet), sgr, style, remark=f"; {_terms(sheet)}")
     if sheet.broken:
-        yield from table([["row", "used", "may use", ""], *(_broken_words(one) for one in sheet.broken)])
+        yield from table([["row", "used", "may use", ""], *map(_broken_words, sheet.broken)])
         yield ""
         yield from wrapped(_way_out(sheet), "")
         if offer is not None:
@@ -128,70 +129,73 @@ def _lines(answer: Answer, style: Style) -> Iterator[str]:
     if sheet.findings is not None:
         yield from requirement_table(sheet.findings, style)
         yield ""
-    keeping = [f"Parts that keep to {one.key}: {_parts_words(one)}." for one in sheet.specifications if one.parts]
+    keeping = [f"Parts that keep to {spec.key}: {_parts_words(spec)}." for spec in sheet.specifications if spec.parts]
     for text in [*_remarks(sheet), *keeping]:
         yield from wrapped(text, "  ")
     if offer is not None:
         yield ""
         yield from wrapped(_offered(offer), "  ")
         head = ["figure", "offered", "ordered", ""]
-        lines = [[one.key, one.text or "-", one.ordered or "free", _side(one)] for one in offer.figures]
+        lines = [
+            [figure.key, figure.text or "-", figure.ordered or "free", _side(figure)] for figure in offer.figures
+        ]
         yield from table([head, *lines])
 
 
 def _verdict(sheet: SpecificationSheet) -> str:
     if sheet.broken:
         return "no specification can be found: other errors leave no room"
-    number = sum(one.value is not None for one in sheet.specifications)
+    number = sum(spec.value is not None for spec in sheet.specifications)
     count = counted(number, "specification")
-    stands = STATUS[sheet.status].text
+    status_text = STATUS[sheet.status].text
     if not number:
-        return f"no requirement limits any of these errors: check says {stands}"
+        return f"no requirement limits any of these errors: check says {status_text}"
     if not sheet.complies:
-        return f"{count}, but the mission does not comply with them: {stands}"
-    return f"{count} that meet{'s' if number == 1 else ''} every requirement together: check says {stands}"
+        return f"{count}, but the mission does not comply with them: {status_text}"
+    return f"{count} that meet{'s' if number == 1 else ''} every requirement together: check says {status_text}"
 
 
 def _terms(sheet: SpecificationSheet) -> str:
-    how = "root-sum-square" if sheet.combine == "rss" else "sum of all at their worst"
-    return f"{sheet.model} model, {how}, {percent(sheet.reserve)} of each limit in reserve"
+    combination = "root-sum-square" if sheet.combine == "rss" else "sum of all at their worst"
+    return f"{sheet.model} model, {combination}, {percent(sheet.reserve)} of each limit in reserve"
 
 
-def _line(one: Specification) -> list[str]:
-    most = max(one.shares, key=lambda key: one.shares[key], default="")
-    share = f"{share_percent(one.shares[most])} of {NAMES[most]}" if most else "limited by nothing"
-    return [one.key, one.text or "free", one.declared_text or "-", share]
+def _line(spec: Specification) -> list[str]:
+    most = max(spec.shares, key=lambda key: spec.shares[key], default="")
+    share = f"{share_percent(spec.shares[most])} of {NAMES[most]}" if most else "limited by nothing"
+    return [spec.key, spec.text or "free", spec.declared_text or "-", share]
 
 
 def _offered(offer: Offer) -> str:
-    outside = sum(one.is_inside is False for one in offer.figures)
-    of_all = f"of {counted(len(offer.figures), 'figure')} {outside} {'is' if outside == 1 else 'are'} outside"
-    other = f"; it differs in {', '.join(offer.notes)} too" if offer.notes else ""
-    return f"Offer {printable(offer.file)}: the mission as a whole says {STATUS[offer.status].text}; {of_all}{other}."
+    outside = sum(figure.is_inside is False for figure in offer.figures)
+    count_words = f"of {counted(len(offer.figures), 'figure')} {outside} {'is' if outside == 1 else 'are'} outside"
+    difference = f"; it differs in {', '.join(offer.notes)} too" if offer.notes else ""
+    subject = f"Offer {printable(offer.file)}: the mission as a whole says {STATUS[offer.status].text}"
+    return f"{subject}; {count_words}{difference}."
 
 
-def _parts_words(one: Specification) -> str:
-    """Some of the parts of the catalogue that keep to a specification."""
-    more = f" and {len(one.parts) - _LISTED} more" if len(one.parts) > _LISTED else ""
-    return f"{', '.join(one.parts[:_LISTED])}{more}"
+def _parts_words(spec: Specification) -> str:
+    """First parts of the catalogue that meet a specification, and the number of further parts."""
+    more = f" and {len(spec.parts) - _LISTED_COUNT} more" if len(spec.parts) > _LISTED_COUNT else ""
+    return f"{', '.join(spec.parts[:_LISTED_COUNT])}{more}"
 
 
-def _broken_words(one: Broken) -> list[str]:
-    """Cells of a row in which there is no room."""
-    if one.used is None:
-        return [one.id, "-", percent(one.allowed), "over its limit: they leave no image"]
-    if one.used > 1 + LEAST_ROOM:
-        return [one.id, percent(one.used), percent(one.allowed), "over its limit"]
-    is_full = one.used >= 1 - LEAST_ROOM
-    within = "at its limit" if is_full else "within its limit, but not with the reserve"
-    return [one.id, "100 %" if is_full else share_percent(one.used), percent(one.allowed), within]
+def _broken_words(row: Broken) -> list[str]:
+    """Cells of a row in which other errors leave no room."""
+    if row.used is None:
+        return [row.id, "-", percent(row.allowed), "over its limit: they leave no image"]
+    if row.used > 1 + LEAST_ROOM:
+        return [row.id, percent(row.used), percent(row.allowed), "over its limit"]
+    is_full = row.used >= 1 - LEAST_ROOM
+    remark = "at its limit" if is_full else "within its limit, but not with the reserve"
+    return [row.id, "100 %" if is_full else share_percent(row.used), percent(row.allowed), remark]
 
 
 def _way_out(sheet: SpecificationSheet) -> str:
     """Remedies where other errors leave no room."""
-    used = [math.inf if one.used is None else one.used for one in sheet.broken]
-    room = 1 - max(used) / (1 - LEAST_ROOM)
-    permille = math.ceil(1e3 * room) - 1 if room > 0 else -1  # strictly less than they leave
+    used = [math.inf if row.used is None else row.used for row in sheet.broken]
+    room_fraction = 1 - max(used) / (1 - LEAST_ROOM)
+    permille = math.ceil(1e3 * room_fraction) - 1 if room_fraction > 0 else -1  # strictly less than the room
     if permille >= 0:
         return f"The other errors use that much by themselves. --reserve {permille / 10:g}% or less leaves room."
     return "The other errors, which are fixed, use that much by themselves: make them smaller, or specify them too."
@@ -204,16 +208,16 @@ def _remarks(sheet: SpecificationSheet) -> Iterator[str]:
             effect = row.id.partition(".")[2]
             yield f"{effect.capitalize()} phase is kept negligible, since no requirement takes it: that limits sizes."
         elif row.requirement is None:
-            by = "where the image ends" if row.id.startswith("end") else "what a mission file may state"
-            yield f"{row.id.partition('.')[2]} is limited by {by}."
-    for one in sheet.specifications:
-        if one.remark:
-            yield f"{one.key} {one.text}: {one.remark}."
+            cause = "where the image ends" if row.id.startswith("end") else "what a mission file may state"
+            yield f"{row.id.partition('.')[2]} is limited by {cause}."
+    for spec in sheet.specifications:
+        if spec.remark:
+            yield f"{spec.key} {spec.text}: {spec.remark}."
     yield from (f"{note[0].upper()}{note[1:]}." for note in sheet.notes)
 
 
 def _side(figure: OfferedFigure) -> str:
-    """On which side of a specification a figure is."""
+    """Side of the specification on which an offered figure lies, or the remark of a figure without a side."""
     if figure.is_inside is None:
         return figure.remark
     return "inside" if figure.is_inside else "OUTSIDE"
@@ -222,20 +226,20 @@ def _side(figure: OfferedFigure) -> str:
 # ---------------------------------------------------------------- for a board, and a supplier
 def as_markdown(answers: Sequence[Answer], style: Style) -> str:
     """Write the sheets as Markdown, without drawings."""
-    from bisar_budget.report.compliance.markdown import written
+    from bisar_budget.report.compliance.markdown import markdown_document
 
-    return written(_sheets(answers), "")
+    return markdown_document(_sheets(answers), "")
 
 
 def as_html(answers: Sequence[Answer], style: Style) -> str:
-    """Write the sheets as a page of their own."""
+    """Write the sheets as one page of HTML."""
     from bisar_budget.report.compliance.html import page
 
     return page(_sheets(answers))
 
 
 def _sheets(answers: Sequence[Answer]) -> doc.Compliance:
-    chapters = [_chapter(one, f"sheet-{number}") for number, one in enumerate(answers, 1)]
+    chapters = [_chapter(answer, f"sheet-{number}") for number, answer in enumerate(answers, 1)]
     names = [printable(sheet.name) for sheet, _ in answers]
     facts = doc.Facts([("Tool", f"bisar-budget {__version__}")])
     margins = [
@@ -249,8 +253,8 @@ def _sheets(answers: Sequence[Answer]) -> doc.Compliance:
 def _chapter(answer: Answer, anchor: str) -> doc.Chapter:
     sheet, offer = answer
     facts: list[tuple[doc.Text, doc.Text]] = [("File", doc.Name(printable(sheet.file))), ("Terms", _terms(sheet))]
-    if outside := overrides_words(sheet):
-        facts.append(("Overrides", outside))
+    if overrides := overrides_words(sheet):
+        facts.append(("Overrides", overrides))
     blocks: list[doc.Block] = [
         doc.Paragraph(_verdict(sheet), f"verdict {'pass' if sheet.complies else 'fail'}"),
         doc.Facts(facts),
@@ -259,7 +263,8 @@ def _chapter(answer: Answer, anchor: str) -> doc.Chapter:
     if offer is not None:
         heads = doc.heads("Figure", *doc.numbers("Offered", "Ordered"), "")
         lines: list[doc.Line] = [
-            [doc.Name(one.key), one.text or "–", one.ordered or "free", _side(one)] for one in offer.figures
+            [doc.Name(figure.key), figure.text or "–", figure.ordered or "free", _side(figure)]
+            for figure in offer.figures
         ]
         blocks += [doc.Paragraph(_offered(offer)), doc.TextTable("Offer", "Offer against the sheet", heads, lines)]
     return doc.Chapter(printable(sheet.name), blocks, anchor, level=2, is_article=True)
@@ -269,18 +274,21 @@ def _required(sheet: SpecificationSheet) -> Iterator[doc.Block]:
     heads = doc.heads("Requirement", *doc.numbers("Allowed", "Reached", "Use"), "Status", "Decided by")
     if sheet.findings is not None and not sheet.broken:
         rows: list[doc.Line] = [
-            [one.name, one.allowed, one.reached, one.use, doc.Badge(one.status), _decided_by(one)]
-            for one in requirement_lines(sheet.findings)
+            [line.name, line.allowed, line.reached, line.use, doc.Badge(line.status), _decided_by(line)]
+            for line in requirement_lines(sheet.findings)
         ]
         yield doc.TextTable("Requirements", "Requirements, with what is ordered in place", heads, rows)
 
 
-def _decided_by(one: RequirementLine) -> doc.Text:
-    return (doc.Name(one.decided_by), f", {one.remark}") if one.remark else doc.Name(one.decided_by)
+def _decided_by(line: RequirementLine) -> doc.Text:
+    return (doc.Name(line.decided_by), f", {line.remark}") if line.remark else doc.Name(line.decided_by)
 
 
 def specified(sheet: SpecificationSheet, anchor: str) -> Iterator[doc.Block]:
-    """The specifications with their shares, and a drawing of what uses up each limit; or why there are none."""
+    """The specifications with their shares and a drawing of the shares of each limit.
+
+    Without specifications: the rows in which other errors leave no room, and the remedy.
+    """
     if sheet.broken:
         heads = doc.heads("Row", *doc.numbers("Used", "May use"), "")
         rows: list[doc.Line] = [[doc.Name(name), *cells] for name, *cells in map(_broken_words, sheet.broken)]
@@ -295,21 +303,24 @@ def specified(sheet: SpecificationSheet, anchor: str) -> Iterator[doc.Block]:
 
 
 def _table(sheet: SpecificationSheet) -> Iterator[doc.Block]:
-    keys = [key for key in NAMES if any(key in one.shares for one in sheet.specifications)]
-    sizes = doc.numbers("Ordered", "Found", "Today", *(f"Of {NAMES[key]}" for key in keys))
-    heads = doc.heads(*doc.numbers("No."), "Specification", *sizes, "Parts")
+    keys = [key for key in NAMES if any(key in spec.shares for spec in sheet.specifications)]
+    size_heads = doc.numbers("Ordered", "Found", "Today", *(f"Of {NAMES[key]}" for key in keys))
+    heads = doc.heads(*doc.numbers("No."), "Specification", *size_heads, "Parts")
     rows: list[doc.Line] = []
-    for number, one in enumerate(sheet.specifications, 1):
-        shares = [share_percent(one.shares[key]) if one.shares.get(key, 0.0) > LIMITS else "–" for key in keys]
-        found = (one.text or "free", one.found_text or "–", one.declared_text or "–")
-        rows.append([str(number), doc.Name(one.key), *found, *shares, _parts_words(one) or "–"])
+    for number, spec in enumerate(sheet.specifications, 1):
+        shares = [
+            share_percent(spec.shares[key]) if spec.shares.get(key, 0.0) > LEAST_WEIGHT_FRACTION else "–"
+            for key in keys
+        ]
+        sizes = (spec.text or "free", spec.found_text or "–", spec.declared_text or "–")
+        rows.append([str(number), doc.Name(spec.key), *sizes, *shares, _parts_words(spec) or "–"])
     caption = "Specifications, rounded down to two digits; shares are those of what a limit may use."
     yield doc.TextTable("Specifications", caption, heads, rows)
 
 
 # ---------------------------------------------------------------- for tools that trace requirements
 _PREFIX = "SPEC"
-_LEAST = 1e-3  # of a requirement: an error that takes less of it does not derive from it
+_PARENT_SHARE_FRACTION = 1e-3  # smallest share of a requirement for which a specification derives from it
 _GRAMMAR = """[GRAMMAR]
 ELEMENTS:
 - TAG: REQUIREMENT
@@ -332,32 +343,32 @@ ELEMENTS:
 
 
 def as_needs(answers: Sequence[Answer], style: Style) -> str:
-    """Write each specification as a need of the type `req`, with links to the ids of what it derives from."""
-    found: list[tuple[tuple[str, ...], dict[str, Any]]] = []
-    for sheet, identity, one in _specified(answers, style):
-        content = [_statement(one), _rationale(sheet, one), f"{sheet.name}, {identity.path}"]
-        need = {
+    """Write each specification as a need of the type `req`, with links to the ids of its parents."""
+    needs: list[tuple[tuple[str, ...], dict[str, object]]] = []
+    for sheet, identity, spec in _specified(answers, style):
+        content = [_statement(spec), _rationale(sheet, spec), f"{sheet.name}, {identity.path}"]
+        need: dict[str, object] = {
             "type": "req",
-            "title": need_text(_title(sheet, one)),
+            "title": need_text(_title(sheet, spec)),
             "status": sheet.status,
             "tags": ["bisar-budget", "specification"],
-            "links": [need_text(link) for link in _parents(sheet, one)],
+            "links": [need_text(link) for link in _parents(sheet, spec)],
             "content": "\n\n".join(rst_text(text) for text in content),
         }
-        found.append((identity.of(one.key), need))
-    return needs_document(__version__, _PREFIX, found)
+        needs.append((identity.of(spec.key), need))
+    return needs_document(__version__, _PREFIX, needs)
 
 
 def as_sdoc(answers: Sequence[Answer], style: Style) -> str:
-    """Write each specification as a requirement of a document that StrictDoc reads, its parents by their UIDs."""
-    found = list(_specified(answers, style))
-    names = [identity.of(one.key) for _, identity, one in found]
+    """Write each specification as a requirement of a StrictDoc document. UIDs name its parents."""
+    specifications = list(_specified(answers, style))
+    names = [identity.of(spec.key) for _, identity, spec in specifications]
     uids = distinct([identifier(_PREFIX, name) for name in names], names)
     lines = ["[DOCUMENT]", f"TITLE: specifications, by bisar-budget {__version__}", "", _GRAMMAR]
-    for uid, (sheet, _, one) in zip(uids, found, strict=True):
-        lines += ["[REQUIREMENT]", f"UID: {uid}", f"TITLE: {printable(_title(sheet, one))}"]
-        lines += [f"STATEMENT: {printable(_statement(one))}", f"RATIONALE: {printable(_rationale(sheet, one))}"]
-        parents = _parents(sheet, one)
+    for uid, (sheet, _, spec) in zip(uids, specifications, strict=True):
+        lines += ["[REQUIREMENT]", f"UID: {uid}", f"TITLE: {printable(_title(sheet, spec))}"]
+        lines += [f"STATEMENT: {printable(_statement(spec))}", f"RATIONALE: {printable(_rationale(sheet, spec))}"]
+        parents = _parents(sheet, spec)
         lines += ["RELATIONS:"] if parents else []
         lines += [line for parent in parents for line in ("- TYPE: Parent", f"  VALUE: {printable(parent)}")]
         lines.append("")
@@ -367,38 +378,40 @@ def as_sdoc(answers: Sequence[Answer], style: Style) -> str:
 def _specified(
     answers: Sequence[Answer], style: Style
 ) -> Iterator[tuple[SpecificationSheet, Identity, Specification]]:
-    """Every specification that has a value, with its sheet and what the mission is called."""
+    """Every specification that has a value, with its sheet and the identity of its mission."""
     sheets = [sheet for sheet, _ in answers if sheet.findings is not None]
     missions = [sheet.findings for sheet in sheets if sheet.findings is not None]
     for sheet, identity in zip(sheets, identities(missions, style), strict=True):
-        yield from ((sheet, identity, one) for one in sheet.specifications if one.text)
+        yield from ((sheet, identity, spec) for spec in sheet.specifications if spec.text)
 
 
-def _title(sheet: SpecificationSheet, one: Specification) -> str:
-    return f"{one.key} of {sheet.name}"
+def _title(sheet: SpecificationSheet, spec: Specification) -> str:
+    return f"{spec.key} of {sheet.name}"
 
 
-def _statement(one: Specification) -> str:
-    """The requirement, by the key of the mission file that says what the number means."""
-    return f"{one.key}, as the mission file counts it, shall be at most {one.text}."
+def _statement(spec: Specification) -> str:
+    """The requirement in words. The key of the mission file defines the number."""
+    return f"{spec.key}, as the mission file counts it, shall be at most {spec.text}."
 
 
-def _rationale(sheet: SpecificationSheet, one: Specification) -> str:
-    shares = sorted(one.shares.items(), key=lambda item: -item[1])
-    parts = [f"{share_percent(part)} of the {NAMES[key]}" for key, part in shares if part >= _LEAST]
-    takes = f"It takes {' and '.join(parts)} that may be used. " if parts else ""
+def _rationale(sheet: SpecificationSheet, spec: Specification) -> str:
+    shares = sorted(spec.shares.items(), key=lambda item: -item[1])
+    share_words = [
+        f"{share_percent(share)} of the {NAMES[key]}" for key, share in shares if share >= _PARENT_SHARE_FRACTION
+    ]
+    takes = f"It takes {' and '.join(share_words)} that may be used. " if share_words else ""
     reserve = f"{percent(sheet.reserve)} of each limit is in reserve."
     return f"{takes}With all specifications of the sheet together the check says {sheet.status}; {reserve}"
 
 
-def _parents(sheet: SpecificationSheet, one: Specification) -> list[str]:
-    """The project's own ids of the rows that limit a specification, of their requirements, and of its own rows."""
+def _parents(sheet: SpecificationSheet, spec: Specification) -> list[str]:
+    """Requirement ids of the project: of rows that limit a specification, of their requirements, of its own rows."""
     findings = sheet.findings
     if findings is None or findings.mission is None:
         return []
-    limits = [row for row in sheet.rows if row.shares.get(one.key, 0.0) >= _LEAST]
+    limits = [row for row in sheet.rows if row.shares.get(spec.key, 0.0) >= _PARENT_SHARE_FRACTION]
     rows = [row.id for row in limits] + [f"mission.{row.requirement}" for row in limits]
-    owner, kind = (*parts_of(one.key)[1:2], ""), parts_of(one.key)[-1]
+    owner, kind = (*parts_of(spec.key)[1:2], ""), parts_of(spec.key)[-1]
     rows += [row.id for row in findings.rows if row.subject.owner == owner[0] and row.subject.kind == kind]
     ids = findings.mission.requirement_ids
     return list(dict.fromkeys(ids[row] for row in rows if row in ids))

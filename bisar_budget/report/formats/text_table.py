@@ -1,4 +1,4 @@
-"""The report for a terminal: verdict, table of requirements, geometry, the rows that matter with the worst first."""
+"""The report for a terminal: verdict, table of requirements, geometry, and the rows that matter, worst first."""
 
 import re
 from bisect import bisect_left
@@ -26,14 +26,14 @@ from bisar_budget.report.words.requirements import (
     COLUMNS,
     RequirementLine,
     declared_words,
-    is_said_with_the_table,
+    is_explained_in_table,
     probabilities,
     requirement_lines,
     unjudged_effects,
     verdict,
 )
 from bisar_budget.report.words.sentences import (
-    WIDTH,
+    TEXT_WIDTH,
     aligned,
     allowable_words,
     binding_words,
@@ -49,17 +49,17 @@ from bisar_budget.report.words.sentences import (
 )
 from bisar_budget.units import format_quantity
 
-LINES = 45  # of a report, where its rows can be fewer
-_FEWEST = 3  # rows, however long the rest is
+_PAGE_LINES = 45  # length of a report whose passing rows can be left out
+_MIN_LISTED_ROWS = 3  # also in a report that is longer than a page
 
 
 def piece(mission: MissionFindings | UnusableMission, style: Style) -> str:
-    """Write the part of one mission, at most 80 columns where the file's own names allow it."""
+    """Write the report of one mission in at most 80 columns. Long names of the file may need more."""
     return "\n".join(_unusable(mission, style) if isinstance(mission, UnusableMission) else _mission(mission, style))
 
 
 def joined(pieces: Sequence[Piece], version: str, style: Style) -> str:
-    """Write the report for reading."""
+    """Write the reports of all missions, with their overall status below several missions."""
     text = ("\n" if style.verbosity < 0 else "\n\n").join(piece.text for piece in pieces)
     if len(pieces) > 1:
         text += "\n\n" + _overall([piece.status for piece in pieces], style)
@@ -71,19 +71,23 @@ def _unusable(mission: UnusableMission, style: Style) -> list[str]:
     summary = f"{STATUS['error'].text} {printable(mission.file)}: cannot be used, {faults}"
     if style.verbosity < 0:
         return [_lead(summary, "error", style)]
-    places = [f"  {fault.line or '-'}:{fault.column or '-'}  {fault}" for fault in mission.faults]
-    first, *rest = wrapped_counts(summary)
-    return [_lead(first, "error", style), *rest, *(line for place in places for line in wrapped(place, "       "))]
+    fault_lines = [f"  {fault.line or '-'}:{fault.column or '-'}  {fault}" for fault in mission.faults]
+    first, *continuation = wrapped_counts(summary)
+    return [
+        _lead(first, "error", style),
+        *continuation,
+        *(line for fault_line in fault_lines for line in wrapped(fault_line, "       ")),
+    ]
 
 
 def _mission(mission: MissionFindings, style: Style) -> list[str]:
     if style.verbosity < 0:
         count = sum(not warning.is_of_options for warning in mission.warnings)
-        said = [_summary(mission, is_brief=True), *_alone(mission)]
-        said += [f"{counted(count, 'warning')} about the file"] if count else []
+        summary = [_summary(mission, is_brief=True), *_alone(mission)]
+        summary += [f"{counted(count, 'warning')} about the file"] if count else []
         if outside := overrides_words(mission, with_changes=False):
-            said.append(f"overrides: {outside}")
-        return [_lead("; ".join(said), mission.status, style)]
+            summary.append(f"overrides: {outside}")
+        return [_lead("; ".join(summary), mission.status, style)]
     lines = _verdict(mission, style)
     lines += ["", *_requirements(mission, style)]
     lines += [
@@ -92,7 +96,7 @@ def _mission(mission: MissionFindings, style: Style) -> list[str]:
         "",
     ]
     after = list(_after(mission, style))
-    room = max(LINES - len(lines) - len(after), 0)
+    room = max(_PAGE_LINES - len(lines) - len(after), 0)
     return [*lines, *_table(mission, style, room), *after]
 
 
@@ -101,12 +105,12 @@ def _alone(mission: MissionFindings) -> list[str]:
 
 
 def _verdict(mission: MissionFindings, style: Style) -> list[str]:
-    """Whether it is met and was looked at, what was judged, and what from outside the file bears on it."""
-    said = _summary(mission)
-    first, *rest = wrapped(said, "  ") if mission.changes else wrapped_counts(said)
+    """Verdict, name and document of the mission, rule of the judgement, overrides, and doubts about the model."""
+    summary = _summary(mission)
+    first, *continuation = wrapped(summary, "  ") if mission.changes else wrapped_counts(summary)
     document = ", ".join(filter(None, (document_words(mission.document), mission.document.author)))
     name = f"{mission.name} ({document})" if document else mission.name
-    lines = [_lead(first, mission.status, style), *rest, *wrapped(f"{name}; {rule_words(mission)}", "  ")]
+    lines = [_lead(first, mission.status, style), *continuation, *wrapped(f"{name}; {rule_words(mission)}", "  ")]
     lines += overrides_lines(mission)
     if sentence := doubtful_model(mission):
         lines += wrapped(sentence, "  ")
@@ -117,16 +121,16 @@ def _verdict(mission: MissionFindings, style: Style) -> list[str]:
 
 def requirement_table(mission: MissionFindings, style: Style) -> Iterator[str]:
     """The table of requirements."""
-    found = list(requirement_lines(mission))
-    cells = [COLUMNS[:4], *((one.name, one.allowed, one.reached, one.use) for one in found)]
-    widths = [max(len(line[column]) for line in cells) for column in range(4)]
-    yield spaced(COLUMNS, [*widths, _STATUS, 0], "<>>><<")
-    for one in found:
-        yield from _requirement(one, widths, style)
+    requirement_rows = list(requirement_lines(mission))
+    cells = [COLUMNS[:4], *((line.name, line.allowed, line.reached, line.use) for line in requirement_rows)]
+    widths = [max(len(row_line[column]) for row_line in cells) for column in range(4)]
+    yield spaced(COLUMNS, [*widths, _STATUS_WIDTH, 0], "<>>><<")
+    for line in requirement_rows:
+        yield from _requirement(line, widths, style)
 
 
 def _requirements(mission: MissionFindings, style: Style) -> Iterator[str]:
-    """The table of requirements, effects that none takes, and how much is declared."""
+    """The table of requirements, the effects that no requirement judges, and the number of declared errors."""
     yield from requirement_table(mission, style)
     for effect in unjudged_effects(mission):
         rows = ", ".join(row.id if row.line is None else f"{row.id} of line {row.line}" for row in effect.rows)
@@ -134,26 +138,29 @@ def _requirements(mission: MissionFindings, style: Style) -> Iterator[str]:
     yield from wrapped(declared_words(mission.kinds), "  ")
 
 
-def _requirement(one: RequirementLine, widths: Sequence[int], style: Style) -> Iterator[str]:
-    """One line; what decides stands below it where it is too long."""
-    start = spaced((one.name, one.allowed, one.reached, one.use), widths, "<>>>")
-    decided = ", ".join(filter(None, (one.decided_by, one.remark)))
-    if len(start) + 10 + len(decided) <= WIDTH:
-        yield f"{start} {_word(one.status, style, _STATUS)} {decided}"
+def _requirement(line: RequirementLine, widths: Sequence[int], style: Style) -> Iterator[str]:
+    """One line of the table of requirements. A long deciding row goes on a line of its own below."""
+    start = spaced((line.name, line.allowed, line.reached, line.use), widths, "<>>>")
+    decided = ", ".join(filter(None, (line.decided_by, line.remark)))
+    if len(start) + 10 + len(decided) <= TEXT_WIDTH:
+        yield f"{start} {_word(line.status, style, _STATUS_WIDTH)} {decided}"
     else:
-        yield f"{start} {_word(one.status, style)}"
+        yield f"{start} {_word(line.status, style)}"
         yield from wrapped(f"    {decided}", "    ")
 
 
 def _head(mission: MissionFindings, style: Style) -> Iterator[tuple[str, str]]:
-    """The collection, and with -v how many rows stand how; the model is said with the name."""
+    """Keys and texts of the collection geometry, and with -v the number of rows of each status.
+
+    The model is left out: it follows the name of the mission.
+    """
     yield from ((key, text) for key, text in head(mission) if key != "Model")
     if style.verbosity > 0:
         yield "Rows", ", ".join(f"{count} {STATUS[status].text}" for status, count in mission.summary.items())
 
 
 def _after(mission: MissionFindings, style: Style) -> Iterator[str]:
-    """Lines below the rows: what decides them, warnings, draws and images."""
+    """Lines below the rows: reasons, warnings, results of Monte Carlo and of images."""
     if details := list(_details(mission, style)):
         yield from ("", *details)
     yield from (line for text in _asides(mission, style) for line in wrapped(text, "  "))
@@ -163,17 +170,17 @@ def _after(mission: MissionFindings, style: Style) -> Iterator[str]:
         yield from ("", "Images with each error at its limit", "", *evidence(mission.verdicts, style))
 
 
-_STATUS = 8  # columns of a status, the same in every table: the eye and scripts look there
-_HEADER = (f"{'status':<{_STATUS}} row", "declared", "allowable", "use", "by")
+_STATUS_WIDTH = 8  # columns of a status, the same in every table, for eyes and scripts
+_HEADER = (f"{'status':<{_STATUS_WIDTH}} row", "declared", "allowable", "use", "by")
 
 
 def _table(mission: MissionFindings, style: Style, room: int) -> Iterator[str]:
-    """Rows that are declared or limit something, the worst first, and how many others there are.
+    """Rows that are declared or limit something, worst first, and the numbers of hidden rows.
 
-    Of those that pass, no more than there is room for on a screen.
+    Passing rows are hidden, least use first, until the table has at most `room` lines.
     """
     rows, hidden = worst_first(mission.rows), list[Row]()
-    # Where nothing is declared the allowables are the answer.
+    # A mission without declared errors shows all rows: the allowables are the answer.
     is_short = not style.all_rows and style.verbosity <= 0
     if is_short and not mission.is_empty:
         hidden = [row for row in rows if not matters(row)]
@@ -184,50 +191,52 @@ def _table(mission: MissionFindings, style: Style, room: int) -> Iterator[str]:
 
     @cache
     def lines_without(count: int) -> list[str]:
-        """The table without so many of the rows that pass, those that use least."""
+        """Lines of the table without `count` passing rows, those with the least use."""
         left_out = passing[len(passing) - count :]
         ids = {row.id for row in left_out}
         shown = [row for row in rows if row.id not in ids]
         key = wrapped(_table_key(shown, [*left_out, *hidden]), "  ")
         return [*_lines(shown, [cells[row.id] for row in shown], style), *key]
 
-    most = min(len(passing), max(len(rows) - _FEWEST, 0)) if is_short and not mission.is_empty else 0
-    fewest = bisect_left(range(most), True, key=lambda count: len(lines_without(count)) <= room)
-    yield from lines_without(fewest)
+    max_hidden = min(len(passing), max(len(rows) - _MIN_LISTED_ROWS, 0)) if is_short and not mission.is_empty else 0
+    hidden_count = bisect_left(range(max_hidden), True, key=lambda count: len(lines_without(count)) <= room)
+    yield from lines_without(hidden_count)
 
 
 def _lines(rows: Sequence[Row], cells: Sequence[Sequence[str]], style: Style) -> Iterator[str]:
-    head, *found = aligned([_HEADER, *cells])
+    head, *row_lines = aligned([_HEADER, *cells])
     yield from head
-    for row, (first, *rest) in zip(rows, found, strict=True):
-        yield _word(row.status, style, _STATUS) + first[_STATUS:]
-        yield from rest
+    for row, (first, *continuation) in zip(rows, row_lines, strict=True):
+        yield _word(row.status, style, _STATUS_WIDTH) + first[_STATUS_WIDTH:]
+        yield from continuation
         if row.requirement_id and (not STATUS[row.status].is_explained and style.verbosity < 1):
-            yield f"{'':<{_STATUS}} [{row.requirement_id}]"  # the others have it with their reason
+            yield f"{'':<{_STATUS_WIDTH}} [{row.requirement_id}]"  # other rows show the id with their reason
 
 
 def _table_key(rows: Sequence[Row], hidden: Sequence[Row]) -> str:
-    """Say what the columns are, and what is not in the table."""
+    """Explanation of the columns, and the numbers of hidden rows."""
     key = "use: declared / allowable"
     if any(row.binding_requirement not in (None, "quadratic_phase_error") for row in rows):
         key += "; by: what sets the allowable; a table, an equation or a model stands for QPE"
-    left = [row for row in hidden if row.status != "not_declared"]
+    judged = [row for row in hidden if row.status != "not_declared"]
     counts = [
-        (len(hidden) - len(left), "not declared", "not declared"),
-        (sum(not matters(row) for row in left), "that limits nothing", "that limit nothing"),
-        (sum(matters(row) for row in left), "that uses less", "that use less"),
+        (len(hidden) - len(judged), "not declared", "not declared"),
+        (sum(not matters(row) for row in judged), "that limits nothing", "that limit nothing"),
+        (sum(matters(row) for row in judged), "that uses less", "that use less"),
     ]
-    others = ", ".join(f"{count} {one if count == 1 else many}" for count, one, many in counts if count)
-    return f"{key}. Not shown (--all): {others}." if others else f"{key}."
+    hidden_words = ", ".join(
+        f"{count} {singular if count == 1 else plural}" for count, singular, plural in counts if count
+    )
+    return f"{key}. Not shown (--all): {hidden_words}." if hidden_words else f"{key}."
 
 
 def _row(row: Row, mission: MissionFindings) -> tuple[str, ...]:
-    name, size = f"{STATUS[row.status].text:<{_STATUS}} {row.id}", row_size(row.declared, row, mission)
+    name, size = f"{STATUS[row.status].text:<{_STATUS_WIDTH}} {row.id}", row_size(row.declared, row, mission)
     return name, size, allowable_words(row, mission), use_words(shown_use(row)), _limited_by(row)
 
 
 def _limited_by(row: Row) -> str:
-    """The source of the allowable: another requirement than the row's own, else the place of its equation."""
+    """Source of the allowable: the binding requirement if it differs from the row's own, else the equation."""
     binding = binding_words(row)
     if binding:
         return binding if row.binding_requirement == END_OF_IMAGE else binding.split()[0]
@@ -236,7 +245,11 @@ def _limited_by(row: Row) -> str:
 
 @cache
 def _short_reference(equation: str) -> str:
-    """Shorten `Table II row 4` to `II.4`, `Section V, …` to `V`, the full model's to `full`; others to nothing."""
+    """Short name of an equation.
+
+    `Table II row 4` becomes `II.4`, `Section V, …` becomes `V`, `(25)` stays, an equation of the full model becomes
+    `full`. Other equations have an empty name.
+    """
     if equation in ("full model", "first principles"):
         return "full"
     match = re.match(r"Table (I+)(?: rows? ([\d-]+))?|Section (V?I*)|(\(\d+\))", equation)
@@ -247,12 +260,15 @@ def _short_reference(equation: str) -> str:
 
 
 def _details(mission: MissionFindings, style: Style) -> Iterator[str]:
-    """Reasons of the rows that do not simply pass, once for all that share them; with -v all about every row."""
+    """Reasons of rows that need an explanation. Rows with the same reasons share one paragraph.
+
+    With -v every row has a paragraph with its reason, notes and source.
+    """
     groups: dict[tuple[str, tuple[str, ...]], list[Row]] = {}
     for row in worst_first(mission.rows):
         if style.verbosity > 0:
             yield from _detail([row], [*filter(None, [row.reason]), *row.notes, *_more(row)], mission, style)
-        elif STATUS[row.status].is_explained and not is_said_with_the_table(row):
+        elif STATUS[row.status].is_explained and not is_explained_in_table(row):
             groups.setdefault((row.status, row.decisive), []).append(row)
     for (_, texts), rows in groups.items():
         yield from _detail(rows, texts, mission, style)
@@ -262,11 +278,11 @@ def _detail(rows: Sequence[Row], texts: Sequence[str], mission: MissionFindings,
     file = printable(mission.file)
     names = []
     for row in rows:
-        place = f"{file}:{row.line}" if row.line is not None else file
-        names.append(f"{row.id}{own_id(row)} ({place})")
-    first, *rest = wrapped(f"{STATUS[rows[0].status].text} {', '.join(names)}", "  ")
+        location = f"{file}:{row.line}" if row.line is not None else file
+        names.append(f"{row.id}{own_id(row)} ({location})")
+    first, *continuation = wrapped(f"{STATUS[rows[0].status].text} {', '.join(names)}", "  ")
     yield _lead(first, rows[0].status, style)
-    yield from rest
+    yield from continuation
     for text in texts:
         yield from wrapped(f"  {text}", "  ")
 
@@ -283,9 +299,9 @@ def _more(row: Row) -> Iterator[str]:
 def _asides(mission: MissionFindings, style: Style) -> Iterator[str]:
     for warning in mission.warnings:
         if warning.is_of_options:
-            continue  # the first line says it
-        place = f"{printable(mission.file)}:{warning.line}: " if warning.line is not None else ""
-        yield f"warning: {place}{printable(warning.message)}"
+            continue  # the first line of the report names options
+        location = f"{printable(mission.file)}:{warning.line}: " if warning.line is not None else ""
+        yield f"warning: {location}{printable(warning.message)}"
     if style.verbosity > 0:
         yield from (f"note: {note}" for note in mission.notes)
 
@@ -300,7 +316,7 @@ def _overall(statuses: Sequence[str], style: Style) -> str:
 
 
 def _lead(line: str, status: str, style: Style) -> str:
-    """Colour the status that a line begins with."""
+    """Colour the status at the start of a line."""
     return _word(status, style) + line.removeprefix(STATUS[status].text)
 
 

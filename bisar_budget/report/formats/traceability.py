@@ -5,7 +5,6 @@ import re
 from collections import Counter
 from collections.abc import Container, Iterable, Iterator, Sequence
 from functools import cache
-from typing import Any
 
 from bisar_budget.faults import changes_words
 from bisar_budget.findings.mission import MissionFindings, Report, UnusableMission
@@ -18,24 +17,26 @@ from bisar_budget.report.words.identity import Identity, distinct, identities, s
 from bisar_budget.report.words.requirements import declared_words, requirement_finding, requirement_id, share_columns
 from bisar_budget.report.words.sentences import cause, counted, measure, need_text, rst_text, xml_text
 
+_NamedNeed = tuple[tuple[str, ...], dict[str, object]]  # name and fields of a need
+
 
 def as_junit(report: Report, style: Style) -> str:
-    """Write a suite per mission, a case per requirement and row, which GitLab, Jenkins and requirements tools read.
+    """Write a suite per mission with a test case per requirement and row, for GitLab, Jenkins and requirements tools.
 
-    The shape is that of Jenkins' junit-10, with properties of cases as pytest writes them. What breaks a requirement
-    is a failure, what judges nothing is skipped, a file that cannot be used is an error; a warning passes and says so
-    in its output. There are no times: a report is the same in every run.
+    The schema is Jenkins' junit-10, with properties of cases as pytest writes them. A broken requirement is a
+    failure, a row that judges nothing is skipped, an unusable file is an error, a warning passes with a remark in its
+    output. All times are 0, so that reports of equal runs are equal.
 
-    Nothing is indented, and a row without verdict has no properties but its values: a fleet has 10⁵ rows.
+    Lines are not indented, and a row without a verdict has only its values as properties: a fleet has 10⁵ rows.
     """
     counts: Counter[str] = Counter()
     suites: list[str] = []
-    named = identities(report.missions, style)
-    class_names = distinct([_class_name(one) for one in named], [(one.name,) for one in named])
-    for mission, identity, class_name in zip(report.missions, named, class_names, strict=True):
-        place = xml_text(class_name), identity.path
-        suites += _unusable_suite(mission, *place, counts) if isinstance(mission, UnusableMission) else ()
-        suites += _suite_of(mission, *place, counts) if isinstance(mission, MissionFindings) else ()
+    mission_identities = identities(report.missions, style)
+    class_names = distinct(list(map(_class_name, mission_identities)), [(each.name,) for each in mission_identities])
+    for mission, identity, class_name in zip(report.missions, mission_identities, class_names, strict=True):
+        suite_keys = xml_text(class_name), identity.path
+        suites += _unusable_suite(mission, *suite_keys, counts) if isinstance(mission, UnusableMission) else ()
+        suites += _suite_of(mission, *suite_keys, counts) if isinstance(mission, MissionFindings) else ()
     head = f'<testsuites name="bisar-budget" tests="{counts["tests"]}" failures="{counts["failures"]}"'
     lines = ['<?xml version="1.0" encoding="UTF-8"?>', f'{head} errors="{counts["errors"]}" time="0">', *suites]
     return "\n".join([*lines, "</testsuites>"]) + "\n"
@@ -46,15 +47,15 @@ def _unusable_suite(mission: UnusableMission, class_name: str, file: str, counts
     yield _suite(file, tests=1, failures=0, errors=1, skipped=0)
     yield f'<testcase classname="{class_name}" name="mission file" time="0">'
     message = f"cannot be used, {counted(len(mission.faults), 'fault')}: {mission.faults[0]}"
-    places = [f"{file}:{f.line or '-'}:{f.column or '-'}: {f}" for f in mission.faults]
-    text = "\n".join(map(xml_text, places))
+    fault_lines = [f"{file}:{f.line or '-'}:{f.column or '-'}: {f}" for f in mission.faults]
+    text = "\n".join(map(xml_text, fault_lines))
     yield f'<error message="{xml_text(message)}" type="error">{text}</error>'
     yield "</testcase>"
     yield "</testsuite>"
 
 
 def _suite_of(mission: MissionFindings, class_name: str, file: str, counts: Counter[str]) -> Iterator[str]:
-    statuses = [*(one.status for one in mission.requirements), *(row.status for row in mission.rows)]
+    statuses = [*(requirement.status for requirement in mission.requirements), *(row.status for row in mission.rows)]
     outcomes = Counter(STATUS[name].junit for name in statuses)
     tests, failures = outcomes.total(), outcomes["failure"]
     counts.update(tests=tests, failures=failures)
@@ -74,8 +75,8 @@ def _suite_of(mission: MissionFindings, class_name: str, file: str, counts: Coun
         )
     )
     file = xml_text(file)
-    for one in mission.requirements:
-        yield from _requirement_case(one, mission, class_name, file)
+    for requirement in mission.requirements:
+        yield from _requirement_case(requirement, mission, class_name, file)
     for row in mission.rows:
         yield from _row_case(row, mission, class_name, file)
     if mission.warnings:
@@ -84,9 +85,9 @@ def _suite_of(mission: MissionFindings, class_name: str, file: str, counts: Coun
     yield "</testsuite>"
 
 
-def _waived_by(found: MissionFindings | JudgedRequirement | Row) -> str | None:
-    """Ids of the waivers that hold, as the file writes them; None where nothing is waived."""
-    return "; ".join(waiver.id for waiver in found.waived_by) or None
+def _waived_by(judged: MissionFindings | JudgedRequirement | Row) -> str | None:
+    """Ids of the waivers in force, as the file writes them; None without a waiver."""
+    return "; ".join(waiver.id for waiver in judged.waived_by) or None
 
 
 def _suite(name: str, *, tests: int, failures: int, errors: int, skipped: int) -> str:
@@ -96,23 +97,25 @@ def _suite(name: str, *, tests: int, failures: int, errors: int, skipped: int) -
     )
 
 
-def _requirement_case(one: JudgedRequirement, mission: MissionFindings, class_name: str, file: str) -> Iterator[str]:
-    yield f'<testcase classname="{class_name}" name="{requirement_id(one)}" time="0">'
+def _requirement_case(
+    requirement: JudgedRequirement, mission: MissionFindings, class_name: str, file: str
+) -> Iterator[str]:
+    yield f'<testcase classname="{class_name}" name="{requirement_id(requirement)}" time="0">'
     values: tuple[tuple[str, object], ...] = (
-        ("budget_status", one.status),
-        ("unit", one.unit or None),
-        ("value", one.value),
-        ("allowed", one.allowed),
-        ("reached", one.reached),
-        ("utilization", one.utilization),
-        ("decided_by", one.row),
-        *share_columns(one).items(),
-        ("line", one.line),
-        ("waived_by", _waived_by(one)),
+        ("budget_status", requirement.status),
+        ("unit", requirement.unit or None),
+        ("value", requirement.value),
+        ("allowed", requirement.allowed),
+        ("reached", requirement.reached),
+        ("utilization", requirement.utilization),
+        ("decided_by", requirement.row),
+        *share_columns(requirement).items(),
+        ("line", requirement.line),
+        ("waived_by", _waived_by(requirement)),
     )
     yield from _properties(values)
-    said = requirement_finding(one, mission)
-    yield from _outcome(one.status, said, said, one.line, file)
+    text = requirement_finding(requirement, mission)
+    yield from _outcome(requirement.status, text, text, requirement.line, file)
     yield "</testcase>"
 
 
@@ -137,31 +140,33 @@ def _row_case(row: Row, mission: MissionFindings, class_name: str, file: str) ->
             ("waived_by", _waived_by(row)),
         )
     yield from _properties(values)
-    why, size = cause(row), measure(row, mission)
-    remark = f"{size}. {why}" if why else size
+    reason, size = cause(row), measure(row, mission)
+    remark = f"{size}. {reason}" if reason else size
     if STATUS[row.status].junit == "failure":
-        yield from _outcome(row.status, remark, f"{size}\n{why}\n{row.equation}", row.line, file)
+        yield from _outcome(row.status, remark, f"{size}\n{reason}\n{row.equation}", row.line, file)
     else:
-        yield from _outcome(row.status, why if STATUS[row.status].junit == "skipped" else remark, "", row.line, file)
+        yield from _outcome(
+            row.status, reason if STATUS[row.status].junit == "skipped" else remark, "", row.line, file
+        )
     yield "</testcase>"
 
 
 def _outcome(status_name: str, message: str, text: str, line: int | None, file: str) -> Iterator[str]:
-    """Elements of a test case besides its properties; none where it simply passes."""
+    """Elements of a test case after its properties: failure, skip or remark. A plain pass has no such element."""
     status = STATUS[status_name]
     if status.junit == "failure":
-        place = f"{file}:{line}: " if line is not None else ""
+        location = f"{file}:{line}: " if line is not None else ""
         lines = "\n".join(map(xml_text, text.split("\n")))
-        yield f'<failure message="{xml_text(message)}" type="{status.name}">{place}{lines}</failure>'
+        yield f'<failure message="{xml_text(message)}" type="{status.name}">{location}{lines}</failure>'
     elif status.junit == "skipped":
-        said = f"{status.junit_words}{f': {message}' if message else ''}"
-        yield f'<skipped message="{xml_text(said)}" type="{status.name}"/>'
+        skip_text = f"{status.junit_words}{f': {message}' if message else ''}"
+        yield f'<skipped message="{xml_text(skip_text)}" type="{status.name}"/>'
     elif status.junit == "remark":
         yield f"<system-out>{xml_text(f'{status.name}: {message}')}</system-out>"
 
 
 def _properties(values: Iterable[tuple[str, object]]) -> Iterator[str]:
-    """Elements of what has a value."""
+    """Elements of the properties that have a value."""
     yield "<properties>"
     yield from [_property(name, value) for name, value in values if value is not None]
     yield "</properties>"
@@ -174,40 +179,41 @@ def _property(name: str, value: object) -> str:
 
 @cache
 def _escaped(text: str) -> str:
-    """The same few texts (units, equations, sources) stand in every mission."""
+    """Text escaped for XML. The cache serves units, equations and sources, which recur in every mission."""
     return xml_text(text)
 
 
 def _class_name(identity: Identity) -> str:
-    """Dotted name of a mission, as test tools group by: `missions/a.yaml` is missions.a."""
+    """Dotted name of a mission, by which test tools group: `missions/a.yaml` becomes `missions.a`."""
     return stem(identity.name).strip("/").replace(".", "_").replace("/", ".")
 
 
 def as_needs(report: Report, style: Style) -> str:
-    """Write every requirement and row of every mission; a file that cannot be used is one need, of status `error`.
+    """Write a need for every requirement and row of every mission. An unusable file is one need of status `error`.
 
-    Only fields that every project of Sphinx-Needs has are used, so that an import warns of nothing. A project's own
-    requirement id becomes a link; numbers are in the content, which Sphinx reads as reStructuredText.
+    Needs use only fields that every project of Sphinx-Needs has, so that an import gives no warning. The requirement
+    id of the project becomes a link. Numbers are in the content, which Sphinx reads as reStructuredText.
     """
-    found: list[tuple[tuple[str, ...], dict[str, Any]]] = []
+    needs: list[_NamedNeed] = []
     for mission, identity in zip(report.missions, identities(report.missions, style), strict=True):
         file = identity.path
         if isinstance(mission, UnusableMission):
-            found.append((identity.of("mission"), _unusable_need(mission, file)))
+            needs.append((identity.of("mission"), _unusable_need(mission, file)))
             continue
-        for one in mission.requirements:
-            found.append((identity.of(requirement_id(one)), _requirement_need(one, mission, file)))
+        for requirement in mission.requirements:
+            needs.append((identity.of(requirement_id(requirement)), _requirement_need(requirement, mission, file)))
         for row in mission.rows:
-            found.append((identity.of(row.id, row.requirement_id), _row_need(row, mission, file)))
-    return needs_document(report.version, "BUDGET", found)
+            needs.append((identity.of(row.id, row.requirement_id), _row_need(row, mission, file)))
+    return needs_document(report.version, "BUDGET", needs)
 
 
-def needs_document(version: str, prefix: str, found: Sequence[tuple[tuple[str, ...], dict[str, Any]]]) -> str:
-    """Write needs, each with the parts of its name, which become its id behind a prefix."""
-    names = [name for name, _ in found]
-    needs: dict[str, dict[str, Any]] = {}
-    for wanted, (_, need) in zip(distinct([identifier(prefix, name) for name in names], names), found, strict=True):
-        unique = _unused(wanted, needs)
+def needs_document(version: str, prefix: str, named_needs: Sequence[_NamedNeed]) -> str:
+    """Write needs as `needs.json`. The id of a need is the prefix and the items of its name."""
+    names = [name for name, _ in named_needs]
+    needs: dict[str, dict[str, object]] = {}
+    ids = distinct([identifier(prefix, name) for name in names], names)
+    for preferred, (_, need) in zip(ids, named_needs, strict=True):
+        unique = _unused(preferred, needs)
         needs[unique] = {"id": unique, **need}
     current = {
         "creator": {"program": "bisar-budget", "version": version},
@@ -224,31 +230,31 @@ def identifier(prefix: str, name: tuple[str, ...]) -> str:
 
 
 def _unused(identifier: str, needs: Container[str]) -> str:
-    """Number the findings of a file that is named twice."""
+    """The identifier, with a number from 2 on if it is used already: a file may be named twice."""
     unique, number = identifier, 2
     while unique in needs:
         unique, number = f"{identifier}_{number}", number + 1
     return unique
 
 
-def _row_need(row: Row, mission: MissionFindings, file: str) -> dict[str, Any]:
+def _row_need(row: Row, mission: MissionFindings, file: str) -> dict[str, object]:
     texts = [measure(row, mission), cause(row), f"From {row.equation}."]
     texts += [f"Evidence: {row.evidence}"] if row.evidence else []
     texts += _origin(row.line, mission, file)
     return _need(f"{row.id} of {mission.name}", row.status, texts, row.metric, link=row.requirement_id)
 
 
-def _requirement_need(one: JudgedRequirement, mission: MissionFindings, file: str) -> dict[str, Any]:
-    texts = [requirement_finding(one, mission), *_origin(one.line, mission, file)]
-    return _need(f"{one.name} of {mission.name}", one.status, texts, "requirement", one.key)
+def _requirement_need(requirement: JudgedRequirement, mission: MissionFindings, file: str) -> dict[str, object]:
+    texts = [requirement_finding(requirement, mission), *_origin(requirement.line, mission, file)]
+    return _need(f"{requirement.name} of {mission.name}", requirement.status, texts, "requirement", requirement.key)
 
 
-def _unusable_need(mission: UnusableMission, file: str) -> dict[str, Any]:
+def _unusable_need(mission: UnusableMission, file: str) -> dict[str, object]:
     texts = [f"{fault.line or '-'}:{fault.column or '-'} {fault}" for fault in mission.faults]
     return _need(f"{file} cannot be used", mission.status, texts)
 
 
-def _need(title: str, status: str, texts: Sequence[str], *tags: str, link: str | None = None) -> dict[str, Any]:
+def _need(title: str, status: str, texts: Sequence[str], *tags: str, link: str | None = None) -> dict[str, object]:
     return {
         "type": "test",
         "title": need_text(title),
@@ -260,7 +266,7 @@ def _need(title: str, status: str, texts: Sequence[str], *tags: str, link: str |
 
 
 def _origin(line: int | None, mission: MissionFindings, file: str) -> Iterator[str]:
-    """Where a value stands, and what from outside the file bears on the verdict."""
+    """File and line of a value, and changes and overrides from outside the file."""
     yield f"{mission.name}, {file}" + (f":{line}" if line is not None else "")
     if mission.changes:
         yield f"Not as the file says: {changes_words(mission.changes)}"

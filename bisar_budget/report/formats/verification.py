@@ -11,19 +11,19 @@ from bisar_budget.report.words.heading import file_words, overrides_lines
 from bisar_budget.report.words.sentences import table, wrapped, wrapped_counts
 from bisar_budget.units import format_limit, format_quantity
 
-WORDS = {
+_VERDICT_WORDS = {
     "optimistic": "optimistic",
     "confirmed": "confirmed",
     "conservative": "conservative",
     "not_evaluated": "not eval",
 }
-_OTHER = {"published": "full", "full": "II", "strictest": "other"}
+_OTHER_MODEL_HEADS = {"published": "full", "full": "II", "strictest": "other"}
 _ANSI = {"optimistic": "1;31", "confirmed": "32", "conservative": "33", "not_evaluated": "35"}
 
 
 def as_json(missions: Sequence[VerifiedMission], style: Style) -> str:
-    """Write the contract."""
-    found = [
+    """Write `verify/1`, with an item per mission."""
+    items = [
         {
             "file": mission.file,
             "name": mission.name,
@@ -34,20 +34,22 @@ def as_json(missions: Sequence[VerifiedMission], style: Style) -> str:
         }
         for mission in missions
     ]
-    return document_text("bisar-budget/verify/1", {"missions": found})
+    return document_text("bisar-budget/verify/1", {"missions": items})
 
 
 def as_text(missions: Sequence[VerifiedMission], style: Style) -> str:
-    """Write a table per mission: the limit, its budget, what exact ranges predict and the image shows."""
+    """Write a table per mission: limit, budget, prediction by exact ranges, measurement in the image, verdict."""
     blocks = [_mission(mission, style) for mission in missions]
     return "\n\n".join("\n".join(block) for block in blocks) + "\n"
 
 
 def _mission(mission: VerifiedMission, style: Style) -> list[str]:
-    found = [row.verdict for row in mission.rows]
-    counts = ", ".join(f"{found.count(verdict)} {word}" for verdict, word in WORDS.items() if verdict in found)
+    verdicts = [row.verdict for row in mission.rows]
+    counts = ", ".join(
+        f"{verdicts.count(verdict)} {word}" for verdict, word in _VERDICT_WORDS.items() if verdict in verdicts
+    )
     refuted = sum(row.verdict_autofocus == "optimistic" for row in mission.rows)
-    counts += f"; {refuted} optimistic with autofocus" if refuted else ""  # they decide the exit code too
+    counts += f"; {refuted} optimistic with autofocus" if refuted else ""  # these rows decide the exit code too
     summary = f"{file_words(mission)}: {counts or 'no row has a limit here'}"
     conditions = wrapped(f"Images: {mission.conditions}.", "  ") if mission.conditions else []
     return [
@@ -63,33 +65,37 @@ def _mission(mission: VerifiedMission, style: Style) -> list[str]:
 
 
 def evidence(rows: Sequence[Verdict], style: Style) -> list[str]:
-    """Table of the verdicts, with autofocus a second one, and what there is to say about them.
+    """Table of the verdicts, a second table of verdicts with autofocus, and remarks below them.
 
-    Of a phase the model that gates says the budget; beside it stands what the other one says.
+    For a phase, the gating model gives the budget. The next column gives the value of the other model.
     """
-    other = next((_OTHER[row.model] for row in rows), "full")
-    lines = table([("row", "limit", "budget", other, "exact", "image", "verdict"), *map(_cells, rows)])
+    other_head = next((_OTHER_MODEL_HEADS[row.model] for row in rows), "full")
+    lines = table([("row", "limit", "budget", other_head, "exact", "image", "verdict"), *map(_cells, rows)])
     refocused = [(printable(row.id), *refocused_cells(row)) for row in rows if row.verdict_autofocus]
     if refocused:
         lines += ["", "At the limit with autofocus, refocused:", ""]
         lines += table([("row", "limit", "budget", "residual", "loss", "verdict"), *refocused])
     lines = [_coloured(line, style) for line in lines]
-    asides = [line for text in (*geometry_remarks(rows), *reasons_of(rows)) for line in wrapped(f"  {text}", "    ")]
-    return [*lines, "", *asides] if asides else lines
+    remarks = [line for text in (*geometry_remarks(rows), *reasons_of(rows)) for line in wrapped(f"  {text}", "    ")]
+    return [*lines, "", *remarks] if remarks else lines
 
 
 def reasons_of(rows: Sequence[Verdict]) -> list[str]:
-    """Reasons of verdicts, each once, behind the rows that it is of."""
+    """Reasons of verdicts. A reason is written once, after the ids of its rows."""
     ids: dict[str, list[str]] = {}
     for row in rows:
-        for which, reason in (("", row.reason), (", with autofocus", row.reason_autofocus)):
+        for variant, reason in (("", row.reason), (", with autofocus", row.reason_autofocus)):
             if reason:
-                ids.setdefault(reason, []).append(f"{row.id}{which}")
-    return [f"{', '.join(of_reason)}: {reason}" for reason, of_reason in ids.items()]
+                ids.setdefault(reason, []).append(f"{row.id}{variant}")
+    return [f"{', '.join(row_ids)}: {reason}" for reason, row_ids in ids.items()]
 
 
 def geometry_remarks(rows: Sequence[Verdict]) -> Iterator[str]:
-    """Say what phases are shown, and how far displacement and smear are from the gating model's and from (31)."""
+    """Remarks below the table of verdicts.
+
+    They name the kind of phase in the table, the largest distance between the displacement of an image and that of
+    its gating model, and the largest angle between the smear of an image and (31).
+    """
     hidden = [row for row in rows if row.of_equal_loss]
     if hidden:
         least = min(hidden, key=lambda row: (row.measured_qpe_rad or 0.0) / (row.measured_equal_loss_qpe_rad or 1.0))
@@ -97,36 +103,36 @@ def geometry_remarks(rows: Sequence[Verdict]) -> Iterator[str]:
             "exact, image: the quadratic phase of equal loss, which the budget holds; least quadratic part "
             f"{_phase(least.measured_qpe_rad)} of {_phase(least.measured_equal_loss_qpe_rad)} rad, {least.id}"
         )
-    by_25 = [row for row in rows if row.model == "published"]
-    by_full = [row for row in rows if row.model != "published"]
-    for rule, members, field in (
-        ("(25)", by_25, "displacement_published_m"),
-        ("the full model", by_full, "displacement_full_m"),
+    published_rows = [row for row in rows if row.model == "published"]
+    full_rows = [row for row in rows if row.model != "published"]
+    for rule, rule_rows, field in (
+        ("(25)", published_rows, "displacement_published_m"),
+        ("the full model", full_rows, "displacement_full_m"),
     ):
-        apart = [
-            (math.dist(row.measured_displacement_m, said), row.id)
-            for row in members
-            if row.measured_displacement_m and (said := getattr(row, field)) is not None
+        distances = [
+            (math.dist(row.measured_displacement_m, predicted_m), row.id)
+            for row in rule_rows
+            if row.measured_displacement_m and (predicted_m := getattr(row, field)) is not None
         ]
-        if apart:
-            distance, row_id = max(apart)
+        if distances:
+            distance, row_id = max(distances)
             within = format_quantity(distance, "m", 2)
             yield f"displacement of the images: within {within} of {rule}, farthest {row_id}"
-    turned = [
-        (abs((measured - line + math.pi / 2) % math.pi - math.pi / 2), row.id)
+    angles = [
+        (abs((measured - predicted + math.pi / 2) % math.pi - math.pi / 2), row.id)
         for row in rows
         if (measured := row.measured_smear_azimuth_rad) is not None
-        and (line := row.smear_azimuth_published_rad) is not None
+        and (predicted := row.smear_azimuth_published_rad) is not None
     ]
-    if turned:
-        angle, row_id = max(turned)
+    if angles:
+        angle, row_id = max(angles)
         yield f"smear of the images: within {math.degrees(angle):.2g} deg of (31), farthest {row_id}"
 
 
 def _cells(row: Verdict) -> tuple[str, ...]:
     budget, published, full, exact, image = numbers(row)
-    other = {"published": full, "full": published, "strictest": _phase(_smaller(row))}[row.model]
-    return printable(row.id), limit(row), budget, other, exact, image, WORDS[row.verdict]
+    other_model = {"published": full, "full": published, "strictest": _phase(_smaller(row))}[row.model]
+    return printable(row.id), limit(row), budget, other_model, exact, image, _VERDICT_WORDS[row.verdict]
 
 
 def _smaller(row: Verdict) -> float | None:
@@ -135,15 +141,15 @@ def _smaller(row: Verdict) -> float | None:
 
 
 def limit(row: Verdict) -> str:
-    """The error that the image was formed with."""
+    """Size of the error in the image."""
     return format_limit(row.boundary_error, row.unit)
 
 
 def numbers(row: Verdict) -> tuple[str, str, str, str, str]:
-    """Budget, what Table II, the full model and exact ranges predict, what the image shows; phases in rad."""
+    """Budget, predictions by Table II, the full model and exact ranges, and the measurement. Phases are in rad."""
     if row.requirement_db is not None:
         return f"{row.requirement_db:.4g} dB", "-", "-", "-", _decibel(row.measured_db)
-    if row.budget_rad is None and row.measured_displacement_m is not None:  # held to the location
+    if row.budget_rad is None and row.measured_displacement_m is not None:  # the row has a limit of the displacement
         moves = (row.displacement_m, row.measured_displacement_m)
         exact, image = ("-" if move is None else format_quantity(math.hypot(*move), "m") for move in moves)
         return limit(row) if row.id == "mission.location_error" else "-", "-", "-", exact, image
@@ -154,7 +160,7 @@ def numbers(row: Verdict) -> tuple[str, str, str, str, str]:
 
 
 def _by_full(row: Verdict) -> float | None:
-    """Quadratic phase of equal loss by the full model, which is what it holds to the budget. [rad]"""
+    """Quadratic phase by the full model that the budget limits: that of equal loss where it was measured. [rad]"""
     if row.full_qpe_rad is None or row.measured_equal_loss_qpe_rad is None:
         return row.full_qpe_rad
     return row.equal_loss_qpe_rad
@@ -171,7 +177,7 @@ def refocused_cells(row: Verdict) -> tuple[str, str, str, str, str]:
         _budget(row),
         _phase(row.measured_residual_qpe_rad),
         _decibel(row.refocused_loss_db),
-        WORDS[row.verdict_autofocus or "not_evaluated"],
+        _VERDICT_WORDS[row.verdict_autofocus or "not_evaluated"],
     )
 
 
@@ -184,8 +190,8 @@ def _decibel(value: float | None) -> str:
 
 
 def _coloured(line: str, style: Style) -> str:
-    """Colour the verdict that ends a line."""
-    for verdict, word in WORDS.items():
+    """Colour the verdict at the end of a line."""
+    for verdict, word in _VERDICT_WORDS.items():
         if line.endswith(f" {word}"):
             return line.removesuffix(word) + style.coloured(word, _ANSI[verdict])
     return line

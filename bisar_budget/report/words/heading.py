@@ -1,4 +1,4 @@
-"""Words above findings: of which mission they are, what was checked and how, what from outside bears on it."""
+"""Words above findings: mission, geometry, budget, model, paths, and overrides from outside the file."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -13,7 +13,7 @@ from bisar_budget.geometry import BistaticGeometry, PlatformState
 from bisar_budget.mission.model import Document
 from bisar_budget.mission.platforms import FlownPath
 from bisar_budget.report import Style
-from bisar_budget.report.words.sentences import WIDTH, phase_limit, sentence, wrapped
+from bisar_budget.report.words.sentences import TEXT_WIDTH, phase_limit, sentence, wrapped
 from bisar_budget.units import format_quantity
 
 _MODELS = {"published": "published model", "full": "full model", "strictest": "stricter of both models"}
@@ -23,8 +23,8 @@ _MODELS_AT_LENGTH = {
     "full": "full (exact ranges, displacement included)",
     "strictest": "strictest (the stricter of published and full for each row)",
 }
-_LEAST_LOSS_DB = 0.01  # less is not told apart
-_NARROW_DEG = 30.0  # between range and Doppler gradients; below it the verdict says what that does
+_LEAST_LOSS_DB = 0.01  # a smaller loss is written as "below"
+_NARROW_ANGLE_DEG = 30.0  # angle between range and Doppler gradients below which the verdict warns of displacements
 
 
 class AboutMission(Protocol):
@@ -32,75 +32,80 @@ class AboutMission(Protocol):
 
     @property
     def file(self) -> str:
-        """Its file."""
+        """Path of the mission file."""
 
     @property
     def name(self) -> str:
-        """Its name."""
+        """Name of the mission."""
 
     @property
     def changes(self) -> tuple[SetValue, ...]:
-        """Values that options put in place of the file's."""
+        """Values that options put in place of values of the file."""
 
     @property
     def overrides(self) -> tuple[Override, ...]:
-        """Settings from outside the file that bear on the mission."""
+        """Settings from outside the file that affect the mission."""
 
 
 def rule_words(mission: MissionFindings) -> str:
-    """Say by which model, and by which rule, a mission is judged."""
+    """Model and rule of combination that judge a mission."""
     return f"{_MODELS[mission.model]}, {_RULES[mission.combine]}"
 
 
-def overrides_words(found: AboutMission, *, with_changes: bool = True) -> str:
-    """Say what bears on the verdict besides the errors; empty if nothing does. `--set` may be said elsewhere."""
-    return "; ".join(_overrides(found, with_changes=with_changes))
+def overrides_words(mission: AboutMission, *, with_changes: bool = True) -> str:
+    """Settings from outside the file that affect the verdict; empty without any.
+
+    Without `with_changes` values of `--set` are left out.
+    """
+    return "; ".join(_overrides(mission, with_changes=with_changes))
 
 
-def _overrides(found: AboutMission, *, with_changes: bool) -> list[str]:
+def _overrides(mission: AboutMission, *, with_changes: bool) -> list[str]:
     return [
-        f"{one.name} {printable(one.value)} ({one.origin})"
-        for one in found.overrides
-        if with_changes or one.name != "--set"
+        f"{override.name} {printable(override.value)} ({override.origin})"
+        for override in mission.overrides
+        if with_changes or override.name != "--set"
     ]
 
 
-def overrides_lines(found: AboutMission) -> list[str]:
-    """The same for a terminal, beside `--set`: in one line, else each in its own; no line if there is nothing."""
-    said = _overrides(found, with_changes=False)
-    line = f"Overrides: {'; '.join(said)}"
-    if len(line) <= WIDTH or len(said) < 2:
-        return wrapped(line, "  ") if said else []
-    return ["Overrides:", *(part for one in said for part in wrapped(f"  {one}", "    "))]
+def overrides_lines(mission: AboutMission) -> list[str]:
+    """Lines of the overrides for a terminal, without `--set`. Overrides that do not fit one line get a line each."""
+    overrides = _overrides(mission, with_changes=False)
+    line = f"Overrides: {'; '.join(overrides)}"
+    if len(line) <= TEXT_WIDTH or len(overrides) < 2:
+        return wrapped(line, "  ") if overrides else []
+    return ["Overrides:", *(line for override in overrides for line in wrapped(f"  {override}", "    "))]
 
 
-def file_words(found: AboutMission) -> str:
-    """File of a mission, with the options that changed what it says."""
-    return f"{printable(found.file)} {changes_words(found.changes)}" if found.changes else printable(found.file)
+def file_words(mission: AboutMission) -> str:
+    """File of a mission, with the options that changed its values."""
+    return (
+        f"{printable(mission.file)} {changes_words(mission.changes)}" if mission.changes else printable(mission.file)
+    )
 
 
 def title_lines(
-    found: AboutMission, said: str, sgr: str, style: Style, *, more: Sequence[str] = (), remark: str = ""
+    mission: AboutMission, verdict: str, sgr: str, style: Style, *, more: Sequence[str] = (), remark: str = ""
 ) -> Iterator[str]:
-    """An answer in a sentence, coloured on a terminal, more about it, and of which mission it is."""
-    first, *rest = wrapped(said, "  ")
+    """Lines above an answer: the coloured verdict, `more` lines, file and name of the mission, overrides."""
+    first, *continuation = wrapped(verdict, "  ")
     yield style.coloured(first, sgr)
-    yield from rest
-    for text in (*more, f"{file_words(found)}, {printable(found.name)}{remark}"):
+    yield from continuation
+    for text in (*more, f"{file_words(mission)}, {printable(mission.name)}{remark}"):
         yield from wrapped(text, "  ")
-    yield from overrides_lines(found)
+    yield from overrides_lines(mission)
     yield ""
 
 
 def document_words(document: Document) -> str:
-    """Number and issue of a document; empty where the file gives neither."""
+    """Number and issue of a document; empty if the file gives neither."""
     return ", ".join(filter(None, (document.number, document.issue and f"issue {document.issue}")))
 
 
 def narrow_gradients(geometry: BistaticGeometry) -> str:
-    """Say what range and Doppler gradients close to parallel do to displacements; nothing from 30 degrees on."""
+    """Warning that displacements grow with a narrow angle between the gradients; empty from 30 degrees on."""
     angle = geometry.gradient_angle
-    if math.degrees(angle) >= _NARROW_DEG:
+    if math.degrees(angle) >= _NARROW_ANGLE_DEG:
         return ""
     return (
         f"Range and Doppler gradients are only {_degrees(angle)} apart: displacements are {1 / math.sin(angle):.2g} "
@@ -109,15 +114,15 @@ def narrow_gradients(geometry: BistaticGeometry) -> str:
 
 
 def doubtful_model(mission: MissionFindings) -> str:
-    """Say where the published model judges and does not hold, as a sentence; nothing if it does hold."""
-    said = mission.model_doubt
-    return f"{sentence(said)}." if said else ""
+    """Sentence on the doubts about the published model; empty if the model is valid."""
+    doubt = mission.model_doubt
+    return f"{sentence(doubt)}." if doubt else ""
 
 
 def head(mission: MissionFindings) -> Iterator[tuple[str, str]]:
-    """Say in a few lines what was checked: geometry, resolution, budget, model."""
+    """Names and texts of the lines on platforms, geometry, resolution, budget, model and scene."""
     geometry, allocation = mission.geometry, mission.allocation
-    is_first = True  # the first squint says what one is
+    is_first = True  # the first squint comes with its explanation
     for name, state in (("Transmitter", geometry.transmitter), ("Receiver", geometry.receiver)):
         yield name, _platform(state, is_first)
         is_first = is_first and state.squint is None
@@ -172,20 +177,20 @@ def _peak_loss(loss_db: float) -> str:
 
 
 def path_words(path: FlownPath) -> str:
-    """Say where a path comes from, and how far the polynomials that stand for it are from what the file has."""
-    said = path.source if path.file is None else f"{path.file}: {path.source}"
+    """Source of a path, its polynomials, and their distance from the fixes or the orbit of the source."""
+    text = path.source if path.file is None else f"{path.file}: {path.source}"
     if path.age is not None:
-        when = "old" if path.age >= 0 else "ahead"
-        said += f", {format_quantity(abs(path.age) / 86400, '')} days {when}"
+        direction = "old" if path.age >= 0 else "ahead"
+        text += f", {format_quantity(abs(path.age) / 86400, '')} days {direction}"
     if path.order is None or path.farthest is None or path.rms is None:
-        return said
+        return text
     is_one = path.pieces is None or path.pieces == 1
-    said += f"; flown as {'a polynomial' if is_one else f'{path.pieces} polynomials'} of order {path.order}"
+    text += f"; flown as {'a polynomial' if is_one else f'{path.pieces} polynomials'} of order {path.order}"
     if path.samples:
-        rms, farthest = (format_quantity(one, "m") for one in (path.rms, path.farthest))
+        rms, farthest = (format_quantity(size, "m") for size in (path.rms, path.farthest))
         within = "" if path.stretch is None else f" in {format_quantity(path.stretch, 's')}"
-        return f"{said} through {path.samples} places{within}, {rms} rms and at most {farthest} from them"
-    return f"{said}, at most {format_quantity(path.farthest, 'm')} from it"
+        return f"{text} through {path.samples} places{within}, {rms} rms and at most {farthest} from them"
+    return f"{text}, at most {format_quantity(path.farthest, 'm')} from it"
 
 
 def multiple_of_pi(factor: float) -> str:

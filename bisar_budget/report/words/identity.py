@@ -1,8 +1,8 @@
-"""Names that a mission and its findings keep wherever the command runs: ids of needs, fingerprints, test cases.
+"""Names of a mission and its findings that do not depend on the current folder or the machine.
 
-A mission is named by the number of its document, else by its path within its repository, else by the file's name.
-The path is that of the file itself: given from the root of the repository, from a folder, absolutely or through a
-symbolic link, it is one.
+Ids of needs, fingerprints and test cases use them. A mission is named by the number of its document, else by its path
+within its repository, else by the name of its file. The path is that of the file itself: a path from the root of the
+repository, a relative path, an absolute path and a symbolic link all give the same name.
 """
 
 import os
@@ -17,9 +17,9 @@ _STANDARD_INPUT = "standard input"
 
 
 class Identity(NamedTuple):
-    """Name of a mission, which no other file of the run has, and the path by which reports name its file.
+    """Name of a mission, unique among the files of a run, and the path of its file in reports.
 
-    `shared` are requirement ids, each with a row, that would name findings of other missions of the run too.
+    `shared` are pairs of a requirement id and a row that name findings of several missions of the run.
     """
 
     name: str
@@ -27,7 +27,7 @@ class Identity(NamedTuple):
     shared: frozenset[tuple[str, str]] = frozenset()
 
     def of(self, subject: str, requirement_id: str | None = None) -> tuple[str, ...]:
-        """Parts of the name of a row or requirement: the project's own requirement id, else the mission, and it."""
+        """Name of a row or requirement: the requirement id of the project, else the mission, and the subject."""
         if requirement_id is None:
             return self.name, subject
         if (requirement_id, subject) in self.shared:
@@ -36,14 +36,14 @@ class Identity(NamedTuple):
 
 
 def identities(missions: Sequence[MissionFindings | UnusableMission], style: Style) -> list[Identity]:
-    """Name every mission of a run; no name depends on the order in which they were given.
+    """Identity of every mission of a run. Names do not depend on the order of the missions.
 
-    Missions that share a document number have their path beside it. Files that share a path, in different
-    repositories or in none, have as many folders before it as tell them apart.
+    If missions share a document number, their paths follow the number. If files share a path, in different
+    repositories or in none, the path gets parent folders until the paths differ.
     """
-    places = [_place(mission.file, style) for mission in missions]
-    files = [place.file for place in places]
-    paths = _told_apart({place.file: place.portable_path for place in places})
+    locations = [_locate(mission.file, style) for mission in missions]
+    files = [location.file for location in locations]
+    paths = _with_distinct_folders({location.file: location.portable_path for location in locations})
     names = dict(paths)
     for mission, file in zip(missions, files, strict=True):
         if isinstance(mission, MissionFindings) and mission.document.number:
@@ -51,22 +51,22 @@ def identities(missions: Sequence[MissionFindings | UnusableMission], style: Sty
     while alike := _alike(names):
         names |= {file: f"{names[file]}/{paths[file]}" for file in alike}
     shared = _shared_requirements(missions, files, names)
-    return [Identity(names[place.file], place.portable_path, shared) for place in places]
+    return [Identity(names[location.file], location.portable_path, shared) for location in locations]
 
 
-def digest(*parts: str) -> str:
-    """Digest of a name, the same on every machine, also of half a character, which the name of a file may have."""
-    from hashlib import sha256  # loads OpenSSL: 5 ms, and a check to a terminal does without
+def digest(*items: str) -> str:
+    """Digest of a name, the same on every machine. File names with half a character have a digest too."""
+    from hashlib import sha256  # OpenSSL takes 5 ms to load; a check to a terminal does not need it
 
-    return sha256("\0".join(parts).encode(errors="surrogatepass")).hexdigest()
+    return sha256("\0".join(items).encode(errors="surrogatepass")).hexdigest()
 
 
-def distinct(spelled: Sequence[str], names: Sequence[tuple[str, ...]]) -> list[str]:
-    """Spellings of names in a smaller alphabet; one that several names share has a digest of the name behind it."""
-    uses = Counter(word for word, _ in set(zip(spelled, names, strict=True)))
+def distinct(spellings: Sequence[str], names: Sequence[tuple[str, ...]]) -> list[str]:
+    """Unique spellings of names. A spelling that several names share gets a digest of its name at the end."""
+    uses = Counter(spelling for spelling, _ in set(zip(spellings, names, strict=True)))
     return [
-        word if uses[word] == 1 else f"{word}_{digest(*name)[:8].upper()}"
-        for word, name in zip(spelled, names, strict=True)
+        spelling if uses[spelling] == 1 else f"{spelling}_{digest(*name)[:8].upper()}"
+        for spelling, name in zip(spellings, names, strict=True)
     ]
 
 
@@ -76,25 +76,25 @@ def stem(name: str) -> str:
 
 
 def source_path(file: str, style: Style) -> str:
-    """Path by which a mission file is found: within its repository, else below `style.root`, else absolute.
+    """Path of a mission file: within its repository, else below `style.root`, else absolute.
 
-    With forward slashes; without a root the file is named as given.
+    It has forward slashes. Without `style.root` it is the path that was given.
     """
     if not style.root or file == "-":
         return file.replace(os.sep, "/")
-    place = _place(file, style)
-    if place.is_in_repository:
-        return place.portable_path
-    for name in (os.path.abspath(file), place.file):
+    location = _locate(file, style)
+    if location.is_in_repository:
+        return location.portable_path
+    for name in (os.path.abspath(file), location.file):
         if path := _below(name, style.root):
             return path.replace(os.sep, "/")
     return os.path.abspath(file).replace(os.sep, "/")
 
 
-class _FilePlace(NamedTuple):
-    """Absolute path of a file, links followed, and the path that is the same on every machine, with forward slashes.
+class _FileLocation(NamedTuple):
+    """Absolute path of a file with links resolved, and a path that is the same on every machine.
 
-    That is within the repository, else the name of the file alone.
+    `portable_path` has forward slashes. It is the path within the repository, else the name of the file.
     """
 
     file: str
@@ -102,16 +102,16 @@ class _FilePlace(NamedTuple):
     is_in_repository: bool = False
 
 
-def _place(file: str, style: Style) -> _FilePlace:
-    """Find a file and the Git work tree that holds it.
+def _locate(file: str, style: Style) -> _FileLocation:
+    """Location of a file, and whether a Git work tree contains it.
 
-    A link is followed. Where that leads out of every work tree, to a store of large files such as git-annex has in
-    `.git`, the link itself is the file of the repository. One that leads to no file is that of a pipe.
+    Links are resolved. If the target is outside every work tree, such as in the store of large files that git-annex
+    has in `.git`, the link itself is the file of the repository. A link without a target belongs to a pipe.
     """
     if file == "-":
-        return _FilePlace(_STANDARD_INPUT, _STANDARD_INPUT)
-    if not style.root or "\0" in file:  # which no file has in its name
-        return _FilePlace(file, file.replace(os.sep, "/"))
+        return _FileLocation(_STANDARD_INPUT, _STANDARD_INPUT)
+    if not style.root or "\0" in file:  # no name of a file has a NUL
+        return _FileLocation(file, file.replace(os.sep, "/"))
     link = os.path.join(os.path.realpath(os.path.dirname(file)), os.path.basename(file))
     target = os.path.realpath(file)
     if not os.path.exists(target):
@@ -120,12 +120,15 @@ def _place(file: str, style: Style) -> _FilePlace:
         root = _work_tree(os.path.dirname(path), style)
         below = _below(path, root) if root else ""
         if below and not below.startswith(f".git{os.sep}"):
-            return _FilePlace(path, below.replace(os.sep, "/"), is_in_repository=True)
-    return _FilePlace(target, os.path.basename(target))
+            return _FileLocation(path, below.replace(os.sep, "/"), is_in_repository=True)
+    return _FileLocation(target, os.path.basename(target))
 
 
 def _work_tree(folder: str, style: Style) -> str:
-    """Nearest folder from here up with a `.git` (in worktrees and submodules a file), or GitHub's checkout."""
+    """Nearest folder, from `folder` upwards, with a `.git`, or GitHub's checkout; empty without one.
+
+    In worktrees and submodules `.git` is a file.
+    """
     while not (os.path.lexists(os.path.join(folder, ".git")) or (style.is_checkout and folder == style.root)):
         above = os.path.dirname(folder)
         if above == folder:
@@ -135,19 +138,19 @@ def _work_tree(folder: str, style: Style) -> str:
 
 
 def _below(file: str, folder: str) -> str:
-    """Path of a file from a folder that it lies in, however deep; empty if it does not."""
+    """Path of a file relative to a folder above it; empty if the file is not below the folder."""
     start = os.path.join(folder, "")
     return file[len(start) :] if file.startswith(start) else ""
 
 
 def _alike(names: Mapping[str, str]) -> list[str]:
-    """Files that have not a name of their own."""
+    """Files that share their name with another file."""
     uses = Counter(names.values())
     return [file for file, name in names.items() if uses[name] > 1]
 
 
-def _told_apart(paths: Mapping[str, str]) -> dict[str, str]:
-    """Put folders before the paths that several files have, until no two files have one; whole paths differ."""
+def _with_distinct_folders(paths: Mapping[str, str]) -> dict[str, str]:
+    """Paths with parent folders before those that several files share, until all differ; absolute paths do differ."""
     names, added = dict(paths), 0
     while alike := _alike(names):
         added += 1
@@ -156,16 +159,16 @@ def _told_apart(paths: Mapping[str, str]) -> dict[str, str]:
 
 
 def _with_folders(file: str, path: str, count: int) -> str:
-    """Path of a file with so many of the folders that stand before it."""
-    whole = file.replace(os.sep, "/")
-    parts, length = whole.strip("/").split("/"), path.count("/") + 1 + count
-    return "/".join(parts[-length:]) if length <= len(parts) else whole
+    """Path of a file with `count` further parent folders."""
+    full_path = file.replace(os.sep, "/")
+    folders, length = full_path.strip("/").split("/"), path.count("/") + 1 + count
+    return "/".join(folders[-length:]) if length <= len(folders) else full_path
 
 
 def _shared_requirements(
     missions: Sequence[MissionFindings | UnusableMission], files: Sequence[str], names: Mapping[str, str]
 ) -> frozenset[tuple[str, str]]:
-    """Requirement ids with their row that stand in several files, or that are the name of a mission too."""
+    """Pairs of a requirement id and a row that occur in several files, or whose id is the name of a mission too."""
     used = {
         (row.requirement_id, row.id, file)
         for mission, file in zip(missions, files, strict=True)

@@ -1,4 +1,4 @@
-"""Words of every format about requirements: whether each is met and by what, and how often it is in draws."""
+"""Words of every format about requirements: status, deciding row, and probability by Monte Carlo."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -26,8 +26,8 @@ COLUMNS = ("requirement", "allowed", "reached", "use", "status", "decided by")
 class RequirementLine(NamedTuple):
     """One line of the table of requirements, in words.
 
-    `decided_by` is the row that decides; where nothing could be judged, why. `remark` says which share `use` is of,
-    with its own two numbers, what autofocus gains, and which waiver stands.
+    `decided_by` is the deciding row, or the reason why nothing could be judged. `remark` names the share that `use`
+    refers to, with its reached and allowed values, the gain of autofocus, and the waivers.
     """
 
     requirement: JudgedRequirement
@@ -40,96 +40,105 @@ class RequirementLine(NamedTuple):
     remark: str
 
 
-def requirement_id(one: JudgedRequirement) -> str:
-    """Name of a line of the table among rows, such as `requirement.islr`."""
-    return f"requirement.{one.key}"
+def requirement_id(requirement: JudgedRequirement) -> str:
+    """Id of a requirement in lists that hold rows too, such as `requirement.islr`."""
+    return f"requirement.{requirement.key}"
 
 
 def requirement_lines(mission: MissionFindings) -> Iterator[RequirementLine]:
     """Write the table of requirements, in the order of the contract."""
-    for one in mission.requirements:
-        is_open = one.is_unjudged
-        remark = ", ".join([*use_remarks(one), *(waiver.words for waiver in one.waivers)])
+    for requirement in mission.requirements:
+        is_open = requirement.is_unjudged
+        remark = ", ".join([*use_remarks(requirement), *(waiver.words for waiver in requirement.waivers)])
         yield RequirementLine(
-            requirement=one,
-            name=one.name,
-            allowed=requirement_limit(one.value, one),
-            reached=requirement_size(one.reached, one),
-            use=use_words(None if one.value is None or is_open else one.utilization),
-            status=one.status,
-            decided_by=(one.reason if is_open and one.reason else one.row) or ("" if remark else "-"),
+            requirement=requirement,
+            name=requirement.name,
+            allowed=requirement_limit(requirement.value, requirement),
+            reached=requirement_size(requirement.reached, requirement),
+            use=use_words(None if requirement.value is None or is_open else requirement.utilization),
+            status=requirement.status,
+            decided_by=(requirement.reason if is_open and requirement.reason else requirement.row)
+            or ("" if remark else "-"),
             remark=remark,
         )
 
 
-def use_remarks(one: JudgedRequirement) -> Iterator[str]:
-    """Say what the use is of, where that is not reached over allowed: another row, a share, more by autofocus."""
-    if one.is_unjudged or one.value is None:
+def use_remarks(requirement: JudgedRequirement) -> Iterator[str]:
+    """Remarks on a use that is not the reached value over the allowed value.
+
+    They name the row with the largest use, the share that decides, and the gain of autofocus.
+    """
+    if requirement.is_unjudged or requirement.value is None:
         return
-    if one.use_row not in (None, one.row):
-        yield f"most used by {one.use_row}"
-    said = [] if one.share is None else [share_words(one, one.share)]
-    if one.autofocus_gain is not None and one.autofocus_gain > 1:
-        has_no_gain = one.share is not None and one.share.owner in _SHARES
-        said.insert(0 if has_no_gain else len(said), f"autofocus gain {one.autofocus_gain:.3g}")
-    yield from said
+    if requirement.use_row not in (None, requirement.row):
+        yield f"most used by {requirement.use_row}"
+    remarks = [] if requirement.share is None else [share_words(requirement, requirement.share)]
+    if requirement.autofocus_gain is not None and requirement.autofocus_gain > 1:
+        has_no_gain = requirement.share is not None and requirement.share.owner in _SHARE_NAMES
+        remarks.insert(0 if has_no_gain else len(remarks), f"autofocus gain {requirement.autofocus_gain:.3g}")
+    yield from remarks
 
 
-_OF_OWNER = "'s share"
-# Shares that no platform and no clock has.
-_SHARES = {"autofocus": "pull-in of autofocus", "scene": "at the scene's edge", "band": "over the band"}
+_SHARE_SUFFIX = "'s share"
+# Shares without a platform or a clock as owner.
+_SHARE_NAMES = {"autofocus": "pull-in of autofocus", "scene": "at the scene's edge", "band": "over the band"}
 
 
-def share_words(one: JudgedRequirement, share: DecidingShare) -> str:
-    """Say whose share decides, with its own two numbers: `receiver's share: 24.4 of 31.5 deg`."""
-    reached, allowed = requirement_size(share.reached, one), requirement_limit(share.allowed, one)
+def share_words(requirement: JudgedRequirement, share: DecidingShare) -> str:
+    """Owner of the deciding share, with the reached and allowed values: `receiver's share: 24.4 of 31.5 deg`."""
+    reached, allowed = requirement_size(share.reached, requirement), requirement_limit(share.allowed, requirement)
     number, _, unit = reached.rpartition(" ")
-    if number and allowed.endswith(f" {unit}"):  # the unit stands once
+    if number and allowed.endswith(f" {unit}"):  # the unit is written once
         reached = number
-    return f"{_SHARES.get(share.owner, share.owner + _OF_OWNER)}: {reached} of {allowed}"
+    return f"{_SHARE_NAMES.get(share.owner, share.owner + _SHARE_SUFFIX)}: {reached} of {allowed}"
 
 
-def share_columns(one: JudgedRequirement) -> dict[str, str | float | None]:
-    """Whose share decides, its own two numbers, and the gain of autofocus, by the names of columns and properties."""
-    share = one.share
+def share_columns(requirement: JudgedRequirement) -> dict[str, str | float | None]:
+    """Deciding share and gain of autofocus, by the names of columns and properties."""
+    share = requirement.share
     return {
         "share_owner": None if share is None else share.owner,
         "share_allowed": None if share is None else share.allowed,
         "share_reached": None if share is None else share.reached,
-        "autofocus_gain": one.autofocus_gain,
+        "autofocus_gain": requirement.autofocus_gain,
     }
 
 
 def confidence_words(mission: MissionFindings) -> str:
-    """Say behind the status of a mission with which confidence its requirements are met; nothing where one is not."""
+    """Confidence with which the requirements of a mission are met, after a space; empty if one fails."""
     status = STATUS[mission.status]
     return f" {mission.confidence}" if status.is_held and not status.fails else ""
 
 
-_HAS_CONFIDENCE = ("quadratic_phase_error", "cubic_phase_error", "location_error")  # levels are of mean powers
+_HAS_CONFIDENCE = ("quadratic_phase_error", "cubic_phase_error", "location_error")  # levels are mean powers
 
 
-def requirement_finding(one: JudgedRequirement, mission: MissionFindings) -> str:
-    """Say in a sentence how a requirement stands; where it is met, with which confidence."""
-    text = one.name
-    if one.value is not None:
-        text += f" of {requirement_limit(one.value, one)}{' (default)' if one.is_default else ''}"
-    text += f": {STATUS[one.status].words}"
-    if STATUS[one.status].is_held and not STATUS[one.status].fails and one.key in _HAS_CONFIDENCE:
+def requirement_finding(requirement: JudgedRequirement, mission: MissionFindings) -> str:
+    """Sentence with the status of a requirement, its values and remarks; with its confidence if it is met."""
+    text = requirement.name
+    if requirement.value is not None:
+        limit = requirement_limit(requirement.value, requirement)
+        text += f" of {limit}{' (default)' if requirement.is_default else ''}"
+    status = STATUS[requirement.status]
+    text += f": {status.words}"
+    if status.is_held and not status.fails and requirement.key in _HAS_CONFIDENCE:
         text += f" {mission.confidence}"
-    if one.reached is not None:
-        text += f", {requirement_size(one.reached, one)} reached"
-    if one.row is not None and not one.is_unjudged:
-        text += f", decided by {one.row}"
-    text += "".join(f", {remark}" for remark in use_remarks(one))
-    return "; ".join([text, *filter(None, [one.reason]), *(waiver.words for waiver in one.waivers)])
+    if requirement.reached is not None:
+        text += f", {requirement_size(requirement.reached, requirement)} reached"
+    if requirement.row is not None and not requirement.is_unjudged:
+        text += f", decided by {requirement.row}"
+    text += "".join(f", {remark}" for remark in use_remarks(requirement))
+    return "; ".join([text, *filter(None, [requirement.reason]), *(waiver.words for waiver in requirement.waivers)])
 
 
 def verdict(mission: MissionFindings, *, is_brief: bool = False) -> str:
-    """Say whether every requirement was judged and is met; else how many are not. `is_brief` leaves verbs out."""
+    """Sentence on the whole mission: every requirement is met, or the number of broken or unjudged ones by kind.
+
+    With `is_brief` the sentence leaves out verbs.
+    """
     if mission.is_empty:
         return "the file declares no error" + ("" if is_brief else ", so nothing is judged; the allowables follow")
-    statuses = [one.status for one in mission.requirements]
+    statuses = [requirement.status for requirement in mission.requirements]
     specified = [row.status for row in mission.rows if row.metric == SPECIFICATION]
     counts = (
         (statuses.count("fail"), "requirement", ("is", "are"), "not met"),
@@ -138,16 +147,16 @@ def verdict(mission: MissionFindings, *, is_brief: bool = False) -> str:
         (specified.count("fail"), "specification", ("is", "are"), "exceeded"),
         (specified.count("not_evaluated"), "specification", ("has", "have"), "no declared error"),
     )
-    said, named = [], ""
-    for count, what, verbs, outcome in counts:
+    clauses, last_noun = [], ""
+    for count, noun, verbs, outcome in counts:
         if count:
-            subject = str(count) if what == named else f"{count} {what}{'' if count == 1 else 's'}"
+            subject = str(count) if noun == last_noun else f"{count} {noun}{'' if count == 1 else 's'}"
             verb = "" if is_brief and verbs[0] == "is" else f"{verbs[count > 1]} "
-            said.append(f"{subject} {verb}{outcome}")
-            named = what
+            clauses.append(f"{subject} {verb}{outcome}")
+            last_noun = noun
     waived = _waived(mission, is_brief=is_brief)
-    if said:
-        return ", ".join([*said, *waived])
+    if clauses:
+        return ", ".join([*clauses, *waived])
     broken = [row for row in mission.rows if row.status in BROKEN]
     if broken:
         fails = f"{len(broken)} row{' fails' if len(broken) == 1 else 's fail'} or cannot be judged"
@@ -158,17 +167,19 @@ def verdict(mission: MissionFindings, *, is_brief: bool = False) -> str:
 
 
 def _waived(mission: MissionFindings, *, is_brief: bool) -> list[str]:
-    """Say how many requirements are waived, else how many rows, and by which waivers; nothing where none is."""
-    counts = [sum(one.status == "waived" for one in each) for each in (mission.requirements, mission.rows)]
-    count, what = (counts[0], "requirement") if counts[0] else (counts[1], "row")
+    """Number of waived requirements, else of waived rows, with the waivers; empty without a waiver."""
+    counts = [sum(item.status == "waived" for item in judged) for judged in (mission.requirements, mission.rows)]
+    count, noun = (counts[0], "requirement") if counts[0] else (counts[1], "row")
     if not count:
         return []
     verb = "" if is_brief else " is" if count == 1 else " are"
-    return [f"{counted(count, what)}{verb} waived, not met ({waiver_names([one.id for one in mission.waived_by])})"]
+    return [
+        f"{counted(count, noun)}{verb} waived, not met ({waiver_names([waiver.id for waiver in mission.waived_by])})"
+    ]
 
 
 def _met(mission: MissionFindings, waived: Sequence[str]) -> str:
-    """Say that nothing is broken that is not waived, and what bears on that."""
+    """Verdict of a mission in which nothing is broken, with its waivers, warnings and autofocus."""
     text = ", ".join(waived) or f"every requirement is judged and met {mission.confidence}"
     if "warn" in mission.statuses:
         return f"{text}, with warnings"
@@ -176,47 +187,51 @@ def _met(mission: MissionFindings, waived: Sequence[str]) -> str:
 
 
 class UnjudgedEffect(NamedTuple):
-    """An effect that no requirement takes: what is said of it, with the line to add, and the rows that make it up."""
+    """An effect that no requirement judges.
+
+    `text` names the effect and the line to add to the file. `rows` are the rows with the effect.
+    """
 
     text: str
     rows: tuple[Row, ...]
 
 
 def unjudged_effects(mission: MissionFindings) -> list[UnjudgedEffect]:
-    """List the effects of declared errors that no requirement takes, above what is negligible."""
-    found: dict[str, tuple[str, list[Row]]] = {}
+    """Effects of declared errors that no requirement judges and that are not negligible."""
+    effects: dict[str, tuple[str, list[Row]]] = {}
     for row in mission.rows:
         if row.status not in BROKEN or row.reason is None:
             continue
         for note in (row.reason, *(value for value in row.reason.values if isinstance(value, phrases.Note))):
             if note.code == "effect-is-not-judged":
                 kind, _, total, lines = note.values[:4]
-                said = phrases.effect_is_not_judged(str(kind), float(str(total)), float(str(total)), _texts(lines))
-                found.setdefault(str(kind), (said, []))[1].append(row)
-    return [UnjudgedEffect(said, tuple(rows)) for said, rows in found.values()]
+                text = phrases.effect_is_not_judged(str(kind), float(str(total)), float(str(total)), _texts(lines))
+                effects.setdefault(str(kind), (text, []))[1].append(row)
+    return [UnjudgedEffect(text, tuple(rows)) for text, rows in effects.values()]
 
 
 def _texts(values: object) -> list[str]:
     return [str(value) for value in values] if isinstance(values, list | tuple) else []
 
 
-def is_said_with_the_table(row: Row) -> bool:
-    """Whether the table of requirements, and what stands below it, says why a row is not evaluated."""
+def is_explained_in_table(row: Row) -> bool:
+    """Whether the lines below the table of requirements explain why the row is not evaluated."""
     return row.status == "not_evaluated" and row.reason is not None and row.reason.code == "effect-is-not-judged"
 
 
 def unseen(mission: MissionFindings) -> list[JudgedRequirement]:
-    """Requirements that are broken or waived while no row that judges them is: rows alone would not show it."""
+    """Requirements that are broken or waived without a row of the same status; rows alone would not show them."""
     statuses = {row.id: row.status for row in mission.rows}
     return [
-        one
-        for one in mission.requirements
-        if one.status in (*BROKEN, "waived") and not any(statuses.get(row) == one.status for row in one.rows)
+        requirement
+        for requirement in mission.requirements
+        if requirement.status in (*BROKEN, "waived")
+        and not any(statuses.get(row) == requirement.status for row in requirement.rows)
     ]
 
 
 def declared_words(kinds: DeclaredKinds) -> str:
-    """Say how many kinds of error are declared, which are not, and which have no source or are shifted off it."""
+    """Sentence with the number of declared kinds of error, and the kinds not declared, without source or shifted."""
     text = f"Declared {len(kinds.declared)} of {kinds.in_all} kinds of error"
     if kinds.missing:
         text += f"; not declared: {', '.join(kind_names(kinds.missing))}"
@@ -228,28 +243,31 @@ def declared_words(kinds: DeclaredKinds) -> str:
 
 
 def shifted_names(kinds: DeclaredKinds) -> list[str]:
-    """Name the kinds of error that a level shifts off their source, each with its level."""
-    return [f"{''.join(kind_names([one.kind]))} {one.level}" for one in kinds.shifted]
+    """Kinds of error that a level shifts off their source, each with its level."""
+    return [f"{''.join(kind_names([error.kind]))} {error.level}" for error in kinds.shifted]
 
 
 def kind_names(kinds: Sequence[str]) -> list[str]:
-    """Write kinds of error for reading, those that both platforms have once."""
+    """Kinds of error in words. A kind of both platforms is written once."""
     owners: dict[str, list[str]] = {}
     for kind in kinds:
-        owner, _, what = kind.rpartition(".")
-        owners.setdefault(what, []).append(owner)
+        owner, _, error = kind.rpartition(".")
+        owners.setdefault(error, []).append(owner)
     names = []
-    for what, of in owners.items():
-        owner = "both" if len(of) > 1 else of[0]
-        names.append(f"{what} ({owner})" if owner else what)
+    for error, owners_of_error in owners.items():
+        owner = "both" if len(owners_of_error) > 1 else owners_of_error[0]
+        names.append(f"{error} ({owner})" if owner else error)
     return names
 
 
-_WIDTH = 33  # of the ids
+_NAME_WIDTH = 33  # characters
 
 
 def probabilities(drawn: MonteCarlo) -> list[str]:
-    """Table of how often each requirement holds, beside what needs no draws, then doubts and notes."""
+    """Table of the Monte Carlo result, with warnings and notes.
+
+    It has the probability of each requirement beside sums that need no draws.
+    """
     lines = [
         f"Monte Carlo: {drawn.draws:,} draws, seed {drawn.seed}, {drawn.model} model; "
         f"intervals of {100 * drawn.confidence:.0f} % by Wilson",
@@ -261,19 +279,22 @@ def probabilities(drawn: MonteCarlo) -> list[str]:
     for requirement in drawn.requirements:
         lines += _requirement(requirement)
     if len(drawn.requirements) > 1:
-        lines += ["all at once", f"  {held(drawn.probability, drawn.probability_low, drawn.probability_high)}"]
-    texts = [f"warning: {one.id}: {text}" for one in drawn.requirements for text in one.warnings]
+        words = probability_words(drawn.probability, drawn.probability_low, drawn.probability_high)
+        lines += ["all at once", f"  {words}"]
+    texts = [f"warning: {judged.id}: {text}" for judged in drawn.requirements for text in judged.warnings]
     texts += [f"note: {text}" for text in drawn.notes]
     return [*lines, *[line for text in texts for line in wrapped(f"  {text}", "    ")]]
 
 
-def _requirement(one: Requirement) -> Iterator[str]:
-    limit = format_quantity(one.limit, one.unit, 3, "down")
-    yield _cells(one.id, limit, *(_size(size, one.unit) for size in (one.sum, one.rss, one.sigma)))
-    decimals = _decimals(one.probability_low, one.probability_high)
+def _requirement(requirement: Requirement) -> Iterator[str]:
+    limit = format_quantity(requirement.limit, requirement.unit, 3, "down")
+    sizes = (requirement.sum, requirement.rss, requirement.sigma)
+    yield _cells(requirement.id, limit, *(_size(size, requirement.unit) for size in sizes))
+    low, high = requirement.probability_low, requirement.probability_high
+    probability_normal = _percent(requirement.probability_normal, _decimals(low, high))
     yield (
-        f"  {held(one.probability, one.probability_low, one.probability_high)}, "
-        f"normal with sigma {format_quantity(one.sigma_rss, one.unit)}: {_percent(one.probability_normal, decimals)}"
+        f"  {probability_words(requirement.probability, low, high)}, "
+        f"normal with sigma {format_quantity(requirement.sigma_rss, requirement.unit)}: {probability_normal}"
     )
 
 
@@ -282,11 +303,11 @@ def _size(size: float | None, unit: str) -> str:
 
 
 def _cells(name: str, *cells: str) -> str:
-    return f"{name:<{_WIDTH}}" + "".join(f"{cell:>11}" for cell in cells)
+    return f"{name:<{_NAME_WIDTH}}" + "".join(f"{cell:>11}" for cell in cells)
 
 
-def held(probability: float, low: float, high: float) -> str:
-    """Probability and its interval, to the digits that the interval leaves."""
+def probability_words(probability: float, low: float, high: float) -> str:
+    """Probability and its interval, with the digits that the interval determines."""
     decimals = _decimals(low, high)
     ends = f"{_percent(low, decimals)} to {_percent(high, decimals)}".replace(" % to", " to")
     return f"holds in {_percent(probability, decimals)} ({ends})"
@@ -297,6 +318,6 @@ def _decimals(low: float, high: float) -> int:
 
 
 def _percent(probability: float, decimals: int) -> str:
-    """Percent with so many decimals; what rounds to all or none without."""
+    """Percentage with `decimals` decimals; 0 % and 100 % without."""
     text = f"{100 * probability:.{decimals}f}"
     return f"{float(text):.0f} %" if float(text) in (0.0, 100.0) else f"{text} %"
