@@ -34,7 +34,7 @@ from bisar_budget.ranges.exact_ranges import FINE, Found, aperture_nodes
 from bisar_budget.simulator.collection import CELLS, PointCollection
 from bisar_budget.simulator.impulse_response import upsampled
 from bisar_budget.simulator.phase_history import (
-    SMOOTH,
+    SMOOTH_ORDER,
     Course,
     Errors,
     Floats,
@@ -485,8 +485,8 @@ def _smooth_at_nodes(aperture_time: float, times: Floats) -> Floats:
     At the nodes alone noise of a short correlation time would pass for a larger phase.
     """
     legendre = np.polynomial.legendre
-    fit = np.linalg.pinv(legendre.legvander(2 * times / aperture_time, SMOOTH))
-    return np.asarray(legendre.legvander(2 * aperture_nodes(aperture_time) / aperture_time, SMOOTH) @ fit)
+    fit = np.linalg.pinv(legendre.legvander(2 * times / aperture_time, SMOOTH_ORDER))
+    return np.asarray(legendre.legvander(2 * aperture_nodes(aperture_time) / aperture_time, SMOOTH_ORDER) @ fit)
 
 
 def _power_of_samples(times: Floats, correlation_time: float) -> float:
