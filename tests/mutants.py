@@ -150,8 +150,8 @@ MUTANTS = (
     Mutant(
         "(28): twice the slope",
         _POINT,
-        "np.interp(times, fine, left), np.interp(times, fine, slope)",
-        "np.interp(times, fine, left), 2 * np.interp(times, fine, slope)",
+        "np.interp(times, fine, remaining_range), np.interp(times, fine, slope)",
+        "np.interp(times, fine, remaining_range), 2 * np.interp(times, fine, slope)",
         (_POINTS_OF_29,),
     ),
     Mutant(
@@ -164,8 +164,8 @@ MUTANTS = (
     Mutant(
         "simulate: the clock without coverage factor",
         _POINT,
-        "[[one.declared * term for term in one.clock]",
-        "[[one.declared / factor * term for term in one.clock]",
+        "[source.declared * term for term in source.clock]",
+        "[source.declared / factor * term for term in source.clock]",
         (f"{_IMAGES}test_the_clock_of_a_simulated_image_has_the_coverage_factor",),
     ),
     Mutant(
@@ -313,15 +313,15 @@ MUTANTS = (
     Mutant(
         "simulate: sensors flown without the coverage factor",
         "bisar_budget/simulator/realisations.py",
-        "Course(times, factor * drawn[0])",
-        "Course(times, drawn[0])",
+        "Course(times, factor * series[0])",
+        "Course(times, series[0])",
         (f"{_SEAMS}test_the_coverage_factor_is_in_the_time_series_of_sensors_and_clocks",),
     ),
     Mutant(
         "simulate: clocks flown without the coverage factor",
         "bisar_budget/simulator/realisations.py",
-        "drawn = factor * phase_courses",
-        "drawn = phase_courses",
+        "series = factor * phase_courses",
+        "series = phase_courses",
         (f"{_SEAMS}test_the_coverage_factor_is_in_the_time_series_of_sensors_and_clocks",),
     ),
     Mutant(
@@ -452,8 +452,8 @@ MUTANTS = (
     Mutant(
         "tones of an oscillator: cycles as a frequency over the aperture",
         "bisar_budget/simulator/realisations.py",
-        "if one.name == name and one.frequency * T >= SLOWEST",
-        "if one.name == name and one.frequency / T >= SLOWEST",
+        "if tone.name == name and tone.frequency * T >= SLOWEST",
+        "if tone.name == name and tone.frequency / T >= SLOWEST",
         (
             "tests/simulate/test_realisations.py::test_a_tone_of_an_oscillator_is_flown_from_one_cycle_per_aperture_on",
         ),
