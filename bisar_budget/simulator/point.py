@@ -252,7 +252,7 @@ def simulate_point(
         recorded_range = [smooth.range_error(point, (0.0, 0.0)) for point in target_points]
         shown = [former.place(*point) for point in zip(displaced, recorded_range, strict=True)]
         in_scene_shown = [scene_former.place(*point) for point in zip(displaced, recorded_range, strict=True)]
-        smear = former.left(shown[0], remaining_range, recorded_range[0])
+        smear = former.remaining_range(shown[0], remaining_range, recorded_range[0])
         slope = np.gradient(smear, fine)
         plan = _plan(mission, former, scene_former, np.array(shown), np.array(in_scene_shown), smear, slope)
     except ValueError as error:
@@ -273,12 +273,12 @@ def simulate_point(
     done_work = 0
 
     def image(by: Former, data: PhaseHistory, grid: Floats) -> Complexes:
-        def told(pixels: int) -> None:
+        def on_pixels(pixels: int) -> None:
             nonlocal done_work
             done_work += plan.pulses * pixels
             progress(done_work, plan.work)
 
-        return by.image(data, grid, told)
+        return by.image(data, grid, on_pixels)
 
     trial_start, trial_times = time.perf_counter(), cell_centres(T, _TRIAL_PULSES)
     trial_flight = collection.flight(slow, trial_times)
