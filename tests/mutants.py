@@ -255,15 +255,15 @@ MUTANTS = (
     Mutant(
         "verify: refocused against twice the budget",
         _PHASES,
-        "is_met = left <= budget * (1 + TOLERANCE)",
-        "is_met = left <= 2 * budget * (1 + TOLERANCE)",
+        "is_met = remaining_phase <= budget * (1 + TOLERANCE_FRACTION)",
+        "is_met = remaining_phase <= 2 * budget * (1 + TOLERANCE_FRACTION)",
         (f"{_BORDERS}TestRefocused",),
     ),
     Mutant(
         "verify: ratio of the cubic phase inverted",
         _PHASES,
-        "verdict = compare(measured / requirement - 1, TOLERANCE)",
-        "verdict = compare(requirement / measured - 1, TOLERANCE)",
+        "verdict = compare(measured / requirement - 1, TOLERANCE_FRACTION)",
+        "verdict = compare(requirement / measured - 1, TOLERANCE_FRACTION)",
         (f"{_BORDERS}TestCubic",),
     ),
     Mutant(
@@ -280,8 +280,20 @@ MUTANTS = (
         "TOLERANCE_DB = 2.0",
         (f"{_BORDERS}TestVibration::test_noise_that_the_rule_of_small_phases_underrates_is_optimistic",),
     ),
-    Mutant("verify: confirmed within 5.5 %", _PHASES, "TOLERANCE = 0.05 ", "TOLERANCE = 0.055 ", (_FIVE_PERCENT,)),
-    Mutant("verify: confirmed within 4.5 %", _PHASES, "TOLERANCE = 0.05 ", "TOLERANCE = 0.045 ", (_FIVE_PERCENT,)),
+    Mutant(
+        "verify: confirmed within 5.5 %",
+        _PHASES,
+        "TOLERANCE_FRACTION = 0.05 ",
+        "TOLERANCE_FRACTION = 0.055 ",
+        (_FIVE_PERCENT,),
+    ),
+    Mutant(
+        "verify: confirmed within 4.5 %",
+        _PHASES,
+        "TOLERANCE_FRACTION = 0.05 ",
+        "TOLERANCE_FRACTION = 0.045 ",
+        (_FIVE_PERCENT,),
+    ),
     Mutant(
         "verify: the phase inside a limit ignored",
         _PHASES,
@@ -334,8 +346,8 @@ MUTANTS = (
     Mutant(
         "verify: what autofocus leaves is met within 20 %",
         _PHASES,
-        "is_met = left <= budget * (1 + TOLERANCE)",
-        "is_met = left <= budget * (1 + 4 * TOLERANCE)",
+        "is_met = remaining_phase <= budget * (1 + TOLERANCE_FRACTION)",
+        "is_met = remaining_phase <= budget * (1 + 4 * TOLERANCE_FRACTION)",
         (f"{_BORDERS}TestRefocused",),
     ),
     Mutant(
@@ -424,8 +436,8 @@ MUTANTS = (
     Mutant(
         "seam: level of a power as of an amplitude",
         _NOISE,
-        "return 10 * math.log10(max(lost, _TINY) / (self.energy * left))",
-        "return 20 * math.log10(max(lost, _TINY) / (self.energy * left))",
+        "return 10 * math.log10(max(lost, _MIN_ENERGY_FRACTION) / (self.energy * remaining_energy))",
+        "return 20 * math.log10(max(lost, _MIN_ENERGY_FRACTION) / (self.energy * remaining_energy))",
         ("tests/verify/test_noise_image.py",),
     ),
     Mutant(
