@@ -79,7 +79,7 @@ _BLOCK_DRAWS = 250  # in memory at once
 _CUBIC_ORDER = 3  # up to which a phase moves and defocuses; the rest spreads
 
 _ISLR_SAMPLES = (
-    1024  # of an aperture whose spread power is measured; the mask holds two of as many cells of white noise
+    1024  # of an aperture whose spread power is measured; the mask holds two of these cells of white noise
 )
 _FIRST_DRAWS, _MAX_DRAWS = 64, 8192
 _BLOCK_ISLR_DRAWS = 256  # in memory at once
@@ -542,7 +542,7 @@ def _series(study: Study, error: RandomError, rng: np.random.Generator) -> list[
         for name, courses in position_courses(study.mission, error, times, _IMAGE_DRAWS, rng).items():
             smooth = (PathError(course=Course(times, course).smooth(_CUBIC_ORDER)) for course in courses)
             errors_of_images = [
-                course.of(name, path_error) for course, path_error in zip(errors_of_images, smooth, strict=True)
+                errors.of(name, path_error) for errors, path_error in zip(errors_of_images, smooth, strict=True)
             ]
         return errors_of_images
     if error.subject.kind == "propagation":
