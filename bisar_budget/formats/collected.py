@@ -177,8 +177,8 @@ def fitted(times: Floats, positions: Floats, aperture_time_s: float, wavelength_
 
 
 # ---------------------------------------------------------------------- errors that a file declares
-KINDS = ("P1", "P2", "P3", "V1", "V2", "V3")
-FRAMES = {"ECF": "scene", "RIC_ECF": "ric", "RIC_ECI": "ric"}
+SIGMA_NAMES = ("P1", "P2", "P3", "V1", "V2", "V3")
+MISSION_FRAMES = {"ECF": "scene", "RIC_ECF": "ric", "RIC_ECI": "ric"}
 ADDED = "bisar-budget"  # prefix of the names that this program adds
 _MAX_SIGMAS = (1e9, 1e6)  # position [m] and velocity [m/s] that a mission file takes
 _MIN_CORRELATION_FRACTION = 1e-6  # a smaller correlation is rounding of a turned covariance
@@ -187,7 +187,7 @@ _EIGENVALUE_TOLERANCE_FRACTION = 2.5e-6  # of an eigenvalue of correlations that
 
 def sigmas_and_correlations(element: Element) -> Floats:
     """Covariance (6, 6) of a `PosVelErr`. [m², m²/s, m²/s²]"""
-    sigmas = np.array([element.number(kind) for kind in KINDS])
+    sigmas = np.array([element.number(kind) for kind in SIGMA_NAMES])
     if sigmas.min() < 0:
         raise element.fault("has a negative sigma")
     _require_size(sigmas, element)
@@ -196,9 +196,9 @@ def sigmas_and_correlations(element: Element) -> Floats:
     if coefficients is not None:
         for row in range(6):
             for column in range(row + 1, 6):
-                value = coefficients.number(KINDS[row] + KINDS[column])
+                value = coefficients.number(SIGMA_NAMES[row] + SIGMA_NAMES[column])
                 if abs(value) > 1:
-                    raise coefficients.fault("must be within ±1", KINDS[row] + KINDS[column])
+                    raise coefficients.fault("must be within ±1", SIGMA_NAMES[row] + SIGMA_NAMES[column])
                 correlation[row, column] = correlation[column, row] = value
     covariance: Floats = np.outer(sigmas, sigmas) * correlation
     return covariance
@@ -228,8 +228,8 @@ def declared(
     """
     name = frame.text()
     _require_size(np.sqrt(np.abs(covariance).max(axis=1)), frame)
-    if name not in FRAMES:
-        raise frame.fault(f"must be one of {', '.join(FRAMES)} (got {name!r})")
+    if name not in MISSION_FRAMES:
+        raise frame.fault(f"must be one of {', '.join(MISSION_FRAMES)} (got {name!r})")
     target = state.frame("scene") if name == "ECF" else axes.radial(state.position, state.velocity)
     source = _axes_of(name, state, axes)
     turn: Floats = np.array(target) @ np.array(source).T  # from the file's frame into the mission's frame
@@ -252,7 +252,7 @@ def declared(
     is_correlated = bool((np.abs(correlation - np.eye(6)) > _MIN_CORRELATION_FRACTION).any())
     x, y, z, u, v, w = (float(sigma) for sigma in sigmas)
     rows = tuple(tuple(float(value) for value in row) for row in correlation) if is_correlated else ()
-    return DeclaredMotionError(FRAMES[name], (x, y, z), (u, v, w), rows), remarks
+    return DeclaredMotionError(MISSION_FRAMES[name], (x, y, z), (u, v, w), rows), remarks
 
 
 def _axes_of(name: str, state: PlatformState, axes: SceneAxes) -> Axes:
@@ -457,7 +457,7 @@ def _unused_of_sensor(sensor: Element, names: tuple[str, ...], path: str) -> lis
 # ---------------------------------------------------------------------- the mission file
 # A tree of keys, and its text with comments.
 _COMMENT_WIDTH = 110
-_KINDS = ("position", "velocity")
+_MOTION_KINDS = ("position", "velocity")
 # Higher terms of a path: key, unit, and factor from the coefficient of the Taylor series to the derivative.
 _BENDS = (
     ("jerk", "m/s^3", 6.0),
@@ -562,9 +562,11 @@ def _platform(imported: Imported, track: Fitted, error: DeclaredMotionError | No
 def _error(imported: Imported, error: DeclaredMotionError) -> dict[str, Any]:
     units = {"position": "m", "velocity": "m/s"}
     tree: dict[str, Any] = {"frame": error.frame}
-    sigmas = {kind: _triple(value, units[kind]) for kind in _KINDS if (value := getattr(error, kind)) is not None}
+    sigmas = {
+        kind: _triple(value, units[kind]) for kind in _MOTION_KINDS if (value := getattr(error, kind)) is not None
+    }
     if error.correlation:
-        axes = [f"{kind}.{axis}" for kind in _KINDS for axis in FRAME_AXES[error.frame]]
+        axes = [f"{kind}.{axis}" for kind in _MOTION_KINDS for axis in FRAME_AXES[error.frame]]
         pairs = {
             f"{axes[i]}-{axes[j]}": f"{error.correlation[i][j]:.9f}".rstrip("0")
             for i in range(6)

@@ -22,7 +22,7 @@ from bisar_budget import __version__
 from bisar_budget.analysis.analysis import Analysis, Case
 from bisar_budget.constants import SPEED_OF_LIGHT
 from bisar_budget.faults import printable
-from bisar_budget.formats.collected import ADDED, KINDS, correlated
+from bisar_budget.formats.collected import ADDED, SIGMA_NAMES, correlated
 from bisar_budget.formats.containers import check_extra
 from bisar_budget.geometry import Axes, PlatformState, Vector
 from bisar_budget.mission.model import Mission, Simulation, has_instruments
@@ -35,7 +35,7 @@ from bisar_budget.simulator.realisations import has_unset_clocks
 from bisar_budget.simulator.targets import Targets
 
 NAMESPACE = "http://api.nsgreg.nga.mil/schema/cphd/1.1.0"
-NOWHERE = Geodetic(0.0, 0.0, 0.0)  # of a scene without coordinates in its mission
+DEFAULT_SCENE = Geodetic(0.0, 0.0, 0.0)  # of a scene without coordinates in its mission
 UNDATED = "2000-01-01T12:00:00Z"
 _AREA_MARGIN_CELLS = 24  # of the image area beyond the targets, on each side
 _EXTENT_SAMPLES = 2049  # slow times at which the extent of the signal is computed
@@ -47,7 +47,7 @@ _EXPORT_CLUTTER_STREAM_INDEX = 2  # beside the file's seed
 _CHANNEL = "1"
 
 # Per vector parameters of the standard, each with its number of words of 8 bytes.
-_VECTOR = (
+_VECTOR_WORDS = (
     ("TxTime", 1), ("TxPos", 3), ("TxVel", 3), ("RcvTime", 1), ("RcvPos", 3), ("RcvVel", 3), ("SRPPos", 3),
     ("aFDOP", 1), ("aFRR1", 1), ("aFRR2", 1), ("FX1", 1), ("FX2", 1), ("TOA1", 1), ("TOA2", 1), ("TDTropoSRP", 1),
     ("SC0", 1), ("SCSS", 1), ("SIGNAL", 1),
@@ -118,7 +118,7 @@ def export_phase_history(mission: Mission, targets: Targets) -> Exported:
     remarks = []
     axes = mission.scene.axes
     if axes is None:
-        axes = axes_at(NOWHERE)
+        axes = axes_at(DEFAULT_SCENE)
         remarks.append("the mission does not say where its scene is (scene.latitude): it is put at 0 deg N, 0 deg E")
     center_time = mission.collection.center_time
     if center_time is None:
@@ -195,7 +195,7 @@ def _vectors(
     time runs by 1 ∓ Ṙ/c of slow time, so its velocity is divided by this factor.
     """
     dtype = np.dtype(
-        [(name, "i8" if name == "SIGNAL" else "f8", (size,) if size > 1 else ()) for name, size in _VECTOR]
+        [(name, "i8" if name == "SIGNAL" else "f8", (size,) if size > 1 else ()) for name, size in _VECTOR_WORDS]
     )
     vectors: NDArray[Any] = np.zeros(slow_time.size, dtype)
     ranges = []
@@ -372,7 +372,7 @@ def _scene_coordinates(plan: _Plan, axes: SceneAxes) -> _Leaves:
 def _layout(vectors: NDArray[Any]) -> _Leaves:
     fields: Any = vectors.dtype.fields
     leaves: _Leaves = {}
-    for name, size in _VECTOR:
+    for name, size in _VECTOR_WORDS:
         form = "X=F8;Y=F8;Z=F8;" if size == 3 else "I8" if name == "SIGNAL" else "F8"
         attributes = {"Offset": int(fields[name][1]) // 8, "Size": size, "Format": form}
         leaves |= {f"PVP/{name}/{key}": value for key, value in attributes.items()}
@@ -472,10 +472,10 @@ def _covariance(mission: Mission, owner: str, axes: SceneAxes, added: dict[str, 
 def _pos_vel_err(path: str, covariance: Floats, frame: str) -> _Leaves:
     sigmas, correlation = correlated(covariance)
     leaves: _Leaves = {f"{path}/Frame": frame}
-    leaves |= {f"{path}/{kind}": float(sigma) for kind, sigma in zip(KINDS, sigmas, strict=True)}
+    leaves |= {f"{path}/{kind}": float(sigma) for kind, sigma in zip(SIGMA_NAMES, sigmas, strict=True)}
     for row in range(6):
         for column in range(row + 1, 6):
-            leaves[f"{path}/CorrCoefs/{KINDS[row]}{KINDS[column]}"] = float(correlation[row, column])
+            leaves[f"{path}/CorrCoefs/{SIGMA_NAMES[row]}{SIGMA_NAMES[column]}"] = float(correlation[row, column])
     return leaves
 
 

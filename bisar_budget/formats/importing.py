@@ -78,7 +78,7 @@ def import_collection(file: str, channel: str | None = None) -> Imported:
     """
     check_extra()
     container = open_container(file)
-    read: Callable[[Container, str | None], Imported] = _READERS[container.format.split()[0]]
+    read: Callable[[Container, str | None], Imported] = _FORMAT_READERS[container.format.split()[0]]
     with np.errstate(all="ignore"):  # results that are not finite are refused later
         return read(container, channel)
 
@@ -525,4 +525,8 @@ def _imported(
     )
 
 
-_READERS: dict[str, Callable[[Container, str | None], Imported]] = {"CPHD": _cphd, "CRSD": _crsd, "SICD": _sicd}
+_FORMAT_READERS: dict[str, Callable[[Container, str | None], Imported]] = {
+    "CPHD": _cphd,
+    "CRSD": _crsd,
+    "SICD": _sicd,
+}

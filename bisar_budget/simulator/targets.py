@@ -14,12 +14,12 @@ from bisar_budget.units import parse_quantity
 _MAX_POINTS = 100
 _MAX_DISTANCE_M = 1e5  # from the scene centre
 _LEVEL_RANGE_DB = (-200.0, 200.0)
-_FORM = (
+_ACCEPTED_FORMS = (
     "EAST, NORTH or EAST, NORTH, LEVEL or grid:NXxNY:SPACING or clutter LEVEL, separated by semicolons; or the name "
     "of a .csv file"
 )
-_GRID = re.compile(r"grid:\s*(\d{1,3})\s*x\s*(\d{1,3})\s*:(.+)", re.ASCII)
-_COLUMNS = ("east [m]", "north [m]", "amplitude")
+_GRID_PATTERN = re.compile(r"grid:\s*(\d{1,3})\s*x\s*(\d{1,3})\s*:(.+)", re.ASCII)
+_LIST_COLUMNS = ("east [m]", "north [m]", "amplitude")
 _MAX_LIST_BYTES = 1 << 20
 
 
@@ -68,11 +68,11 @@ def parse_targets(text: str) -> Targets:
             continue
         fields = [field.strip() for field in entry.split(",")]
         if len(fields) not in (2, 3):
-            raise ValueError(f"{entry!r} has {len(fields)} parts; accepted: {_FORM}")
+            raise ValueError(f"{entry!r} has {len(fields)} parts; accepted: {_ACCEPTED_FORMS}")
         east, north = (_number(entry, field, units.LENGTH) for field in fields[:2])
         points.append(Target(east, north, _number(entry, fields[2], units.POWER_RATIO) if fields[2:] else 0.0))
     if not points:
-        raise ValueError(f"there is no point; accepted: {_FORM}")
+        raise ValueError(f"there is no point; accepted: {_ACCEPTED_FORMS}")
     if len(points) > _MAX_POINTS:
         raise ValueError(f"there are {len(points)} points, at most {_MAX_POINTS} are simulated")
     return Targets(tuple(points), clutter)
@@ -80,9 +80,9 @@ def parse_targets(text: str) -> Targets:
 
 def _grid(entry: str) -> Iterator[Target]:
     """Points of equal level, `grid:NXxNY:SPACING`, about the scene centre."""
-    match = _GRID.fullmatch(entry)
+    match = _GRID_PATTERN.fullmatch(entry)
     if match is None:
-        raise ValueError(f"{entry!r} is no grid; accepted: {_FORM}")
+        raise ValueError(f"{entry!r} is no grid; accepted: {_ACCEPTED_FORMS}")
     columns, rows = int(match[1]), int(match[2])
     if not 0 < columns * rows <= _MAX_POINTS:
         raise ValueError(f"{entry!r} has {columns * rows} points, 1 to {_MAX_POINTS} are simulated")
@@ -107,8 +107,8 @@ def read_list(file: str) -> list[Target]:
     except csv.Error as error:
         raise ValueError(f"{file} is not CSV: {error}") from None
     header = [name.strip() for name in (rows or [[]])[0]]
-    if tuple(header) != _COLUMNS:
-        raise ValueError(f"{file}:1: the columns must be {', '.join(_COLUMNS)} (got {', '.join(header)[:60]})")
+    if tuple(header) != _LIST_COLUMNS:
+        raise ValueError(f"{file}:1: the columns must be {', '.join(_LIST_COLUMNS)} (got {', '.join(header)[:60]})")
     return [_listed(f"{file}:{line}", row) for line, row in enumerate(rows[1:], 2) if row]
 
 
@@ -129,7 +129,7 @@ def _number(entry: str, quantity: str, dimension: units.Dimension) -> float:
     try:
         number = parse_quantity(quantity, dimension)
     except InvalidValueError as error:
-        raise ValueError(f"{entry!r}: {quantity!r} {error.problem.problem}; accepted: {_FORM}") from None
+        raise ValueError(f"{entry!r}: {quantity!r} {error.problem.problem}; accepted: {_ACCEPTED_FORMS}") from None
     low, high = (-_MAX_DISTANCE_M, _MAX_DISTANCE_M) if dimension is units.LENGTH else _LEVEL_RANGE_DB
     if not low <= number <= high:
         raise ValueError(f"{entry!r}: {quantity!r} is beyond {low:g} to {high:g} {dimension.si}")

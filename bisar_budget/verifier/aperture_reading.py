@@ -37,7 +37,7 @@ _READ_STRIDE_LINES = 2  # from one line that is read to the next
 _INNER_FRACTION = 0.95  # of the aperture, in the correlation; its edges ring in a patch of finite extent
 # Orders of the polynomial, each with the share of the aperture that it needs. A turn of ±0.5 rad shows sixth powers.
 # High orders are worthless where they are extrapolated beyond the patch.
-_ORDERS = ((0.9, 6), (0.6, 3), (-1.0, 2))
+_POLYNOMIAL_ORDERS = ((0.9, 6), (0.6, 3), (-1.0, 2))
 _PRESENT_FRACTION = 0.25  # of the median strength over the aperture; weaker pulses are smeared out of the patch
 _WALK_ROUNDS = 2  # of the fit, each with the range walk of the fit before
 _MAX_REFINEMENT_STEPS, _MAX_HALVING_STEPS, _REFINEMENT_TOLERANCE_RAD = 20, 6, 1e-5
@@ -227,11 +227,11 @@ def _fit_to_pulses(
     gaps = np.nonzero(~(present & inner))[0]
     first = int(gaps[gaps < middle].max(initial=-1)) + 1
     last = int(gaps[gaps > middle].min(initial=scaled_time.size))
-    if last - first <= _ORDERS[0][1]:  # too few pulses for a polynomial
+    if last - first <= _POLYNOMIAL_ORDERS[0][1]:  # too few pulses for a polynomial
         return np.zeros(4), 0.0
     fitted_pulses = slice(first, last)
     coverage = float(scaled_time[last - 1] - scaled_time[first]) / (2 * _INNER_FRACTION)
-    order = next(order for least_coverage, order in _ORDERS if coverage > least_coverage)
+    order = next(order for least_coverage, order in _POLYNOMIAL_ORDERS if coverage > least_coverage)
     phase = np.unwrap(np.angle((with_error * clean.conj())[fitted_pulses]))
     fit = np.zeros(max(4, order + 1))
     fit[: order + 1] = np.polynomial.legendre.legfit(
@@ -272,7 +272,7 @@ class _Fitting:
         """Refine a polynomial in rounds, each with the range walk of the fit before."""
         collection = self.fitted_pixels.collection
         scaled_time = 2 * self.slow_time / collection.aperture_time
-        solution = _Refined(np.pad(fit, (0, _ORDERS[0][1] + 1 - fit.size)), math.inf)
+        solution = _Refined(np.pad(fit, (0, _POLYNOMIAL_ORDERS[0][1] + 1 - fit.size)), math.inf)
         for _ in range(self.fits):
             # The remaining range error also moves a pulse to other range cells.
             phase = np.polynomial.legendre.legval(scaled_time, [0.0, *solution.fit[1:]])

@@ -81,7 +81,7 @@ _CUBIC_ORDER = 3  # up to which a phase moves and defocuses; the rest spreads
 _ISLR_SAMPLES = (
     1024  # of an aperture whose spread power is measured; the mask holds two of these cells of white noise
 )
-_FIRST_DRAWS, _MAX_DRAWS = 64, 8192
+_FIRST_ISLR_DRAWS, _MAX_ISLR_DRAWS = 64, 8192
 _BLOCK_ISLR_DRAWS = 256  # in memory at once
 _INTERVAL_95_SIGMA = 1.96  # standard errors on either side of a mean
 _DECISION_SIGMA = 3.3  # standard errors within one verdict, 99.9 %: another seed must not give another verdict
@@ -663,7 +663,7 @@ class AddedIslr:
             return "conservative"
         if low >= -TOLERANCE_DB and high <= TOLERANCE_DB:
             return "confirmed"
-        return "conservative" if self.draws >= _MAX_DRAWS and high < 0 else "not_evaluated"
+        return "conservative" if self.draws >= _MAX_ISLR_DRAWS and high < 0 else "not_evaluated"
 
 
 class Mainlobe:
@@ -714,13 +714,13 @@ def added_islr(weights: Floats, draw: Callable[[int], Floats], required_db: floa
     mainlobe = Mainlobe(weights)
     lost: Floats = np.empty(0)
     while True:
-        count = min(_BLOCK_ISLR_DRAWS, max(_FIRST_DRAWS, lost.size))
+        count = min(_BLOCK_ISLR_DRAWS, max(_FIRST_ISLR_DRAWS, lost.size))
         lost = np.concatenate((lost, mainlobe.lost(draw(count))))
-        if lost.size < _FIRST_DRAWS or lost.size & (lost.size - 1):  # evaluate only after each doubling
+        if lost.size < _FIRST_ISLR_DRAWS or lost.size & (lost.size - 1):  # evaluate only after each doubling
             continue
         mean, error = float(lost.mean()), float(lost.std(ddof=1)) / math.sqrt(lost.size)
         level, low, high = (mainlobe.added_db(mean + sign * _INTERVAL_95_SIGMA * error) for sign in (0, -1, 1))
         added = AddedIslr(level, low, high, lost.size)
         is_narrow = added.high - added.low <= 2 * _MAX_HALF_INTERVAL_DB
-        if lost.size >= _MAX_DRAWS or (is_narrow and added.verdict(required_db) != "not_evaluated"):
+        if lost.size >= _MAX_ISLR_DRAWS or (is_narrow and added.verdict(required_db) != "not_evaluated"):
             return added
